@@ -200,7 +200,10 @@ def path_limits(path: Path, limits: Limits, machine_axes: MachineAxes | None = N
     accel, jerk = kinds[np.where(path.turning[stops[:-1]], 2, path.rapid[stops[:-1]])].T
     along_path = np.repeat((0.5 / accel, 1.0 / jerk), np.diff(begin[stops]), axis=1)
     rows[0][[0, 2]] = np.maximum(rows[0][[0, 2]], along_path)
-    vectors = Intervals(np.concatenate(([0.0], np.cumsum(width))), cap, rows[0], begin[stops], accel, jerk)
+    before = np.cumsum(width) - width
+    ways = np.repeat((path.edge[:-1], before[begin[:-1]]), count + joined, axis=1)  # to each element
+    edge = np.append(before - ways[1] + ways[0], path.edge[-1])  # exact where elements begin
+    vectors = Intervals(np.maximum.accumulate(edge), cap, rows[0], begin[stops], accel, jerk)
     if machine_axes is None:
         return PathLimits(vectors, vectors, None)
     whole = replace(vectors, cap=np.minimum(cap, machine_cap), rows=rows.max(axis=0))

@@ -89,6 +89,11 @@ class Path:
         return len(self.length)
 
     @property
+    def edge(self) -> Floats:
+        """(m + 1,) path coordinate of the elements' ends."""
+        return np.concatenate(([0.0], np.cumsum(self.length)))
+
+    @property
     def bent(self) -> Bools:
         """(m,) bool: curves on which the tip moves."""
         return (self.row >= 0) & ~self.turning

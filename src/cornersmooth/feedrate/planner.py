@@ -129,28 +129,27 @@ def plan_path(
     """Plan the motion along any path."""
     machine_axes = None if machine is None else follow(machine, path)
     borders = [0, len(path)] if machine_axes is None else _portions(path)
-    start = np.concatenate(([0.0], np.cumsum(path.length)))
-    phases, junctions, end = [], [path.junction_speed[:1]], 0.0
+    phases, junctions, edges = [], [path.junction_speed[:1]], [np.zeros(1)]
     for begin, stop in pairwise(borders):
         own = path.part(begin, stop)
         own_axes = None if machine_axes is None else replace(machine_axes, path=own)
         report = None if progress is None else partial(_report, progress, len(path), begin, stop)
-        own, found, length = _plan_part(own, limits, own_axes, report)
-        found[1] = found[1] + start[begin]
+        own, found = _plan_part(own, limits, own_axes, report)
+        found[1] = found[1] + edges[-1][-1]
+        edges.append(edges[-1][-1] + own.edge[1:])
         phases.append(found)
         junctions.append(own.junction_speed[1:])
-        end = start[begin] + length
     duration, way, speed, rising, rate, constant = (np.concatenate(parts) for parts in zip(*phases, strict=True))
     return TimeLaw(
         time=np.concatenate(([0.0], np.cumsum(duration))),
-        way=np.append(way, end),
+        way=np.append(way, edges[-1][-1:]),
         speed=speed,
         accel=rising,
         jerk=constant,
         rate=rate,
         path=replace(path, junction_speed=np.concatenate(junctions)),
         limits=limits,
-        edge=start,
+        edge=np.concatenate(edges),
         machine_axes=machine_axes,
     )
 
@@ -175,8 +174,8 @@ def _plan_part(
     limits: Limits,
     machine_axes: MachineAxes | None,
     progress: Progress | None,
-) -> tuple[Path, list[Floats], float]:
-    """Plan from a stop to a stop: the path with its speeds at junctions, phases of the law, and the length."""
+) -> tuple[Path, list[Floats]]:
+    """Plan from a stop to a stop: the path with its speeds at junctions, and phases of the law."""
     if machine_axes is not None:
         path = replace(path, junction_speed=np.minimum(path.junction_speed, machine_axes.jump_speeds(limits.period)))
     path = replace(path, junction_speed=_not_crowded(path, limits.period))
@@ -188,7 +187,7 @@ def _plan_part(
     run, *phases = (np.concatenate([part[i] for part in parts]) for i in range(7))
     order = np.argsort(run, kind="stable")
     order = order[phases[0][order] > 0.0]
-    return path, [phase[order] for phase in phases], float(found.whole.edge[-1])
+    return path, [phase[order] for phase in phases]
 
 
 def _level_runs(limits: Intervals, runs: Ints) -> tuple[Floats | Ints, ...]:

@@ -5,8 +5,8 @@ The first plan keeps sums of amounts, which is on the safe side (`intervals`). H
 and Kortanek 1993): at both ends of each cell for the axes that come nearest to their limits in it, and wherever inside
 a cell a plan was seen beyond a limit. Each round solves with these, measures all axes at all samples, and adds the
 place of each cell that is farthest beyond; a few rounds do. What an axis uses between the places is left free of its
-limit in the next round. A run that is still beyond in the end is slowed down as a whole, so every plan keeps every
-limit.
+limit in the next round. A plan that is beyond a limit is slowed down run by run before it counts, so every plan that is
+taken keeps every limit. Where derivatives are not known, and next to the stops, sums of amounts are kept.
 """
 
 from __future__ import annotations
@@ -26,9 +26,6 @@ from cornersmooth.model import Bools, Floats, Ints
 
 #: axes that have their limits with signs in each cell, and rounds
 AXES, ROUNDS = 2, 9
-
-#: rounds whose plans are so far from the last that what they leave free is forgotten again
-_TRIALS = 2
 
 #: how much slower than the plan before the next one begins, so that it keeps its limits with room to spare
 _SLOWER = 0.97
@@ -179,8 +176,14 @@ class Places:
         for values in (accel / self.accel[:, None], jerk * (np.sqrt(here) / self.jerk[:, None])):
             used = np.zeros((len(values), len(batch)))
             used[:, s[begin]] = np.maximum.reduceat(values, begin, axis=1)
-            found.append(np.where(_inner_cells(batch), used, 0.0))
+            found.append(np.where(self.signed(batch), used, 0.0))
         return found, self._worst(values, begin, z, here, found[1])
+
+    def signed(self, batch: Batch) -> Bools:
+        """(n,) bool: slots with a cell between two others in which derivatives are known."""
+        node = batch.slope > 0.0
+        known: Bools = node & np.append(node[1:], False) & ~self.unknown
+        return known
 
     def _worst(self, jerks: Floats, begin: Ints, z: Floats, here: Floats, used: Floats) -> _Signed | None:
         """Of each cell in which a jerk is beyond its limit the place where it is most so; nothing in the others."""
@@ -205,7 +208,7 @@ class Places:
         """Accelerations, and jerks, at the start and at the end of every cell."""
         begin = np.flatnonzero(np.diff(self.slot, prepend=-1))
         last = np.append(begin[1:], len(self.slot)) - 1
-        where, inner = self.slot[begin], _inner_cells(batch)
+        where, inner = self.slot[begin], self.signed(batch)
         accel, jerk = 1.0 / self.accel[:, None], 1.0 / self.jerk[:, None]
         accels, jerks = [], []
         for at, chosen in enumerate((begin, last)):  # places of a cell are in order
@@ -215,13 +218,6 @@ class Places:
             accels.append(_Signed(at, accel * two, 0.5 * accel * one, None))
             jerks.append(_Signed(at, jerk * three, 1.5 * jerk * two, jerk * one))
         return accels, jerks
-
-
-def _inner_cells(batch: Batch) -> Bools:
-    """(n,) bool: slots with a cell between two others."""
-    node = batch.slope > 0.0
-    inner: Bools = node & np.append(node[1:], False)
-    return inner
 
 
 def faster(grid: Grid, free: Grid, places: Places, batch: Batch, best: Floats) -> Floats:
@@ -245,37 +241,40 @@ def faster(grid: Grid, free: Grid, places: Places, batch: Batch, best: Floats) -
         Coefficients that keep every limit; none of the runs is slower.
     """
     first, last = batch.first, batch.last
-    inner = np.ones(len(batch), np.bool_)
-    inner[first] = inner[last] = False  # next to the stops sums of amounts are kept
-    free = replace(free, cap=np.where(inner, free.cap, grid.cap), rows=np.where(inner, free.rows, grid.rows))
-    bare = problem_of(free)
+    stop = np.zeros(len(batch), np.bool_)
+    stop[first] = stop[last] = True
+    free = replace(free, cap=np.where(stop, grid.cap, free.cap), rows=np.where(stop, grid.rows, free.rows))
+    bare, summed = problem_of(free), places.unknown.copy()
     ends = places.at_ends(bare)
     run = np.repeat(np.arange(len(first)), last - first + 1)
-    summed, going = places.unknown.copy(), np.ones(len(first), np.bool_)
+    going = np.ones(len(first), np.bool_)
     inside: list[_Signed] = []
-    c, (taken, highest) = best.copy(), np.zeros((2, 2, len(places.accel), len(batch)))
-    held = np.zeros(taken.shape, np.bool_)
+    c, (uses, worst) = best.copy(), places.uses(bare, best)
+    chosen = np.zeros((2, AXES, len(batch)), np.int64)  # axes that have their limits with signs, of either kind
     for number in range(ROUNDS):
-        uses, worst = places.uses(bare, c)
         inside += [] if worst is None else [worst]
-        for own, high, asks, used, limits in zip(taken, highest, held, uses, (ends[0], ends[1] + inside), strict=True):
-            now = np.maximum(used - _seen(bare, c, limits, used.shape), 0.0) / np.maximum(used, 1.0) + _ROOM
-            own[:] = now if number < _TRIALS else np.maximum(own, now)
-            if number:
-                beyond = asks & (used > 1.0)
-                own += np.where(beyond, used - 1.0 + _ROOM, 0.0)
-                summed |= (beyond & (own > _MOST)).any(axis=0)  # signs do not help there
-            np.maximum(high, used, out=high)
-            asks[:] = False
-            np.put_along_axis(asks, np.argpartition(-high, AXES - 1, axis=0)[:AXES], True, axis=0)
+        shares = []
+        for used, limits, axes in zip(uses, (ends[0], ends[1] + inside), chosen, strict=True):
+            seen = _seen(bare, c, limits, used.shape)
+            unseen = np.maximum(used - seen, 0.0) / np.maximum(used, 1.0)
+            held, left = (np.take_along_axis(part, axes, axis=0) for part in (used, unseen))
+            summed |= ((held > 1.0) & (held - 1.0 + left > _MOST)).any(axis=0)  # signs do not help there
+            axes[:] = np.argpartition(-used, AXES - 1, axis=0)[:AXES]
+            shares.append(1.0 / (1.0 - np.minimum(unseen + _ROOM, _MOST)))
         # the cell of a slot is the next one of the grid; sums use the same share of their limits
-        cells = inner & np.concatenate(([False], summed[:-1]))
-        problem = problem_of(replace(free, rows=np.where(cells, grid.rows / _USED, free.rows)))
-        problem = replace(problem, rows=(*problem.rows, *_rows(ends, held, taken, summed, inside)))
+        sums = ~stop & np.append(False, summed[:-1])
+        problem = problem_of(replace(free, rows=np.where(sums, grid.rows / _USED, free.rows)))
+        signed = [
+            row
+            for axes, limits, share in zip(chosen, (ends[0], ends[1] + inside), shares, strict=True)
+            for row in _rows(limits, axes, np.where(summed, 0.0, share))
+        ]
+        problem = replace(problem, rows=(*problem.rows, *signed))
         start, gap = _within(problem, best, run), GAP if number else ROUGH
         c[going[run]] = solve_runs(problem.of(going), free.of(going), start=start[going[run]], gap=gap, most=_STEPS)
+        uses, worst = places.uses(bare, c)
         # sums of amounts keep limits by themselves, with less room for what lies between samples than is measured here
-        slower = _slower([np.where(summed, 0.0, used) for used in places.uses(bare, c)[0]], batch)
+        slower = _slower([np.where(summed, 0.0, used) for used in uses], batch)
         kept = c * slower[run]
         time, before = (np.bincount(run, batch.weight / np.sqrt(values)) for values in (kept, best))
         best = np.where((time < before)[run], kept, best)
@@ -285,28 +284,24 @@ def faster(grid: Grid, free: Grid, places: Places, batch: Batch, best: Floats) -
     return best
 
 
+def _rows(limits: Sequence[_Signed], axes: Ints, share: Floats) -> list[Row]:
+    """Limits of some axes (a, n) at both ends of each cell, and of those within, times `share` (d, n)."""
+    slot, found = np.arange(axes.shape[1]), []
+    for axis in axes:
+        for limit in limits[:2]:
+            found += limit.rows(axis, share[axis, slot])
+    for limit in limits[2:]:
+        assert limit.axis is not None
+        found += limit.rows(np.zeros_like(slot), share[limit.axis[0], slot])
+    return found
+
+
 def _seen(batch: Batch, c: Floats, limits: Sequence[_Signed], shape: tuple[int, ...]) -> Floats:
     """(d, n) largest share of the limits of each axis that is used where these count."""
     most, seen = np.zeros(shape), batch.seen_by_rows(c, 0.0)
     for limit in limits:
         limit.use(seen, most)
     return most
-
-
-def _rows(
-    ends: Sequence[Sequence[_Signed]], held: Bools, taken: Floats, summed: Bools, inside: Sequence[_Signed]
-) -> list[Row]:
-    """Limits of the axes that come nearest to theirs in each slot, but where sums of amounts are kept."""
-    share = np.where(summed, 0.0, 1.0 / (1.0 - np.minimum(taken, _MOST)))
-    slot, found = np.arange(len(summed)), []
-    for limits, chosen, own in zip(ends, held, share, strict=True):
-        for axis in np.nonzero(chosen.T)[1].reshape(-1, AXES).T:
-            for limit in limits:
-                found += limit.rows(axis, own[axis, slot])
-    for limit in inside:
-        assert limit.axis is not None
-        found += limit.rows(np.zeros_like(slot), share[1][limit.axis[0], slot])
-    return found
 
 
 def _slower(uses: list[Floats], batch: Batch) -> Floats:
