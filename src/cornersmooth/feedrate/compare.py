@@ -44,7 +44,6 @@ class SlowMove:
         Where the move ends.
     seconds, lost_seconds : float
         Its time, and what that is more than at the programmed speed.
-    length_mm : float
     slowest_mm_per_s : float
         Least speed at the ends of its parts.
     """
@@ -78,10 +77,8 @@ class Comparison:
 
     Parameters
     ----------
-    program : Program
     settings : Settings
         Of the smoothing; its `method` is replaced by each method in turn.
-    limits : Limits
     laws : mapping of str to TimeLaw
         The two `BASELINES`, every method by its name, and `AS_WRITTEN` where there is a text.
     machine : Machine or None
@@ -157,7 +154,6 @@ def compare(
 
     Parameters
     ----------
-    program : Program
     settings : Settings, optional
     limits : Limits, optional
     methods : sequence of str

@@ -85,7 +85,6 @@ def make_grid(limits: Intervals, runs: Ints, resolution: Resolution | None = Non
 
     Parameters
     ----------
-    limits : Intervals
     runs : (r,) int64
         Which runs, ascending.
     """

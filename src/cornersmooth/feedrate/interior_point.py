@@ -55,7 +55,6 @@ def solve(batch: Batch, c: Floats, gap: float = GAP, most: int = MAX_STEPS, begi
 
     Parameters
     ----------
-    batch : Batch
     c : (n,) float64
         Strictly feasible coefficients to start from.
     gap : float

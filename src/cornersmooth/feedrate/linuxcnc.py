@@ -81,7 +81,6 @@ def line_times(lines: Lines, limits: AxisLimits) -> tuple[Floats, Floats]:
     ----------
     lines : Lines
         Each must move.
-    limits : AxisLimits
     """
     if not len(lines):
         return np.zeros(0), np.zeros(0)

@@ -31,7 +31,6 @@ def program_lines(text: str, name: str | None = None) -> Lines:
 
     Parameters
     ----------
-    text : str
     name : str, optional
         File name for messages.
 

@@ -41,8 +41,6 @@ class MachineAxes:
 
     Parameters
     ----------
-    machine : Machine
-    path : Path
     angles : (n, 2) float64, degrees
         Rotary angles at the poses of the program.
     branch : (n,) int64

@@ -35,7 +35,6 @@ def taylor_along(
 
     Parameters
     ----------
-    path : Path
     element : (m,) int64
     share : (m,) float64
         Where on each element: the part of its length for lines and arcs, the parameter t of its half for curves. Curves

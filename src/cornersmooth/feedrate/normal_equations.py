@@ -20,7 +20,6 @@ class Equations:
 
     Parameters
     ----------
-    batch : Batch
     by_z : tuple of (n,) float64
         Of each row the derivative of left minus right side by z.
     downhill : (n,) float64

@@ -42,11 +42,8 @@ class Path:
 
     Parameters
     ----------
-    program : Program
     corners : Corners or None
         The transitions that some curves are halves of; None for the direct path.
-    settings : Settings
-    curves : Curves
     kind : (m,) uint8
         `Kind`.
     turning : (m,) bool

@@ -48,7 +48,6 @@ def plan(
 
     Parameters
     ----------
-    smooth_program : SmoothProgram
     limits : Limits, optional
     machine : Machine, optional
         Keep the limits of its five axes.
@@ -82,7 +81,6 @@ def direct(
 
     Parameters
     ----------
-    program : Program
     limits : Limits, optional
     baseline : {"exact_stop", "velocity_jump"}
         What happens at corners: a stop at the end of every move, or a jump of velocity of at most ``accel · period``,

@@ -26,7 +26,6 @@ class AxisPeaks:
 
     Parameters
     ----------
-    name : {"X", "Y", "Z", "A", "B", "C"}
     reached : (float, float, float)
         Speed, acceleration, jerk.
     limits : (float, float, float)

@@ -229,7 +229,6 @@ def faster(grid: Grid, free: Grid, places: Places, batch: Batch, best: Floats) -
         With all limits as amounts.
     free : Grid
         The same cells without accelerations and jerks of the machine's axes.
-    places : Places
     batch : Batch
         The problem of `grid`.
     best : (n,) float64

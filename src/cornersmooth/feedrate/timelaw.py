@@ -63,8 +63,6 @@ class TimeLaw:
         Path coordinate, mm (rad where the tip stands still), running on over all elements.
     speed, accel, jerk, rate : (p,) float64
         At the start of each phase; `jerk` is that of phases with constant jerk.
-    path : Path
-    limits : Limits
     edge : (m + 1,) float64
         Path coordinate of the elements' ends.
     machine_axes : MachineAxes or None
