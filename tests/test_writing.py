@@ -38,8 +38,8 @@ def test_pages_are_written_by_the_rules(page: Path) -> None:
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_helps_are_written_by_the_rules(name: str) -> None:
-    command: click.Command = import_module(COMMANDS[name][0]).command
-    helps = [COMMANDS[name][1], command.help or "", *(getattr(one, "help", None) or "" for one in command.params)]
+    command: click.Command = import_module(f"cornersmooth.cli.{name}").command
+    helps = [COMMANDS[name], command.help or "", *(getattr(one, "help", None) or "" for one in command.params)]
     spoken = [
         text for one in helps for text in one.replace("\b\n", "\n").split("\n\n") if "  cornersmooth " not in text
     ]

@@ -51,38 +51,24 @@ __version__ = "0.2.0"
 
 #: module of each public name
 _HOME = {
-    "Corners": "model",
-    "CornersmoothError": "errors",
-    "Finding": "errors",
-    "Frame": "nc",
-    "Limits": "feedrate",
-    "PathPoints": "path_points",
-    "Program": "model",
-    "Verdict": "verdict",
-    "VerdictError": "errors",
-    "Result": "pipeline",
-    "Settings": "settings",
-    "SmoothProgram": "model",
-    "Statement": "model",
-    "TimeLaw": "feedrate",
-    "Verification": "verify",
-    "choose_form": "nc",
-    "compare": "feedrate",
-    "corner_table": "report.corners",
-    "direct": "feedrate",
-    "filter_program": "filter",
-    "fit_settings": "nc",
-    "from_poses": "model",
-    "load_control": "nc",
-    "load_machine": "kinematics",
-    "plan": "feedrate",
-    "postprocess": "pipeline",
-    "read": "cl",
-    "report": "report",
-    "sample": "path_points",
-    "smooth": "pipeline",
-    "verify": "verify",
-    "write": "nc",
+    name: module
+    for module, names in {
+        "cl": "read",
+        "errors": "CornersmoothError Finding VerdictError",
+        "feedrate": "Limits TimeLaw compare direct plan",
+        "filter": "filter_program",
+        "kinematics": "load_machine",
+        "model": "Corners Program SmoothProgram Statement from_poses",
+        "nc": "Frame choose_form fit_settings load_control write",
+        "path_points": "PathPoints sample",
+        "pipeline": "Result postprocess smooth",
+        "report": "report",
+        "report.corners": "corner_table",
+        "settings": "Settings",
+        "verdict": "Verdict",
+        "verify": "Verification verify",
+    }.items()
+    for name in names.split()
 }
 
 __all__ = [

@@ -68,41 +68,31 @@ class CornersmoothError(Exception):
         One clause, lower case, no full stop: what is wrong, with the offending value.
     hint : str
         One clause: what the user can do about it.
-    file, line, column : optional
-        Where. `line` and `column` count from 1.
+    file, line : optional
+        Where. `line` counts from 1.
     """
 
     #: exit code of the command line (docs/smooth.md)
     exit_code = 3
 
     def __init__(
-        self,
-        code: str,
-        what: str,
-        hint: str = "",
-        *,
-        file: str | None = None,
-        line: int | None = None,
-        column: int | None = None,
+        self, code: str, what: str, hint: str = "", *, file: str | None = None, line: int | None = None
     ) -> None:
         self.code = code
         self.what = what
         self.hint = hint
         self.file = file
         self.line = line
-        self.column = column
-        super().__init__(code, what, hint, file, line, column)
+        super().__init__(code, what, hint, file, line)
 
     def __reduce__(self) -> tuple[object, ...]:
         """Survive the trip between worker processes with every field."""
-        return _rebuild, (type(self), self.code, self.what, self.hint, self.file, self.line, self.column)
+        return _rebuild, (type(self), self.code, self.what, self.hint, self.file, self.line)
 
     @property
     def place(self) -> str:
-        """``FILE:LINE:COLUMN`` as far as known, or the empty string."""
-        parts = [self.file or ("<input>" if self.line is not None else "")]
-        parts += [str(number) for number in (self.line, self.column) if number is not None]
-        return ":".join(part for part in parts if part)
+        """``FILE:LINE`` as far as known, or the empty string."""
+        return self.file or "" if self.line is None else f"{self.file or '<input>'}:{self.line}"
 
     def __str__(self) -> str:
         """Text of the message, as `message` gives it."""
@@ -110,15 +100,9 @@ class CornersmoothError(Exception):
 
 
 def _rebuild(
-    cls: type[CornersmoothError],
-    code: str,
-    what: str,
-    hint: str,
-    file: str | None,
-    line: int | None,
-    column: int | None,
+    cls: type[CornersmoothError], code: str, what: str, hint: str, file: str | None, line: int | None
 ) -> CornersmoothError:
-    return cls(code, what, hint, file=file, line=line, column=column)
+    return cls(code, what, hint, file=file, line=line)
 
 
 class InputError(CornersmoothError):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -15,6 +15,11 @@ if TYPE_CHECKING:
     from cornersmooth.model import Floats
 
 Lines = Literal["dense", "long"]
+
+
+def _setting(default: Any, low: float, high: float, unit: str = "") -> Any:
+    """Field of one number or several, with closed bounds."""
+    return field(default=default, metadata={"bounds": (low, high), "unit": unit})
 
 
 @dataclass(frozen=True)
@@ -70,26 +75,27 @@ class Settings:
         A straight remainder shorter than this between two transitions is not written as a line of its own.
     """
 
-    tolerance: float = 0.01
-    axis_length: float = 10.0
-    axis_tolerance: float | None = None
+    tolerance: float = _setting(0.01, 1e-6, 10.0, "mm")
+    axis_length: float = _setting(10.0, 1e-3, 1e4, "mm")
+    axis_tolerance: float | None = _setting(None, 1e-4, 45.0, "deg")
     method: str = AUTO
-    weights: tuple[float, float] = (1.0, 1.0)
-    ratio: float = 2.0 / 3.0
-    reversal_angle: float = 170.0
-    max_axis_step: float = 90.0
-    chord_tolerance: float | None = None
-    block_time: float | None = None
-    axis_step: float | None = None
+    weights: tuple[float, float] = _setting((1.0, 1.0), 0.001, 3.0)
+    ratio: float = _setting(2.0 / 3.0, 0.5, 0.9)
+    reversal_angle: float = _setting(170.0, 1.0, 180.0, "deg")
+    max_axis_step: float = _setting(90.0, 1.0, 90.0, "deg")
+    chord_tolerance: float | None = _setting(None, 1e-7, 1.0, "mm")
+    block_time: float | None = _setting(None, 0.0, 1.0, "s")
+    axis_step: float | None = _setting(None, 1e-3, 90.0, "deg")
     lines: Lines | None = None
-    curve_share: float = 1.0
-    line_share: float = 1.0
-    blend_share: float = 0.1
+    curve_share: float = _setting(1.0, 0.01, 1.0)
+    line_share: float = _setting(1.0, 0.01, 1.0)
+    blend_share: float = _setting(0.1, 0.0, 1.0)
     round_feed_changes: bool = True
-    tip_resolution: float = 0.0
-    axis_point_resolution: float = 0.0
-    duplicate_distance: float = 1e-6
-    shortest_line: float = 1e-3
+    # what forms in rotary words take off for them grows with the tolerance
+    tip_resolution: float = _setting(0.0, 0.0, 10.0, "mm")
+    axis_point_resolution: float = _setting(0.0, 0.0, 10.0, "mm")
+    duplicate_distance: float = _setting(1e-6, 0.0, 0.01, "mm")
+    shortest_line: float = _setting(1e-3, 0.0, 1.0, "mm")
 
     def __post_init__(self) -> None:
         if self.method not in (AUTO, *METHODS):
@@ -242,12 +248,7 @@ class Settings:
 
 
 #: unit of each setting that has one
-UNITS = {
-    **dict.fromkeys(("tolerance", "axis_length", "chord_tolerance", "tip_resolution"), "mm"),
-    **dict.fromkeys(("axis_point_resolution", "duplicate_distance", "shortest_line"), "mm"),
-    **dict.fromkeys(("axis_tolerance", "reversal_angle", "max_axis_step", "axis_step"), "deg"),
-    "block_time": "s",
-}
+UNITS = {item.name: item.metadata["unit"] for item in fields(Settings) if item.metadata.get("unit")}
 
 #: What the axis point may be off, over ε, where the axis has a tolerance of its own. The larger, the less the way of
 #: the tip takes of what the axis may turn (a tenth of it at most), and the longer is H.
@@ -288,22 +289,5 @@ TIMED_POSES = 20_000
 
 #: closed bounds of the numeric settings
 BOUNDS: dict[str, tuple[float, float]] = {
-    "tolerance": (1e-6, 10.0),
-    "axis_length": (1e-3, 1e4),
-    "axis_tolerance": (1e-4, 45.0),
-    "weights": (0.001, 3.0),
-    "ratio": (0.5, 0.9),
-    "reversal_angle": (1.0, 180.0),
-    "max_axis_step": (1.0, 90.0),
-    "chord_tolerance": (1e-7, 1.0),
-    "block_time": (0.0, 1.0),
-    "axis_step": (1e-3, 90.0),
-    "curve_share": (0.01, 1.0),
-    "line_share": (0.01, 1.0),
-    "blend_share": (0.0, 1.0),
-    # what forms in rotary words take off for them grows with the tolerance
-    "tip_resolution": (0.0, 10.0),
-    "axis_point_resolution": (0.0, 10.0),
-    "duplicate_distance": (0.0, 0.01),
-    "shortest_line": (0.0, 1.0),
+    item.name: item.metadata["bounds"] for item in fields(Settings) if item.metadata
 }

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any, TypeVar
 
 import numpy as np
 
-from cornersmooth.model import Arcs, Bools, Ints, Program, Runs
+from cornersmooth.model import Bools, Ints, Program, Runs
 
 Columns = TypeVar("Columns")
 
 
 def some_rows(columns: Columns, which: slice | Bools | Ints) -> Columns:
     """Rows of a dataclass whose fields are arrays of the same length; what is no array stays."""
-    own: dict[str, Any] = {
-        name: column[which] for name, column in vars(columns).items() if isinstance(column, np.ndarray)
-    }
+    arrays = {item.name: getattr(columns, item.name) for item in fields(columns)}  # type: ignore[arg-type]
+    own: dict[str, Any] = {name: column[which] for name, column in arrays.items() if isinstance(column, np.ndarray)}
     return replace(columns, **own)  # type: ignore[type-var]
 
 
@@ -29,18 +28,10 @@ def some_poses(program: Program, first: int, stop: int) -> Program:
         An arc that ends at the first pose is left out: it begins outside. Earlier statements come
         before the first pose.
     """
-    rows, arcs = slice(first, stop), program.arcs
-    own = (arcs.pose > first) & (arcs.pose < stop)
+    arcs = some_rows(program.arcs, (program.arcs.pose > first) & (program.arcs.pose < stop))
     return replace(
-        program,
-        tip=program.tip[rows],
-        axis=program.axis[rows],
-        kind=program.kind[rows],
-        feed=program.feed[rows],
-        line=program.line[rows],
-        feed_mode=program.feed_mode[rows],
-        keep=program.keep[rows],
-        arcs=Arcs(arcs.pose[own] - first, arcs.centre[own], arcs.normal[own], arcs.sweep[own]),
+        some_rows(program, slice(first, stop)),
+        arcs=replace(arcs, pose=arcs.pose - first),
         statements=tuple(
             replace(statement, pose=max(statement.pose - first, 0))
             for statement in program.statements

@@ -16,25 +16,22 @@ from cornersmooth import __version__
 from cornersmooth.cli.headings import write_part
 from cornersmooth.cli.shutdown import Shutdown
 
-#: name of each command, its module and its line in the list of commands
+#: line in the list of commands of each, whose module has its name
 COMMANDS = {
-    "smooth": ("cornersmooth.cli.smooth", "Round the corners of CL files and write NC programs."),
-    "filter": ("cornersmooth.cli.filter", "Smooth the cutting runs of a finished NC program."),
-    "verify": ("cornersmooth.cli.verify", "Measure an NC program against the CL file it was made from."),
-    "compare": (
-        "cornersmooth.cli.compare",
-        "Compare the programs of all forms, methods and line densities of a control.",
-    ),
-    "time": ("cornersmooth.cli.time", "Plan the motion directly and smoothed, and compare the times."),
-    "setup": ("cornersmooth.cli.setup", "Find how to clamp a part so that its program runs fastest."),
-    "surface": ("cornersmooth.cli.surface", "Measure what an NC program leaves of the surface of the CL file."),
-    "info": ("cornersmooth.cli.info", "Say what a CL file holds and what would limit the rounding of its corners."),
-    "controls": ("cornersmooth.cli.controls", "List the controls that programs can be written for, and their forms."),
-    "machines": ("cornersmooth.cli.machines", "List the machines whose rotary words can be written, or describe one."),
-    "config": ("cornersmooth.cli.config", "Say which values hold here, and where each comes from."),
-    "completion": ("cornersmooth.cli.completion", "Print what makes a shell complete commands, names and files."),
-    "explain": ("cornersmooth.cli.explain", "Explain the code of a message: cause, and what to do."),
-    "man": ("cornersmooth.cli.man", "Print the manual page."),
+    "smooth": "Round the corners of CL files and write NC programs.",
+    "filter": "Smooth the cutting runs of a finished NC program.",
+    "verify": "Measure an NC program against the CL file it was made from.",
+    "compare": "Compare the programs of all forms, methods and line densities of a control.",
+    "time": "Plan the motion directly and smoothed, and compare the times.",
+    "setup": "Find how to clamp a part so that its program runs fastest.",
+    "surface": "Measure what an NC program leaves of the surface of the CL file.",
+    "info": "Say what a CL file holds and what would limit the rounding of its corners.",
+    "controls": "List the controls that programs can be written for, and their forms.",
+    "machines": "List the machines whose rotary words can be written, or describe one.",
+    "config": "Say which values hold here, and where each comes from.",
+    "completion": "Print what makes a shell complete commands, names and files.",
+    "explain": "Explain the code of a message: cause, and what to do.",
+    "man": "Print the manual page.",
 }
 
 #: how the list shows them
@@ -73,7 +70,7 @@ class LazyGroup(click.Group):
         """Import the module of the command."""
         if cmd_name not in COMMANDS:
             return None
-        command: click.Command = import_module(COMMANDS[cmd_name][0]).command
+        command: click.Command = import_module(f"cornersmooth.cli.{cmd_name}").command
         return command
 
     def resolve_command(
@@ -90,7 +87,7 @@ class LazyGroup(click.Group):
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """List the commands without importing them."""
         for heading, names in GROUPS.items():
-            write_part(formatter, heading, [(name, COMMANDS[name][1]) for name in names.split()])
+            write_part(formatter, heading, [(name, COMMANDS[name]) for name in names.split()])
         with formatter.section("Pages that helps name"):
             formatter.write_dl([("docs/", str(_pages()))])
 
