@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, Final
 
 #: how much of a text may hold its head
 HEAD = 1 << 13
@@ -63,23 +65,10 @@ class Provenance:
 
     def lines(self) -> tuple[str, ...]:
         """Texts of the comments."""
-        words = {
-            "E": f"{self.tolerance:.9g}",
-            "H": f"{self.axis_length:.9g}",
-            **({} if self.axis_tolerance is None else {"AXIS": f"{self.axis_tolerance:.9g}"}),
-            "METHOD": self.method,
-            "CONTROL": self.control,
-            "FORM": self.form,
-            **({"MACHINE": self.machine} if self.machine else {}),
-            **({} if self.tcp else {"TCP": "no"}),
-            **({"WEIGHTS": self.weights_word} if self.weights_word else {}),
-            **({"FEEDS": "plan"} if self.planned_feeds else {}),
-            **({"OFFSET": self.work_offset} if self.work_offset else {}),
-            **({"OPERATION": f"{self.operation}"} if self.operation else {}),
-        }
+        words = {word: write(getattr(self, name)) for word, name, write, _ in _FIELDS}
         mark = f"CORNERSMOOTH {self.version}:"
         lines = [mark]
-        for word in (f"{key}={_word(value)}" for key, value in words.items()):
+        for word in (f"{key}={_word(value)}" for key, value in words.items() if value):
             if len(f"{lines[-1]} {word}") > _LONGEST and lines[-1] != mark:
                 lines.append(mark)
             lines[-1] += f" {word}"
@@ -89,10 +78,7 @@ class Provenance:
     @property
     def weights_word(self) -> str:
         """Weights as they are written; nothing where all are 1."""
-        if self.weights is None:
-            return "any"
-        others = sorted(set(self.weights) - {1.0})
-        return ",".join(f"{weight:g}" for weight in (1.0, *others)) if others else ""
+        return _weights_word(self.weights)
 
 
 def read_provenance(text: bytes) -> Provenance | None:
@@ -112,31 +98,46 @@ def read_provenance(text: bytes) -> Provenance | None:
         if line["version"] == found["version"]:
             words = dict(word.partition("=")[::2] for word in line["words"].split()) | words
     digest = _HASH.search(head, found.end())
+    known = {name: (words[word], read) for word, name, _, read in _FIELDS if word in words}
     try:
-        return Provenance(
-            version=found["version"],
-            tolerance=float(words["E"]),
-            axis_length=float(words["H"]),
-            method=words["METHOD"],
-            control=words["CONTROL"],
-            form=words["FORM"],
-            machine=words.get("MACHINE", ""),
-            tcp=words.get("TCP") != "no",
-            sha256=digest[1].lower() if digest else "",
-            weights=_weights(words.get("WEIGHTS", "1")),
-            planned_feeds=words.get("FEEDS") == "plan",
-            axis_tolerance=float(words["AXIS"]) if "AXIS" in words else None,
-            work_offset=words.get("OFFSET", ""),
-            operation=int(words.get("OPERATION", "0")),
-        )
-    except (KeyError, ValueError):
+        own: dict[str, Any] = {name: read(text) for name, (text, read) in known.items()}
+        return Provenance(version=found["version"], sha256=digest[1].lower() if digest else "", **own)
+    except (TypeError, ValueError):
         return None
+
+
+def _word(text: str) -> str:
+    """Name in the characters of a word."""
+    return re.sub(r"[^\w.+-]", "_", text, flags=re.ASCII)
+
+
+def _number(value: float | None) -> str:
+    return "" if value is None else f"{value:.9g}"
+
+
+def _weights_word(weights: tuple[float, ...] | None) -> str:
+    if weights is None:
+        return "any"
+    others = sorted(set(weights) - {1.0})
+    return ",".join(f"{weight:g}" for weight in (1.0, *others)) if others else ""
 
 
 def _weights(word: str) -> tuple[float, ...] | None:
     return None if word == "any" else tuple(float(number) for number in word.split(","))
 
 
-def _word(text: str) -> str:
-    """Name in the characters of a word."""
-    return re.sub(r"[^\w.+-]", "_", text, flags=re.ASCII)
+#: words of the head in their order: the field of each, how it is written (empty for not at all), and how it is read
+_FIELDS: Final[tuple[tuple[str, str, Callable[[Any], str], Callable[[str], Any]], ...]] = (
+    ("E", "tolerance", _number, float),
+    ("H", "axis_length", _number, float),
+    ("AXIS", "axis_tolerance", _number, float),
+    ("METHOD", "method", str, str),
+    ("CONTROL", "control", str, str),
+    ("FORM", "form", str, str),
+    ("MACHINE", "machine", str, str),
+    ("TCP", "tcp", lambda on: "" if on else "no", lambda word: word != "no"),
+    ("WEIGHTS", "weights", _weights_word, _weights),
+    ("FEEDS", "planned_feeds", lambda on: "plan" if on else "", lambda word: word == "plan"),
+    ("OFFSET", "work_offset", str, str),
+    ("OPERATION", "operation", lambda number: f"{number}" if number else "", int),
+)

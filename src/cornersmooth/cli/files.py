@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import stat
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import BinaryIO
+
+import click
 
 from cornersmooth import output
 from cornersmooth.errors import InputError, OutputError
@@ -120,3 +123,23 @@ def check_path(path: str, inputs: list[str], *, force: bool | None, ours: bytes 
         return True
     sources = [0 if source == STANDARD else source for source in inputs]
     return output.check_output(path, sources, force=force, ours=ours)
+
+
+def suffix_of(path: str) -> str:
+    """Ending of a name, which says the form of a report."""
+    return os.path.splitext(path)[1].lower()
+
+
+def check_reports(reports: Iterable[str], endings: str, inputs: list[str], *, force: bool) -> None:
+    """Refuse reports whose names have none of the endings, or that would destroy something."""
+    for path in reports:
+        if suffix_of(path) not in re.findall(r"\.\w+", endings):
+            raise click.UsageError(f"--report {path}: let the name end in {endings}")
+        check_path(path, inputs, force=force)
+
+
+def write_report(path: str, parts: Iterable[str | bytes], *, replace: bool = True) -> None:
+    """Write the parts of a report; names in it need not be UTF-8."""
+    with output.open_output(target_of(path), replace=replace) as made:
+        for part in parts:
+            made.stream.write(part if isinstance(part, bytes) else part.encode("utf-8", "backslashreplace"))

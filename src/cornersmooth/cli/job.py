@@ -5,16 +5,16 @@ from __future__ import annotations
 import hashlib
 import os
 import traceback
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, BinaryIO, cast
 
-from cornersmooth.cli.files import STANDARD, Beginning, check_path, read_input, target_of
+from cornersmooth.cli.files import STANDARD, Beginning, check_path, read_input, suffix_of, target_of, write_report
 from cornersmooth.cli.fingerprint import fingerprint
 from cornersmooth.cli.show import more
 from cornersmooth.errors import CornersmoothError, SettingsError, VerdictError, message, printable
 from cornersmooth.memory import return_large_arrays
-from cornersmooth.output import ClosedPipe, make_folder, open_output, read_mark
+from cornersmooth.output import ClosedPipe, make_folder, read_mark
 from cornersmooth.verdict import Verdict
 
 if TYPE_CHECKING:
@@ -163,7 +163,7 @@ def check(job: Job, *, replace_target: bool | None = False) -> dict[str, bool | 
     if replace_target is None:
         may_replace[job.target] = None
     for path in job.reports:
-        suffix = _form_of(path)
+        suffix = suffix_of(path)
         if suffix not in _OURS:
             what = f"cannot tell the form of the report {path}"
             raise SettingsError("CS221", what, "let it end in .json, .csv or .html")
@@ -240,9 +240,9 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> dict[
     from cornersmooth.pipeline import postprocess
     from cornersmooth.report import corners_csv, report_json
 
+    may_replace = {} if job.batch else check(job)
     source, name = read_input(job.source, size_limit=job.reading["size_limit"])
     made_of = ""
-    replace_target: bool | None = False
     if job.batch:
         made_of = _made_of(job, source)
         replace_target = _may_replace(job, made_of, outcome)
@@ -250,7 +250,7 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> dict[
             return {}
         for path in (job.target, *job.reports):
             make_folder(os.path.dirname(path) or ".")
-    may_replace = check(job, replace_target=replace_target)
+        may_replace = check(job, replace_target=replace_target)
     target = target_of(job.target)
     beginning = Beginning(cast(BinaryIO, target)) if job.beginning else None
     try:
@@ -278,7 +278,7 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> dict[
         outcome.held_back = beginning.held_back
     outcome.seconds = result.seconds
     outcome.verdict_text = "; ".join(filter(None, (result.judgement.text, job.loosened)))
-    pages = [path for path in job.reports if _form_of(path) == ".html"]
+    pages = [path for path in job.reports if suffix_of(path) == ".html"]
     for path in pages:
         outcome.saving = _write_page(path, job, bool(may_replace[path]), source, result) or outcome.saving
     good = result.verdict in (Verdict.PASSED, Verdict.INCOMPLETE)
@@ -291,14 +291,10 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> dict[
     contents = result.report(command=job.command, loosened=job.loosened, saving=outcome.saving, limits=job.axes)
     for path in job.reports:
         if path not in pages:
-            table = _form_of(path) == ".csv"
+            table = suffix_of(path) == ".csv"
             texts = corners_csv(result.smoothed, dense=not result.form.curve) if table else [report_json(contents)]
-            _write(path, texts, bool(may_replace[path]))
+            write_report(path, texts, replace=bool(may_replace[path]))
     return contents
-
-
-def _form_of(path: str) -> str:
-    return os.path.splitext(path)[1].lower()
 
 
 def _write_page(path: str, job: Job, may_replace: bool, source: bytes, result: Result) -> Saving | None:
@@ -307,14 +303,8 @@ def _write_page(path: str, job: Job, may_replace: bool, source: bytes, result: R
 
     timed = len(result.program) <= job.plan
     page, saving = page_and_saving(result, source=source, frame=result.frame, axes=job.axes, timed=timed, tool=job.tool)
-    _write(path, [page], may_replace)
+    write_report(path, [page], replace=may_replace)
     return saving
-
-
-def _write(path: str, texts: Iterable[str], may_replace: bool) -> None:
-    with open_output(target_of(path), replace=may_replace) as output:
-        for text in texts:
-            output.stream.write(text.encode("utf-8", "backslashreplace"))  # names need not be UTF-8
 
 
 def _say_failed(name: str, result: Result, failure: VerdictError) -> str:

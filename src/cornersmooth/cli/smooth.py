@@ -13,7 +13,7 @@ import click
 from cornersmooth.cli.batch import Batch
 from cornersmooth.cli.files import STANDARD, check_inputs, check_path, read_lines
 from cornersmooth.cli.inputs import Input, check_together, find_inputs, named_input
-from cornersmooth.cli.job import Job, Outcome, check, run_job
+from cornersmooth.cli.job import Job, Outcome, run_job
 from cornersmooth.cli.options import motion, nc_text, outputs, reading, smoothing, surface
 from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand, command_line, loosened
@@ -101,7 +101,6 @@ def command(ending: Shutdown, /, inputs: tuple[str, ...], **given: Any) -> int:
     quiet, verbose = given["quiet"], given["verbose"]
     if len(jobs) == 1 and not given["directory"]:
         check_inputs(jobs[0].source)
-        check(jobs[0])
         with progress_bar(quiet or (jobs[0].target == STANDARD and _to_terminal())) as progress:  # a bar eats lines
             outcome = run_job(jobs[0], progress)
         if outcome.held_back and not quiet:

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import csv
 import io
-import os
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
-from cornersmooth.cli.files import target_of
+from cornersmooth.cli.files import suffix_of, write_report
 from cornersmooth.cli.job import STATUSES, Outcome
 from cornersmooth.errors import SettingsError
-from cornersmooth.output import open_output
 from cornersmooth.verdict import Verdict
 
 
@@ -128,7 +126,7 @@ def check_summary(path: str) -> None:
     SettingsError
         CS221
     """
-    if os.path.splitext(path)[1].lower() not in (".json", ".csv"):
+    if suffix_of(path) not in (".json", ".csv"):
         raise SettingsError("CS221", f"cannot tell the form of the summary {path}", "let it end in .json or .csv")
 
 
@@ -147,15 +145,14 @@ def write_summary(path: str, rows: Sequence[Mapping[str, Any]]) -> None:
     from cornersmooth.report.record import report_json
 
     text = io.StringIO()
-    if path.lower().endswith(".json"):
+    if suffix_of(path) == ".json":
         text.write(report_json(batch_report(rows)))
     else:
         table = csv.DictWriter(text, fieldnames=list(rows[0]), lineterminator="\n")
         table.writeheader()
         told = ("; ".join(f"{code} {count}" for code, count in _counts(row).items()) for row in rows)
         table.writerows({**row, "warnings": warnings} for row, warnings in zip(rows, told, strict=True))
-    with open_output(target_of(path)) as output:
-        output.stream.write(text.getvalue().encode("utf-8", "backslashreplace"))
+    write_report(path, [text.getvalue()])
 
 
 def _counts(row: Mapping[str, Any]) -> dict[str, int]:

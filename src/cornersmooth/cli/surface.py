@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-import os
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from cornersmooth.cli.files import STANDARD, check_inputs, check_path, read_input, target_of
+from cornersmooth.cli.files import STANDARD, check_inputs, check_reports, read_input, suffix_of, write_report
 from cornersmooth.cli.options import nc_text, outputs, reading, smoothing, surface
 from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand
 from cornersmooth.cli.show import say_json, say_line
 from cornersmooth.errors import SettingsError
-from cornersmooth.output import open_output
 from cornersmooth.verdict import Verdict
 
 if TYPE_CHECKING:
     from cornersmooth.model import Program
     from cornersmooth.surface import SurfaceMap, Tool
-
-_SUFFIXES = (".json", ".csv", ".html", ".png", ".svg", ".pdf")
 
 
 @click.command(
@@ -65,10 +62,7 @@ def command(source: str, text: str, **given: Any) -> int:
     if source == text == STANDARD:
         raise click.UsageError("only one of the inputs can be standard input")
     check_inputs(source, text)
-    for path in given["reports"]:
-        if os.path.splitext(path)[1].lower() not in _SUFFIXES:
-            raise click.UsageError(f"--report {path}: let the name end in {', '.join(_SUFFIXES)}")
-        check_path(path, [source, text], force=given["force"])
+    check_reports(given["reports"], ".json, .csv, .html, .png, .svg, .pdf", [source, text], force=given["force"])
     how = nc_text.reading_back_of(given)
     data, name = read_input(source, size_limit=not given["no_size_limit"])
     program = read(data, name=name, **reading.reading_of(given))
@@ -85,9 +79,7 @@ def command(source: str, text: str, **given: Any) -> int:
         stations=given["stations"],
     )
     for path in given["reports"]:
-        with open_output(target_of(path)) as output:
-            for part in _report(path, program, data, written, nc, found, given):
-                output.stream.write(part)
+        write_report(path, _report(suffix_of(path), program, data, written, nc, found, given))
     if given["as_json"]:
         say_json(found.as_dict())
     elif not given["quiet"]:
@@ -118,26 +110,22 @@ def _tool(program: Program, asked: Tool | None) -> Tool:
 
 
 def _report(
-    path: str, program: Program, source: bytes, written: bytes | str, nc: Any, found: SurfaceMap, given: dict[str, Any]
-) -> Any:
-    """Parts of a report, as bytes."""
+    form: str, program: Program, source: bytes, written: bytes | str, nc: Any, found: SurfaceMap, given: dict[str, Any]
+) -> Iterator[str | bytes]:
     from cornersmooth.report import report_json
     from cornersmooth.report.surface import draw_surface, surface_csv
 
-    suffix = os.path.splitext(path)[1].lower()
-    if suffix == ".json":
-        yield report_json(found.as_dict()).encode("utf-8")
-    elif suffix == ".csv":
-        for part in surface_csv(found):
-            yield part.encode("utf-8")
-    elif suffix == ".html":
+    if form == ".json":
+        yield report_json(found.as_dict())
+    elif form == ".csv":
+        yield from surface_csv(found)
+    elif form == ".html":
         from cornersmooth.page import verified_page
         from cornersmooth.verify import verify
 
         how = {"tolerance": given["tolerance"], "axis_length": given["axis_length"], **nc_text.reading_back_of(given)}
         checked = verify(program, written, **how)
         name, control = written if isinstance(written, str) else "", nc_text.control_of(given).name
-        page = verified_page(program, nc, checked, name=name, control=control, source=source, surface=found)
-        yield page.encode("utf-8")
+        yield verified_page(program, nc, checked, name=name, control=control, source=source, surface=found)
     else:
-        yield draw_surface(found, suffix[1:])
+        yield draw_surface(found, form[1:])

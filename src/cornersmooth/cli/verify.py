@@ -6,20 +6,27 @@ import contextlib
 import hashlib
 import os
 import stat
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from cornersmooth.cli.files import STANDARD, check_inputs, check_path, read_input, read_lines, target_of
+from cornersmooth.cli.files import (
+    STANDARD,
+    check_inputs,
+    check_reports,
+    read_input,
+    read_lines,
+    suffix_of,
+    write_report,
+)
 from cornersmooth.cli.options import nc_text, outputs, reading, smoothing, surface
 from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand, command_line, loosened
 from cornersmooth.cli.show import more, print_line, print_message, say_json, say_line, show_findings, warn
 from cornersmooth.errors import SettingsError
 from cornersmooth.memory import return_large_arrays
-from cornersmooth.output import open_output
 from cornersmooth.verdict import Verdict
 
 if TYPE_CHECKING:
@@ -99,7 +106,7 @@ def command(source: str, text: str, **given: Any) -> int:
         raise click.UsageError("only one of the inputs can be standard input")
     return_large_arrays()
     check_inputs(source, text)
-    _check_outputs(source, text, given)
+    check_reports(given["reports"], ".json, .csv or .html", [source, text], force=given["force"])
     data, name = read_input(source, size_limit=not given["no_size_limit"])
     if first_block(data[:HEAD]):
         reading.refuse_operation(given)
@@ -112,7 +119,6 @@ def command(source: str, text: str, **given: Any) -> int:
     measures = {name: given[name] for name in ("tolerance", "axis_length", "axis_tolerance")}
     how = {**measures, **reader}
     program = read(data, name=name, **reading.reading_of(given))
-    pages = [path for path in given["reports"] if path.lower().endswith(".html")]
     if given["verbose"] or given["reports"] or given["as_json"]:  # it is looked at more than once
         nc = readable_twice(nc)
     trusted = [line for path in given["trusted"] for line in read_lines(path)]
@@ -145,17 +151,14 @@ def command(source: str, text: str, **given: Any) -> int:
         loosened=loose,
     )
     contents["verification"] = found.to_dict()
-    for path in given["reports"]:
-        if path not in pages:
-            table = path.lower().endswith(".csv")
-            _write(path, verification_csv(program, found) if table else [report_json(contents)])
-    if pages:
+
+    def page() -> str:
         from cornersmooth.page import verified_page
 
-        text_read, control = _read_for_page(nc, given, reader), nc_text.control_of(given)
-        page = verified_page(
+        control = nc_text.control_of(given)
+        return verified_page(
             program,
-            text_read,
+            _read_for_page(nc, given, reader),
             found,
             name=text if text != STANDARD else "",
             control=control.name,
@@ -165,8 +168,11 @@ def command(source: str, text: str, **given: Any) -> int:
             planner=control.lines.planner,
             tool=given["tool"],
         )
-        for path in pages:
-            _write(path, [page])
+
+    for path in given["reports"]:
+        form = suffix_of(path)
+        table = verification_csv(program, found) if form == ".csv" else None
+        write_report(path, table or [page() if form == ".html" else report_json(contents)])
     for line in _problems(found, name, "<stdin>" if text == STANDARD else text, given["verbose"]):
         print_message(line)
     verdict = contents["verdict_text"]
@@ -309,14 +315,6 @@ def _recognise(given: dict[str, Any], head: bytes, context: click.Context) -> st
     return f"{advice} is taken"
 
 
-def _check_outputs(source: str, text: str, given: dict[str, Any]) -> None:
-    """Refuse wrong names before anything is read."""
-    for path in given["reports"]:
-        if os.path.splitext(path)[1].lower() not in (".json", ".csv", ".html"):
-            raise click.UsageError(f"--report {path}: let the name end in .json, .csv or .html")
-        check_path(path, [source, text], force=given["force"])
-
-
 def _nc_file(text: str, nc: bytes | str | os.PathLike[str], form: str | None, given: dict[str, Any]) -> NcFile:
     """What is told of the program; its hash only where it can be read again."""
     from cornersmooth.report import NcFile
@@ -331,12 +329,6 @@ def _nc_file(text: str, nc: bytes | str | os.PathLike[str], form: str | None, gi
         machine=None if machine is None else machine.name,
         tcp=not given["no_tcp"],
     )
-
-
-def _write(path: str, parts: Iterable[str]) -> None:
-    with open_output(target_of(path)) as output:
-        for part in parts:
-            output.stream.write(part.encode("utf-8"))
 
 
 def _read_for_page(nc: bytes | str | os.PathLike[str], given: dict[str, Any], reader: dict[str, Any]) -> NcProgram:
