@@ -170,5 +170,5 @@ def test_command_warns_of_a_large_step(units: str, tmp_path) -> None:
 def test_info_describes_a_file_that_smoothing_refuses() -> None:
     one = read(cl("MM", leaning(0), leaning(180), leaning(180)))
     found = describe(one, 0.01, 10.0)
-    assert found.corners.not_smoothed["axis_step"] == 2
-    assert [(f.code, f.line, f.count) for f in found.findings if f.code == "CS184"] == [("CS184", 8, 1)]
+    assert found["corners"]["not_smoothed"]["axis_step"] == 2
+    assert [(f["code"], f["line"], f["count"]) for f in found["findings"] if f["code"] == "CS184"] == [("CS184", 8, 1)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -13,9 +13,6 @@ from cornersmooth.cli.options import outputs, reading, smoothing
 from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand
 from cornersmooth.cli.show import say_json, say_line, told_finding
-
-if TYPE_CHECKING:
-    from cornersmooth.report.info import Info, Spread
 
 
 @click.command("info", cls=ShopCommand, epilog=EXIT_CODES_OF_READERS)
@@ -40,7 +37,6 @@ def command(source: str, tolerance: float, axis_length: float, as_json: bool, **
     from cornersmooth.cli.filter import describe_program
     from cornersmooth.nc_reader.recognition import first_block
     from cornersmooth.provenance import HEAD
-    from cornersmooth.report import findings_table
     from cornersmooth.report.info import describe
 
     data, name = read_input(source, size_limit=not given["no_size_limit"])
@@ -57,79 +53,86 @@ def command(source: str, tolerance: float, axis_length: float, as_json: bool, **
         return 0
     info = describe(read(data, name=name, **reading.reading_of(given)), tolerance, axis_length)
     if as_json:
-        say_json(info.as_dict())
+        say_json(info)
         return 0
     rows = [row for part in (_file(info), _motion(info), _axis(info), _corners(info)) for row in part]
     width = max(len(label) for label, _ in rows)
     for label, text in rows:
         say_line(f"{label:<{width}}  {text}".rstrip(), indent=width + 2)
-    for finding in findings_table(info.findings):
+    for finding in info["findings"]:
         for line in told_finding(name, finding).split("\n"):
             say_line(line)
     return 0
 
 
 Rows = Iterator[tuple[str, str]]
+Record = dict[str, Any]
 
 
-def _file(info: Info) -> Rows:
-    yield "file", f"{info.name}: {info.dialect}, {info.units}"
-    yield "poses", _counts(info.motion.moves)
-    if info.statements:
-        yield "statements", _counts(info.statements)
-    for tool in info.tools:
-        number = "no tool number" if tool.number is None else f"T{tool.number}"
-        used = ", ".join(map(str, tool.operations))
-        yield "tool", f"{number}{', ' + tool.shape if tool.shape else ''}: operations {used}"
-    for one in info.operations:
-        tool_named = "" if one.tool is None else f", T{one.tool}"
+def _file(info: Record) -> Rows:
+    yield "file", f"{info['name']}: {info['dialect']}, {info['units']}"
+    yield "poses", _counts(info["motion"]["moves"])
+    if info["statements"]:
+        yield "statements", _counts(info["statements"])
+    for tool in info["tools"]:
+        number = "no tool number" if tool["number"] is None else f"T{tool['number']}"
+        used = ", ".join(map(str, tool["operations"]))
+        yield "tool", f"{number}{tool['shape'] and ', ' + tool['shape']}: operations {used}"
+    for one in info["operations"]:
+        tool_named = "" if one["tool"] is None else f", T{one['tool']}"
         yield (
-            f"operation {one.number}",
-            f"{one.name}{tool_named}, lines {one.first_line} to {one.last_line}, {one.poses} poses, "
-            f"{one.feed_length_mm:.6g} mm of lines at feed, tool axis {one.axis}".lstrip(", "),
+            f"operation {one['number']}",
+            f"{one['name']}{tool_named}, lines {one['first_line']} to {one['last_line']}, {one['poses']} poses, "
+            f"{one['feed_length_mm']:.6g} mm of lines at feed, tool axis {one['axis']}".lstrip(", "),
         )
 
 
-def _motion(info: Info) -> Rows:
-    motion = info.motion
-    yield "chains", f"{motion.chains}, the longest {motion.longest_chain_poses} poses"
-    yield "path", f"{motion.feed_length_mm:.6g} mm of lines at feed, {motion.rapid_length_mm:.6g} mm of rapids"
-    low, high = (" ".join(f"{value:.6g}" for value in corner) for corner in (motion.box_min_mm, motion.box_max_mm))
+def _motion(info: Record) -> Rows:
+    motion = info["motion"]
+    yield "chains", f"{motion['chains']}, the longest {motion['longest_chain_poses']} poses"
+    yield "path", f"{motion['feed_length_mm']:.6g} mm of lines at feed, {motion['rapid_length_mm']:.6g} mm of rapids"
+    low, high = (
+        " ".join(f"{value:.6g}" for value in corner) for corner in (motion["box_min_mm"], motion["box_max_mm"])
+    )
     yield "box", f"{low} to {high} mm"
-    by_unit = {"mm/min": motion.feeds_mm_per_min, "mm/rev": motion.feeds_mm_per_rev}
+    by_unit = {"mm/min": motion["feeds_mm_per_min"], "mm/rev": motion["feeds_mm_per_rev"]}
     feeds = [", ".join(f"{value:g}" for value in values) + f" {unit}" for unit, values in by_unit.items() if values]
-    missing = f"{motion.feed_moves_without_feed} moves without" if motion.feed_moves_without_feed else ""
+    missing = f"{motion['feed_moves_without_feed']} moves without" if motion["feed_moves_without_feed"] else ""
     yield "feeds", "; ".join(part for part in (*feeds, missing) if part) or "none"
-    yield "segments", _spread(motion.segment_length_mm, "mm")
-    if info.arcs.count:
-        yield "arcs", f"{info.arcs.count}, {info.arcs.helices} of them helices"
-        yield "arc radius", _spread(info.arcs.radius_mm, "mm")
-        yield "arc sweep", _spread(info.arcs.sweep_deg, "deg")
+    yield "segments", _spread(motion["segment_length_mm"], "mm")
+    if info["arcs"]["count"]:
+        yield "arcs", f"{info['arcs']['count']}, {info['arcs']['helices']} of them helices"
+        yield "arc radius", _spread(info["arcs"]["radius_mm"], "mm")
+        yield "arc sweep", _spread(info["arcs"]["sweep_deg"], "deg")
 
 
-def _axis(info: Info) -> Rows:
-    axis = info.axis
+def _axis(info: Record) -> Rows:
+    axis = info["axis"]
     meaning = {"fixed": "one direction", "indexed": "turns between cuts only", "simultaneous": "turns while cutting"}
-    yield "tool axis", meaning[axis.kind]
-    yield "tilt from +Z", _spread(axis.tilt_deg, "deg")
-    yield "axis steps", _spread(axis.step_deg, "deg")
-    kinds = {"translations": axis.translations, "pure rotations": axis.rotations, "repetitions": axis.repetitions}
-    if axis.step_deg.count:
+    yield "tool axis", meaning[axis["kind"]]
+    yield "tilt from +Z", _spread(axis["tilt_deg"], "deg")
+    yield "axis steps", _spread(axis["step_deg"], "deg")
+    kinds = {
+        "translations": axis["translations"],
+        "pure rotations": axis["rotations"],
+        "repetitions": axis["repetitions"],
+    }
+    if axis["step_deg"]["count"]:
         yield "", _counts({name: count for name, count in kinds.items() if count}) or "every segment moves and turns"
 
 
-def _corners(info: Info) -> Rows:
-    corners = info.corners
-    yield "corners", f"{corners.count}, {corners.sharp} sharper than 10 deg"
-    yield "turns", _spread(corners.tip_turn_deg, "deg")
+def _corners(info: Record) -> Rows:
+    corners = info["corners"]
+    yield "corners", f"{corners['count']}, {corners['sharp']} sharper than 10 deg"
+    yield "turns", _spread(corners["tip_turn_deg"], "deg")
     yield (
-        f"at {corners.tolerance_mm:g} mm",
-        f"{corners.smoothed} would be rounded: {corners.limited_by_segment} limited by segment length, "
-        f"{corners.limited_by_tolerance} by the tolerance (axis point at {corners.axis_length_mm:g} mm)",
+        f"at {corners['tolerance_mm']:g} mm",
+        f"{corners['smoothed']} would be rounded: {corners['limited_by_segment']} limited by segment length, "
+        f"{corners['limited_by_tolerance']} by the tolerance (axis point at {corners['axis_length_mm']:g} mm)",
     )
-    if corners.not_smoothed:
-        yield "stay sharp", _counts(corners.not_smoothed)
-    yield "deviation", _spread(corners.deviation_mm, "mm")
+    if corners["not_smoothed"]:
+        yield "stay sharp", _counts(corners["not_smoothed"])
+    yield "deviation", _spread(corners["deviation_mm"], "mm")
     yield "", "values are least / 5 % / median / 95 % / most (how many)"
 
 
@@ -137,8 +140,8 @@ def _counts(counts: dict[str, int]) -> str:
     return ", ".join(f"{count} {name}" for name, count in counts.items())
 
 
-def _spread(spread: Spread, unit: str) -> str:
-    if not spread.count:
+def _spread(spread: Record, unit: str) -> str:
+    if not spread["count"]:
         return "none"
-    levels = f"{spread.min:.4g} / {spread.p5:.4g} / {spread.p50:.4g} / {spread.p95:.4g} / {spread.max:.4g}"
-    return f"{levels} {unit} ({spread.count})"
+    levels = " / ".join(f"{spread[level]:.4g}" for level in ("min", "p5", "p50", "p95", "max"))
+    return f"{levels} {unit} ({spread['count']})"
