@@ -256,11 +256,11 @@ def to_and_fro(lift, pitch=0.1, lean=0.0):
 def test_neighbouring_passes_differ_by_what_only_one_is_lifted(lift, rms, most, lean):
     path = to_and_fro([0.0] * 6, lean=lean)
     found = neighbouring_passes(path, to_and_fro(lift, lean=lean), 2.0, 4.0)
-    assert found.apart == pytest.approx(0.1)
+    assert found.apart_mm == pytest.approx(0.1)
     assert found.places >= 6 * 20
-    assert found.percentile_95 == pytest.approx(most, abs=1e-9)
-    assert found.rms == pytest.approx(rms, abs=0.02 * rms + 1e-9)  # between rows the lift rises
-    assert found.largest == pytest.approx(most, abs=1e-9)
+    assert found.percentile_95_mm == pytest.approx(most, abs=1e-9)
+    assert found.rms_mm == pytest.approx(rms, abs=0.02 * rms + 1e-9)  # between rows the lift rises
+    assert found.max_mm == pytest.approx(most, abs=1e-9)
 
 
 def test_a_row_alone_has_no_neighbour_and_one_that_differs_is_found():
@@ -269,5 +269,5 @@ def test_a_row_alone_has_no_neighbour_and_one_that_differs_is_found():
     assert neighbouring_passes(to_and_fro([0.0] * 3, pitch=5.0), to_and_fro([0.0] * 3, pitch=5.0), 2.0, 4.0) is None
     path = to_and_fro([0.0] * 9)
     found = neighbouring_passes(path, to_and_fro([0.0] * 4 + [0.005] + [0.0] * 4), 2.0, 4.0)
-    assert found.largest == pytest.approx(0.005, abs=1e-9)
-    assert 21 * 3 <= found.line <= 21 * 6 + 1
+    assert found.max_mm == pytest.approx(0.005, abs=1e-9)
+    assert 21 * 3 <= found.cl_line <= 21 * 6 + 1

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cornersmooth.errors import Finding
-from cornersmooth.model import Floats, Ints, LimitedBy, Move, SmoothProgram, Status, Trait
-from cornersmooth.report.corners import corner_table, worst_corners
+from cornersmooth.geometry.arcs import arc_radii
+from cornersmooth.model import Floats, Ints, Move, SmoothProgram, Status
+from cornersmooth.report.corners import corner_table, counts_of, worst_corners
 from cornersmooth.report.record import SCHEMA, NcFile, cl_file, findings_table, record, report_json
 from cornersmooth.report.verdict import judge, sharp_corners
 from cornersmooth.smoothing.construction import construction_of
@@ -68,13 +69,7 @@ def report(
         "corners_in_runs": int((corners.status == Status.IN_RUN).sum()),
         "instead": [{"count": one.count, "text": one.text} for one in told if one.instead],
         "smoothed": int(done.sum()),
-        "limited_by_tolerance": int((corners.limited_by == LimitedBy.TOLERANCE).sum()),
-        "limited_by_segment": int((corners.limited_by == LimitedBy.SEGMENT).sum()),
-        "not_smoothed": {
-            status.key: count
-            for status in Status
-            if not status.traits & Trait.ROUNDED and (count := int((corners.status == status).sum()))
-        },
+        **counts_of(corners),
         "sharp": sharp,
         "max_tip_error_mm": max(worst.tip_error, _largest(runs.tip_bound) if runs is not None else 0.0),
         "max_axis_error_mm": max(worst.axis_error, _largest(runs.axis_bound) if runs is not None and not own else 0.0),
@@ -136,10 +131,5 @@ def _feed_length(smoothed: SmoothProgram) -> float:
     kind, from_kind = program.kind[1:], program.kind[:-1]
     straight = float(step[(kind == Move.LINEAR) & (from_kind != Move.FROM)].sum())
     arcs = program.arcs
-    if not len(arcs):
-        return straight
-    start, end = program.tip[arcs.pose - 1], program.tip[arcs.pose]
-    spoke = start - arcs.centre
-    rise = dot(end - start, arcs.normal)
-    spoke = spoke - dot(spoke, arcs.normal)[:, None] * arcs.normal
-    return straight + float(np.hypot(norm(spoke) * arcs.sweep, rise).sum())
+    rise = dot(program.tip[arcs.pose] - program.tip[arcs.pose - 1], arcs.normal)
+    return straight + float(np.hypot(arc_radii(program) * arcs.sweep, rise).sum())

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cornersmooth.geometry import nurbs
-from cornersmooth.model import Floats, Ints, LimitedBy, SmoothProgram, Status
+from cornersmooth.model import Corners, Floats, Ints, LimitedBy, SmoothProgram, Status, Trait
 from cornersmooth.smoothing.construction import RUN_CURVATURE, construction_of
 from cornersmooth.smoothing.path_distance import path_distances
 from cornersmooth.vectors import angle_between, norm
@@ -72,6 +73,19 @@ def corner_table(smoothed: SmoothProgram, rows: Ints | None = None, *, dense: bo
     }
     columns.update(construction_of(settings.method).report_columns(corners, rows))
     return columns
+
+
+def counts_of(corners: Corners) -> dict[str, Any]:
+    """How many corners are limited by what, and how many stay sharp for which reason."""
+    return {
+        "limited_by_tolerance": int(np.count_nonzero(corners.limited_by == LimitedBy.TOLERANCE)),
+        "limited_by_segment": int(np.count_nonzero(corners.limited_by == LimitedBy.SEGMENT)),
+        "not_smoothed": {
+            status.key: count
+            for status in Status
+            if not status.traits & Trait.ROUNDED and (count := int(np.count_nonzero(corners.status == status)))
+        },
+    }
 
 
 def _names(kind: type[Status] | type[LimitedBy], codes: NDArray[np.uint8]) -> NDArray[np.str_]:

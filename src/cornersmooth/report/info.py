@@ -11,7 +11,8 @@ import numpy as np
 
 from cornersmooth.cl.operations import Operation, find_operations
 from cornersmooth.geometry.arcs import arc_radii
-from cornersmooth.model import Bools, Corners, FeedMode, Floats, LimitedBy, Move, Program, Status, Trait
+from cornersmooth.model import Bools, Corners, FeedMode, Floats, Move, Program, Status
+from cornersmooth.report.corners import counts_of
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.axis_steps import axis_step_findings
 from cornersmooth.smoothing.construction import construction_of
@@ -185,13 +186,7 @@ def _corners(program: Program, settings: Settings) -> Record:
         "smoothed": int(done.sum()),
         "tip_turn_deg": spread(np.degrees(turn)),
         "sharp": int(np.count_nonzero(turn > SHARP)),
-        "limited_by_tolerance": int(np.count_nonzero(corners.limited_by == LimitedBy.TOLERANCE)),
-        "limited_by_segment": int(np.count_nonzero(corners.limited_by == LimitedBy.SEGMENT)),
-        "not_smoothed": {
-            status.key: count
-            for status in Status
-            if not status.traits & Trait.ROUNDED and (count := int(np.count_nonzero(corners.status == status)))
-        },
+        **counts_of(corners),
         "deviation_mm": spread(np.maximum(corners.tip_error, corners.axis_error)[done]),
     }
 

@@ -76,8 +76,8 @@ def passes_text(passes: PassDifference | None) -> str:
     if passes is None:
         return "no pass has a neighbour"
     return (
-        f"neighbours, {passes.apart:.3g} mm apart, differ by {passes.rms:.6f} mm (root mean square), 95 % by at most "
-        f"{passes.percentile_95:.6f} mm, the most {passes.largest:.6f} mm at CL line {passes.line}"
+        f"neighbours, {passes.apart_mm:.3g} mm apart, differ by {passes.rms_mm:.6f} mm (root mean square), "
+        f"95 % by at most {passes.percentile_95_mm:.6f} mm, the most {passes.max_mm:.6f} mm at CL line {passes.cl_line}"
     )
 
 

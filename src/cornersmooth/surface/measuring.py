@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -97,16 +97,7 @@ class SurfaceMap:
             "within_tolerance_percent": float(100.0 * (np.abs(off) <= self.tolerance).mean()) if len(off) else None,
             "histogram": {"edges_mm": edges.tolist(), "counts": counts.astype(int).tolist()},
         }
-        passes = self.passes
-        contents["neighbouring_passes"] = passes and {
-            "places": passes.places,
-            "apart_mm": passes.apart,
-            "rms_mm": passes.rms,
-            "percentile_95_mm": passes.percentile_95,
-            "max_mm": passes.largest,
-            "cl_line": passes.line,
-            "at_mm": list(passes.point),
-        }
+        contents["neighbouring_passes"] = self.passes and asdict(self.passes)
         for name, sign in (("overcut", -1), ("undercut", 1)):
             own = np.abs(off[sign * off > 0.0])
             row = self.worst(sign)

@@ -36,23 +36,23 @@ class PassDifference:
     ----------
     places : int
         Places with a neighbour.
-    apart : float, mm
+    apart_mm : float, mm
         Middle distance of neighbours.
-    rms, percentile_95, largest : float, mm
+    rms_mm, percentile_95_mm, max_mm : float
         Of the difference of both deviations, across the surface.
-    line : int
+    cl_line : int
         CL line of the largest.
-    point : (float, float, float), mm
+    at_mm : (float, float, float), mm
         Tip there.
     """
 
     places: int
-    apart: float
-    rms: float
-    percentile_95: float
-    largest: float
-    line: int
-    point: tuple[float, float, float]
+    apart_mm: float
+    rms_mm: float
+    percentile_95_mm: float
+    max_mm: float
+    cl_line: int
+    at_mm: tuple[float, float, float]
 
 
 def neighbouring_passes(
@@ -97,12 +97,12 @@ def neighbouring_passes(
     row = segment[found[worst]]
     return PassDifference(
         places=len(rows),
-        apart=float(np.median(norm(place - here)[rows])),
-        rms=float(np.sqrt(np.square(difference).mean())),
-        percentile_95=float(np.percentile(difference, 95.0)),
-        largest=float(difference.max()),
-        line=int(original.line[row]),
-        point=tuple(original.tip[row].mean(axis=0).tolist()),
+        apart_mm=float(np.median(norm(place - here)[rows])),
+        rms_mm=float(np.sqrt(np.square(difference).mean())),
+        percentile_95_mm=float(np.percentile(difference, 95.0)),
+        max_mm=float(difference.max()),
+        cl_line=int(original.line[row]),
+        at_mm=tuple(original.tip[row].mean(axis=0).tolist()),
     )
 
 
