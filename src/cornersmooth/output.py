@@ -141,21 +141,12 @@ class HashedStream:
 
 @dataclass
 class Output:
-    """A file that is being written and has not taken its place yet.
-
-    Parameters
-    ----------
-    path : str
-        Where the text is until then; empty where it goes straight to a stream or device.
-    failed : bool
-        Set by the writer: the text must not take the place of the output.
-    mark : mapping of str to str
-        Set by the writer: kept with the file where the file system can, for `read_mark`.
-    """
+    """A file that is being written and has not taken its place yet."""
 
     stream: HashedStream
-    path: str = ""
-    failed: bool = False
+    path: str = ""  #: where the text is until then; empty where it goes straight to a stream or device
+    failed: bool = False  #: set by the writer: the text must not take the place of the output
+    #: set by the writer: kept with the file where the file system can, for `read_mark`
     mark: Mapping[str, str] = field(default_factory=dict)
 
 

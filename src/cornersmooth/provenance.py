@@ -19,49 +19,26 @@ _HASH = re.compile(r"\bSHA256=([0-9a-f]{64})\b", re.IGNORECASE)
 
 @dataclass(frozen=True)
 class Provenance:
-    """How a text was made.
+    """How a text was made."""
 
-    Parameters
-    ----------
-    version : str
-        Of the program.
-    tolerance, axis_length : float, mm
-        ε and H.
-    machine : str
-        Empty for none.
-    tcp : bool
-        Whether the control keeps the tool tip.
-    source : str
-        Name of the CL file, without its folder.
-    sha256 : str
-        Of the CL file, in hexadecimal digits; empty where it is not known.
-    weights : tuple of float or None
-        Those that control points of curves have; None where they may have any.
-    planned_feeds : bool
-        Whether feeds are those of a plan, at most the programmed ones.
-    axis_tolerance : float or None, degrees
-        What the tool axis may be off, in place of ε at the axis point.
-    work_offset : str
-        With ``_`` for blanks; ``"none"`` where the text says none, empty for that of the control's own table.
-    operation : int
-        Number of the operation of the CL file that it holds alone; 0 for all.
-    """
-
-    version: str
+    version: str  #: of the program
+    #: mm: ε and H
     tolerance: float
     axis_length: float
     method: str
     control: str
     form: str
-    machine: str = ""
-    tcp: bool = True
-    source: str = ""
-    sha256: str = ""
+    machine: str = ""  #: empty for none
+    tcp: bool = True  #: whether the control keeps the tool tip
+    source: str = ""  #: name of the CL file, without its folder
+    sha256: str = ""  #: of the CL file, in hexadecimal digits; empty where it is not known
+    #: Those that control points of curves have; None where they may have any.
     weights: tuple[float, ...] | None = (1.0,)
-    planned_feeds: bool = False
-    axis_tolerance: float | None = None
+    planned_feeds: bool = False  #: whether feeds are those of a plan, at most the programmed ones
+    axis_tolerance: float | None = None  #: degrees: what the tool axis may be off, in place of ε at the axis point
+    #: With ``_`` for blanks; ``"none"`` where the text says none, empty for that of the control's own table.
     work_offset: str = ""
-    operation: int = 0
+    operation: int = 0  #: number of the operation of the CL file that it holds alone; 0 for all
 
     def lines(self) -> tuple[str, ...]:
         """Texts of the comments."""

@@ -64,25 +64,15 @@ class Parsed(NamedTuple):
 
 @dataclass(frozen=True)
 class Shelf:
-    """Where the tables of one kind lie.
+    """Where the tables of one kind lie."""
 
-    Parameters
-    ----------
-    kind : str
-        What they describe, for messages.
-    package, folder : str
-        Where those lie that come with the program.
-    keys : tuple of str
-        Those that a table may have, ``like`` and ``aliases`` aside.
-    unknown, unreadable, unknown_key, wrong_value : str
-        Codes of the errors that say that a name is unknown, that a file or its text cannot be read, that a key is
-        unknown, and that a value is of a wrong kind.
-    """
-
-    kind: str
+    kind: str  #: what they describe, for messages
+    #: where those lie that come with the program
     package: str
     folder: str
-    keys: tuple[str, ...]
+    keys: tuple[str, ...]  #: those that a table may have, ``like`` and ``aliases`` aside
+    #: codes of the errors that say that a name is unknown, that a file or its text cannot be read, that a key is
+    #: unknown, and that a value is of a wrong kind
     unknown: str
     unreadable: str
     unknown_key: str

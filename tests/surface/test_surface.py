@@ -224,7 +224,14 @@ def test_distribution_of_real_paths_agrees_with_brute_force(name, tolerance, req
     program, text = case(path, tolerance, height)
     [(_, tool, _)] = tools_of(program)
     stations = how_many(40, 150)
-    found = measure_surface(program, text, tool, tolerance=tolerance, edge=height, stations=stations)
+    found = measure_surface(
+        program,
+        read_nc(text, tolerance=tolerance, axis_length=height),
+        tool,
+        tolerance=tolerance,
+        edge=height,
+        stations=stations,
+    )
     assert len(found) > 2.6 * stations
     assert found.known.all()
     # ε and H bound the motion of every point of the edge, and so of the surface

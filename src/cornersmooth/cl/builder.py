@@ -64,24 +64,12 @@ class Changes:
 
 @dataclass
 class Builder:
-    """Poses and state changes of one file; lengths and feeds as written.
+    """Poses and state changes of one file; lengths and feeds as written."""
 
-    Parameters
-    ----------
-    file : str
-        For messages.
-    short_axis_up : bool
-        Whether a pose without an axis has +Z instead of the last one.
-    off_known : bool
-        Whether MULTAX/OFF surely locks the axis where it is.
-    lenient : bool
-        Normalise axis vectors of any length, with a finding.
-    """
-
-    file: str
-    short_axis_up: bool = False
-    off_known: bool = True
-    lenient: bool = False
+    file: str  #: for messages
+    short_axis_up: bool = False  #: whether a pose without an axis has +Z instead of the last one
+    off_known: bool = True  #: whether MULTAX/OFF surely locks the axis where it is
+    lenient: bool = False  #: normalise axis vectors of any length, with a finding
     n: int = 0
     feed: Changes = field(default_factory=lambda: Changes([0], [float("nan")]))
     feed_mode: Changes = field(default_factory=lambda: Changes([0], [0.0]))

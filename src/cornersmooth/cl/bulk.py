@@ -37,42 +37,18 @@ Words = NDArray[np.uint64]
 
 @dataclass(frozen=True)
 class Chunk:
-    """Consecutive lines of a file.
+    """Consecutive lines of a file."""
 
-    Parameters
-    ----------
-    lines : list of bytes
-        All lines, without their ends; empty where all of them are plain.
-    count : int
-        Number of lines.
-    size : int
-        Number of bytes.
-    first : int
-        Number of the first line, from 1.
-    runs : (k, 2) int64
-        Ranges [start, stop) of lines that are plain GOTO statements, ascending.
-    rows : (k+1,) int64
-        First pose of every run; the last is the number of poses.
-    tip : (m, 3) float64
-        As written.
-    own_axis : (m,) bool
-        Which poses have an axis of their own.
-    axis : (a, 3) float64
-        These axes, as written.
-    line : (m,) int64
-        Line of every pose.
-    """
-
-    lines: list[bytes]
-    count: int
-    size: int
-    first: int
-    runs: Ints
-    rows: Ints
-    tip: Floats
-    own_axis: Bools
-    axis: Floats
-    line: Ints
+    lines: list[bytes]  #: all lines, without their ends; empty where all of them are plain
+    count: int  #: number of lines
+    size: int  #: number of bytes
+    first: int  #: number of the first line, from 1
+    runs: Ints  #: (k, 2): ranges [start, stop) of lines that are plain GOTO statements, ascending
+    rows: Ints  #: (k+1,): first pose of every run; the last is the number of poses
+    tip: Floats  #: (m, 3): as written
+    own_axis: Bools  #: (m,): which poses have an axis of their own
+    axis: Floats  #: (a, 3): these axes, as written
+    line: Ints  #: (m,): line of every pose
 
 
 def chunks(data: bytes, *, fast: bool = True) -> Iterator[Chunk]:

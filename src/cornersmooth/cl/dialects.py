@@ -19,31 +19,17 @@ HEAD: Final = 1 << 16
 
 @dataclass(frozen=True)
 class Dialect:
-    """The rules that differ between CAM systems.
-
-    Parameters
-    ----------
-    fingerprint : bytes
-        Regular expression, searched in the head of a file, line by line.
-    short_axis : {"hold", "up"}
-        What a GOTO of three numbers means for the axis: the last one, or +Z.
-    multax_off : {"lock", "up"} or None
-        What it means after MULTAX/OFF: the axis is locked where it is (CATIA V5, Syntax of Generated APT Instructions;
-        PostWorks 7.2), or +Z (ISO 4343:2000, 5.32); None where nothing says.
-    units : {"mm", "inch"}
-        Where the file does not say.
-    decimals : int
-        Digits after the point of coordinates.
-    strips_zeros : bool
-        Whether zeros at their end are left out, so that a statement alone does not tell the digits.
-    """
+    """The rules that differ between CAM systems."""
 
     name: str
-    fingerprint: bytes
-    short_axis: Literal["hold", "up"] = "hold"
+    fingerprint: bytes  #: regular expression, searched in the head of a file, line by line
+    short_axis: Literal["hold", "up"] = "hold"  #: what a GOTO of three numbers means for the axis: the last one, or +Z
+    #: What it means after MULTAX/OFF: the axis is locked where it is (CATIA V5, Syntax of Generated APT Instructions;
+    #: PostWorks 7.2), or +Z (ISO 4343:2000, 5.32); None where nothing says.
     multax_off: Literal["lock", "up"] | None = None
-    units: Units = "mm"
-    decimals: int = 4
+    units: Units = "mm"  #: where the file does not say
+    decimals: int = 4  #: digits after the point of coordinates
+    #: whether zeros at their end are left out, so that a statement alone does not tell the digits
     strips_zeros: bool = False
 
 

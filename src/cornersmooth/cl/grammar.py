@@ -47,34 +47,18 @@ Decode = Callable[[bytes], str]
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """A statement as read, before anyone knows what it means.
+    """A statement as read, before anyone knows what it means."""
 
-    Parameters
-    ----------
-    line : int
-        Line it starts on, from 1.
-    word : str
-        Major word in upper case without inner blanks (but ``"TOOL PATH"``); ``"$$"`` for a comment, ``""`` for a
-        line that is no statement.
-    args : tuple of (float | str)
-        As in `Statement.args`.
-    text : str
-        As written, joined over continuation lines.
-    rest : str
-        What follows the word where no slash does; empty for a proper statement.
-    points : tuple of (int, args)
-        Lines of further numbers after the statement, with their own line numbers.
-    cut_short : bool
-        Whether the file ends where the statement should go on.
-    """
-
-    line: int
+    line: int  #: line it starts on, from 1
+    #: Major word in upper case without inner blanks (but ``"TOOL PATH"``); ``"$$"`` for a comment, ``""`` for a line
+    #: that is no statement.
     word: str
-    args: tuple[Argument, ...] = ()
-    text: str = ""
-    rest: str = ""
+    args: tuple[Argument, ...] = ()  #: as in `Statement.args`
+    text: str = ""  #: as written, joined over continuation lines
+    rest: str = ""  #: what follows the word where no slash does; empty for a proper statement
+    #: lines of further numbers after the statement, with their own line numbers
     points: tuple[tuple[int, tuple[Argument, ...]], ...] = ()
-    cut_short: bool = False
+    cut_short: bool = False  #: whether the file ends where the statement should go on
 
     @property
     def option(self) -> Argument:

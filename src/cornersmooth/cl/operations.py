@@ -42,31 +42,18 @@ _PASSING = frozenset(
 
 @dataclass(frozen=True)
 class Operation:
-    """A stretch of a CL file.
+    """A stretch of a CL file."""
 
-    Parameters
-    ----------
-    number : int
-        From 1.
-    name : str
-        Empty where the file gives none.
-    tool : int or None
-        Number of the tool that it begins with; None where none is loaded.
-    first_line, last_line : int
-        Of its statements and poses.
-    first, stop : int
-        Its poses are those from `first` to before `stop`.
-    first_statement, last_statement : int
-        Its statements, the latter not included.
-    """
-
-    number: int
-    name: str
-    tool: int | None
+    number: int  #: from 1
+    name: str  #: empty where the file gives none
+    tool: int | None  #: Number of the tool that it begins with; None where none is loaded.
+    #: of its statements and poses
     first_line: int
     last_line: int
+    #: its poses are those from `first` to before `stop`
     first: int
     stop: int
+    #: its statements, the latter not included
     first_statement: int
     last_statement: int
 

@@ -45,37 +45,18 @@ _UNIT = re.compile(r"[\[(<]\s*([^\])>]*?)\s*[\])>]|[_/](mm|in|inch)$")
 
 @dataclass(frozen=True)
 class Columns:
-    """Columns of a point file, counted from 0.
+    """Columns of a point file, counted from 0."""
 
-    Parameters
-    ----------
-    width : int
-        Columns of every row.
-    tip : (int, int, int)
-    second : (int, int, int) or None
-        Axis vector or second point, see `meaning`.
-    meaning : {"none", "vectors", "points", "values"}
-    rapid : int or None
-        Says which moves are rapid, as `rapid_as` has it.
-    rapid_as : {"flag", "code", "word"}
-    rapid_name : str
-        Of that column, for messages.
-    unused : tuple of str
-        Names of columns that are not read; counters and times are not counted among them.
-    units : {"mm", "inch"} or None
-        What the header says about units.
-    """
-
-    width: int
+    width: int  #: columns of every row
     tip: Triple
-    second: Triple | None = None
+    second: Triple | None = None  #: axis vector or second point, see `meaning`
     meaning: Meaning = "none"
     feed: int | None = None
-    rapid: int | None = None
+    rapid: int | None = None  #: says which moves are rapid, as `rapid_as` has it
     rapid_as: Rapid = "word"
-    rapid_name: str = ""
-    unused: tuple[str, ...] = ()
-    units: Units | None = None
+    rapid_name: str = ""  #: of that column, for messages
+    unused: tuple[str, ...] = ()  #: names of columns that are not read; counters and times are not counted among them
+    units: Units | None = None  #: what the header says about units
 
     @property
     def wanted(self) -> tuple[int, ...]:

@@ -34,33 +34,25 @@ _FIRST_ROW = re.compile(rb"[^\n]*[^\s,;][^\n]*")
 #: bytes converted at once; large enough for whole-array speed, small enough for the caches
 _CHUNK = 1 << 18
 
+#: lines that tell what a file is
+_LEADING = 200
+
 #: bytes between cells
 _GAP = np.isin(np.arange(256), list(b" \t,\n"))
 
 
 @dataclass(frozen=True)
 class PointText:
-    """A point file, cleaned: no comments, newlines only, commas or blanks between cells, decimal points.
+    """A point file, cleaned: no comments, newlines only, commas or blanks between cells, decimal points."""
 
-    Parameters
-    ----------
-    body : bytes
-        The rows; starts where line `first_line` of the file starts.
-    first_line : int
-        From 1.
-    width, row_line : int
-        Cells of the first row and its line, 0 where there is no row.
-    header_certain : bool
-        False for a header found in a comment, which must fit the rows to be believed.
-    """
-
-    body: bytes
-    first_line: int
+    body: bytes  #: the rows; starts where line `first_line` of the file starts
+    first_line: int  #: from 1
     header: str | None
     header_line: int
+    #: cells of the first row and its line, 0 where there is no row
     width: int
     row_line: int
-    header_certain: bool
+    header_certain: bool  #: false for a header found in a comment, which must fit the rows to be believed
 
 
 def clean(data: bytes, file: str) -> PointText:
@@ -195,12 +187,12 @@ def is_row(line: str) -> bool:
     return len(cells) >= 3 and all(_NUMBER.fullmatch(cell) or _NOT_FINITE.fullmatch(cell) for cell in cells)
 
 
-def leading_lines(data: bytes, most: int = 200) -> Iterator[str]:
+def leading_lines(data: bytes) -> Iterator[str]:
     """Yield the first lines that are neither blank nor comment, decoded."""
-    head = data[: most * 400]
+    head = data[: _LEADING * 400]
     if data.startswith(UTF16_BOMS):
         head = head.decode("utf-16", "replace").encode()
-    for line in _decode(head.removeprefix(UTF8_BOM)).splitlines()[:most]:
+    for line in _decode(head.removeprefix(UTF8_BOM)).splitlines()[:_LEADING]:
         if line.strip() and not _COMMENT_MARK.match(line):
             yield line
 

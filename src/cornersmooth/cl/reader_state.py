@@ -21,25 +21,13 @@ from cornersmooth.model import Move, Statement, Units
 
 @dataclass
 class ReaderState:
-    """State of the reading of one file.
+    """State of the reading of one file."""
 
-    Parameters
-    ----------
-    file : str
-        For messages.
-    builder : Builder
-        Takes the poses.
-    arc_rule : {"left", "right", "tangent"} or None
-        Overrides the dialect's sense of rotation.
-    lenient : bool
-        Go on where that is safe.
-    """
-
-    file: str
+    file: str  #: for messages
     dialect: Dialect
-    builder: Builder
-    arc_rule: ArcRule | None = None
-    lenient: bool = False
+    builder: Builder  #: takes the poses
+    arc_rule: ArcRule | None = None  #: overrides the dialect's sense of rotation
+    lenient: bool = False  #: go on where that is safe
     arcs: ArcTable = field(default_factory=ArcTable)
     statements: list[Statement] = field(default_factory=list)
     stated_units: list[tuple[int, Units, int]] = field(default_factory=list)  #: line, units, pose

@@ -17,17 +17,10 @@ TOLERANCE: Final = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class System:
-    """A coordinate system, seen from another one.
+    """A coordinate system, seen from another one."""
 
-    Parameters
-    ----------
-    axes : (3, 3) float64
-        Its X, Y and Z axes as columns, orthonormal.
-    origin : (3,) float64
-    """
-
-    axes: Floats
-    origin: Floats
+    axes: Floats  #: (3, 3): its X, Y and Z axes as columns, orthonormal
+    origin: Floats  #: (3,)
 
     def points(self, points: Floats) -> Floats:
         """(n, 3) points of this system, in the other one."""

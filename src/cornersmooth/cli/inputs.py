@@ -21,16 +21,10 @@ PATTERNS = ("*.cls", "*.clsf", "*.cl", "*.ncl", "*.apt", "*.aptsource", "*.nccl"
 
 @dataclass(frozen=True)
 class Input:
-    """A file to work on.
-
-    Parameters
-    ----------
-    stem : str
-        Its place below the folder that was named, without the ending: where its outputs go below theirs.
-    """
+    """A file to work on."""
 
     path: str
-    stem: str
+    stem: str  #: its place below the folder that was named, without the ending: where its outputs go below theirs
 
 
 def check_together(inputs: tuple[str, ...], given: Mapping[str, Any]) -> None:

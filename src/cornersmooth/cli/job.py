@@ -45,70 +45,36 @@ _PROBLEMS_SHOWN = 5
 
 @dataclass(frozen=True)
 class Job:
-    """What to do with one input; every field survives the way to another process.
+    """What to do with one input; every field survives the way to another process."""
 
-    Parameters
-    ----------
-    source, target : str
-        Input and NC file; ``-`` for the standard streams.
-    reading : dict
-        Keyword arguments of `cornersmooth.read`.
-    feed : float or None, mm/min
-        For moves without one.
-    verify : bool
-        Whether the text is read back.
-    strict : bool
-        Whether a program with any verdict but PASSED is an error.
-    alone : bool
-        Whether no other job runs at the same time: verification may use all processors.
-    batch : bool
-        Whether it is one of a batch: folders are made, and what an earlier run has made of the same input with the same
-        settings is left as it is.
-    skip_existing : bool
-        Whether an output that exists is left as it is, whatever it was made of.
-    tool : Tool or None
-        For pages, instead of that of the file.
-    plan : int
-        Poses up to which the time that is saved is planned.
-    timed : bool
-        Whether it is planned without a page, too.
-    axes : Machine or None
-        Whose limits, in place of those of the machine of the form.
-    plan_feeds : Limits or None
-        Within which the feeds of the blocks are planned; None for the programmed ones.
-    beginning : bool
-        Whether standard output gets the first lines only.
-    run : str
-        Name of a run that does a file again where a worker was lost, although that may have written it; empty for none.
-    loosened : str
-        What settings made looser than the default; the line of the verdict says it.
-    command : str
-        Command line, for reports.
-    """
-
+    #: Input and NC file; ``-`` for the standard streams.
     source: str
     target: str
     reports: tuple[str, ...]
-    reading: dict[str, Any]
+    reading: dict[str, Any]  #: keyword arguments of `cornersmooth.read`
     settings: Settings
     form: Form
     frame: Frame
-    feed: float | None
+    feed: float | None  #: mm/min: for moves without one
     force: bool
-    verify: bool = True
-    strict: bool = False
-    alone: bool = False
+    verify: bool = True  #: whether the text is read back
+    strict: bool = False  #: whether a program with any verdict but PASSED is an error
+    alone: bool = False  #: whether no other job runs at the same time: verification may use all processors
+    #: whether it is one of a batch: folders are made, and what an earlier run has made of the same input with the
+    #: same settings is left as it is
     batch: bool = False
-    skip_existing: bool = False
-    tool: Tool | None = None
-    plan: int = 0
-    timed: bool = False
-    axes: Machine | None = None
+    skip_existing: bool = False  #: whether an output that exists is left as it is, whatever it was made of
+    tool: Tool | None = None  #: for pages, instead of that of the file
+    plan: int = 0  #: poses up to which the time that is saved is planned
+    timed: bool = False  #: whether it is planned without a page, too
+    axes: Machine | None = None  #: whose limits, in place of those of the machine of the form
+    #: Within which the feeds of the blocks are planned; None for the programmed ones.
     plan_feeds: Limits | None = None
-    beginning: bool = False
+    beginning: bool = False  #: whether standard output gets the first lines only
+    #: name of a run that does a file again where a worker was lost, although that may have written it; empty for none
     run: str = ""
-    loosened: str = ""
-    command: str = ""
+    loosened: str = ""  #: what settings made looser than the default; the line of the verdict says it
+    command: str = ""  #: command line, for reports
 
 
 @dataclass

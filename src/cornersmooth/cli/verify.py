@@ -195,27 +195,13 @@ def command(source: str, text: str, **given: Any) -> int:
 
 @dataclass(frozen=True)
 class _Head:
-    """What was taken from the head of a program.
+    """What was taken from the head of a program."""
 
-    Parameters
-    ----------
-    taken : tuple of str
-        Words that took the place of options that were not given.
-    loose : tuple of str
-        What is not verified because the program itself loosens the check.
-    weights : tuple of float or None
-        Weights of its curves; None for any.
-    form : str or None
-        In which it was written; None where it does not say.
-    remark : str
-        What is strange about it; empty for nothing.
-    """
-
-    taken: tuple[str, ...] = ()
-    loose: tuple[str, ...] = ()
-    weights: tuple[float, ...] | None = None
-    form: str | None = None
-    remark: str = ""
+    taken: tuple[str, ...] = ()  #: words that took the place of options that were not given
+    loose: tuple[str, ...] = ()  #: what is not verified because the program itself loosens the check
+    weights: tuple[float, ...] | None = None  #: Weights of its curves; None for any.
+    form: str | None = None  #: In which it was written; None where it does not say.
+    remark: str = ""  #: what is strange about it; empty for nothing
     problem: Problem | None = None
 
 

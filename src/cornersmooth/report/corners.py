@@ -21,6 +21,9 @@ Column = Floats | Ints | NDArray[np.str_]
 _CURVATURE_AT = np.array([0.2, 0.3, 0.38, 0.44, 0.48, 0.5, 0.52, 0.56, 0.62, 0.7, 0.8])
 
 
+#: corners that a report lists as the worst
+_WORST = 20
+
 #: corners whose errors are found together, and those that are sorted at first
 _TOGETHER = 4096
 _SORTED = 8 * _TOGETHER
@@ -111,23 +114,16 @@ def _largest_curvature(smoothed: SmoothProgram, rows: Ints) -> Floats:
 
 @dataclass(frozen=True)
 class WorstCorners:
-    """The largest errors, and the smoothed corners nearest to the tolerance.
+    """The largest errors, and the smoothed corners nearest to the tolerance."""
 
-    Parameters
-    ----------
-    tip_error, axis_error : float, mm
-        The largest of all corners.
-    rows : (g,) int64
-        Rows of the corners, the worst first; ties in path order.
-    """
-
+    #: mm: the largest of all corners
     tip_error: float
     axis_error: float
-    rows: Ints
+    rows: Ints  #: (g,): rows of the corners, the worst first; ties in path order
 
 
-def worst_corners(smoothed: SmoothProgram, count: int = 20, *, dense: bool = True) -> WorstCorners:
-    """Find the `count` worst corners; most corners are settled by what bounds their errors."""
+def worst_corners(smoothed: SmoothProgram, *, dense: bool = True) -> WorstCorners:
+    """Find the `_WORST` worst corners; most corners are settled by what bounds their errors."""
     corners = smoothed.corners
     rows = np.flatnonzero(corners.rounded)
     bound = np.maximum(corners.tip_error[rows], corners.axis_error[rows])
@@ -135,7 +131,7 @@ def worst_corners(smoothed: SmoothProgram, count: int = 20, *, dense: bool = Tru
     tip, axis_point, larger = np.zeros((3, 0))
     for part in _largest_first(bound):
         least = min(
-            np.sort(larger)[-count] if len(larger) >= count else -np.inf,
+            np.sort(larger)[-_WORST] if len(larger) >= _WORST else -np.inf,
             tip.max(initial=-np.inf),
             axis_point.max(initial=-np.inf),
         )
@@ -145,7 +141,7 @@ def worst_corners(smoothed: SmoothProgram, count: int = 20, *, dense: bool = Tru
         more_tip, more_axis_point = path_distances(smoothed, more, dense=dense)
         seen, tip, axis_point = np.append(seen, more), np.append(tip, more_tip), np.append(axis_point, more_axis_point)
         larger = np.maximum(tip, axis_point)
-    best = np.lexsort((seen, -larger))[:count]
+    best = np.lexsort((seen, -larger))[:_WORST]
     return WorstCorners(float(tip.max(initial=0.0)), float(axis_point.max(initial=0.0)), seen[best])
 
 

@@ -30,36 +30,20 @@ _COLUMNS = 10
 
 @dataclass(frozen=True)
 class Distribution:
-    """Deviations along the feed moves, in path order: of written poses from the original, and of its poses from them.
+    """Deviations along the feed moves in path order: of written poses from the original, and of its poses from them."""
 
-    Parameters
-    ----------
-    way : (k,) float64, mm
-        Length of the original path, rapids included, up to the original pose.
-    tip, axis_point : (k,) float64, mm
-        Axis points as in `Task`: with an axis tolerance, what the axis is off, where that shows as the tolerance.
-    angle : (k,) float64, degrees
-    share : (k,) float64
-        Where on the original move, 1 at its end.
-    fraction : (k,) float64
-        Where on the written element, as in `written_at`; 0 for rows of original poses.
-    pose : (k,) int64
-        Original pose that the original move leads to.
-    element : (k,) int64
-        Written element that was sampled, -1 for rows of original poses.
-    cl_line, nc_line : (k,) int64
-    """
-
-    way: Floats
+    way: Floats  #: (k,) mm: length of the original path, rapids included, up to the original pose
+    #: (k,) mm: axis points as in `Task`: with an axis tolerance, what the axis is off, where that shows as the
+    #: tolerance
     tip: Floats
     axis_point: Floats
-    angle: Floats
-    share: Floats
-    fraction: Floats
-    pose: Ints
-    element: Ints
-    cl_line: Ints
-    nc_line: Ints
+    angle: Floats  #: (k,) degrees
+    share: Floats  #: (k,): where on the original move, 1 at its end
+    fraction: Floats  #: (k,): where on the written element, as in `written_at`; 0 for rows of original poses
+    pose: Ints  #: (k,): original pose that the original move leads to
+    element: Ints  #: (k,): written element that was sampled, -1 for rows of original poses
+    cl_line: Ints  #: (k,)
+    nc_line: Ints  #: (k,)
 
     def __len__(self) -> int:
         return len(self.way)

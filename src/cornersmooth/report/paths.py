@@ -33,71 +33,36 @@ _ARC_CHORD = np.radians(3.0)
 
 @dataclass(frozen=True)
 class OriginalPath:
-    """The CL path as a polyline, k points; arcs in chords.
+    """The CL path as a polyline, k points; arcs in chords."""
 
-    Parameters
-    ----------
-    tip, axis : (k, 3) float64
-    pose : (k,) int64
-        Pose that each point belongs to or leads to.
-    rapid : (k,) bool
-        Whether the tool gets here at rapid speed.
-    breaks : (k,) bool
-        Whether nothing is drawn into the point: the tool does not come from the point before.
-    way : (n,) float64, mm
-        Length of the tip path up to every pose of the program.
-    """
-
-    tip: Floats
-    axis: Floats
-    pose: Ints
-    rapid: Bools
-    breaks: Bools
-    way: Floats
+    tip: Floats  #: (k, 3)
+    axis: Floats  #: (k, 3)
+    pose: Ints  #: (k,): pose that each point belongs to or leads to
+    rapid: Bools  #: (k,): whether the tool gets here at rapid speed
+    breaks: Bools  #: (k,): whether nothing is drawn into the point: the tool does not come from the point before
+    way: Floats  #: (n,) mm: length of the tip path up to every pose of the program
 
 
 @dataclass(frozen=True)
 class WrittenPath:
-    """Points of the written path, m of them in order.
+    """Points of the written path, m of them in order."""
 
-    Parameters
-    ----------
-    tip, axis : (m, 3) float64
-    element : (m,) int64
-        Path element of the text, the first with a single point.
-    share : (m,) float64
-        Where on it, 1 at its end.
-    end : (m,) bool
-        Whether the point is a vertex of the path: an end of a line, or any point of a curve.
-    rapid : (m,) bool
-    pose : (m,) int64
-        Pose that the original move leads to which the point belongs to.
-    way : (m,) float64, mm
-        Length of the original tip path up to there; never falls.
-    tip_off, axis_off : (m,) float64, mm
-        Distance of the tip from the original tip path, and of the axis point from its path; NaN in rapids.
-    angle_off : (m,) float64, degrees
-    feed : (m,) float64, mm/min
-        NaN in rapids, and where the text gives none.
-    curvature : (m,) float64, 1/mm
-    cl_line, nc_line : (m,) int64
-    """
-
-    tip: Floats
-    axis: Floats
-    element: Ints
-    share: Floats
-    end: Bools
-    rapid: Bools
-    pose: Ints
-    way: Floats
+    tip: Floats  #: (m, 3)
+    axis: Floats  #: (m, 3)
+    element: Ints  #: (m,): path element of the text, the first with a single point
+    share: Floats  #: (m,): where on it, 1 at its end
+    end: Bools  #: (m,): whether the point is a vertex of the path: an end of a line, or any point of a curve
+    rapid: Bools  #: (m,)
+    pose: Ints  #: (m,): pose that the original move leads to which the point belongs to
+    way: Floats  #: (m,) mm: length of the original tip path up to there; never falls
+    #: (m,) mm: Distance of the tip from the original tip path, and of the axis point from its path; NaN in rapids.
     tip_off: Floats
     axis_off: Floats
-    angle_off: Floats
-    feed: Floats
-    curvature: Floats
-    cl_line: Ints
-    nc_line: Ints
+    angle_off: Floats  #: (m,) degrees
+    feed: Floats  #: (m,) mm/min: NaN in rapids, and where the text gives none
+    curvature: Floats  #: (m,) 1/mm
+    cl_line: Ints  #: (m,)
+    nc_line: Ints  #: (m,)
 
     def __len__(self) -> int:
         return len(self.element)

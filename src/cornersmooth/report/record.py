@@ -30,26 +30,14 @@ Kind = Literal["smooth", "verify", "filter"]
 
 @dataclass(frozen=True)
 class NcFile:
-    """The NC program that a report is about.
+    """The NC program that a report is about."""
 
-    Parameters
-    ----------
-    name : str or None
-        As the caller named it; None for a stream.
-    form : str or None
-        None where a program does not name it.
-    machine : str or None
-        None without rotary words.
-    tcp : bool
-        Whether the control keeps the tool tip.
-    """
-
-    name: str | None
+    name: str | None  #: As the caller named it; None for a stream.
     sha256: str | None
     control: str
-    form: str | None
-    machine: str | None
-    tcp: bool
+    form: str | None  #: none where a program does not name it
+    machine: str | None  #: none without rotary words
+    tcp: bool  #: whether the control keeps the tool tip
 
     @classmethod
     def of(cls, name: str | None, sha256: str, form: Form) -> NcFile:

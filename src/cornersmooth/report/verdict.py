@@ -50,44 +50,24 @@ def sharp_text(corner: Mapping[str, Any]) -> str:
 
 @dataclass(frozen=True)
 class Saving:
-    """Planned times of a program as it was and as it is written.
+    """Planned times of a program as it was and as it is written."""
 
-    Parameters
-    ----------
-    direct, written : float, s
-    limits : tuple of (str, float)
-        What the written program reaches, and the part of the cutting time, as `feedrate.limiting` gives them.
-    against : str
-        What the program as it was is, where that is not the path of the CL file.
-    """
-
-    direct: float
-    written: float
+    direct: float  #: s
+    written: float  #: s
+    #: what the written program reaches, and the part of the cutting time, as `feedrate.limiting` gives them
     limits: tuple[tuple[str, float], ...] = ()
-    against: str = ""
+    against: str = ""  #: what the program as it was is, where that is not the path of the CL file
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """A verdict and what it rests on.
-
-    Parameters
-    ----------
-    to_check : int
-        Warnings that bear on the metal.
-    left_out : int
-        Holes that an option left out.
-    unverified : str
-        What was not looked at; empty for nothing.
-    what : str
-        One clause: what was found.
-    """
+    """A verdict and what it rests on."""
 
     verdict: Verdict
-    to_check: int
-    left_out: int
-    unverified: str
-    what: str
+    to_check: int  #: warnings that bear on the metal
+    left_out: int  #: holes that an option left out
+    unverified: str  #: what was not looked at; empty for nothing
+    what: str  #: one clause: what was found
 
     @property
     def head(self) -> str:

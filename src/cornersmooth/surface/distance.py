@@ -31,16 +31,10 @@ _SAMPLES = np.linspace(0.0, 1.0, 5)
 
 @dataclass(frozen=True)
 class Cutter:
-    """The cutting part of a tool: nothing above the edge cuts.
-
-    Parameters
-    ----------
-    edge : float, mm
-        Height over the tip at which it ends.
-    """
+    """The cutting part of a tool: nothing above the edge cuts."""
 
     tool: Tool
-    edge: float
+    edge: float  #: mm: height over the tip at which it ends
 
     def distance(self, out: Floats, up: Floats) -> Floats:
         """Signed distance as of the tool, mm; above the edge at least the way down to it."""

@@ -25,28 +25,15 @@ _NO_WAY = 1e-12
 
 @dataclass(frozen=True)
 class EnvelopePoints:
-    """Points on an envelope, k of them.
+    """Points on an envelope, k of them."""
 
-    Parameters
-    ----------
-    point, normal : (k, 3) float64
-        mm; outward unit normal of the tool, so into the material.
-    station : (k,) int64
-        Where along the path, counted from 0.
-    level : (k,) int64
-        Which point of the tool's profile, from the lowest.
-    side : (k,) int8
-        0 left of the motion, seen against the tool axis, 1 right.
-    line : (k,) int64
-        CL line.
-    """
-
+    #: (k, 3): mm; outward unit normal of the tool, so into the material
     point: Floats
     normal: Floats
-    station: Ints
-    level: Ints
-    side: Ints
-    line: Ints
+    station: Ints  #: (k,): where along the path, counted from 0
+    level: Ints  #: (k,): which point of the tool's profile, from the lowest
+    side: Ints  #: 0 left of the motion, seen against the tool axis, 1 right
+    line: Ints  #: (k,): CL line
 
     def __len__(self) -> int:
         return len(self.station)

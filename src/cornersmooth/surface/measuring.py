@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.model import Bools, Floats, Program
-from cornersmooth.nc_reader import NcProgram, read_nc
+from cornersmooth.nc_reader import NcProgram
 from cornersmooth.surface.distance import distance_to_motion
 from cornersmooth.surface.envelope import EnvelopePoints, envelope_points
 from cornersmooth.surface.motion import original_cuts, written_cuts
 from cornersmooth.surface.passes import PassDifference, neighbouring_passes
 from cornersmooth.surface.tool import Tool
-
-if TYPE_CHECKING:
-    from cornersmooth.kinematics.machine import Machine
 
 #: a point deeper than this inside the original volume, mm, is cut away by another part of the path
 BURIED = 1e-3
@@ -31,27 +27,19 @@ SCHEMA = "cornersmooth-surface/1"
 
 @dataclass(frozen=True)
 class SurfaceMap:
-    """Points of the original surface and how far the written motion is off there, k rows.
-
-    Parameters
-    ----------
-    off : (k,) float64, mm
-        Distance to the written volume less that to the original volume: negative where the written motion cuts below
-        the original surface (overcut), positive where it leaves material (undercut); NaN beyond `reach`.
-    edge, tolerance, reach : float, mm
-    buried : int
-        Points of the envelope that another part of the original path cuts away; they are not among the rows.
-    passes : PassDifference or None
-        How differently neighbouring passes are off; None where no pass has a neighbour within the tool.
-    """
+    """Points of the original surface and how far the written motion is off there, k rows."""
 
     points: EnvelopePoints
+    #: (k,) mm: Distance to the written volume less that to the original volume: negative where the written motion
+    #: cuts below the original surface (overcut), positive where it leaves material (undercut); NaN beyond `reach`.
     off: Floats
     tool: Tool
-    edge: float
-    tolerance: float
-    reach: float
+    edge: float  #: mm
+    tolerance: float  #: mm
+    reach: float  #: mm
+    #: points of the envelope that another part of the original path cuts away; they are not among the rows
     buried: int
+    #: How differently neighbouring passes are off; None where no pass has a neighbour within the tool.
     passes: PassDifference | None = None
 
     def __len__(self) -> int:
@@ -114,42 +102,31 @@ class SurfaceMap:
 
 def measure_surface(
     program: Program,
-    nc: NcProgram | bytes | str | os.PathLike[str],
+    nc: NcProgram,
     tool: Tool,
     *,
     tolerance: float,
     edge: float = 10.0,
     levels: int = 7,
     stations: int = 2000,
-    control: str = "fanuc",
-    machine: Machine | None = None,
-    tcp: bool = True,
 ) -> SurfaceMap:
     """Measure what the written motion leaves of the surface that the original one makes.
 
     Parameters
     ----------
-    nc : NcProgram, bytes or path
     tolerance : float, mm
         ε.
     edge : float, mm
         Length of the cutting edge.
     levels, stations
         As in `envelope_points`.
-    control, machine, tcp
-        As in `read_nc`.
 
     Raises
     ------
-    InputError
-        The text cannot be read.
     SettingsError
         CS271: nothing is cut.
     """
-    text = nc
-    if not isinstance(text, NcProgram):
-        text = read_nc(text, control=control, machine=machine, tcp=tcp, tolerance=tolerance, axis_length=edge)
-    original, written = original_cuts(program), written_cuts(text)
+    original, written = original_cuts(program), written_cuts(nc)
     if not len(original):
         raise SettingsError("CS271", "there is no feed move, so no surface", "give a program that cuts")
     points = envelope_points(original, tool, edge, levels=levels, stations=stations)

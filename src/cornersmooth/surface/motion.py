@@ -22,22 +22,13 @@ _CURVE_PARTS = 64
 
 @dataclass(frozen=True)
 class RuledMotion:
-    """Segments of a cutting motion, m rows in order.
+    """Segments of a cutting motion, m rows in order."""
 
-    Parameters
-    ----------
-    tip, axis : (m, 2, 3) float64
-        mm and unit vectors at start and end.
-    line : (m,) int64
-        CL or NC line.
-    joined : (m,) bool
-        Whether the segment goes on where the one before ends.
-    """
-
+    #: (m, 2, 3): mm and unit vectors at start and end
     tip: Floats
     axis: Floats
-    line: Ints
-    joined: Bools
+    line: Ints  #: (m,): CL or NC line
+    joined: Bools  #: (m,): whether the segment goes on where the one before ends
 
     def __len__(self) -> int:
         return len(self.line)
@@ -76,22 +67,14 @@ class RuledMotion:
 
 @dataclass(frozen=True)
 class Parts:
-    """Parts of the segments of a motion, p of them.
-
-    Parameters
-    ----------
-    segment : (p,) int64
-    low, high : (p,) float64
-        Shares of the segment where the part begins and ends.
-    way : (p,) float64, mm
-        How far any point of interest moves at most.
-    """
+    """Parts of the segments of a motion, p of them."""
 
     motion: RuledMotion
-    segment: Ints
+    segment: Ints  #: (p,)
+    #: (p,): shares of the segment where the part begins and ends
     low: Floats
     high: Floats
-    way: Floats
+    way: Floats  #: (p,) mm: how far any point of interest moves at most
 
     def __len__(self) -> int:
         return len(self.segment)

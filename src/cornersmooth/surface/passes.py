@@ -30,29 +30,16 @@ _TOGETHER = 2048
 
 @dataclass(frozen=True)
 class PassDifference:
-    """By how much the written motion is off differently on neighbouring passes.
+    """By how much the written motion is off differently on neighbouring passes."""
 
-    Parameters
-    ----------
-    places : int
-        Places with a neighbour.
-    apart_mm : float, mm
-        Middle distance of neighbours.
-    rms_mm, percentile_95_mm, max_mm : float
-        Of the difference of both deviations, across the surface.
-    cl_line : int
-        CL line of the largest.
-    at_mm : (float, float, float), mm
-        Tip there.
-    """
-
-    places: int
-    apart_mm: float
+    places: int  #: places with a neighbour
+    apart_mm: float  #: mm: middle distance of neighbours
+    #: of the difference of both deviations, across the surface
     rms_mm: float
     percentile_95_mm: float
     max_mm: float
-    cl_line: int
-    at_mm: tuple[float, float, float]
+    cl_line: int  #: CL line of the largest
+    at_mm: tuple[float, float, float]  #: mm: tip there
 
 
 def neighbouring_passes(

@@ -85,22 +85,14 @@ class Cell:
 
 @dataclass(frozen=True)
 class Layout:
-    """Columns of a row.
+    """Columns of a row."""
 
-    Parameters
-    ----------
-    template : (width,) uint8
-        A row with its constant characters; zero bytes where others are written. The width is a multiple of `WORD`.
-    spans : tuple of (int, int)
-        First column of each word with its number, and the one behind it.
-    tail : int
-        First column of what stands behind the numbers; what stands before them begins in column 0.
-    """
-
+    #: (width,): A row with its constant characters; zero bytes where others are written. The width is a multiple of
+    #: `WORD`.
     template: Bytes
     cells: tuple[Cell, ...]
-    spans: tuple[tuple[int, int], ...]
-    tail: int
+    spans: tuple[tuple[int, int], ...]  #: first column of each word with its number, and the one behind it
+    tail: int  #: first column of what stands behind the numbers; what stands before them begins in column 0
 
 
 @lru_cache(maxsize=256)
