@@ -69,7 +69,7 @@ class Arc:
 
 
 def read_arc(record: Record, file: str, rule: ArcRule | None, decimals: int) -> Arc:
-    """Read CIRCLE or MOVARC.
+    """Read CIRCLE or MOVARC (InputError CS106, CS113, CS120, CS124, CS125, CS127).
 
     Parameters
     ----------
@@ -79,11 +79,6 @@ def read_arc(record: Record, file: str, rule: ArcRule | None, decimals: int) -> 
         Sense of rotation that overrides the dialect's; "tangent" is settled when the neighbours are known.
     decimals : int
         Digits after the point that the dialect prints at most.
-
-    Raises
-    ------
-    InputError
-        CS106, CS113, CS120, CS124, CS125, CS127
     """
     values, words = record.values, record.words
     if record.word == "MOVARC" and record.args[:9:4] == _PARTS_OF_MOVARC:  # DMG MORI MfgSuite

@@ -102,13 +102,7 @@ class Builder:
         self._last_single = False
 
     def add(self, tip: Vector, axis: Vector | None, line: int) -> None:
-        """Append one pose.
-
-        Raises
-        ------
-        InputError
-            CS113
-        """
+        """Append one pose (InputError CS113)."""
         check_range(tip, self.file, line)
         self._single_at.append(self.n)
         self._single_tip.append(tip)
@@ -293,13 +287,7 @@ class Builder:
 
 
 def check_range(values: Iterable[float], file: str, line: int) -> None:
-    """Refuse lengths that are not finite or beyond all machines.
-
-    Raises
-    ------
-    InputError
-        CS113
-    """
+    """Refuse lengths that are not finite or beyond all machines (InputError CS113)."""
     for value in values:
         if not abs(value) <= FARTHEST:
             raise error("CS113", file, line, value=value, limit=FARTHEST)

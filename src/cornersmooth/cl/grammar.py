@@ -111,7 +111,7 @@ class _Lines:
 
 
 def read_records(lines: Sequence[bytes], first: int, decode: Decode, file: str, follows: str) -> Iterator[Record]:
-    """Yield the statements of some consecutive lines.
+    """Yield the statements of some consecutive lines (InputError CS104, CS105, CS190).
 
     Parameters
     ----------
@@ -125,11 +125,6 @@ def read_records(lines: Sequence[bytes], first: int, decode: Decode, file: str, 
         For messages.
     follows : str
         What comes after these lines, for the message when the last statement is not complete.
-
-    Raises
-    ------
-    InputError
-        CS104, CS105, CS190
     """
     source = _Lines(lines, first, decode, file, follows)
     while source.at < len(lines):

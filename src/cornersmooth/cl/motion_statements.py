@@ -187,13 +187,7 @@ def _control(state: ReaderState, record: Record) -> None:
 
 
 def finish_curve(state: ReaderState) -> None:
-    """Turn the NURBS record that just ended into lines, within `CURVE_DIGITS`.
-
-    Raises
-    ------
-    InputError
-        CS113, CS128
-    """
+    """Turn the NURBS record that just ended into lines, within `CURVE_DIGITS` (InputError CS113, CS128)."""
     curve, state.curve = state.curve, None
     assert curve is not None
     why = curve.complaint

@@ -75,14 +75,9 @@ class ReaderState:
         self.statements.append(Statement(self.builder.n, record.line, word, record.args, record.text))
 
     def numbers(self, record: Record, args: tuple[Argument, ...] | None = None, line: int = 0) -> list[float]:
-        """Return arguments (of the statement, or of a line after it) that must all be numbers.
+        """Return arguments (of the statement, or of a line after it) that must all be numbers (InputError CS106).
 
         They are separated by commas, or all by blanks.
-
-        Raises
-        ------
-        InputError
-            CS106
         """
         given = record.args if args is None else args
         if len(given) == 1 and isinstance(given[0], str) and len(parts := given[0].split()) > 1:
@@ -96,13 +91,7 @@ class ReaderState:
         return [float(value) for value in given]
 
     def vector(self, record: Record) -> Vector:
-        """Return the three numbers of a statement that has a vector.
-
-        Raises
-        ------
-        InputError
-            CS106, CS110
-        """
+        """Return the three numbers of a statement that has a vector (InputError CS106, CS110)."""
         values = self.numbers(record)
         if len(values) != 3:
             raise self.count(record, len(values), "i,j,k", record.line)

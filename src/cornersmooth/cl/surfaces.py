@@ -39,7 +39,7 @@ Direction = tuple[str, Vector] | None
 
 
 def read_drive_arc(record: Record, start: Vector, direction: Direction, file: str) -> tuple[Arc, Vector]:
-    """Read TLON,GOFWD on a circle or cylinder; return the arc and its end point.
+    """Read TLON,GOFWD on a circle or cylinder; return the arc and its end point (InputError CS123, CS125, CS126).
 
     Parameters
     ----------
@@ -49,11 +49,6 @@ def read_drive_arc(record: Record, start: Vector, direction: Direction, file: st
         INDIRV or INDIRP before it.
     file : str
         For messages.
-
-    Raises
-    ------
-    InputError
-        CS123, CS125, CS126
     """
     text = "".join(record.text.split())
     surface, _, check = text.partition(",ON,")

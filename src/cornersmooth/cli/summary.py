@@ -119,13 +119,7 @@ def _warnings(findings: Iterable[Mapping[str, Any]]) -> dict[str, tuple[int, str
 
 
 def check_summary(path: str) -> None:
-    """Refuse a name that does not say the form.
-
-    Raises
-    ------
-    SettingsError
-        CS221
-    """
+    """Refuse a name that does not say the form (SettingsError CS221)."""
     if suffix_of(path) not in (".json", ".csv"):
         raise SettingsError("CS221", f"cannot tell the form of the summary {path}", "let it end in .json or .csv")
 

@@ -153,13 +153,7 @@ class Tool:
 
 
 def parse_tool(text: str) -> Tool:
-    """Tool of ``D[,r[,taper[,length]]]`` in mm and degrees.
-
-    Raises
-    ------
-    SettingsError
-        CS270
-    """
+    """Tool of ``D[,r[,taper[,length]]]`` in mm and degrees (SettingsError CS270)."""
     try:
         numbers = [float(part) for part in text.split(",")]
     except ValueError:
