@@ -73,8 +73,6 @@ def read_arc(record: Record, file: str, rule: ArcRule | None, decimals: int) -> 
 
     Parameters
     ----------
-    file : str
-        For messages.
     rule : {"left", "right", "tangent"} or None
         Sense of rotation that overrides the dialect's; "tangent" is settled when the neighbours are known.
     decimals : int
@@ -166,8 +164,6 @@ def resolve(table: ArcTable, tip: Floats, kind: NDArray[np.uint8], file: str, ru
         Tips as written, in the unit of the arcs.
     kind : (n,) uint8
         `Move` of every pose.
-    file : str
-        For messages.
     rule : {"left", "right", "tangent"} or None
 
     Raises

@@ -36,8 +36,6 @@ def without_card_columns(data: bytes, file: str) -> tuple[bytes, str | None]:
     ----------
     data : bytes
         Lines that end with LF.
-    file : str
-        For messages.
 
     Raises
     ------

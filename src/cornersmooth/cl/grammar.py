@@ -119,10 +119,6 @@ def read_records(lines: Sequence[bytes], first: int, decode: Decode, file: str, 
         Without line ends.
     first : int
         Number of the first of them.
-    decode : callable
-        bytes to str.
-    file : str
-        For messages.
     follows : str
         What comes after these lines, for the message when the last statement is not complete.
     """

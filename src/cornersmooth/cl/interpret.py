@@ -44,13 +44,7 @@ _STRANGE_PREFIXES: Final = ("TLON,", "TLLFT,", "TLRGT,", "TLOFF,")
 
 
 def plain(state: ReaderState, count: int, line: int) -> None:
-    """Carry out some plain GOTO statements, whose poses the builder already has.
-
-    Parameters
-    ----------
-    line : int
-        Line of the first, for messages.
-    """
+    """Carry out some plain GOTO statements, whose poses the builder already has."""
     if state.finished:
         raise state.fail("CS118", line, word="GOTO")
     if state.curve is not None:

@@ -85,8 +85,6 @@ def numbers(text: PointText, columns: Columns, file: str) -> tuple[Floats, Ints]
     columns : Columns
         Says which columns must hold a number, and which may (the feed); whatever stands in the others becomes NaN
         where it is no number.
-    file : str
-        For messages.
 
     Returns
     -------

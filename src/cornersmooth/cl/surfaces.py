@@ -47,8 +47,6 @@ def read_drive_arc(record: Record, start: Vector, direction: Direction, file: st
         Where the tool stands; the unit of the file.
     direction : (word, vector) or None
         INDIRV or INDIRP before it.
-    file : str
-        For messages.
     """
     text = "".join(record.text.split())
     surface, _, check = text.partition(",ON,")

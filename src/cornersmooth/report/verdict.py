@@ -144,13 +144,7 @@ def trusted_blocks(found: Verification) -> Iterator[Finding]:
 
 
 def first_line(contents: Mapping[str, Any], saving: Saving | None = None) -> str:
-    """Say in one line how it went: the verdict, the sharp corners, the time saved.
-
-    Parameters
-    ----------
-    contents : mapping
-        The report.
-    """
+    """Say in one line how it went: the verdict, the sharp corners, the time saved."""
     parts = [contents["verdict_text"], sharp_line(contents)]
     if saving is not None:
         parts.append(saving_text(saving))
@@ -177,13 +171,7 @@ def time_text(saving: Saving, limits: str | None) -> str:
 
 
 def method_text(summary: Mapping[str, Any]) -> str:
-    """Say which method made the curves, for how many runs, and what was done in another way, and why.
-
-    Parameters
-    ----------
-    summary : mapping
-        Of the report.
-    """
+    """Say which method made the curves, for how many runs, and what was done in another way, and why."""
     text = summary["method"]
     if runs := summary.get("runs"):
         text += f", {runs:,} {'run' if runs == 1 else 'runs'} with {summary['corners_in_runs']:,} corners"

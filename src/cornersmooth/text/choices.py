@@ -24,8 +24,6 @@ class Choices:
     ----------
     ids : (m,) or () int
         Which text each row has.
-    count : int
-        m.
     align_right : bool
         Fill up on the left rather than on the right: zero bytes that are together are dropped together.
     """
