@@ -85,7 +85,7 @@ def test_reports_and_refusals(files, tmp_path, capsys):
     assert contents["max_tip_deviation_mm"] == pytest.approx(0.05 / np.sqrt(2))
     assert contents["where"]["max_tip_deviation_mm"] == {"cl_line": 6, "nc_line": 11}
     table = list(csv.DictReader(rows.read_text().splitlines()))
-    assert tuple(table[0]) == CSV_COLUMNS
+    assert tuple(table[0]) == tuple(CSV_COLUMNS)
     assert [float(row["tip_deviation_mm"]) for row in table] == pytest.approx([0, 0.0353553, 0], abs=1e-6)
     assert run(["verify", source, text, "--report", str(found)]) == 4
     assert run(["verify", source, text, "--report", str(tmp_path / "found.txt")]) == 2

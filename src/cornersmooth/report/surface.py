@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from io import BytesIO
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.optional_packages import install_hint
+from cornersmooth.report.csv_text import csv_text
 from cornersmooth.report.thinning import thinned
 from cornersmooth.surface import PassDifference, SurfaceMap
 
-CSV_COLUMNS = ("cl_line", "station", "level", "side", "x", "y", "z", "nx", "ny", "nz", "off_mm")
-
-#: rows of CSV text made at a time
-_BLOCK = 10_000
+#: columns of the table, and how they are written; lengths are mm
+_COLUMNS = {
+    **dict.fromkeys(("cl_line", "station", "level"), "%d"),
+    "side": "%s",
+    **dict.fromkeys(("x", "y", "z"), "%.6f"),
+    **dict.fromkeys(("nx", "ny", "nz"), "%.7f"),
+    "off_mm": "%s",
+}
 
 #: width of the longest bar of the histogram on a terminal, and its classes
 _BAR, _CLASSES = 40, 20
@@ -29,24 +35,16 @@ _POINTS = 30_000
 
 
 def surface_csv(surface: SurfaceMap) -> Iterator[str]:
-    """Header, then a row for every point, in blocks of text. Lengths are mm; overcut is negative, unknown is empty."""
-    yield ",".join(CSV_COLUMNS) + "\n"
+    """Header, then a row for every point, in blocks of text; overcut is negative, unknown is empty."""
     points = surface.points
-    for begin in range(0, len(surface), _BLOCK):
-        part = slice(begin, begin + _BLOCK)
-        columns = (
-            *(points.line[part].tolist(), points.station[part].tolist(), points.level[part].tolist()),
-            np.where(points.side[part] == 0, "left", "right").tolist(),
-            *points.point[part].T.tolist(),
-            *points.normal[part].T.tolist(),
-            surface.off[part].tolist(),
-        )
-        yield "".join(
-            f"{line},{station},{level},{side},{x:.6f},{y:.6f},{z:.6f},{i:.7f},{j:.7f},{k:.7f},"
-            + ("" if off != off else f"{off:.7f}")
-            + "\n"
-            for line, station, level, side, x, y, z, i, j, k, off in zip(*columns, strict=True)
-        )
+
+    def columns(part: slice) -> Iterable[NDArray[Any]]:
+        off = np.array(["" if value != value else f"{value:.7f}" for value in surface.off[part].tolist()])
+        side = np.where(points.side[part] == 0, "left", "right")
+        yield from (points.line[part], points.station[part], points.level[part], side)
+        yield from (*points.point[part].T, *points.normal[part].T, off)
+
+    return csv_text(_COLUMNS, len(surface), columns)
 
 
 def surface_lines(surface: SurfaceMap) -> Iterator[str]:

@@ -2,35 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from typing import Any
 
-import numpy as np
+from numpy.typing import NDArray
 
 from cornersmooth.feedrate.timelaw import TimeLaw
 from cornersmooth.kinematics.dynamics import LINEAR
-
-#: columns: way, speed, acceleration and jerk are in rad where the tip stands still and only the axis turns
-COLUMNS = (
-    "t_s",
-    "s_mm",
-    "v_mm_per_s",
-    "a_mm_per_s2",
-    "j_mm_per_s3",
-    "centripetal_mm_per_s2",
-    "x_mm",
-    "y_mm",
-    "z_mm",
-    "i",
-    "j",
-    "k",
-    "turning",
-    "line",
-)
-
-_BLOCK = 16384
+from cornersmooth.report.csv_text import csv_text
 
 #: digits that third differences over a period of 1 ms still need
 _NUMBER = "%.14g"
+
+#: columns: way, speed, acceleration and jerk are in rad where the tip stands still and only the axis turns
+COLUMNS = {
+    **dict.fromkeys("t_s s_mm v_mm_per_s a_mm_per_s2 j_mm_per_s3 centripetal_mm_per_s2".split(), _NUMBER),
+    **dict.fromkeys("x_mm y_mm z_mm i j k".split(), _NUMBER),
+    **dict.fromkeys(("turning", "line"), "%d"),
+}
 
 
 def timelaw_csv(law: TimeLaw) -> Iterator[str]:
@@ -39,25 +28,17 @@ def timelaw_csv(law: TimeLaw) -> Iterator[str]:
     For a law that was planned for a machine the positions of its axes follow: linear ones as without tool centre point
     control (`cornersmooth.kinematics.machine_position`), rotary ones unwrapped.
     """
-    yield ",".join((*COLUMNS, *axis_columns(law))) + "\n"
-    form = ",".join([_NUMBER] * 12 + ["%d", "%d"] + [_NUMBER] * len(axis_columns(law))) + "\n"
+    names = () if law.machine_axes is None else law.machine_axes.names
+    own = {f"machine_{name.lower()}_{'mm' if name in LINEAR else 'deg'}": _NUMBER for name in names}
     times = law.every_period()
-    for begin in range(0, len(times), _BLOCK):
-        block = times[begin : begin + _BLOCK]
-        states = law.at(block)
-        axes = np.zeros((len(block), 0)) if law.machine_axes is None else law.axes_at(block)[0]
+
+    def columns(part: slice) -> Iterable[NDArray[Any]]:
+        now = law.at(times[part])
         # adding 0.0 turns -0.0 into 0.0
-        numbers = np.column_stack(
-            (states.t, states.s, states.v, states.a, states.j, states.centripetal, states.tip, states.axis)
-        )
-        rows = zip(
-            (numbers + 0.0).tolist(), states.turning.tolist(), states.line.tolist(), (axes + 0.0).tolist(), strict=True
-        )
-        yield "".join(form % (*row, turning, line, *places) for row, turning, line, places in rows)
+        for one in (now.t, now.s, now.v, now.a, now.j, now.centripetal, *now.tip.T, *now.axis.T):
+            yield one + 0.0
+        yield from (now.turning, now.line)
+        if own:
+            yield from (law.axes_at(times[part])[0] + 0.0).T
 
-
-def axis_columns(law: TimeLaw) -> tuple[str, ...]:
-    """Columns of the machine's axes."""
-    if law.machine_axes is None:
-        return ()
-    return tuple(f"machine_{name.lower()}_{'mm' if name in LINEAR else 'deg'}" for name in law.machine_axes.names)
+    return csv_text(COLUMNS | own, len(times), columns)

@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cornersmooth.model import Floats, Program
+from cornersmooth.report.csv_text import csv_text
 from cornersmooth.report.deviation_profile import Distribution
 from cornersmooth.verify import Verification
 
-CSV_COLUMNS = (
-    "pose",
-    "cl_line",
-    "nc_line",
-    "x",
-    "y",
-    "z",
-    "tip_deviation_mm",
-    "axis_point_deviation_mm",
-    "orientation_deviation_deg",
-)
+#: columns of the table, and how they are written; lengths are mm
+CSV_COLUMNS = {
+    **dict.fromkeys(("pose", "cl_line", "nc_line"), "%d"),
+    **dict.fromkeys(("x", "y", "z"), "%.6f"),
+    **dict.fromkeys(("tip_deviation_mm", "axis_point_deviation_mm", "orientation_deviation_deg"), "%.7f"),
+}
 
 #: classes of the histogram as parts of the tolerance, and the width of its longest bar
 _CLASSES, _BAR = 10, 40
@@ -28,29 +26,17 @@ _CLASSES, _BAR = 10, 40
 #: rows of the table along the path
 _ROWS = 20
 
-#: rows of CSV text made at a time
-_BLOCK = 10_000
-
 
 def verification_csv(program: Program, found: Verification) -> Iterator[str]:
-    """Header, then a row for every pose that is passed at feed, in blocks of text. Lengths are mm."""
-    yield ",".join(CSV_COLUMNS) + "\n"
+    """Header, then a row for every pose that is passed at feed, in blocks of text."""
     poses = np.flatnonzero(np.isfinite(found.pose_tip))
-    for begin in range(0, len(poses), _BLOCK):
-        rows = poses[begin : begin + _BLOCK]
-        columns = (
-            rows.tolist(),
-            program.line[rows].tolist(),
-            found.pose_nc_line[rows].tolist(),
-            *program.tip[rows].T.tolist(),
-            found.pose_tip[rows].tolist(),
-            found.pose_axis_point[rows].tolist(),
-            found.pose_angle[rows].tolist(),
-        )
-        yield "".join(
-            f"{pose},{cl},{nc},{x:.6f},{y:.6f},{z:.6f},{tip:.7f},{axis:.7f},{angle:.7f}\n"
-            for pose, cl, nc, x, y, z, tip, axis, angle in zip(*columns, strict=True)
-        )
+
+    def columns(part: slice) -> Iterable[NDArray[Any]]:
+        rows = poses[part]
+        yield from (rows, program.line[rows], found.pose_nc_line[rows], *program.tip[rows].T)
+        yield from (found.pose_tip[rows], found.pose_axis_point[rows], found.pose_angle[rows])
+
+    return csv_text(CSV_COLUMNS, len(poses), columns)
 
 
 def histogram_lines(found: Verification) -> list[str]:
