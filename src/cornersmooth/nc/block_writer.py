@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from cornersmooth.errors import InputError
 from cornersmooth.kinematics import machine_position, tool_axis
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program
-from cornersmooth.nc.along_tool import lifted
 from cornersmooth.nc.circles import FIRST_PLANE, Circles
 from cornersmooth.nc.control import INVERSE_TIME
 from cornersmooth.nc.curve_blocks import Curves, RowWriter
@@ -181,8 +180,27 @@ class BlockWriter:
         return tip
 
     def lifted(self, ticks: Ints, distance: float) -> Ints:
-        """Row of ticks so many mm back along the tool axis."""
-        return lifted(self.form, self.program.units, self.program.mm_per_unit, ticks, distance)
+        """Row of ticks so many mm back along the tool axis; a point on the axis moves as the tip does."""
+        step = distance / self.program.mm_per_unit * self._back(ticks)
+        shift = np.round(step * 10.0 ** self._format.decimals[0]).astype(np.int64)
+        row = ticks.copy()
+        row[:3] += shift
+        if self.form.orientation == "point":
+            row[3:] += shift
+        return row
+
+    def _back(self, ticks: Ints) -> Floats:
+        """(3,) way of X Y Z for a step of one along the tool axis."""
+        machine = self.form.machine
+        if self.plane is not None:
+            return np.array([0.0, 0.0, 1.0])
+        if self.form.orientation == "point":
+            return unit((ticks[3:] - ticks[:3]).astype(np.float64))
+        if self.form.orientation == "machine" and machine is not None:
+            angles = self.angles(ticks[None])
+            ends = [machine_position(machine, tip, angles)[0] for tip in (tool_axis(machine, angles), np.zeros((1, 3)))]
+            return unit(ends[0] - ends[1])
+        return self.tool_axis(ticks)
 
     def rapid(self, ticks: Ints, words: str = "") -> str:
         """Rapid block of a row of ticks, after words of other kinds."""
@@ -246,11 +264,9 @@ class BlockWriter:
         ticks: Ints = to_ticks(self._numbers(tip, other), self._format.decimals)
         return ticks
 
-    def bezier(
-        self, tip: Floats, other: Floats, curve: NDArray[np.int8], spline: Floats | None = None
-    ) -> Floats | None:
+    def bezier(self, tip: Floats, other: Floats, curve: NDArray[np.int8], spline: Floats | None) -> Floats | None:
         """`Run.bezier` where the form writes polynomials."""
-        if self._curves.format is None or not (curve > 0).any():
+        if self._curves.format is None or spline is None or not (curve > 0).any():
             return None
         return bezier_points(self._numbers(tip, other), curve, spline)
 

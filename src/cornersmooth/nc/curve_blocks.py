@@ -53,8 +53,7 @@ class Curves:
 class KnotBlocks(Curves):
     """FANUC's G06.2: a knot before and a weight after every control point, the last four knots in blocks of their own.
 
-    The first control point is the current position (B-63324EN/03 4.17). Curves without `Run.spline` have the knots
-    {0, 0, 0, 0, 1/2, 1, 1, 1, 1}.
+    The first control point is the current position (B-63324EN/03 4.17).
     """
 
     def __init__(self, weight_decimals: int, blank: bytes = b" ") -> None:
@@ -62,28 +61,17 @@ class KnotBlocks(Curves):
 
     def add_prefixes(self, run: Run, table: list[bytes], chosen: Ints) -> int:
         """Knots."""
-        curve = run.curve[run.curve > 0]
-        knots, which, ends = np.array([0.0, 0.5]), (curve == 5).astype(np.int64), curve == 5
-        if run.spline is not None:
-            knots, which = np.unique(run.spline[run.curve > 0, 0], return_inverse=True)
-            ends = run.spline[:, 2] > 0.0
+        assert run.spline is not None
+        curved = run.curve > 0
+        knots, which = np.unique(run.spline[curved, 0], return_inverse=True)
         words = [self._word(b"K", knot) + self._blank for knot in knots.tolist()]
-        chosen[run.curve > 0] = len(table) + which.reshape(-1) + np.where(curve == 1, len(words), 0)
+        chosen[curved] = len(table) + which + np.where(run.curve[curved] == 1, len(words), 0)
         table += [*words, *(b"G6.2" + self._blank + b"P4" + self._blank + word for word in words)]
-        return 4 * int(np.count_nonzero(ends))
+        return 4 * int(np.count_nonzero(run.spline[:, 2]))
 
     def add_suffixes(self, run: Run, table: list[bytes], chosen: Ints) -> None:
         """Weights, and the last knots."""
-        curved = run.curve > 0
-        if run.spline is None:
-            weights, which = _weights(run, curved)
-            pairs = [(weight, last) for last in (0.0, 1.0) for weight in weights]
-            which += np.where(run.curve[curved] == 5, len(weights), 0)
-        else:
-            found, which = np.unique(run.spline[curved, 1:], axis=0, return_inverse=True)
-            pairs = [(weight, last) for weight, last in found.tolist()]
-        chosen[curved] = len(table) + which.reshape(-1)
-        for weight, last in pairs:
+        for weight, last in _pairs(run, 1, table, chosen):
             end = self._blank + self._word(b"R", weight) + b"\n"
             table.append(end + 4 * (self._word(b"K", last) + b"\n") if last > 0.0 else end)
 
@@ -94,18 +82,16 @@ class KnotBlocks(Curves):
 class SplineBlocks(Curves):
     """Siemens' BSPLINE: the first control point is where the block before ended; knot intervals PL and weights PW.
 
-    With the clamped knots u the block of control point j has PL = u[j+2] − u[j+1]: 0, 1/2, 1/2, 0. Curves that follow
-    one another are one spline with triple knots between them, with the same intervals.
+    With the clamped knots u the block of control point j has PL = u[j+2] − u[j+1]: 0, 1/2, 1/2, 0 for five points.
+    Curves that follow one another are one spline with triple knots between them, with the same intervals.
     """
-
-    _intervals = (b"0", b"0.5", b"0.5", b"0")
 
     def __init__(self, weight_decimals: int) -> None:
         self._decimals = weight_decimals
         self._open = False  # the last block was on a spline
 
     def prepare(self, run: Run) -> Run:
-        """Leave out the first control points; for curves with knots of their own, find the intervals of the others."""
+        """Leave out the first control points; find the knot intervals of the others."""
         if run.spline is not None:
             run = replace(run, spline=_intervals(run.spline, run.curve))
         self._open &= bool((run.curve > 0).any())  # a run of lines alone gets no prefixes of ours
@@ -123,18 +109,8 @@ class SplineBlocks(Curves):
 
     def add_suffixes(self, run: Run, table: list[bytes], chosen: Ints) -> None:
         """Knot intervals and weights."""
-        curved = run.curve > 0
-        if run.spline is not None:
-            pairs, which = np.unique(run.spline[curved, :2], axis=0, return_inverse=True)
-            chosen[curved] = len(table) + which.reshape(-1)
-            for interval, weight in pairs.tolist():
-                table.append(f" PL={self._number(interval)} PW={self._number(weight)}\n".encode())
-            return
-        values, which = _weights(run, curved)
-        base = len(table)
-        for interval in self._intervals:
-            table += [b" PL=" + interval + b" PW=" + self._number(value).encode() + b"\n" for value in values]
-        chosen[curved] = base + (run.curve[curved] - 2) * len(values) + which
+        for interval, weight in _pairs(run, 0, table, chosen):
+            table.append(f" PL={self._number(interval)} PW={self._number(weight)}\n".encode())
 
     def _number(self, value: float) -> str:
         return format_number(value, self._decimals, trim=True).rstrip(".")
@@ -157,10 +133,11 @@ def _intervals(spline: Floats, curve: NDArray[np.int8]) -> Floats:
     return found
 
 
-def _weights(run: Run, curved: Bools) -> tuple[list[float], Ints]:
-    """Distinct weights of the rows on curves, and which of them each has."""
-    assert run.weights is not None
-    column = np.array([0, -1, 0, 1, 0, -1])[run.curve[curved]]
-    number = np.where(column < 0, 1.0, run.weights[curved][np.arange(len(column)), np.maximum(column, 0)])
-    values, which = np.unique(number, return_inverse=True)
-    return values.tolist(), which.reshape(-1)
+def _pairs(run: Run, column: int, table: list[bytes], chosen: Ints) -> list[tuple[float, float]]:
+    """Distinct pairs in two columns of `Run.spline`; rows on curves choose the entries that the table will have."""
+    assert run.spline is not None
+    curved = run.curve > 0
+    numbers = run.spline[curved]
+    pairs, which = np.unique(numbers[:, column] + 1j * numbers[:, column + 1], return_inverse=True)
+    chosen[curved] = len(table) + which
+    return [(pair.real, pair.imag) for pair in pairs.tolist()]

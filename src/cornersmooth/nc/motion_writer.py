@@ -219,7 +219,6 @@ class MotionWriter:
             feed=feed,
             mode=mode,
             curve=rows.curve,
-            weights=rows.weights,
             arc=arc,
             bezier=writer.bezier(rows.tip, rows.other, rows.curve, rows.spline),
             spline=rows.spline,

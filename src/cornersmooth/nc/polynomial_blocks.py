@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -173,7 +172,7 @@ class _SplFormat:
         return f"{mantissa}E{exponent[0]}{int(exponent[1:]):03d}"
 
 
-def bezier_points(points: Floats, curve: NDArray[np.int8], spline: Floats | None = None) -> Floats:
+def bezier_points(points: Floats, curve: NDArray[np.int8], spline: Floats) -> Floats:
     """Bézier points of the knot intervals of curves, in the last rows of each; zero elsewhere.
 
     Parameters
@@ -181,8 +180,8 @@ def bezier_points(points: Floats, curve: NDArray[np.int8], spline: Floats | None
     points : (r, c) float64
         Control points; p rows for a curve of p − 3 knot intervals, all weights 1.
     curve : (r,) int8
-    spline : (r, 3) float64, optional
-        As in `Rows`; without it the intervals of a curve are equal.
+    spline : (r, 3) float64
+        As in `Rows`.
 
     Returns
     -------
@@ -192,19 +191,12 @@ def bezier_points(points: Floats, curve: NDArray[np.int8], spline: Floats | None
     first = np.flatnonzero(curve == 1)
     ends = np.append(np.flatnonzero((curve[1:] <= 1) & (curve[:-1] > 0)) + 1, len(curve) if curve[-1] > 0 else [])
     counts = (ends - first).astype(np.int64)
-    if spline is not None:
-        rows = ranges(first, counts)
-        own = _splines(curve[rows], spline[rows], counts)
-        low = own.knot[own.span_knot]
-        matrix = own.bernstein(np.arange(len(low)), low, low + own.width)
-        taps = rows[own.span_control[:, None] + np.arange(4)]
-        intervals[taps[:, -1]] = matrix @ points[taps]
-        return intervals
-    for count in np.unique(counts).tolist():
-        begin = first[counts == count]
-        own = points[begin[:, None] + np.arange(count)]
-        bezier = (_bezier_matrix(count) @ own).reshape(len(begin), count - _DEGREE, 4, -1)
-        intervals[begin[:, None] + np.arange(_DEGREE, count)] = bezier
+    rows = ranges(first, counts)
+    own = _splines(curve[rows], spline[rows], counts)
+    low = own.knot[own.span_knot]
+    matrix = own.bernstein(np.arange(len(low)), low, low + own.width)
+    taps = rows[own.span_control[:, None] + np.arange(4)]
+    intervals[taps[:, -1]] = matrix @ points[taps]
     return intervals
 
 
@@ -214,11 +206,3 @@ def _splines(curve: NDArray[np.int8], spline: Floats, counts: Ints) -> Splines:
     chosen = (curve == 1) | (curve > _DEGREE + 1)
     knots = np.insert(knot[chosen], np.cumsum(chosen)[last], spline[last, 2])
     return Splines(knots, counts - 2)
-
-
-@cache
-def _bezier_matrix(points: int) -> Floats:
-    """Matrix from control points to the Bézier points of all knot intervals, four rows each."""
-    span = np.arange(points - _DEGREE)
-    equal = Splines(np.arange(len(span) + 1.0), np.array([len(span) + 1]))
-    return equal.bezier(np.eye(points), span, equal.knot[:-1], equal.knot[1:]).reshape(-1, points)

@@ -28,7 +28,6 @@ class Run:
         `FeedMode` or `INVERSE_TIME`.
     curve : (r,) int8
         As in `Rows`.
-    weights : (r, 2) float64 or None
     arc : (r,) int64 or None
     dwell : (r,) bool or None
         Where the tool waits after the block.
@@ -47,7 +46,6 @@ class Run:
     feed: Floats
     mode: Ints
     curve: NDArray[np.int8]
-    weights: Floats | None = None
     arc: Ints | None = None
     dwell: Bools | None = None
     bezier: Floats | None = None

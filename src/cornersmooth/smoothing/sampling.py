@@ -40,16 +40,14 @@ class Rows:
         0 for the end of a line; 1 to 5 for a control point of a transition, from 1 on for one of a section of a run.
     joined : (r,) bool
         First control points that are the end of the row before, with no line between.
-    weights : (r, 2) float64 or None
-        w1 and w2 of the transition the row belongs to, in curve rows.
     arc : (r,) int64 or None
         Row of `Program.arcs` where the tool gets here on a circle or helix about that arc's axis, -1 where it gets here
         straight; None where the program has no such rows.
     rate : (r,) float64 or None
         Moves per minute (inverse time) of rows that are timed so, NaN for the others; None where none is.
     spline : (r, 3) float64 or None
-        Of control points where not all curves are five-point curves: knot, weight and, in the last row of a curve, the
-        last knot.
+        Of control points: knot, weight and, in the last row of a curve, the last knot, zero elsewhere. None in rows of
+        lines.
     blend : (r,) float64 or None, mm
         How far the control may round the corner at each row by itself; None where one value holds for all.
     left : (r,) bool or None
@@ -61,7 +59,6 @@ class Rows:
     move: Ints
     curve: NDArray[np.int8]
     joined: Bools
-    weights: Floats | None = None
     arc: Ints | None = None
     rate: Floats | None = None
     spline: Floats | None = None
@@ -130,17 +127,12 @@ class _RunRows:
         batch.tip[at], batch.other[at] = self.tip[own], self.other[own]
         return at, own
 
-    def fill_curves(self, batch: _Batch, curve: NDArray[np.int8], joined: Bools) -> Floats | None:
-        """Put the control points into their rows; returns `Rows.spline` of all curves."""
-        if self.sections is None:
-            return None
-        at, own = self.fill(batch)
-        spline = np.ones((len(curve), 3))
-        spline[:, 0] = np.where(curve == len(KNOTS), KNOTS[-1], 0.0)
-        spline[:, 2] = curve == len(KNOTS)
-        curve[at], joined[at] = self.sections.number[own], self.sections.number[own] == 1
-        spline[at, 0], spline[at, 2] = self.sections.knot[own], self.sections.last_knot[own]
-        return spline
+    def fill_curves(self, batch: _Batch, curve: NDArray[np.int8], joined: Bools, spline: Floats) -> None:
+        """Put the control points into their rows."""
+        if self.sections is not None:
+            at, own = self.fill(batch)
+            curve[at], joined[at] = self.sections.number[own], self.sections.number[own] == 1
+            spline[at, 0], spline[at, 2] = self.sections.knot[own], self.sections.last_knot[own]
 
 
 #: knots that go with the control points of a transition; the last four are 1
@@ -198,19 +190,20 @@ def curve_rows(smoothed: SmoothProgram, *, divide: bool = False, poses: int = 16
         _fill_arcs(smoothed, batch, arc_counts, height=height)
 
         curve, joined = _no_curves(len(batch.tip))
-        weights = np.ones((len(batch.tip), 2))
+        spline = np.tile((0.0, 1.0, 0.0), (len(batch.tip), 1))
         pose, first = batch.poses[row >= 0], batch.last[row >= 0] - 5
         if len(pose):
             tip_curve, axis_curve = nurbs.control_points(program, corners, segments.row[pose], height)
             at = first[:, None] + np.arange(5)
             batch.tip[at], batch.other[at] = tip_curve, axis_curve
             curve[at] = np.arange(1, 6)
-            weights[at] = corners.weights[segments.row[pose]][:, None, :]
+            spline[at, 0], spline[at[:, -1], 2] = KNOTS, 1.0
+            spline[at, 1] = nurbs.full_weights(corners.weights[segments.row[pose]])
             line = segments.has_line[pose]
             joined[first] = ~line
             batch.tip[first[line] - 1], batch.other[first[line] - 1] = tip_curve[line, 0], axis_curve[line, 0]
-        spline = sections.fill_curves(batch, curve, joined)
-        yield Rows(batch.tip, batch.other, batch.move, curve, joined, weights, spline=spline)
+        sections.fill_curves(batch, curve, joined, spline)
+        yield Rows(batch.tip, batch.other, batch.move, curve, joined, spline=spline)
 
 
 def _no_curves(count: int) -> tuple[NDArray[np.int8], Bools]:
