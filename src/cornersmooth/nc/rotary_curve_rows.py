@@ -16,6 +16,9 @@ from cornersmooth.nc.rotary_words import machine_of, note_inserted
 from cornersmooth.nc.tools import ToolTravel
 from cornersmooth.rotary import rapid_moves
 from cornersmooth.rotary.angle_curves import CurveGroup, RotaryCurves, angle_allowance, rotary_curves
+from cornersmooth.rotary.corner_lines import CornerLines
+from cornersmooth.rotary.subdivision import Insertions
+from cornersmooth.slices import some_rows
 from cornersmooth.smoothing.sampling import Rows
 from cornersmooth.smoothing.segments import Segments, segments_of
 
@@ -56,7 +59,7 @@ def rotary_curve_rows(smoothed: SmoothProgram, form: Form, findings: Findings) -
     angles, rapid = found.pose_angles, rapid_moves(program.kind)
     shift = from_zero(form, program, program.axis, angles, np.arange(len(program)), rapid)
     travel = ToolTravel(program, machine)
-    for chunk in _Table(smoothed, found).chunks():
+    for chunk in _rows(smoothed, found):
         chunk.other[:] += shift[chunk.move]
         travel.check(chunk.tip, chunk.other, chunk.move)
         yield chunk
@@ -69,124 +72,100 @@ def warn_of_curves(form: Form, findings: Findings) -> None:
     findings.add("CS370", "warning", 0, text)
 
 
-class _Table:
-    """Where all rows stand, pose by pose: inserted points, the end of the straight motion, the curve."""
-
-    def __init__(self, smoothed: SmoothProgram, found: RotaryCurves) -> None:
-        program, corners = smoothed.program, smoothed.corners
-        self.smoothed, self.found = smoothed, found
-        self.segments: Segments = segments_of(smoothed, dense=False)
-        n = len(program)
-        more = found.inserted
-        self.order = np.lexsort((more.fraction, more.segment))
-        self.inserted = np.bincount(more.segment, minlength=n)[:n]
-        self.straight = np.where(self.segments.has_line & ~self.segments.skip, 1, 0)
-        self.arc_lines = arc_lines(program, smoothed.settings) if len(program.arcs) else np.zeros(0, np.int64)
-        self.straight[program.arcs.pose] = self.arc_lines
-        curve = np.zeros(n, np.int64)
-        curve[corners.pose] = found.points + np.maximum(np.bincount(found.lines.row, minlength=len(corners)) - 1, 0)
-        self.counts = self.inserted + self.straight + curve
-
-    def chunks(self) -> Iterator[Rows]:
-        """Rows of some poses at a time."""
-        for begin in range(0, len(self.counts), _CHUNK):
-            yield _Chunk(self, begin, min(begin + _CHUNK, len(self.counts))).rows
+def _rows(smoothed: SmoothProgram, found: RotaryCurves) -> Iterator[Rows]:
+    """Rows of some poses at a time: for each inserted points, the end of the straight motion, the curve."""
+    arcs = arc_lines(smoothed.program, smoothed.settings) if len(smoothed.program.arcs) else np.zeros(0, np.int64)
+    segments = segments_of(smoothed, dense=False)
+    order = np.lexsort((found.inserted.fraction, found.inserted.segment))
+    for begin in range(0, len(smoothed.program), _CHUNK):
+        poses = slice(begin, min(begin + _CHUNK, len(smoothed.program)))
+        parts = [
+            _inserted(smoothed, found.inserted, segments, order, poses),
+            _ends(smoothed, found, segments, poses),
+            _arcs(smoothed, found.pose_angles, arcs, poses),
+            *(part for group in found.groups for part in _curves(smoothed, group, segments, poses)),
+            _corner_lines(smoothed, found.lines, segments, poses),
+        ]
+        place = np.concatenate([place for place, _ in parts])
+        columns = {
+            name: np.concatenate([vars(rows)[name] for _, rows in parts])
+            for name in ("tip", "other", "move", "curve", "joined", "spline")
+        }
+        yield some_rows(Rows(**columns), np.lexsort((place, columns["move"])))
 
 
-class _Chunk:
-    """Rows of the poses from `begin` to before `end`."""
+#: rows, and where each of them is among those of its pose: up to 1 on the straight motion
+_Part = tuple[Floats, Rows]
 
-    def __init__(self, table: _Table, begin: int, end: int) -> None:
-        self.table, self.begin, self.end = table, begin, end
-        poses = slice(begin, end)
-        counts = table.counts[poses]
-        self.first = np.cumsum(counts) - counts  # of each pose
-        self.after = self.first + table.inserted[poses] + table.straight[poses]  # where the curve of each pose begins
-        total = int(counts.sum())
-        self.rows = Rows(
-            tip=np.zeros((total, 3)),
-            other=np.zeros((total, 2)),
-            move=np.repeat(np.arange(begin, end), counts),
-            curve=np.zeros(total, np.int8),
-            joined=np.zeros(total, np.bool_),
-            spline=np.zeros((total, 3)),
-        )
-        self._inserted()
-        self._straight()
-        self._arcs()
-        for group in table.found.groups:
-            self._curves(group)
-        self._lines()
 
-    def _put(self, at: Ints, tip: Floats, angles: Floats) -> None:
-        self.rows.tip[at], self.rows.other[at] = tip, angles
+def _lines(pose: Ints, place: Floats, tip: Floats, angles: Floats) -> _Part:
+    count = len(pose)
+    return place, Rows(
+        tip, angles, pose, np.zeros(count, np.int8), np.zeros(count, np.bool_), spline=np.zeros((count, 3))
+    )
 
-    def _within(self, poses: Ints) -> slice:
-        """Entries of a list of poses, ascending, that are in this chunk."""
-        low, high = np.searchsorted(poses, (self.begin, self.end)).tolist()
-        return slice(low, high)
 
-    def _inserted(self) -> None:
-        """Points inserted into straight motion."""
-        more, program = self.table.found.inserted, self.table.smoothed.program
-        own = self.table.order[self._within(more.segment[self.table.order])]
-        segment, fraction = more.segment[own], more.fraction[own]
-        number = np.arange(len(own)) - np.searchsorted(segment, segment)
-        start = program.tip[self.table.segments.start[segment]]
-        tip = start + fraction[:, None] * (program.tip[segment] - start)
-        self._put(self.first[segment - self.begin] + number, tip, more.angles[own])
+def _within(pose: Ints, poses: slice) -> slice:
+    """Entries of a list of poses, ascending, that are among some."""
+    low, high = np.searchsorted(pose, (poses.start, poses.stop)).tolist()
+    return slice(low, high)
 
-    def _straight(self) -> None:
-        """Ends of straight motion that are no joints."""
-        poses = slice(self.begin, self.end)
-        pose = self.begin + np.flatnonzero((self.table.straight[poses] > 0) & (self.table.segments.row[poses] < 0))
-        at = self.after[pose - self.begin] - 1
-        self._put(at, self.table.smoothed.program.tip[pose], self.table.found.pose_angles[pose])
 
-    def _arcs(self) -> None:
-        program, poses = self.table.smoothed.program, self.table.found.pose_angles
-        chosen = self._within(program.arcs.pose)
-        lines = self.table.arc_lines[chosen]
-        if not len(lines):
-            return
-        rows, share = divided(lines)
-        rows += chosen.start
-        pose = program.arcs.pose[rows]
-        at = np.flatnonzero(np.isin(self.rows.move, program.arcs.pose[chosen]))
-        tip, _ = arc_points(program, rows, share)
-        start = np.where(np.isnan(poses[pose - 1]), poses[pose], poses[pose - 1])  # from a stated position
-        self._put(at, tip, start + share[:, None] * (poses[pose] - start))
+def _inserted(smoothed: SmoothProgram, more: Insertions, segments: Segments, order: Ints, poses: slice) -> _Part:
+    """Points inserted into straight motion."""
+    own = order[_within(more.segment[order], poses)]
+    segment, fraction, tip = more.segment[own], more.fraction[own], smoothed.program.tip
+    start = tip[segments.start[segment]]
+    return _lines(segment, fraction, start + fraction[:, None] * (tip[segment] - start), more.angles[own])
 
-    def _curves(self, group: CurveGroup) -> None:
-        poses = self.table.smoothed.corners.pose[group.row]
-        own = self._within(poses)
-        pose, tip, angles = poses[own], group.tips(own), group.angles[own]
-        count = group.points
-        at = self.after[pose - self.begin][:, None] + np.arange(count)
-        self._put(at, tip, angles)
-        self.rows.curve[at] = np.arange(1, count + 1)
-        spline = self.rows.spline
-        assert spline is not None
-        spline[at, 0] = group.knots[:count]
-        spline[at, 1] = group.weights[own]
-        spline[at[:, -1], 2] = group.knots[-1]
-        self._join(pose, tip[:, 0], angles[:, 0])
-        self.rows.joined[at[:, 0]] = ~self.table.segments.has_line[pose]
 
-    def _lines(self) -> None:
-        lines = self.table.found.lines
-        own = self._within(self.table.smoothed.corners.pose[lines.row])
-        row, tip, angles = lines.row[own], lines.tip[own], lines.angles[own]
-        begins = np.diff(row, prepend=-1) != 0
-        first = np.flatnonzero(begins)
-        pose = self.table.smoothed.corners.pose[row[first]]
-        self._join(pose, tip[first], angles[first])
-        rest = np.flatnonzero(~begins)
-        number = np.cumsum(begins)[rest] - 1
-        at = self.after[pose[number] - self.begin] + rest - first[number] - 1
-        self._put(at, tip[rest], angles[rest])
+def _ends(smoothed: SmoothProgram, found: RotaryCurves, segments: Segments, poses: slice) -> _Part:
+    """Ends of straight motion that are no joints."""
+    straight = segments.has_line & ~segments.skip & (segments.row < 0)
+    straight[smoothed.program.arcs.pose] = False
+    pose = poses.start + np.flatnonzero(straight[poses])
+    return _lines(pose, np.ones(len(pose)), smoothed.program.tip[pose], found.pose_angles[pose])
 
-    def _join(self, pose: Ints, tip: Floats, angles: Floats) -> None:
-        """Let the straight motion before a curve end exactly where the curve begins."""
-        line = self.table.segments.has_line[pose]
-        self._put(self.after[pose[line] - self.begin] - 1, tip[line], angles[line])
+
+def _arcs(smoothed: SmoothProgram, angles: Floats, lines: Ints, poses: slice) -> _Part:
+    own = _within(smoothed.program.arcs.pose, poses)
+    rows, share = divided(lines[own])
+    rows += own.start
+    pose = smoothed.program.arcs.pose[rows]
+    start = np.where(np.isnan(angles[pose - 1]), angles[pose], angles[pose - 1])  # from a stated position
+    tip, _ = arc_points(smoothed.program, rows, share)
+    return _lines(pose, share, tip, start + share[:, None] * (angles[pose] - start))
+
+
+def _curves(smoothed: SmoothProgram, group: CurveGroup, segments: Segments, poses: slice) -> tuple[_Part, _Part]:
+    """Control points, and the ends of the lines before them: exactly where the curves begin."""
+    own = _within(smoothed.corners.pose[group.row], poses)
+    pose, tip, angles = smoothed.corners.pose[group.row[own]], group.tips(own), group.angles[own]
+    line = segments.has_line[pose]
+    number = np.arange(1, group.points + 1)
+    joined = (number == 1) & ~line[:, None]
+    spline = np.zeros((len(pose), group.points, 3))
+    spline[:, :, 0], spline[:, :, 1] = group.knots[: group.points], group.weights[own]
+    spline[:, -1, 2] = group.knots[-1]
+    numbers = np.tile(number, len(pose))
+    place = (1 + numbers).astype(np.float64)
+    points = Rows(
+        tip.reshape(-1, 3),
+        angles.reshape(-1, 2),
+        np.repeat(pose, group.points),
+        numbers.astype(np.int8),
+        joined.ravel(),
+        spline=spline.reshape(-1, 3),
+    )
+    return (place, points), _lines(pose[line], np.ones(int(line.sum())), tip[line, 0], angles[line, 0])
+
+
+def _corner_lines(smoothed: SmoothProgram, lines: CornerLines, segments: Segments, poses: slice) -> _Part:
+    """Corners in lines; the first point of each ends the line before it."""
+    pose = smoothed.corners.pose[lines.row]
+    own = _within(pose, poses)
+    pose = pose[own]
+    number = np.arange(len(pose)) - np.searchsorted(pose, pose)
+    kept = (number > 0) | segments.has_line[pose]
+    place = (1 + number[kept]).astype(np.float64)
+    return _lines(pose[kept], place, lines.tip[own][kept], lines.angles[own][kept])
