@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 from typing import Protocol
 
 import numpy as np
@@ -63,7 +64,7 @@ class KnotBlocks(Curves):
         """Knots."""
         assert run.spline is not None
         curved = run.curve > 0
-        knots, which = np.unique(run.spline[curved, 0], return_inverse=True)
+        knots, which = _distinct(run.spline[curved, 0])
         words = [self._word(b"K", knot) + self._blank for knot in knots.tolist()]
         chosen[curved] = len(table) + which + np.where(run.curve[curved] == 1, len(words), 0)
         table += [*words, *(b"G6.2" + self._blank + b"P4" + self._blank + word for word in words)]
@@ -134,10 +135,15 @@ def _intervals(spline: Floats, curve: NDArray[np.int8]) -> Floats:
 
 
 def _pairs(run: Run, column: int, table: list[bytes], chosen: Ints) -> list[tuple[float, float]]:
-    """Distinct pairs in two columns of `Run.spline`; rows on curves choose the entries that the table will have."""
+    """Pairs of the values of two columns of `Run.spline`; rows on curves choose the entries that the table will have."""
     assert run.spline is not None
     curved = run.curve > 0
-    numbers = run.spline[curved]
-    pairs, which = np.unique(numbers[:, column] + 1j * numbers[:, column + 1], return_inverse=True)
-    chosen[curved] = len(table) + which
-    return [(pair.real, pair.imag) for pair in pairs.tolist()]
+    (ones, one), (others, other) = (_distinct(run.spline[curved, place]) for place in (column, column + 1))
+    chosen[curved] = len(table) + one * len(others) + other
+    return list(product(ones.tolist(), others.tolist()))
+
+
+def _distinct(values: Floats) -> tuple[Floats, Ints]:
+    """Distinct values, few of many, and which of them each is: faster than the inverse of `np.unique`."""
+    found = np.unique(values)
+    return found, np.searchsorted(found, values)
