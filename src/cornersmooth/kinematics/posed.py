@@ -59,19 +59,11 @@ def parse_pose(machine: Machine, text: str) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class Posed:
-    """A machine at given rotary angles.
-
-    Parameters
-    ----------
-    angles : (2,) float64, degrees
-        In the order of the machine's axes; zero for those that it has not.
-    tip : (3,) float64, mm
-        In part coordinates.
-    """
+    """A machine at given rotary angles."""
 
     machine: Machine
-    angles: Floats
-    tip: Floats
+    angles: Floats  #: (2,), degrees; in the order of the machine's axes; zero for those that it has not
+    tip: Floats  #: (3,), mm; in part coordinates
 
     @classmethod
     def of(cls, machine: Machine, pose: Mapping[str, float]) -> Posed:

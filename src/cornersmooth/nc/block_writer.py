@@ -36,33 +36,17 @@ _ROUNDING = 1e-6
 
 @dataclass
 class BlockWriter:
-    """Writes runs and remembers what a control remembers: feed, feed mode, plane.
-
-    Parameters
-    ----------
-    statements : StatementWriter
-        Knows the plane, which statements change too, and the words of the control.
-    circles : Circles
-        How arcs are written.
-    stretch : float
-        `Form.stretch`.
-    blend : str
-        How far the head lets the control round the corners of lines; empty for no other.
-    plane : Plane or None
-        Tilted plane in whose coordinates positions are written.
-    modal : bool
-        Whether words that repeat are left out, where the control keeps them.
-    """
+    """Writes runs and remembers what a control remembers: feed, feed mode, plane."""
 
     form: Form
     program: Program
-    statements: StatementWriter
+    statements: StatementWriter  #: knows the plane, which statements change too, and the words of the control
     findings: Findings
-    circles: Circles
-    stretch: float = 1.0
-    blend: str = ""
-    plane: Plane | None = None
-    modal: bool = False
+    circles: Circles  #: how arcs are written
+    stretch: float = 1.0  #: `Form.stretch`
+    blend: str = ""  #: how far the head lets the control round the corners of lines; empty for no other
+    plane: Plane | None = None  #: tilted plane in whose coordinates positions are written
+    modal: bool = False  #: whether words that repeat are left out, where the control keeps them
     blocks: int = 0
     _feed: int = -1  # ticks and feed mode of the last F, as one number
     _mode: int = FeedMode.PER_MINUTE

@@ -45,24 +45,12 @@ FIRST_PLANE = 17
 
 @dataclass(frozen=True)
 class Circles:
-    """How the arcs of a program are written, k rows.
+    """How the arcs of a program are written, k rows."""
 
-    Parameters
-    ----------
-    blocks : (k,) int64
-        Circular blocks of each arc; 0 where it becomes lines.
-    plane : (k,) int64
-        17, 18 or 19.
-    clockwise : (k,) bool
-        G2 rather than G3, seen from the positive end of the axis that stands on the plane.
-    radius : (k,) int64
-        In steps of the last written digit.
-    """
-
-    blocks: Ints
-    plane: Ints
-    clockwise: Bools
-    radius: Ints
+    blocks: Ints  #: (k,) circular blocks of each arc; 0 where it becomes lines
+    plane: Ints  #: (k,) 17, 18 or 19
+    clockwise: Bools  #: (k,) G2 rather than G3, seen from the positive end of the axis that stands on the plane
+    radius: Ints  #: (k,) in steps of the last written digit
 
 
 def plan_circles(program: Program, settings: Settings, form: Form, planes: Planes, upright: Bools) -> Circles:

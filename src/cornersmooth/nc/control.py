@@ -38,140 +38,85 @@ Share = Annotated[float, Bound(math.ulp(0.0), 1.0, "give a part of 1")]
 
 @dataclass(frozen=True)
 class Words:
-    """Blocks by which a control is told what is not motion; an empty field is not translated.
+    """Blocks by which a control is told what is not motion; an empty field is not translated."""
 
-    Parameters
-    ----------
-    tool_change, tool_select : tuple of str
-        With ``{tool}``; the latter only brings the tool near. The former may have ``{speed}``, the first of the tool.
-    spindle_speed : tuple of str
-        With ``{speed}`` and ``{direction}``, one of the next two.
-    speed_without_tip_control : bool
-        Whether tool tip control must be off where a speed is given.
-    coolant : mapping
-        Blocks by CL word; other words are not translated.
-    coolant_off : mapping
-        Blocks that switch off, by CL word, what ``coolant.OFF`` leaves on.
-    dwell : tuple of str
-        With ``{milliseconds}`` or ``{seconds}``.
-    dwell_turns : str
-        What makes a dwell count revolutions of the spindle under feed per revolution; empty for nothing.
-    compensation_left, compensation_right : tuple of str
-        Cutter compensation, with ``{register}``.
-    compensation_entry : bool
-        Whether the first move under it must go some way in the plane, more than what the register holds.
-    plane : mapping
-        Block for the planes 17 (XY), 18 (ZX) and 19 (YZ).
-    feed_mode : mapping
-        Block for `FeedMode` and `INVERSE_TIME`.
-    """
-
+    #: tool_change, tool_select: with ``{tool}``; the latter only brings the tool near. The former may have ``{speed}``,
+    #: the first of the tool.
     tool_change: Blocks = ()
     tool_select: Blocks = ()
-    spindle_speed: Blocks = ()
+    spindle_speed: Blocks = ()  #: with ``{speed}`` and ``{direction}``, one of the next two
     clockwise: str = "M3"
     counterclockwise: str = "M4"
-    speed_without_tip_control: bool = False
+    speed_without_tip_control: bool = False  #: whether tool tip control must be off where a speed is given
     spindle_off: Blocks = ()
     spindle_orient: Blocks = ()
-    coolant: Mapping[str, Blocks] = field(default_factory=dict)
+    coolant: Mapping[str, Blocks] = field(default_factory=dict)  #: blocks by CL word; other words are not translated
+    #: blocks that switch off, by CL word, what ``coolant.OFF`` leaves on
     coolant_off: Mapping[str, Blocks] = field(default_factory=dict)
-    dwell: Blocks = ()
+    dwell: Blocks = ()  #: with ``{milliseconds}`` or ``{seconds}``
+    #: what makes a dwell count revolutions of the spindle under feed per revolution; empty for nothing
     dwell_turns: str = ""
     stop: Blocks = ()
     optional_stop: Blocks = ()
+    #: compensation_left, compensation_right: cutter compensation, with ``{register}``
     compensation_left: Blocks = ()
     compensation_right: Blocks = ()
     compensation_off: Blocks = ()
+    #: whether the first move under it must go some way in the plane, more than what the register holds
     compensation_entry: bool = False
+    #: block for the planes 17 (XY), 18 (ZX) and 19 (YZ)
     plane: Annotated[Mapping[int, str], {"xy": 17, "zx": 18, "yz": 19}] = field(default_factory=dict)
+    #: block for `FeedMode` and `INVERSE_TIME`
     feed_mode: Annotated[Mapping[int, str], _FEED_MODES] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Motion:
-    """How motion blocks look.
+    """How motion blocks look."""
 
-    Parameters
-    ----------
-    rapid, line, clockwise, counterclockwise : str
-        What blocks begin with.
-    rapid_end : str
-        What rapids end with.
-    coordinates : tuple of str
-        Addresses of X, Y and Z.
-    radius, feed : str
-        Addresses.
-    arc_directions : tuple of str
-        What says after the radius of a circular block that it goes clockwise, and counterclockwise. Such blocks have X
-        and Y alone: arcs in the plane XY at one height. Empty where the code says it, in blocks of X, Y and Z.
-    feed_point : bool
-        Whether a whole feed is written with a point.
-    signs : bool
-        Whether numbers that are not negative have a plus.
-    spaces, leading_zeros, trailing_zeros : bool
-        Whether words stand apart; ``0.5`` rather than ``.5``; ``2.5000`` rather than ``2.5``.
-    feed_needed : bool
-        Whether a program without a feed before its first feed move, or with one per revolution and no spindle speed, is
-        refused by the control before it runs.
-    endless_words : bool
-        Whether words of endless rotary axes beyond 0 to 360 degrees are taken on every machine.
-    shortest : tuple of str
-        What stands before and after the number of a modulo axis that goes the shorter way; none where the control has
-        no words for that.
-    inch_feed : int
-        What one inch per minute is written as: 10 where F counts tenths.
-    modal : tuple of str
-        What may be left out where it repeats, as the control keeps it: ``code`` (G0, G1), ``tip`` (each of X Y Z) and
-        ``axis`` (the tool vector as a whole, each rotary word).
-    fastest : float, 1/min
-        Largest F of inverse time (G93) that the control takes; 0 for none. Such an F has three decimals.
-    largest_feed : float, mm/min
-        Largest F per minute that the control takes; 0 where its manual names none.
-    with_z : str
-        Block, the last of those that switch the length of the tool on, whose words stand in the first block that moves
-        Z instead, after the approach: alone it may move the axis. Empty where it never does.
-    """
-
+    #: rapid, line, clockwise, counterclockwise: what blocks begin with
     rapid: str = "G0"
     line: str = "G1"
     clockwise: str = "G2"
     counterclockwise: str = "G3"
-    rapid_end: str = ""
-    coordinates: tuple[str, ...] = ("X", "Y", "Z")
+    rapid_end: str = ""  #: what rapids end with
+    coordinates: tuple[str, ...] = ("X", "Y", "Z")  #: addresses of X, Y and Z
+    #: radius, feed: addresses
     radius: str = "R"
+    #: what says after the radius of a circular block that it goes clockwise, and counterclockwise. Such blocks have X
+    #: and Y alone: arcs in the plane XY at one height. Empty where the code says it, in blocks of X, Y and Z.
     arc_directions: tuple[str, ...] = ()
     feed: str = "F"
-    feed_point: bool = True
-    signs: bool = False
+    feed_point: bool = True  #: whether a whole feed is written with a point
+    signs: bool = False  #: whether numbers that are not negative have a plus
+    #: spaces, leading_zeros, trailing_zeros: whether words stand apart; ``0.5`` rather than ``.5``; ``2.5000`` rather
+    #: than ``2.5``
     spaces: bool = True
     leading_zeros: bool = True
     trailing_zeros: bool = True
+    #: whether a program without a feed before its first feed move, or with one per revolution and no spindle speed, is
+    #: refused by the control before it runs
     feed_needed: bool = False
+    #: whether words of endless rotary axes beyond 0 to 360 degrees are taken on every machine
     endless_words: bool = True
+    #: what stands before and after the number of a modulo axis that goes the shorter way; none where the control has no
+    #: words for that
     shortest: tuple[str, ...] = ()
-    inch_feed: int = 1
+    inch_feed: int = 1  #: what one inch per minute is written as: 10 where F counts tenths
+    #: what may be left out where it repeats, as the control keeps it: ``code`` (G0, G1), ``tip`` (each of X Y Z) and
+    #: ``axis`` (the tool vector as a whole, each rotary word)
     modal: tuple[str, ...] = ()
+    #: 1/min; largest F of inverse time (G93) that the control takes; 0 for none. Such an F has three decimals.
     fastest: float = 9999.999
-    largest_feed: float = 0.0
+    largest_feed: float = 0.0  #: mm/min; largest F per minute that the control takes; 0 where its manual names none
+    #: block, the last of those that switch the length of the tool on, whose words stand in the first block that moves Z
+    #: instead, after the approach: alone it may move the axis. Empty where it never does.
     with_z: str = ""
 
 
 @dataclass(frozen=True)
 class Digits:
-    """Digits after the point; `mm` and `inch` for lengths, `feed`, `speed` and `coefficient` at most.
-
-    Parameters
-    ----------
-    most : int
-        Digits of a length in mm that the control takes.
-    lever : int, mm
-        Distance from the tip at which a second point is written at least. Curves are the same whatever it is, as only
-        the direction counts; the farther the point, the less its rounded digits turn the tool.
-    vector_length : int
-        Length of written tool vectors. Only their direction counts; where the control rounds their words as it rounds
-        lengths, a longer one keeps more of it.
-    """
+    """Digits after the point; `mm` and `inch` for lengths, `feed`, `speed` and `coefficient` at most."""
 
     mm: Decimals = 4
     inch: Decimals = 5
@@ -181,93 +126,59 @@ class Digits:
     weight: Decimals = 3
     coefficient: Decimals = 7
     speed: Decimals = 0
-    most: Decimals = 6
+    most: Decimals = 6  #: digits of a length in mm that the control takes
+    #: length of written tool vectors. Only their direction counts; where the control rounds their words as it rounds
+    #: lengths, a longer one keeps more of it.
     vector_length: Annotated[int, Bound(1)] = 1
+    #: mm; distance from the tip at which a second point is written at least. Curves are the same whatever it is, as
+    #: only the direction counts; the farther the point, the less its rounded digits turn the tool.
     lever: int = 100
 
 
 @dataclass(frozen=True)
 class Mode:
-    """One way in which a form can say the orientation.
+    """One way in which a form can say the orientation."""
 
-    Parameters
-    ----------
-    words : tuple of str
-        Addresses of vector or point; rotary addresses come from the machine.
-    on, off : tuple of str
-        Blocks before the motion and after it; with ``{offset}``, the length register.
-    within_on, within_off : tuple of str
-        Blocks that stand within these: the latter before the retract.
-    begin : tuple of str or None
-        In place of `ProgramTable.begin`.
-    circles : bool
-        Whether arcs may be written as circular blocks, without the words of the orientation.
-    timed_turns : bool
-        Whether blocks in which only rotary axes turn are written with inverse time: F would be degrees per minute.
-    tool_end : tuple of str or None
-        In place of `ProgramTable.tool_end`.
-    rotations : str
-        Of a tilted plane: the axes of its three rotations, each that of the frame which those before it have made, as
-        in ``zxz``; their degrees stand for ``{first}``, ``{second}`` and ``{third}`` in `on`. Empty where the rotary
-        axes are turned by words (``{rotary_start}``), and the part with them.
-    reset : tuple of str
-        Of a tilted plane: blocks at the start of the program that end one which another program has left.
-    """
-
-    words: tuple[str, ...] = ()
+    words: tuple[str, ...] = ()  #: addresses of vector or point; rotary addresses come from the machine
+    #: on, off: blocks before the motion and after it; with ``{offset}``, the length register
     on: Blocks = ()
     off: Blocks = ()
     motion: Motion = Motion()
-    circles: bool = False
+    circles: bool = False  #: whether arcs may be written as circular blocks, without the words of the orientation
+    #: whether blocks in which only rotary axes turn are written with inverse time: F would be degrees per minute
     timed_turns: bool = False
+    #: within_on, within_off: blocks that stand within these: the latter before the retract
     within_on: Blocks = ()
     within_off: Blocks = ()
-    begin: Blocks | None = None
-    tool_end: Blocks | None = None
+    begin: Blocks | None = None  #: in place of `ProgramTable.begin`
+    tool_end: Blocks | None = None  #: in place of `ProgramTable.tool_end`
+    #: of a tilted plane: the axes of its three rotations, each that of the frame which those before it have made, as in
+    #: ``zxz``; their degrees stand for ``{first}``, ``{second}`` and ``{third}`` in `on`. Empty where the rotary axes
+    #: are turned by words (``{rotary_start}``), and the part with them.
     rotations: str = ""
+    #: of a tilted plane: blocks at the start of the program that end one which another program has left
     reset: Blocks = ()
 
 
 @dataclass(frozen=True)
 class TextStyle:
-    """How lines look.
+    """How lines look."""
 
-    Parameters
-    ----------
-    units : mapping
-        What ``{units}`` stands for.
-    comment : (str, str)
-        What stands before and after a comment.
-    comment_orders : tuple of str
-        First words by which a comment would be an order to the control; they get a mark before them.
-    block_number : str
-        With ``{number}``; empty where blocks have none unless asked for.
-    unnumbered : str
-        Regular expression of what begins a line without number besides ``%``; empty for none.
-    number_start, number_step, number_last : int
-        After the last the first follows again; 0 for no last.
-    longest_block : int
-        Characters that a line may have; 0 for any number.
-    continuation : str
-        What a line ends with whose block goes on in the next; empty where blocks cannot.
-    line_ends : {"lf", "crlf"}
-        What the lines of its files end with, where the user says nothing.
-    suffix : str
-        What the names of its files end in.
-    """
-
-    units: Mapping[Units, str] = field(default_factory=lambda: {"mm": "", "inch": ""})
+    units: Mapping[Units, str] = field(default_factory=lambda: {"mm": "", "inch": ""})  #: what ``{units}`` stands for
+    #: what stands before and after a comment
     comment: Annotated[tuple[str, str], "give what stands before and behind"] = ("(", ")")
+    #: first words by which a comment would be an order to the control; they get a mark before them
     comment_orders: Blocks = ()
-    block_number: str = ""
-    unnumbered: Pattern = ""
+    block_number: str = ""  #: with ``{number}``; empty where blocks have none unless asked for
+    unnumbered: Pattern = ""  #: regular expression of what begins a line without number besides ``%``; empty for none
+    #: number_start, number_step, number_last: after the last the first follows again; 0 for no last
     number_start: int = 10
     number_step: int = 10
     number_last: int = 0
-    longest_block: int = 0
-    continuation: str = ""
-    line_ends: Literal["lf", "crlf"] = "lf"
-    suffix: str = ".nc"
+    longest_block: int = 0  #: characters that a line may have; 0 for any number
+    continuation: str = ""  #: what a line ends with whose block goes on in the next; empty where blocks cannot
+    line_ends: Literal["lf", "crlf"] = "lf"  #: what the lines of its files end with, where the user says nothing
+    suffix: str = ".nc"  #: what the names of its files end in
 
 
 @dataclass(frozen=True)
@@ -295,92 +206,58 @@ class Cycles:
     feeding begins) and ``bottom``; above the top ``setup`` (of the clearance) and ``above`` (of the travel), below it
     ``depth``; ``step`` of a peck; ``feed``; ``milliseconds`` and ``seconds`` of a dwell; of a tap ``pitch`` and
     ``speed``. They are written for each hole, but those before the first with ``{x}`` only where they change.
-
-    Parameters
-    ----------
-    drill, dwell : tuple of str
-        In one feed, without and with a dwell at the bottom.
-    peck, chip : tuple of str
-        In steps, out of the hole after each, or up a little to break the chip.
-    ream, ream_dwell : tuple of str
-        Out of the hole at feed.
-    tap : tuple of str
-        A right-hand thread.
-    off : tuple of str
-        Ends the cycle.
-    per_minute : bool
-        Whether their feeds are per minute in millimetres only.
     """
 
+    #: drill, dwell: in one feed, without and with a dwell at the bottom
     drill: Blocks = ()
     dwell: Blocks = ()
+    #: peck, chip: in steps, out of the hole after each, or up a little to break the chip
     peck: Blocks = ()
     chip: Blocks = ()
+    #: ream, ream_dwell: out of the hole at feed
     ream: Blocks = ()
     ream_dwell: Blocks = ()
-    tap: Blocks = ()
-    off: Blocks = ()
-    per_minute: bool = False
+    tap: Blocks = ()  #: A right-hand thread
+    off: Blocks = ()  #: ends the cycle
+    per_minute: bool = False  #: whether their feeds are per minute in millimetres only
 
 
 @dataclass(frozen=True)
 class Extra:
-    """Blocks that are written when they are asked for by name: a function of the control that not every one has.
-
-    Parameters
-    ----------
-    on, off : tuple of str
-        Blocks around the motion, with ``{blend}``, a tenth of ε, and ``{turn}``, the degrees that are worth as much at
-        the axis point.
-    outside : bool
-        Whether they stand before tool tip control is switched on and after its end, or within.
-    forms : tuple of str
-        Forms that they go with; empty for all.
-    warning : str
-        Shown to the user who asks for it; empty for none.
-    """
+    """Blocks that are written when they are asked for by name: a function of the control that not every one has."""
 
     name: str = ""
     description: str = ""
-    warning: str = ""
+    warning: str = ""  #: shown to the user who asks for it; empty for none
+    #: on, off: blocks around the motion, with ``{blend}``, a tenth of ε, and ``{turn}``, the degrees that are worth as
+    #: much at the axis point
     on: Blocks = ()
     off: Blocks = ()
-    outside: bool = False
-    forms: Blocks = ()
+    outside: bool = False  #: whether they stand before tool tip control is switched on and after its end, or within
+    forms: Blocks = ()  #: forms that they go with; empty for all
 
 
 @dataclass(frozen=True)
 class LineStyle:
-    """What lines suit the control, and how it is to share ε between what is written and what it does by itself.
-
-    Parameters
-    ----------
-    lines : {"dense", "long"}
-    curve_share, line_share, blend_share : float
-        Those of `Settings` where lines are long.
-    lag : float
-        By how many times ε the axis point may lag behind the tip where the control rounds corners of lines by itself,
-        as `cornersmooth.smoothing.long_lines.lags` estimates it; 0 where it does no such thing.
-    rounding : str
-        Block that says with ``{blend}`` how far the control may round the corners of lines from the next line on, where
-        it may stand between any two lines; empty for none. Then every corner gets what
-        `cornersmooth.smoothing.blending.largest_blends` finds, up to ε.
-    executed_share : float
-        Part of ε that is left to what the control executes at those corners, by that estimate.
-    planner : str
-        Law by which the control plans lines, where it is not that of `cornersmooth.feedrate`: "linuxcnc-2.9".
-    block_time : float, s
-        `Settings.block_time`. By default that of Haas, whose makers state it.
-    """
+    """What lines suit the control, and how it is to share ε between what is written and what it does by itself."""
 
     lines: Lines = "dense"
+    #: curve_share, line_share, blend_share: those of `Settings` where lines are long
     curve_share: Share = 0.5
     line_share: Share = 1.0
     blend_share: Share = 0.1
+    #: by how many times ε the axis point may lag behind the tip where the control rounds corners of lines by itself, as
+    #: `cornersmooth.smoothing.long_lines.lags` estimates it; 0 where it does no such thing
     lag: Annotated[float, Bound(0.0, 100.0, "give a number up to 100")] = 0.0
+    #: block that says with ``{blend}`` how far the control may round the corners of lines from the next line on, where
+    #: it may stand between any two lines; empty for none. Then every corner gets what
+    #: `cornersmooth.smoothing.blending.largest_blends` finds, up to ε.
     rounding: str = ""
+    #: part of ε that is left to what the control executes at those corners, by that estimate
     executed_share: Share = 0.85
+    #: law by which the control plans lines, where it is not that of `cornersmooth.feedrate`: "linuxcnc-2.9"
     planner: Literal["", "linuxcnc-2.9"] = ""
+    #: s; `Settings.block_time`. By default that of Haas, whose makers state it.
     block_time: Annotated[float, Bound(0.0, BOUNDS["block_time"][1], "give seconds, up to 1")] = 0.001
 
 

@@ -135,7 +135,7 @@ def _intervals(spline: Floats, curve: NDArray[np.int8]) -> Floats:
 
 
 def _pairs(run: Run, column: int, table: list[bytes], chosen: Ints) -> list[tuple[float, float]]:
-    """Pairs of the values of two columns of `Run.spline`; rows on curves choose the entries that the table will have."""
+    """Pairs of values of two columns of `Run.spline`; rows on curves choose the entries that the table will have."""
     assert run.spline is not None
     curved = run.curve > 0
     (ones, one), (others, other) = (_distinct(run.spline[curved, place]) for place in (column, column + 1))

@@ -27,7 +27,7 @@ UPRIGHT: Final = 1.0 - 1e-6
 #: places on the way that are looked at
 _PLACES: Final = np.linspace(0.0, 1.0, 65)
 
-#: Where X Y stand before, the program does not always say: as far aside as the tool is above, at most, is a fair guess.
+#: where X Y stand before, the program does not always say: as far aside as the tool is above, at most, is a fair guess.
 _FLAT: Final = math.cos(math.radians(45.0))
 
 #: mm by which the start may be below the position: digits
@@ -36,31 +36,15 @@ _BELOW: Final = 1e-3
 
 @dataclass(frozen=True)
 class FirstBlock:
-    """The block, as the machine runs it.
-
-    Parameters
-    ----------
-    machine : Machine or None
-        With the length of the tool.
-    plane : Plane or None
-        Tilted plane that the block is written in.
-    tip : (3,) float64, mm
-        Its end, in the part.
-    axis : (3,) float64
-        Tool axis there.
-    angles : (2,) float64 or None, degrees
-        Rotary words, where there are any.
-    line : int
-        Of the CL file.
-    """
+    """The block, as the machine runs it."""
 
     form: Form
-    machine: Machine | None
-    plane: Plane | None
-    tip: Floats
-    axis: Floats
-    angles: Floats | None
-    line: int
+    machine: Machine | None  #: with the length of the tool
+    plane: Plane | None  #: tilted plane that the block is written in
+    tip: Floats  #: (3,), mm; its end, in the part
+    axis: Floats  #: (3,) tool axis there
+    angles: Floats | None  #: (2,), degrees; rotary words, where there are any
+    line: int  #: of the CL file
 
     def check(self, place: Floats | None, findings: Findings, file: str | None) -> None:
         """Refuse the block, or warn of it.

@@ -58,41 +58,19 @@ _FIXED_ORDER = ("plain", "hsm")
 
 @dataclass(frozen=True)
 class Cycle:
-    """What a CYCLE statement asks for; lengths in mm along the tool axis.
+    """What a CYCLE statement asks for; lengths in mm along the tool axis."""
 
-    Parameters
-    ----------
-    depth : float
-        Below the position.
-    clearance : float or None
-        Above the position: where feeding begins; None for the height of travel.
-    retract : float
-        Above the position: least height when the hole is done.
-    feed : float
-        mm/min or mm/rev; NaN for the feed in force.
-    dwell : int
-        Milliseconds at the depth.
-    steps : tuple of float
-        Depths of the pecks, the last one repeated; none for a single feed.
-    full_retract : bool
-        Whether a peck comes out of the hole.
-    pecking : bool
-        Whether `steps` are to be taken; without any the hole is drilled in one feed.
-    tap : bool
-        Whether a thread is cut: the spindle turns with the feed.
-    """
-
-    depth: float
-    clearance: float | None
-    retract: float = 0.0
-    feed: float = math.nan
+    depth: float  #: below the position
+    clearance: float | None  #: above the position: where feeding begins; None for the height of travel
+    retract: float = 0.0  #: above the position: least height when the hole is done
+    feed: float = math.nan  #: mm/min or mm/rev; NaN for the feed in force
     feed_mode: FeedMode = FeedMode.PER_MINUTE
-    dwell: int = 0
-    steps: tuple[float, ...] = ()
-    full_retract: bool = True
+    dwell: int = 0  #: milliseconds at the depth
+    steps: tuple[float, ...] = ()  #: depths of the pecks, the last one repeated; none for a single feed
+    full_retract: bool = True  #: whether a peck comes out of the hole
     feed_out: bool = False
-    pecking: bool = False
-    tap: bool = False
+    pecking: bool = False  #: whether `steps` are to be taken; without any the hole is drilled in one feed
+    tap: bool = False  #: whether a thread is cut: the spindle turns with the feed
 
 
 def in_force(
@@ -233,17 +211,11 @@ def _pairs(args: tuple[float | str, ...]) -> tuple[set[str], dict[str, tuple[flo
 
 @dataclass
 class HoleCycles:
-    """Remembers the cycle for the holes that follow.
-
-    Parameters
-    ----------
-    skip : bool
-        Whether cycles that cannot be written are left out with a warning; an error otherwise.
-    """
+    """Remembers the cycle for the holes that follow."""
 
     program: Program
     findings: Findings
-    skip: bool = False
+    skip: bool = False  #: whether cycles that cannot be written are left out with a warning; an error otherwise
     now: Cycle | None = None  #: the cycle in force, None where it is not understood
     _statement: Statement | None = None  #: the last CYCLE
     _args: tuple[float | str, ...] = ()

@@ -41,18 +41,10 @@ _SAME_AXIS = 1e-9
 
 @dataclass
 class HoleWriter:
-    """Writes the holes of a program.
+    """Writes the holes of a program."""
 
-    Parameters
-    ----------
-    motion : MotionWriter
-        What the moves over holes and into them are written by.
-    native : bool
-        Whether holes are cycles of the control, where they can be.
-    """
-
-    motion: MotionWriter
-    native: bool = False
+    motion: MotionWriter  #: what the moves over holes and into them are written by
+    native: bool = False  #: whether holes are cycles of the control, where they can be
 
     @cached_property
     def _approach(self) -> Ints:

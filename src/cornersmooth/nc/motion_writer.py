@@ -35,30 +35,19 @@ _NOWHERE = 1 << 62
 
 @dataclass
 class MotionWriter:
-    """Writes rows and statements in order.
-
-    Parameters
-    ----------
-    tilting : BlockWriter
-        For tools under tool tip control.
-    upright : (n,) bool
-        `cycle_blocks.upright_poses`.
-    approach, retract : float, mm
-        Along the tool, after a retract and before one.
-    native : bool
-        Whether holes are cycles of the control, where they can be.
-    """
+    """Writes rows and statements in order."""
 
     program: Program
-    tilting: BlockWriter
-    upright: Bools
+    tilting: BlockWriter  #: for tools under tool tip control
+    upright: Bools  #: (n,) `cycle_blocks.upright_poses`
     planes: Planes
     statements: StatementWriter
     operation: Operation
     findings: Findings
+    #: approach, retract: mm; along the tool, after a retract and before one
     approach: float = 0.0
     retract: float = 0.0
-    native: bool = False
+    native: bool = False  #: whether holes are cycles of the control, where they can be
     position: Ints | None = None  #: where the tool is, in ticks; None where it may be elsewhere
     last: Ints | None = None  #: what was written last, before a tool change too
     last_writer: BlockWriter | None = None  #: and by which

@@ -28,19 +28,11 @@ _RUNNING_ON = ("{spindle_off}", "{coolant_off}")
 
 @dataclass
 class Operation:
-    """Writes the blocks around the motion of each tool and remembers what is on.
-
-    Parameters
-    ----------
-    values : mapping
-        What stands for braces in blocks.
-    texts : mapping
-        Blocks of the steps that a user gives: ``work_offset``, ``header``, ``footer``.
-    """
+    """Writes the blocks around the motion of each tool and remembers what is on."""
 
     form: Form
-    values: Mapping[str, str]
-    texts: Mapping[str, Blocks]
+    values: Mapping[str, str]  #: what stands for braces in blocks
+    texts: Mapping[str, Blocks]  #: blocks of the steps that a user gives: ``work_offset``, ``header``, ``footer``
     findings: Findings
     offset: int = 1  #: length register
     retracted: bool = False  #: the next motion comes from the height of the retract

@@ -37,35 +37,20 @@ _IDLE: Final = (Move.RAPID, Move.FROM)
 
 @dataclass(frozen=True)
 class Plane:
-    """A tilted plane.
+    """A tilted plane."""
 
-    Parameters
-    ----------
-    frame : (3, 3) float64
-        Columns: X', Y' and Z' of the plane in the part; Z' is the tool axis, the zero is that of the part.
-    words : mapping of str to str
-        Numbers of the three rotations, as they are written: ``first``, ``second``, ``third``.
-    angles : (2,) float64 or None, degrees
-        Rotary words, where these make the plane.
-    """
-
+    #: (3, 3) columns: X', Y' and Z' of the plane in the part; Z' is the tool axis, the zero is that of the part
     frame: Floats
+    #: numbers of the three rotations, as they are written: ``first``, ``second``, ``third``
     words: Mapping[str, str] = field(default_factory=dict)
-    angles: Floats | None = None
+    angles: Floats | None = None  #: (2,), degrees; rotary words, where these make the plane
 
 
 @dataclass(frozen=True)
 class Planes:
-    """The tilted planes of a program.
+    """The tilted planes of a program."""
 
-    Parameters
-    ----------
-    of : (n,) int64
-        Plane of each pose, -1 for none.
-    planes : tuple of Plane
-    """
-
-    of: Ints
+    of: Ints  #: (n,) plane of each pose, -1 for none
     planes: tuple[Plane, ...] = ()
 
     def frames(self, poses: Ints) -> Floats:

@@ -24,24 +24,12 @@ _FEED: Final = re.compile(rb" ?F(\d+\.?\d*|\.\d+)$")
 
 @dataclass(frozen=True)
 class PlannedFeeds:
-    """Feeds of a plan for the blocks of a text, b of them.
+    """Feeds of a plan for the blocks of a text, b of them."""
 
-    Parameters
-    ----------
-    line : (b,) int64
-        NC lines, ascending.
-    feed : (b,) float64, mm/min
-        NaN where the plan says none, as where the tip stands still.
-    minutes : (b,) float64
-        What a block takes, more than nothing, for inverse time.
-    programmed : (b,) float64, mm/min
-        What the feed may not exceed; the feed where the plan says none.
-    """
-
-    line: Ints
-    feed: Floats
-    minutes: Floats
-    programmed: Floats
+    line: Ints  #: (b,) NC lines, ascending
+    feed: Floats  #: (b,), mm/min; NaN where the plan says none, as where the tip stands still
+    minutes: Floats  #: (b,) what a block takes, more than nothing, for inverse time
+    programmed: Floats  #: (b,), mm/min; what the feed may not exceed; the feed where the plan says none
 
     def write(self, text: bytes, form: Form, units: Units, mm_per_unit: float) -> bytes:
         """Return the text with a feed word wherever the feed changes, none above the programmed one.

@@ -219,21 +219,12 @@ def blend_word(blend: float) -> str:
 
 @dataclass
 class FramedText:
-    """Writes one text; numbers its blocks where asked for.
-
-    Parameters
-    ----------
-    stream : binary stream
-    number : str
-        With ``{number}``; empty for none.
-    end : bytes
-        What lines end with.
-    """
+    """Writes one text; numbers its blocks where asked for."""
 
     stream: Stream
-    number: str
+    number: str  #: with ``{number}``; empty for none
     layout: TextStyle
-    end: bytes
+    end: bytes  #: what lines end with
     next_number: int
     blocks: int = 0  #: in head and tail
 

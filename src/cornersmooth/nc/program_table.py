@@ -16,51 +16,26 @@ class ProgramTable:
 
     An item that is nothing but a name in braces is a step (`STEPS`); all others are blocks, with ``{program}``,
     ``{units}`` and ``{blend}``, a tenth of ε.
-
-    Parameters
-    ----------
-    name : str
-        Name or number of the program where neither the user nor the name of the CL file gives one.
-    file_name : str
-        The same from the name of the CL file, with ``{stem}``, its letters and digits in capitals with underscores
-        between, or ``{number}``, the digits that it ends in, four at least; empty where `name` is for all files.
-    name_pattern : str
-        Regular expression of the names that the control takes; empty for any.
-    work_offset : str
-        What ``{work_offset}`` stands for where the user gives nothing.
-    work_offset_pattern : str
-        Regular expression of what it may be.
-    work_offset_block : tuple of str
-        With ``{work_offset}``.
-    retract : tuple of str
-        Blocks that bring the tool to a height that clears everything; none where the control is told nothing.
-    position : str
-        Block with ``{position}``, words of a position of the machine; empty where the control has no such.
-    start : tuple of str
-        Before everything else.
-    begin : tuple of str
-        Before the first motion of each tool, and after a retract.
-    tool_end : tuple of str
-        After the last motion of each tool.
-    between_tools : tuple of str
-        Behind `tool_end`, before another tool than the first, where the CL file does not stop there anyway.
-    end : tuple of str
-        After everything else, `tool_end` included.
     """
 
-    name: str = "O0001"
+    name: str = "O0001"  #: name or number of the program where neither the user nor the name of the CL file gives one
+    #: the same from the name of the CL file, with ``{stem}``, its letters and digits in capitals with underscores
+    #: between, or ``{number}``, the digits that it ends in, four at least; empty where `name` is for all files
     file_name: str = ""
-    name_pattern: Pattern = ""
-    work_offset: str = ""
-    work_offset_pattern: Pattern = ""
-    work_offset_block: Blocks = ()
+    name_pattern: Pattern = ""  #: regular expression of the names that the control takes; empty for any
+    work_offset: str = ""  #: what ``{work_offset}`` stands for where the user gives nothing
+    work_offset_pattern: Pattern = ""  #: regular expression of what it may be
+    work_offset_block: Blocks = ()  #: with ``{work_offset}``
+    #: blocks that bring the tool to a height that clears everything; none where the control is told nothing
     retract: Blocks = ()
+    #: block with ``{position}``, words of a position of the machine; empty where the control has no such
     position: str = ""
-    start: Blocks = ("{header}",)
-    begin: Blocks = ("{tip_control_on}",)
-    tool_end: Blocks = ("{tip_control_off}",)
+    start: Blocks = ("{header}",)  #: before everything else
+    begin: Blocks = ("{tip_control_on}",)  #: before the first motion of each tool, and after a retract
+    tool_end: Blocks = ("{tip_control_off}",)  #: after the last motion of each tool
+    #: behind `tool_end`, before another tool than the first, where the CL file does not stop there anyway
     between_tools: Blocks = ()
-    end: Blocks = ("{footer}",)
+    end: Blocks = ("{footer}",)  #: after everything else, `tool_end` included
 
 
 #: steps that `ProgramTable` may name; what is off already, or not asked for, is no block

@@ -154,24 +154,17 @@ def lines_of_way(
 
 @dataclass(frozen=True)
 class _Chunk:
-    """Rows of a way, n of them.
+    """Rows of a way, n of them."""
 
-    Parameters
-    ----------
-    move, start : (n,) int64
-        Move of each, and the pose that its segment starts from.
-    at_pose, held, left : (n,) bool
-        Whether it is the last of its move, stays whatever ε allows, and comes back into a cut that was left.
-    timed : (n,) bool or None
-        Whether it is timed by us; None where only turns are that.
-    """
-
+    #: move, start: (n,); move of each, and the pose that its segment starts from
     move: Ints
     start: Ints
+    #: at_pose, held, left: (n,); whether it is the last of its move, stays whatever ε allows, and comes back into a cut
+    #: that was left
     at_pose: Bools
     held: Bools
     left: Bools
-    timed: Bools | None
+    timed: Bools | None  #: (n,) whether it is timed by us; None where only turns are that
 
     def vertices(self, filled: FilledPath, smoothed: SmoothProgram) -> Vertices:
         """Where the original motion is at the rows of a path that was made of these."""

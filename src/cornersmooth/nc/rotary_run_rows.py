@@ -33,26 +33,15 @@ _SHARE = 0.95
 
 @dataclass(frozen=True)
 class _Sections:
-    """Sections of runs with angles: k of them, in path order.
+    """Sections of runs with angles: k of them, in path order."""
 
-    Parameters
-    ----------
-    rows : SectionRows
-        With points (m, 5): tip, mm, and both angles, degrees.
-    first : (k + 1,) int64
-        Where the rows of each section begin.
-    run : (k,) int64
-    begin, end : (k,) float64, steps
-    good : (k,) bool
-        Within the tolerance, and within the limits of the axes.
-    """
-
-    rows: SectionRows
-    first: Ints
-    run: Ints
+    rows: SectionRows  #: with points (m, 5): tip, mm, and both angles, degrees
+    first: Ints  #: (k + 1,) where the rows of each section begin
+    run: Ints  #: (k,)
+    #: begin, end: (k,), steps
     begin: Floats
     end: Floats
-    good: Bools
+    good: Bools  #: (k,) within the tolerance, and within the limits of the axes
 
 
 def rotary_run_rows(smoothed: SmoothProgram, form: Form, findings: Findings) -> Iterator[Rows]:

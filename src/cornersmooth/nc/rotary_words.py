@@ -24,26 +24,16 @@ from cornersmooth.smoothing.sampling import Rows
 
 @dataclass(frozen=True)
 class RotaryWay:
-    """Rows with their angles, n of them: more than were given where cuts are left.
+    """Rows with their angles, n of them: more than were given where cuts are left."""
 
-    Parameters
-    ----------
-    tip, axis : (n, 3) float64, mm and unit vectors
-    move : (n,) int64
-    angles : (n, 2) float64, degrees
-        In the order of the machine's axes.
-    branch : (n,) int8
-        As in `cornersmooth.rotary.RotaryPath`.
-    free, left : (n,) bool
-        Whether nothing is looked at on the way to the row, as it cuts nothing; whether the tool comes back there into a
-        cut that it has left.
-    """
-
+    #: tip, axis: (n, 3), mm and unit vectors
     tip: Floats
     axis: Floats
-    move: Ints
-    angles: Floats
-    branch: NDArray[np.int8]
+    move: Ints  #: (n,)
+    angles: Floats  #: (n, 2), degrees; in the order of the machine's axes
+    branch: NDArray[np.int8]  #: (n,) as in `cornersmooth.rotary.RotaryPath`
+    #: free, left: (n,); whether nothing is looked at on the way to the row, as it cuts nothing; whether the tool comes
+    #: back there into a cut that it has left
     free: Bools
     left: Bools
 

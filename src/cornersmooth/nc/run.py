@@ -13,45 +13,21 @@ from cornersmooth.nc.control import INVERSE_TIME
 
 @dataclass(frozen=True)
 class Run:
-    """Rows that nothing interrupts, r of them: what each block says.
+    """Rows that nothing interrupts, r of them: what each block says."""
 
-    Parameters
-    ----------
-    ticks : (r, c) int64
-        Numbers in steps of their last digit.
-    move : (r,) int64
-        Pose, for messages.
-    rapid : (r,) bool
-    feed : (r,) float64
-        mm/min, mm/rev or 1/min, NaN where there is none.
-    mode : (r,) int64
-        `FeedMode` or `INVERSE_TIME`.
-    curve : (r,) int8
-        As in `Rows`.
-    arc : (r,) int64 or None
-    dwell : (r,) bool or None
-        Where the tool waits after the block.
-    bezier : (r, 4, c) float64 or None
-        Bézier points of the knot intervals of curves, in units of the text, for polynomials.
-    spline : (r, 3) float64 or None
-    blend : (r,) float64 or None, mm
-        As in `Rows`.
-    left : (r,) bool or None
-        As in `Rows`.
-    """
-
-    ticks: Ints
-    move: Ints
-    rapid: Bools
-    feed: Floats
-    mode: Ints
-    curve: NDArray[np.int8]
-    arc: Ints | None = None
-    dwell: Bools | None = None
+    ticks: Ints  #: (r, c) numbers in steps of their last digit
+    move: Ints  #: (r,) pose, for messages
+    rapid: Bools  #: (r,)
+    feed: Floats  #: (r,) mm/min, mm/rev or 1/min, NaN where there is none
+    mode: Ints  #: (r,) `FeedMode` or `INVERSE_TIME`
+    curve: NDArray[np.int8]  #: (r,) as in `Rows`
+    arc: Ints | None = None  #: (r,)
+    dwell: Bools | None = None  #: (r,) where the tool waits after the block
+    #: (r, 4, c) Bézier points of the knot intervals of curves, in units of the text, for polynomials
     bezier: Floats | None = None
-    spline: Floats | None = None
-    blend: Floats | None = None
-    left: Bools | None = None
+    spline: Floats | None = None  #: (r, 3)
+    blend: Floats | None = None  #: (r,), mm; as in `Rows`
+    left: Bools | None = None  #: (r,) as in `Rows`
 
     @classmethod
     def straight(cls, program: Program, ticks: Ints, move: Ints) -> Run:

@@ -16,15 +16,9 @@ _WINDOW, _LEAST = 10, 6
 
 @dataclass
 class SplineShare:
-    """Looks at ten feed blocks from the beginning of every spline on; what comes after a rapid is no spline.
+    """Looks at ten feed blocks from the beginning of every spline on; what comes after a rapid is no spline."""
 
-    Parameters
-    ----------
-    line : (n,) int64
-        Lines of the CL file, for messages.
-    """
-
-    line: Ints
+    line: Ints  #: (n,) lines of the CL file, for messages
     findings: Findings
     _flags: Bools = field(default_factory=lambda: np.zeros(0, np.bool_))
     _moves: Ints = field(default_factory=lambda: np.zeros(0, np.int64))

@@ -49,23 +49,13 @@ _NC_WORDS = re.compile(r"\s*(?:[A-Z][+-]?(?:\d+\.?\d*|\.\d+)\s*)+[$%]?\s*", re.I
 
 @dataclass
 class StatementWriter:
-    """Turns statements into NC blocks, remembering what the machine would.
-
-    Parameters
-    ----------
-    findings : Findings
-        Takes what is noticed.
-    operation : Operation
-        What is on around the motion.
-    comments : bool
-        Whether comments are written.
-    """
+    """Turns statements into NC blocks, remembering what the machine would."""
 
     form: Form
     program: Program
-    findings: Findings
-    operation: Operation
-    comments: bool = True
+    findings: Findings  #: takes what is noticed
+    operation: Operation  #: what is on around the motion
+    comments: bool = True  #: whether comments are written
     skip_cycles: bool = False  #: whether hole cycles that cannot be written are left out with a warning
     plane: int = 17  #: the plane selected, kept by who writes the motion
     changed: bool = False  #: a tool change, or the way home, left the machine elsewhere

@@ -36,17 +36,17 @@ from cornersmooth.rotary.remainders import RotaryMotion, lever_points, rotary_mo
 from cornersmooth.rotary.subdivision import Insertions
 from cornersmooth.settings import WEIGHT_DECIMALS
 
-#: Numbers of equal knot intervals of the curves, from the five-point curve on: n intervals have n + 3 control points.
+#: numbers of equal knot intervals of the curves, from the five-point curve on: n intervals have n + 3 control points.
 SPANS = (2, 4, 8, 16, 32)
-#: Knots with more intervals than this would need more than three decimals in [0, 1]: they run to a higher end.
+#: knots with more intervals than this would need more than three decimals in [0, 1]: they run to a higher end.
 SPANS_PER_UNIT = 8
-#: Numbers of knot intervals in the order of trial, and whether the rates of the ruled motion hold at the joints.
+#: numbers of knot intervals in the order of trial, and whether the rates of the ruled motion hold at the joints.
 TRIALS = tuple((spans, False) for spans in SPANS[:3]) + tuple((spans, True) for spans in SPANS[1:])
-#: Share of the allowance that a curve may take at its samples.
+#: share of the allowance that a curve may take at its samples.
 SHARE = 0.95
-#: An allowance below this share of the tolerance is nothing.
+#: an allowance below this share of the tolerance is nothing.
 LEAST_ALLOWANCE = 1e-3
-#: Samples on curves that are worked on at a time: their intermediate arrays fit the processor's cache.
+#: samples on curves that are worked on at a time: their intermediate arrays fit the processor's cache.
 CHUNK = 1 << 15
 #: A curve on even segments whose angles vary by D (rad) errs by less than this times D² away from the pole. Within the
 #: allowance such an error has one hump on either half, and needs few samples.
@@ -59,25 +59,15 @@ class CurveGroup:
 
     A block holds the knot, X Y Z, both rotary words and the weight of one control point (FANUC B-63324EN/03 4.17); the
     last four knots have blocks of their own. The first control point is the current position.
-
-    Parameters
-    ----------
-    smoothed : SmoothProgram
-    row : (g,) int64
-        Rows of `Corners`, ascending.
-    knots : (p + 4,) float64
-        As they are to be written: from 0, with three decimals at most.
-    weights : (g, p) float64
-        As they are to be written: with three decimals at most. All of a curve may have a power of two as common factor.
-    angles : (g, p, 2) float64, degrees
-        Control points of the rotary angles in the order of `Machine.axes`.
     """
 
     smoothed: SmoothProgram
-    row: Ints
-    knots: Floats
+    row: Ints  #: (g,) rows of `Corners`, ascending
+    knots: Floats  #: (p + 4,) as they are to be written: from 0, with three decimals at most
+    #: (g, p) as they are to be written: with three decimals at most. All of a curve may have a power of two as common
+    #: factor.
     weights: Floats
-    angles: Floats
+    angles: Floats  #: (g, p, 2), degrees; control points of the rotary angles in the order of `Machine.axes`
 
     def __len__(self) -> int:
         return len(self.row)
@@ -99,31 +89,17 @@ class CurveGroup:
 
 @dataclass(frozen=True)
 class RotaryCurves:
-    """Smoothed corners in rotary angles, and the straight motion between them.
+    """Smoothed corners in rotary angles, and the straight motion between them."""
 
-    Parameters
-    ----------
-    groups : tuple of CurveGroup
-        By the number of control points: 5, 7, 11, 19, 35; every smoothed corner is in one of them or in `lines`.
-    lines : CornerLines
-        Corners that no curve meets, as points of dense lines.
-    points : (k,) int64
-        Control points of each row of `Corners`; 0 where it is not smoothed or belongs to `lines`.
-    pose_angles : (n, 2) float64, degrees
-        Angles at the poses that are passed; NaN where nothing is written (`Status.DUPLICATE`, `Move.FROM`). At a
-        rounded pose what its axis would need.
-    inserted : Insertions
-        Points that the straight remainders need, as in `RotaryMotion`.
-    findings : tuple of Finding
-        Those of `rotary_angles`, and of corners that no curve meets.
-    """
-
+    #: by the number of control points: 5, 7, 11, 19, 35; every smoothed corner is in one of them or in `lines`
     groups: tuple[CurveGroup, ...]
-    lines: CornerLines
-    points: Ints
+    lines: CornerLines  #: corners that no curve meets, as points of dense lines
+    points: Ints  #: (k,) control points of each row of `Corners`; 0 where it is not smoothed or belongs to `lines`
+    #: (n, 2), degrees; angles at the poses that are passed; NaN where nothing is written (`Status.DUPLICATE`,
+    #: `Move.FROM`). At a rounded pose what its axis would need.
     pose_angles: Floats
-    inserted: Insertions
-    findings: tuple[Finding, ...]
+    inserted: Insertions  #: points that the straight remainders need, as in `RotaryMotion`
+    findings: tuple[Finding, ...]  #: those of `rotary_angles`, and of corners that no curve meets
 
 
 def angle_allowance(smoothed: SmoothProgram, angle_resolution: float) -> Floats:

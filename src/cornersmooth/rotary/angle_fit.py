@@ -16,31 +16,24 @@ from cornersmooth.kinematics.machine import Machine
 from cornersmooth.kinematics.poses import angle_between, radians, rotate, tool_axis
 from cornersmooth.model import Floats
 
-#: Fitted at so many samples in each knot interval, measured at so many.
+#: fitted at so many samples in each knot interval, measured at so many.
 FIT_SAMPLES, MEASURE_SAMPLES = 6, 8
-#: Linearisations.
+#: linearisations.
 ROUNDS = 3
-#: How much an error of an angle counts by itself beside that of the axis: it only decides where the axis does not.
+#: how much an error of an angle counts by itself beside that of the axis: it only decides where the axis does not.
 TAME = 1e-9
-#: Control points at each end that value, first and second derivative determine.
+#: control points at each end that value, first and second derivative determine.
 FIXED = 3
 
 
 @dataclass(frozen=True)
 class Targets:
-    """What g curves of axis directions have to follow.
+    """What g curves of axis directions have to follow."""
 
-    Parameters
-    ----------
-    levers : (g, 5, 3) float64
-        Control points of Q − P on the five-point knots.
-    weights : (g, 5) float64
-    start, end : three (g, 2) float64, degrees
-        Angle and its first two derivatives with respect to u at u = 0, and those with respect to 1 − u at u = 1.
-    """
-
-    levers: Floats
-    weights: Floats
+    levers: Floats  #: (g, 5, 3) control points of Q − P on the five-point knots
+    weights: Floats  #: (g, 5)
+    #: start, end: three (g, 2), degrees; angle and its first two derivatives with respect to u at u = 0, and those with
+    #: respect to 1 − u at u = 1
     start: tuple[Floats, Floats, Floats]
     end: tuple[Floats, Floats, Floats]
 

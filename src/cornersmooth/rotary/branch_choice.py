@@ -12,46 +12,37 @@ import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
 
-#: What a full turn back of an axis in a rapid costs, in degrees of rotation: so much that rotation never outweighs it.
+#: what a full turn back of an axis in a rapid costs, in degrees of rotation: so much that rotation never outweighs it.
 REWIND_COST = 1e9
-#: What a start on the solution that is not preferred costs, in degrees of rotation: more than any start turn.
+#: what a start on the solution that is not preferred costs, in degrees of rotation: more than any start turn.
 PREFERENCE_COST = 1e3
-#: What each turn costs by which a path starts away from zero: it only breaks ties.
+#: what each turn costs by which a path starts away from zero: it only breaks ties.
 START_TURN_COST = 1e-3
-#: What a stretch costs that leaves the limits in every turn.
+#: what a stretch costs that leaves the limits in every turn.
 OUTSIDE_COST = 1e12
-#: Words may pass their limits by so much (degrees): rounding of the solution, far below the last digit of a word.
+#: words may pass their limits by so much (degrees): rounding of the solution, far below the last digit of a word.
 LIMIT_SLACK = 1e-9
-#: An axis with room for more turns is taken as endless first; only where that fails its turns are searched.
+#: an axis with room for more turns is taken as endless first; only where that fails its turns are searched.
 MANY_TURNS = 8
-#: More states than these are not searched: axes with many turns are then kept within `MANY_TURNS` of zero.
+#: more states than these are not searched: axes with many turns are then kept within `MANY_TURNS` of zero.
 MOST_STATES = 1000
-#: Numbers that the costs of the steps between states may take up at a time.
+#: numbers that the costs of the steps between states may take up at a time.
 CHUNK = 1 << 20
 
 
 @dataclass(frozen=True)
 class Stretches:
-    """Angles of p stretches on both branches, unwrapped from the first pose of each stretch; degrees.
+    """Angles of p stretches on both branches, unwrapped from the first pose of each stretch; degrees."""
 
-    Parameters
-    ----------
-    first, last : (p, 2, 2) float64
-        ``[stretch, branch, axis]`` at the first and at the last pose, or at the pole where stretches meet.
-    low, high : (p, 2, 2) float64
-        Extremes over the stretch.
-    free : (p,) bool
-        A rapid leads into the stretch, not a passage through the pole. True for the first stretch.
-    dislike : (2,) float64
-        What a start of the path on either branch costs.
-    """
-
+    #: first, last: (p, 2, 2); ``[stretch, branch, axis]`` at the first and at the last pose, or at the pole where
+    #: stretches meet
     first: Floats
     last: Floats
+    #: low, high: (p, 2, 2); extremes over the stretch
     low: Floats
     high: Floats
-    free: Bools
-    dislike: Floats
+    free: Bools  #: (p,) A rapid leads into the stretch, not a passage through the pole. True for the first stretch.
+    dislike: Floats  #: (2,) what a start of the path on either branch costs
 
     def __len__(self) -> int:
         return len(self.first)

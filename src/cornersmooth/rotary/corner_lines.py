@@ -20,22 +20,12 @@ from cornersmooth.vectors import unit
 
 @dataclass(frozen=True)
 class CornerLines:
-    """Points of some corners from joint to joint, q rows in path order; even angles between them keep the tolerance.
+    """Points of some corners from joint to joint, q rows in path order; even angles between them keep the tolerance."""
 
-    Parameters
-    ----------
-    row : (q,) int64
-        Row of `Corners`, ascending.
-    tip : (q, 3) float64, mm
-    angles : (q, 2) float64, degrees
-    unsolved : (v,) int64
-        Rows of `Corners` in which the axis jumps: no division helps.
-    """
-
-    row: Ints
-    tip: Floats
-    angles: Floats
-    unsolved: Ints
+    row: Ints  #: (q,) row of `Corners`, ascending
+    tip: Floats  #: (q, 3), mm
+    angles: Floats  #: (q, 2), degrees
+    unsolved: Ints  #: (v,) rows of `Corners` in which the axis jumps: no division helps
 
 
 def corner_lines(

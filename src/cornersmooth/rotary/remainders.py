@@ -21,17 +21,17 @@ from cornersmooth.rotary.subdivision import Insertions, insertions
 from cornersmooth.smoothing.segments import Segments, segments_of
 from cornersmooth.vectors import unit
 
-#: Samples at which each transition is followed, as a rule and where the first rotary axis may turn fast.
+#: samples at which each transition is followed, as a rule and where the first rotary axis may turn fast.
 FEW_SAMPLES, MANY_SAMPLES = 3, 17
-#: It may where the pole is nearer than so many times the axis step at the corner, and so many degrees.
+#: it may where the pole is nearer than so many times the axis step at the corner, and so many degrees.
 NEAR_POLE, NEAR_POLE_DEGREES = 5.0, 1.0
-#: Samples on a segment where even angles are compared with the ruled motion, and the share of the tolerance they keep.
+#: samples on a segment where even angles are compared with the ruled motion, and the share of the tolerance they keep.
 SEGMENT_SAMPLES, SEGMENT_SHARE = tuple(j / 8 for j in range(1, 8)), 0.8
-#: Least share of the tolerance that axes at the pole and at the edge of reach have to keep.
+#: least share of the tolerance that axes at the pole and at the edge of reach have to keep.
 STRICTEST_SHARE = 0.1
-#: Step of the derivatives of the ruled angles, in fractions of the segment.
+#: step of the derivatives of the ruled angles, in fractions of the segment.
 DIFFERENCE = 1e-3
-#: Samples worked on at a time: their intermediate arrays fit the processor's cache.
+#: samples worked on at a time: their intermediate arrays fit the processor's cache.
 CHUNK = 1 << 15
 
 
@@ -47,21 +47,14 @@ class Ends:
 
 @dataclass(frozen=True)
 class Followed:
-    """Angles at samples of the transitions, chosen with the whole path in view: c smoothed corners, m rows in all.
+    """Angles at samples of the transitions, chosen with the whole path in view: c smoothed corners, m rows in all."""
 
-    Parameters
-    ----------
-    first, count : (c,) int64
-        The samples of corner i are rows ``first[i]`` to ``first[i] + count[i] - 1``, at even parameters from 0 to 1.
-    angles : (m, 2) float64, degrees
-    branch : (m,) int64
-        As in `Solutions.angles`, -1 at the pole.
-    """
-
+    #: first, count: (c,); the samples of corner i are rows ``first[i]`` to ``first[i] + count[i] - 1``, at even
+    #: parameters from 0 to 1
     first: Ints
     count: Ints
-    angles: Floats
-    branch: Ints
+    angles: Floats  #: (m, 2), degrees
+    branch: Ints  #: (m,) as in `Solutions.angles`, -1 at the pole
 
     def interpolated(self, corner: Ints, u: Floats) -> tuple[Floats, Ints]:
         """Angles (g, m, 2) evenly between the samples, and branches (g, m), of some corners at common parameters."""
@@ -77,41 +70,24 @@ class Followed:
 
 @dataclass(frozen=True)
 class RotaryMotion:
-    """What the curves have to join.
+    """What the curves have to join."""
 
-    Parameters
-    ----------
-    rows : (c,) int64
-        Rows of `Corners` of the smoothed corners.
-    segments : Segments
-    pose_angles : (n, 2) float64, degrees
-        At a smoothed corner what the axis there would need; NaN where nothing is written.
-    even : (n,) bool
-        The segment into the pose runs evenly in its angles.
-    start, end : Ends
-        With the rates of the first and last line of the straight remainders; NaN where there is no segment.
-    ruled_start, ruled_end : Ends
-        The same with the rates of the ruled motion, which differ where points are inserted.
-    followed : Followed
-    inserted : Insertions
-        Into the straight remainders: `segment` is the pose that each leads to, `fraction` that of the whole segment.
-        `unsolved` are poses into which no division helps.
-    cone : float, degrees
-        Within this angle of the pole the first rotary angle is free.
-    findings : tuple of Finding
-    """
-
-    rows: Ints
+    rows: Ints  #: (c,) rows of `Corners` of the smoothed corners
     segments: Segments
+    #: (n, 2), degrees; at a smoothed corner what the axis there would need; NaN where nothing is written
     pose_angles: Floats
-    even: Bools
+    even: Bools  #: (n,) the segment into the pose runs evenly in its angles
+    #: start, end: with the rates of the first and last line of the straight remainders; NaN where there is no segment
     start: Ends
     end: Ends
+    #: ruled_start, ruled_end: the same with the rates of the ruled motion, which differ where points are inserted
     ruled_start: Ends
     ruled_end: Ends
     followed: Followed
+    #: into the straight remainders: `segment` is the pose that each leads to, `fraction` that of the whole segment.
+    #: `unsolved` are poses into which no division helps.
     inserted: Insertions
-    cone: float
+    cone: float  #: degrees; within this angle of the pole the first rotary angle is free
     findings: tuple[Finding, ...]
 
 

@@ -39,22 +39,12 @@ CHUNK = 1 << 14
 
 @dataclass(frozen=True)
 class Guide:
-    """Angles known along the runs, m places in path order; both ends of every run are among them.
+    """Angles known along the runs, m places in path order; both ends of every run are among them."""
 
-    Parameters
-    ----------
-    run : (m,) int64
-    s : (m,) float64, steps
-    angles : (m, 2) float64, degrees
-        Unwrapped, as `rotary_angles` gives them.
-    branch : (m,) int64
-        Which solution they are, -1 at the pole.
-    """
-
-    run: Ints
-    s: Floats
-    angles: Floats
-    branch: Ints
+    run: Ints  #: (m,)
+    s: Floats  #: (m,), steps
+    angles: Floats  #: (m, 2), degrees; unwrapped, as `rotary_angles` gives them
+    branch: Ints  #: (m,) which solution they are, -1 at the pole
 
     def between(self, run: Ints, s: Floats) -> tuple[Floats, Ints]:
         """Angles (k, 2) evenly between the known ones, and the branch (k,) of both neighbours, -1 for none."""
@@ -69,20 +59,11 @@ class Guide:
 
 @dataclass(frozen=True)
 class RunAngles:
-    """Runs with angles.
+    """Runs with angles."""
 
-    Parameters
-    ----------
-    runs : Runs
-        The same curves, on more knots where the angles need them.
-    angles : (c, 2) float64, degrees
-        Control points, those of `runs.control`.
-    error : (spans,) float64, degrees
-        Bound on the angle between the tool axis of the angles and that of the run in each span.
-    """
-
-    runs: Runs
-    angles: Floats
+    runs: Runs  #: the same curves, on more knots where the angles need them
+    angles: Floats  #: (c, 2), degrees; control points, those of `runs.control`
+    #: (spans,), degrees; bound on the angle between the tool axis of the angles and that of the run in each span
     error: Floats
 
 
