@@ -32,6 +32,7 @@ from cornersmooth.nc.planes import Planes, plan_planes
 from cornersmooth.nc.program_frame import POINT_APPROACH, Frame, Stream
 from cornersmooth.nc.rewound_curve_rows import curve_rows_of, rewound_curve_rows
 from cornersmooth.nc.rotary_rows import rotary_rows
+from cornersmooth.nc.rotary_words import rotary_way
 from cornersmooth.nc.run_reach import within_reach
 from cornersmooth.nc.statement_writer import StatementWriter
 from cornersmooth.nc.warnings import add_warnings
@@ -229,11 +230,11 @@ def _rows(smoothed: SmoothProgram, form: Form, circles: Circles, planes: Planes,
     long = smoothed.settings.lines == "long"
     rows = coarse_rows(smoothed, circles.blocks) if long else dense_rows(smoothed, circles.blocks)
     if form.rotary:
-        inside = planes.of >= 0 if planes.planes else None
-        return with_arcs(
-            rotary_rows(rows, smoothed, form, findings, long=long, in_planes=inside), smoothed.program, circles
-        )
-    return long_rows(rows, smoothed, form) if long else rows
+        inside, way = planes.of >= 0 if planes.planes else None, rotary_way(rows, smoothed, form, findings)
+        rows = (part for part, _ in rotary_rows(way, smoothed, form, findings, long=long, in_planes=inside))
+    elif long:
+        rows = long_rows(rows, smoothed, form)
+    return with_arcs(rows, smoothed.program, circles)
 
 
 def _one_ahead(chunks: Iterator[tuple[Rows, Ints]]) -> Iterator[tuple[Rows, Ints]]:

@@ -105,7 +105,7 @@ def plan_circles(program: Program, settings: Settings, form: Form, planes: Plane
 
 
 def with_arcs(rows: Iterator[Rows], program: Program, circles: Circles) -> Iterator[Rows]:
-    """Rows in rotary words with `Rows.arc`: in a tilted plane the axes stand, so that no row of an arc has moved."""
+    """Rows with `Rows.arc`: all rows of a pose that an arc leads to are on it."""
     own = np.full(len(program), -1, np.int64)
     own[program.arcs.pose] = np.where(circles.blocks > 0, np.arange(len(circles.blocks)), -1)
     some = bool((own >= 0).any())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -13,6 +12,7 @@ from cornersmooth.kinematics import tip_position, tool_axis
 from cornersmooth.methods import METHODS
 from cornersmooth.model import Bools, Floats, Ints, SmoothProgram
 from cornersmooth.nc.form import Form
+from cornersmooth.nc.rotary_words import whole_rows
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.blending import largest_blends
 from cornersmooth.smoothing.long_lines import LineLimits, Vertices, fewest_lines, segments_of_rows, vertices
@@ -78,28 +78,13 @@ def corner_blends(
 
 def long_rows(rows: Iterator[Rows], smoothed: SmoothProgram, form: Form) -> Iterator[Rows]:
     """Rows with tool vectors at which long lines end; arcs stay as they are."""
-    chunks = deque(rows)
-    if not chunks:
+    tip, axis, move = whole_rows(rows)
+    if not len(move):
         return
-    tip, axis = np.concatenate([chunk.tip for chunk in chunks]), np.concatenate([chunk.other for chunk in chunks])
-    move = np.concatenate([chunk.move for chunk in chunks])
-    arc = None
-    if any(chunk.arc is not None for chunk in chunks):
-        none = [np.full(len(chunk.tip), -1, np.int64) if chunk.arc is None else chunk.arc for chunk in chunks]
-        arc = np.concatenate(none)
-    chunks.clear()
     limits = line_limits(smoothed.settings, form)
     for begin in range(0, max(len(move) - 1, 1), LONG_CHUNK):
         here = slice(begin, begin + LONG_CHUNK + 1)  # the last row of a chunk is the start of the next
         start, at_pose = segments_of_rows(move, here.start, here.stop)
         part = vertices(smoothed, tip[here], axis[here], axis[here], move[here], start, at_pose)
         kept = begin + fewest_lines(part, limits)[1 if begin else 0 :]
-        nothing = np.zeros(len(kept), np.int8)
-        yield Rows(
-            tip[kept],
-            axis[kept],
-            move[kept],
-            nothing,
-            nothing.astype(np.bool_),
-            arc=None if arc is None else arc[kept],
-        )
+        yield Rows(tip[kept], axis[kept], move[kept], np.zeros(len(kept), np.int8), np.zeros(len(kept), np.bool_))

@@ -54,7 +54,8 @@ def rewound_curve_rows(smoothed: SmoothProgram, form: Form, findings: Findings) 
         if in_lines[first]:
             text = "cut between rapids written in lines, not in curves: it is left where a rotary axis turns back"
             findings.add("CS381", "note", int(program.line[first]), text)
-            rows = rotary_rows(dense_rows(part), part, form, findings)
+            way = rotary_way(dense_rows(part), part, form, findings)
+            rows: Iterator[Rows] = (lines for lines, _ in rotary_rows(way, part, form, findings))
         else:
             rows = curve_rows_of(part, form, findings)
         for some in rows:

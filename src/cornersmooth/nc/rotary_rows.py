@@ -13,7 +13,7 @@ from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program, SmoothPro
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import TIP_SHARE, Form
 from cornersmooth.nc.long_rows import LONG_CHUNK, corner_blends, line_limits
-from cornersmooth.nc.rotary_words import RotaryWay, machine_of, note_inserted, rotary_way
+from cornersmooth.nc.rotary_words import RotaryWay, machine_of, note_inserted
 from cornersmooth.nc.tools import ToolTravel
 from cornersmooth.rotary import FilledPath, fill, insertions, rapid_moves
 from cornersmooth.settings import Settings
@@ -45,38 +45,6 @@ _NO_TURN = 1e-9
 
 
 def rotary_rows(
-    rows: Iterator[Rows],
-    smoothed: SmoothProgram,
-    form: Form,
-    findings: Findings,
-    *,
-    long: bool = False,
-    in_planes: Bools | None = None,
-) -> Iterator[Rows]:
-    """Rows of lines with the words of the form's machine in `Rows.other`, in the order of its axes.
-
-    Parameters
-    ----------
-    rows : iterator of Rows
-        From `dense_rows`, with tool vectors.
-    findings : Findings
-        Takes what the kinematics notice.
-    long : bool
-        Whether only those rows are left that ε asks for (`cornersmooth.smoothing.long_lines`).
-    in_planes : (n,) bool, optional
-        Poses in tilted planes, whose rotary axes the control turns, and whose travel is not looked at here.
-
-    Raises
-    ------
-    InputError
-        The machine cannot follow the path.
-    """
-    way = rotary_way(rows, smoothed, form, findings)
-    for part, _ in lines_of_way(way, smoothed, form, findings, long=long, in_planes=in_planes):
-        yield part
-
-
-def lines_of_way(
     way: RotaryWay,
     smoothed: SmoothProgram,
     form: Form,
@@ -85,13 +53,28 @@ def lines_of_way(
     long: bool = False,
     in_planes: Bools | None = None,
 ) -> Iterator[tuple[Rows, Ints]]:
-    """Rows of a way, with the points that its lines need, some thousand at a time; parameters as in `rotary_rows`.
+    """Rows of lines with the words of the form's machine in `Rows.other`, in the order of its axes.
+
+    Parameters
+    ----------
+    findings : Findings
+        Takes what the kinematics notice.
+    long : bool
+        Whether only those rows are left that ε asks for (`cornersmooth.smoothing.long_lines`).
+    in_planes : (n,) bool, optional
+        Poses in tilted planes, whose rotary axes the control turns, and whose travel is not looked at here.
 
     Yields
     ------
     rows : Rows
+        Some thousand at a time, with the points that lines need.
     source : (r,) int64
         Row of the way that each is, -1 for an inserted point.
+
+    Raises
+    ------
+    InputError
+        The machine cannot follow the path.
     """
     if not len(way.move):
         return

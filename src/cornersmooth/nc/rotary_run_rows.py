@@ -18,7 +18,7 @@ from cornersmooth.model import Bools, Floats, Ints, Runs, SmoothProgram
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.rotary_curve_rows import warn_of_curves
-from cornersmooth.nc.rotary_rows import lines_of_way
+from cornersmooth.nc.rotary_rows import rotary_rows
 from cornersmooth.nc.rotary_words import RotaryWay, machine_of, rotary_way
 from cornersmooth.nc.tools import ToolTravel
 from cornersmooth.rotary.run_angles import Guide, RunAngles, lever_at, run_angles
@@ -80,7 +80,7 @@ def rotary_run_rows(smoothed: SmoothProgram, form: Form, findings: Findings) -> 
             findings.add("CS378", "note", int(program.line[pose[0]]), text, len(lost))
         if sections.good.any():
             warn_of_curves(form, findings)
-    for lines, source in lines_of_way(way, smoothed, form, findings):
+    for lines, source in rotary_rows(way, smoothed, form, findings):
         yield _with_curves(lines, np.where(source < 0, -1, section[source]), sections)
 
 

@@ -161,9 +161,9 @@ def dense_rows(smoothed: SmoothProgram, circles: Ints | None = None, poses: int 
         batch.tip[at], batch.other[at] = program.tip[batch.poses[sharp]], program.axis[batch.poses[sharp]]
         _fill_divided(smoothed, segments, batch)
         _fill_transitions(smoothed, segments, batch, halves)
-        arc = _fill_arcs(smoothed, batch, arc_counts, circles)
+        _fill_arcs(smoothed, batch, arc_counts)
         runs.fill(batch)
-        yield Rows(batch.tip, batch.other, batch.move, *_no_curves(len(batch.tip)), arc=arc)
+        yield Rows(batch.tip, batch.other, batch.move, *_no_curves(len(batch.tip)))
 
 
 def curve_rows(smoothed: SmoothProgram, *, divide: bool = False, poses: int = 16384) -> Iterator[Rows]:
@@ -187,7 +187,7 @@ def curve_rows(smoothed: SmoothProgram, *, divide: bool = False, poses: int = 16
         pose, at = batch.poses[sharp], batch.last[sharp] - 1
         batch.tip[at] = program.tip[pose]
         batch.other[at] = program.tip[pose] + height * program.axis[pose]
-        _fill_arcs(smoothed, batch, arc_counts, height=height)
+        _fill_arcs(smoothed, batch, arc_counts, height)
 
         curve, joined = _no_curves(len(batch.tip))
         spline = np.tile((0.0, 1.0, 0.0), (len(batch.tip), 1))
@@ -231,25 +231,18 @@ def _batches(smoothed: SmoothProgram, counts: Ints, arc_counts: Ints, poses: int
         )
 
 
-def _fill_arcs(
-    smoothed: SmoothProgram, batch: _Batch, arc_counts: Ints, circles: Ints | None = None, height: float | None = None
-) -> Ints | None:
-    """Points of the arcs in the batch with their axes or axis points; returns `Rows.arc`."""
+def _fill_arcs(smoothed: SmoothProgram, batch: _Batch, arc_counts: Ints, height: float | None = None) -> None:
+    """Points of the arcs in the batch with their axes or axis points."""
     arcs = smoothed.program.arcs.pose
     inside = np.flatnonzero((arcs >= batch.poses[0]) & (arcs <= batch.poses[-1]))
     if not len(inside):
-        return None
+        return
     local, share = divided(arc_counts[inside])
     rows = inside[local]
     where = np.flatnonzero(np.isin(batch.move, arcs[inside]))
     tip, axis = arc_points(smoothed.program, rows, share)
     batch.tip[where] = tip
     batch.other[where] = axis if height is None else tip + height * axis
-    if circles is None:
-        return None
-    arc = np.full(len(batch.tip), -1, np.int64)
-    arc[where] = np.where(circles[rows] > 0, rows, -1)
-    return arc
 
 
 def nodes(lines: int) -> Floats:
