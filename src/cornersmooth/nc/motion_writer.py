@@ -331,7 +331,7 @@ class MotionWriter:
             run = run if above else run.with_programmed_feed(self.program)
         self.warnings.of_tool(pose, self.statements.tool)
         if not run.rapid.all():
-            self.warnings.of_cut(int(run.move[np.argmin(run.rapid)]), turning=bool(operation.spindle))
+            self.warnings.of_cut(int(run.move[np.argmin(run.rapid)]), turning=bool(operation.on["spindle"]))
         if writer.form.rotary:
             self.warnings.of_turns(run, writer.form, writer.angles(run.ticks))
         self.position = self.last = run.ticks[-1]

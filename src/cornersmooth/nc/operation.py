@@ -36,8 +36,8 @@ class Operation:
     findings: Findings
     offset: int = 1  #: length register
     retracted: bool = False  #: the next motion comes from the height of the retract
-    spindle: Blocks = ()  #: blocks that turn the spindle; none while it stands
-    coolant: Blocks = ()  #: the same for the coolant
+    #: blocks that turn the spindle and let the coolant flow; none while it stands, or does not flow
+    on: dict[str, Blocks] = field(default_factory=lambda: {"spindle": (), "coolant": ()})
     begun: bool = False  #: the blocks of `begin` hold
     withdraw: Callable[[], list[str]] = list  #: blocks along the tool before a retract, of who knows where it is
     halted: bool = False  #: the CL file has stopped the program since the last motion
@@ -68,14 +68,13 @@ class Operation:
         """Blocks before the next motion of a tool; what a tool change stopped goes on again."""
         self._moved = self._used = self.begun = True
         own = self.mode.begin
-        blocks = [block for what in ("spindle", "coolant") for block in self._stopped.get(what, ())]
+        blocks = [block for what in self.on for block in self._stopped.get(what, ())]
         if self._stopped:
             text = (
                 f"{' and '.join(self._stopped)} not given again in translated words after a tool change: on as before"
             )
             self.findings.add("CS331", "warning", self._stopped_line, text)
-        self.spindle = self._stopped.get("spindle", self.spindle)
-        self.coolant = self._stopped.get("coolant", self.coolant)
+        self.on |= self._stopped
         self._halted -= self._stopped.keys()
         self._stopped = {}
         steps = self.form.table.program.begin if own is None else own
@@ -91,7 +90,7 @@ class Operation:
     @property
     def turning(self) -> bool:
         """Whether the spindle turns at the next motion: it does, or goes on after a tool change."""
-        return bool(self.spindle or self._stopped.get("spindle"))
+        return bool(self.on["spindle"] or self._stopped.get("spindle"))
 
     @property
     def _tool_end(self) -> Blocks:
@@ -176,49 +175,38 @@ class Operation:
             blocks += self._hold()
         return [*blocks, *home, *self._expand(steps, {**rotary, "rotary_zero": zero})]
 
-    def turn(self, blocks: Blocks) -> None:
-        """Take note of the blocks that turn the spindle, or of none where it stops."""
-        self.spindle = blocks
-        self._stopped.pop("spindle", None)
-        self._halted.discard("spindle")
+    def switch(self, what: str, blocks: Blocks) -> None:
+        """Take note of the blocks that turn the spindle or let the coolant flow, or of none where it stops."""
+        self.on[what] = blocks
+        self._stopped.pop(what, None)
+        self._halted.discard(what)
 
     def halt(self) -> None:
         """Take note of a stop: most controls stop spindle and coolant with it, and start neither again."""
-        self.halted, self._halted = True, {"spindle", "coolant"}
+        self.halted, self._halted = True, set(self.on)
 
     def go_on(self) -> list[str]:
         """Blocks before the first motion after a stop: spindle and coolant as they were."""
-        blocks = [
-            *(self.spindle[-1:] if "spindle" in self._halted else ()),
-            *(self.coolant if "coolant" in self._halted else ()),
-        ]
-        self._halted = set()
-        return blocks
+        again = {"spindle": self.on["spindle"][-1:], "coolant": self.on["coolant"]}
+        halted, self._halted = self._halted, set()
+        return [block for what, blocks in again.items() if what in halted for block in blocks]
 
     def later(self, what: str, blocks: Blocks) -> list[str]:
         """Let blocks that turn the spindle, or let the coolant flow, wait for a tool change ahead of any motion."""
         self._stopped[what] = blocks
         return []
 
-    def cool(self, blocks: Blocks) -> None:
-        """Take note of the blocks that let the coolant flow, or of none where it stops."""
-        self.coolant = blocks
-        self._stopped.pop("coolant", None)
-        self._halted.discard("coolant")
-
     def coolant_end(self) -> Blocks:
         """Blocks that stop the coolant that flows."""
-        words = self.form.table.words
-        own = [
-            off for kind, off in words.coolant_off.items() if self.coolant and words.coolant.get(kind) == self.coolant
-        ]
+        words, on = self.form.table.words, self.on["coolant"]
+        own = [off for kind, off in words.coolant_off.items() if on and words.coolant.get(kind) == on]
         return own[0] if own else words.coolant.get("OFF", ())
 
     def coolant_before(self, blocks: Blocks) -> Blocks:
         """Blocks before those of another kind of coolant: where one of both has its own end, the other would go on."""
-        words = self.form.table.words
+        words, on = self.form.table.words, self.on["coolant"]
         own = {words.coolant.get(kind) for kind in words.coolant_off}
-        return self.coolant_end() if self.coolant not in ((), blocks) and {self.coolant, blocks} & own else ()
+        return self.coolant_end() if on not in ((), blocks) and {on, blocks} & own else ()
 
     def _expand(self, steps: Sequence[str], rotary: RotaryBlocks = _NO_ROTARY) -> list[str]:
         """Blocks of steps; what is no step is a block itself."""
@@ -310,18 +298,10 @@ class Operation:
             for block in getattr(extra, side)
         ]
 
-    def _spindle_off(self) -> list[str]:
-        return self._stop("spindle", self.form.table.words.spindle_off)
-
-    def _coolant_off(self) -> list[str]:
-        return self._stop("coolant", self.coolant_end())
-
     def _stop(self, what: str, blocks: Blocks) -> list[str]:
-        was_on: Blocks = getattr(self, what)
-        if not was_on:
+        if not self.on[what]:
             return []
-        self._stopped[what] = was_on
-        setattr(self, what, ())
+        self._stopped[what], self.on[what] = self.on[what], ()
         return list(blocks)
 
 
@@ -330,6 +310,6 @@ _STEPS: Mapping[str, Callable[[Operation], list[str]]] = {
     "{tip_control_on}": Operation._tip_control_on,
     "{functions_off}": Operation._functions_off,
     "{tip_control_off}": Operation._tip_control_off,
-    "{spindle_off}": Operation._spindle_off,
-    "{coolant_off}": Operation._coolant_off,
+    "{spindle_off}": lambda operation: operation._stop("spindle", operation.form.table.words.spindle_off),
+    "{coolant_off}": lambda operation: operation._stop("coolant", operation.coolant_end()),
 }

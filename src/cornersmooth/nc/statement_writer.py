@@ -185,17 +185,14 @@ class StatementWriter:
 
     def _speed_of(self, statement: Statement) -> float | None:
         """Revolutions per minute that SPINDL gives; None for none."""
-        words, numbers = words_of(statement), numbers_of(statement)
-        for word in _LIMITS:
-            for number in number_after(statement, word) if word in words else ():
-                numbers.remove(number)
-        if len(numbers) != 1 or numbers[0] <= 0.0:
-            return None
-        cutting = next((unit for unit in ("SFM", "SMM") if unit in words), None)
-        if cutting is None:
-            return numbers[0]
-        speed = revolutions(numbers[0], cutting, self._diameter)
-        return None if speed is None else float(round(speed))
+        words, numbers = _spindle_args(statement)
+        return self._turns(words, numbers[0]) if len(numbers) == 1 and numbers[0] > 0.0 else None
+
+    def _turns(self, words: list[str], number: float) -> float | None:
+        """Revolutions per minute, or what gives a cutting speed (SFM, SMM); None without the tool's diameter."""
+        unit = _cutting_unit(words)
+        speed = revolutions(number, unit, self._diameter) if unit else number
+        return speed if speed is None or not unit else float(round(speed))
 
     def _speed_text(self, speed: float) -> str:
         return format_number(speed, self.form.table.digits.speed, trim=True).rstrip(".")
@@ -235,32 +232,23 @@ class StatementWriter:
 
     def spindle(self, statement: Statement) -> list[str] | None:
         """SPINDL in every order of its words."""
-        words, numbers = words_of(statement), numbers_of(statement)
-        for word in _LIMITS:  # gears and limits are the control's own affair
-            if word in words:
-                following = number_after(statement, word)
-                words = [other for other in words if other not in _GEARS]
-                for number in following:
-                    numbers.remove(number)
+        words, numbers = _spindle_args(statement)
         if not set(words) <= {"RPM", "CLW", "CCLW", "ON", "OFF", "SFM", "SMM", "LOCK", "ORIENT", "NOMORE"}:
             return None
         if "LOCK" in words or "ORIENT" in words:
             if numbers not in ([], [0.0]) or not self.words.spindle_orient:
                 return None
-            self.operation.turn(())
+            self.operation.switch("spindle", ())
             return list(self.words.spindle_orient)
         if "OFF" in words or "NOMORE" in words or numbers == [0.0]:
-            self.operation.turn(())
+            self.operation.switch("spindle", ())
             return list(self.words.spindle_off) or None
         if len(numbers) > 1 or any(number < 0.0 for number in numbers):
             return None
-        cutting = next((unit for unit in ("SFM", "SMM") if unit in words), None)
-        speed = numbers[0] if numbers else None
-        if cutting is not None and speed is not None:
-            speed = revolutions(speed, cutting, self._diameter)
-            if speed is None:
-                return None
-            speed = float(round(speed))
+        speed = self._turns(words, numbers[0]) if numbers else None
+        if numbers and speed is None:
+            return None
+        if numbers and (cutting := _cutting_unit(words)):
             text = f"SPINDL in {cutting} is written as revolutions at the cutter's diameter"
             self.findings.add("CS322", "note", statement.line, text)
         if "CLW" in words or "CCLW" in words:
@@ -269,15 +257,15 @@ class StatementWriter:
         if speed is None and self.speed is None:
             text = "the spindle is started without a speed: a control takes the one that holds from before"
             self.findings.add("CS335", "warning", statement.line, text)
-            self.operation.turn((direction,))
+            self.operation.switch("spindle", (direction,))
             return [direction]
         self.speed = self.speed if speed is None else speed
         self.cycles.read(self.speed)
         digits = self._speed_text(self.speed or 0.0)
         turning = tuple(block.format(speed=digits, direction=direction) for block in self.words.spindle_speed)
-        if not self.operation.spindle and id(statement) in self._ahead_of_tools:
+        if not self.operation.on["spindle"] and id(statement) in self._ahead_of_tools:
             return self.operation.later("spindle", turning)
-        self.operation.turn(turning)
+        self.operation.switch("spindle", turning)
         return [direction] if speed is None else [*self._outside_tip_control(), *turning]
 
     def _outside_tip_control(self) -> list[str]:
@@ -296,15 +284,15 @@ class StatementWriter:
             return None
         if "OFF" in words or kinds == ["NOMORE"]:
             off = self.operation.coolant_end()
-            self.operation.cool(())
+            self.operation.switch("coolant", ())
             return list(off) or None
         blocks = self.words.coolant.get(kinds[0])
         if blocks is None:
             return None
-        if not self.operation.coolant and id(statement) in self._ahead_of_tools:
+        if not self.operation.on["coolant"] and id(statement) in self._ahead_of_tools:
             return self.operation.later("coolant", blocks)
         before = self.operation.coolant_before(blocks)
-        self.operation.cool(blocks)
+        self.operation.switch("coolant", blocks)
         return [*before, *blocks]
 
     def halt(self, blocks: Blocks) -> list[str]:
@@ -380,10 +368,8 @@ class StatementWriter:
             text = f"AUXFUN/{number} clamps a rotary axis or lets it turn: left out, the machine's file says where"
             self.findings.add("CS359", "warning", statement.line, text)
             return self.comment(statement.text)
-        if number in (3, 4, 5):
-            self.operation.turn(() if number == 5 else blocks)
-        elif number in (7, 8, 9):
-            self.operation.cool(() if number == 9 else blocks)
+        if number in (3, 4, 5, 7, 8, 9):
+            self.operation.switch("spindle" if number <= 5 else "coolant", () if number in (5, 9) else blocks)
         return list(blocks)
 
     def paint(self, statement: Statement) -> list[str]:
@@ -402,6 +388,22 @@ class StatementWriter:
         numbers = (format_number(value, decimals, trim=True) for value in numbers_of(statement))
         place = " ".join(letter + number for letter, number in zip("XYZ", numbers, strict=True))
         return self.comment(f"FROM {place}")
+
+
+def _spindle_args(statement: Statement) -> tuple[list[str], list[float]]:
+    """Words and numbers of SPINDL without gears and limits, which are the control's own affair."""
+    words, numbers = words_of(statement), numbers_of(statement)
+    for word in _LIMITS:
+        if word in words:
+            words = [other for other in words if other not in _GEARS]
+            for number in number_after(statement, word):
+                numbers.remove(number)
+    return words, numbers
+
+
+def _cutting_unit(words: list[str]) -> str:
+    """Unit of a cutting speed; empty where the number is one of revolutions."""
+    return next((unit for unit in ("SFM", "SMM") if unit in words), "")
 
 
 Handler = Callable[[StatementWriter, Statement], list[str] | None]
