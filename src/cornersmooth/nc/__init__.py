@@ -205,7 +205,8 @@ def write(
     of_rows = Findings()  # rows are made in a thread of their own: their findings come last
     with _BackgroundWriter(stream) as behind:
         text = frame.start(behind, chosen)
-        text.write_blocks(operation.start())
+        for lines in motion.text(operation.start()):
+            text.write(lines)
         chunks = (
             (rows, writer.ticks(rows.tip, rows.other)) for rows in _rows(smoothed, chosen, circles, planes, of_rows)
         )
@@ -217,7 +218,7 @@ def write(
         for lines in motion.finish():
             text.write(lines)
     findings.add_all(of_rows.all())
-    return Written(text.blocks + motion.written, findings.all())
+    return Written(motion.written, findings.all())
 
 
 def _rows(smoothed: SmoothProgram, form: Form, circles: Circles, planes: Planes, findings: Findings) -> Iterator[Rows]:

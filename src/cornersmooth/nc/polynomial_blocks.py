@@ -35,16 +35,12 @@ def curves_for(form: Form, units: Units) -> Curves:
 
 
 class _Polynomials(Curves):
-    """One block for each knot interval, in the last rows of a curve.
+    """One block for each knot interval, in the last rows of a curve: words before and after its numbers."""
 
-    Parameters
-    ----------
-    decimals : tuple of int
-        Of the words of lines.
-    """
+    begin, end = b"", b"\n"
 
-    def __init__(self, decimals: tuple[int, ...]) -> None:
-        self._line_decimals = decimals
+    def __init__(self, form: Form, units: Units) -> None:
+        self._line_decimals = form.decimals(units)
 
     def prepare(self, run: Run) -> Run:
         """Leave the rows that carry an interval; each begins and ends in printed digits, where the one before ended.
@@ -66,6 +62,17 @@ class _Polynomials(Curves):
                     kept.bezier[curved, point] += shift
         return kept
 
+    def add_prefixes(self, run: Run, table: list[bytes], chosen: Ints) -> int:
+        """Words before the numbers."""
+        chosen[run.curve > 0] = len(table)
+        table.append(self.begin)
+        return 0
+
+    def add_suffixes(self, run: Run, table: list[bytes], chosen: Ints) -> None:
+        """Words after the numbers."""
+        chosen[run.curve > 0] = len(table)
+        table.append(self.end)
+
     def _intervals(self, run: Run, curved: Bools) -> NDArray[np.float64]:
         """Bézier points (4, r, c) of the rows on curves."""
         assert run.bezier is not None
@@ -79,8 +86,10 @@ class PolyBlocks(_Polynomials):
     denominator of POLY acts on the geometry axes alone.
     """
 
+    begin, end = b"POLY ", b") PL=1\n"
+
     def __init__(self, form: Form, units: Units) -> None:
-        super().__init__(form.decimals(units))
+        super().__init__(form, units)
         digits, tip = form.table.digits, form.tip_decimals(units)
         letters = [word.rstrip("=") for word in (*form.mode.motion.coordinates, *form.other_words)]
         words = []
@@ -88,17 +97,6 @@ class PolyBlocks(_Polynomials):
             words += [f"{') ' if index else ''}PO[{letter}]=(".encode(), b",", b","]
         self._decimals = (tip, digits.coefficient, digits.coefficient) * len(letters)
         self.format = RowFormat(words=tuple(words), decimals=self._decimals)
-
-    def add_prefixes(self, run: Run, table: list[bytes], chosen: Ints) -> int:
-        """``POLY``."""
-        chosen[run.curve > 0] = len(table)
-        table.append(b"POLY ")
-        return 0
-
-    def add_suffixes(self, run: Run, table: list[bytes], chosen: Ints) -> None:
-        """Length of the parameter interval."""
-        chosen[run.curve > 0] = len(table)
-        table.append(b") PL=1\n")
 
     def numbers(self, run: Run, curved: Bools) -> Ints:
         """End point and coefficients of each interval, axis by axis."""
@@ -114,21 +112,13 @@ class SplBlocks(_Polynomials):
     X(t) = K3·t³ + K2·t² + K1·t + X; the sum gives the start of the block again and may differ by a micrometre.
     """
 
+    begin = b"SPL "
+
     def __init__(self, form: Form, units: Units) -> None:
-        super().__init__(form.decimals(units))
+        super().__init__(form, units)
         letters = (*form.mode.motion.coordinates, *form.other_words)
-        self._decimals, self._coefficient = form.decimals(units), form.table.digits.coefficient
-        self.format = _SplFormat(letters, self._decimals, self._coefficient)
-
-    def add_prefixes(self, run: Run, table: list[bytes], chosen: Ints) -> int:
-        """``SPL``."""
-        chosen[run.curve > 0] = len(table)
-        table.append(b"SPL ")
-        return 0
-
-    def add_suffixes(self, run: Run, table: list[bytes], chosen: Ints) -> None:
-        """Line ends."""
-        chosen[run.curve > 0] = 0
+        self._coefficient = form.table.digits.coefficient
+        self.format = _SplFormat(letters, self._line_decimals, self._coefficient)
 
     def numbers(self, run: Run, curved: Bools) -> Ints:
         """End point, then K3, K2 and K1 of each axis."""
@@ -136,7 +126,7 @@ class SplBlocks(_Polynomials):
         slope, square = 3.0 * (second - end), 3.0 * (end - 2.0 * second + first)
         cube = start - 3.0 * first + 3.0 * second - end
         factors = np.stack((cube, square, slope), axis=2).reshape(len(end), -1)
-        return np.concatenate((to_ticks(end, self._decimals), to_ticks(factors, self._coefficient)), axis=1)
+        return np.concatenate((to_ticks(end, self._line_decimals), to_ticks(factors, self._coefficient)), axis=1)
 
 
 class _SplFormat:

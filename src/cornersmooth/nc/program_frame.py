@@ -226,7 +226,6 @@ class FramedText:
     layout: TextStyle
     end: bytes  #: what lines end with
     next_number: int
-    blocks: int = 0  #: in head and tail
 
     def write(self, text: bytes) -> None:
         """Write whole lines."""
@@ -236,12 +235,6 @@ class FramedText:
         if longest and _longest_line(text) > longest:
             text = b"".join(self._folded(line) for line in text.splitlines(keepends=True))
         self.stream.write(text if self.end == b"\n" else text.replace(b"\n", self.end))
-
-    def write_blocks(self, lines: Sequence[str]) -> None:
-        """Write blocks of head or tail."""
-        self.blocks += len(lines)
-        if lines:
-            self.write("".join(line + "\n" for line in lines).encode("ascii"))
 
     def _numbered(self, text: bytes) -> bytes:
         before, _, behind = self.number.partition("{number}")
