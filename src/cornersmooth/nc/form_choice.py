@@ -70,36 +70,34 @@ def choose_form(
     chosen = table.forms[name]
     if machine is None and not tcp and "machine" in chosen.modes:
         raise SettingsError("CS215", "machine positions need a machine", "name it with --machine")
-    wanted: tuple[Orientation, ...] = ("vector", "point", "fixed")
     if machine is not None and len(machine.names) < 2 and planes:
         what = f"{machine.name} has no two rotary axes, which a tilted plane asks for"
         raise SettingsError("CS232", what, "leave out --planes")
+    orientation, mode = _mode(table, chosen, machine, tcp)
+    asked = tuple(_extra(table, name, extra) for extra in dict.fromkeys(extras))
+    if machine is not None and machine.names:
+        _check_modulo(table, chosen, mode, machine)
+        _check_curves(table, chosen, machine)
+    plane = _plane(table, chosen, machine) if planes else None
+    found = Form(table, name, chosen.curve, orientation, mode, machine, asked, chosen.upright, rewind, plane)
+    _check_rewind(found)
+    return found
+
+
+def _mode(table: Control, form: FormTable, machine: Machine | None, tcp: bool) -> tuple[Orientation, Mode]:
+    """What says the orientation, and how; refuses what the form has not."""
     if machine is not None and not machine.names:
-        asked = tuple(_extra(table, name, extra) for extra in dict.fromkeys(extras))
-        found = _without_rotary_axes(table, chosen, machine, asked, rewind)
-        _check_rewind(found)
-        return found
-    if not tcp:
-        wanted = ("machine",)
-    elif machine is not None:
-        wanted = ("angles",)
+        return "fixed", _without_rotary_axes(table, form)
+    wanted: tuple[Orientation, ...] = ("vector", "point", "fixed") if machine is None else ("angles",)
+    wanted = wanted if tcp else ("machine",)
     for orientation in wanted:
-        if orientation in chosen.modes:
-            asked = tuple(_extra(table, name, extra) for extra in dict.fromkeys(extras))
-            mode = chosen.modes[orientation]
-            _check_modulo(table, chosen, mode, machine)
-            _check_curves(table, chosen, machine)
-            plane = _plane(table, chosen, machine) if planes else None
-            found = Form(table, name, chosen.curve, orientation, mode, machine, asked, chosen.upright, rewind, plane)
-            _check_rewind(found)
-            return found
-    raise _refusal(table, chosen, wanted, machine)
+        if orientation in form.modes:
+            return orientation, form.modes[orientation]
+    raise _refusal(table, form, wanted, machine)
 
 
-def _without_rotary_axes(
-    table: Control, form: FormTable, machine: Machine, extras: tuple[Extra, ...], rewind: float
-) -> Form:
-    """Return the form for a machine without rotary axes: blocks without words of the tool axis, along Z."""
+def _without_rotary_axes(table: Control, form: FormTable) -> Mode:
+    """Return the mode for a machine without rotary axes: blocks without words of the tool axis, along Z."""
     mode = form.modes.get("fixed", None if form.curve else form.upright)
     if mode is None:
         here = f"{table.name} form {form.name}"
@@ -107,12 +105,12 @@ def _without_rotary_axes(
         lines = next((name for name in with_such if not table.forms[name].curve), "")
         hint = f"use -f {lines}" if lines else "leave out --machine"
         raise SettingsError("CS215", f"{here} has no blocks without words of the tool axis", hint)
-    return Form(table, form.name, form.curve, "fixed", mode, machine, extras, form.upright, rewind)
+    return mode
 
 
-def _check_curves(table: Control, form: FormTable, machine: Machine | None) -> None:
+def _check_curves(table: Control, form: FormTable, machine: Machine) -> None:
     """Refuse curves in rotary words of a machine with one rotary axis."""
-    if machine is None or not form.curve or len(machine.names) > 1:
+    if not form.curve or len(machine.names) > 1:
         return
     what = f"{table.name} form {form.name} has no curves for a machine with one rotary axis"
     raise SettingsError("CS215", what, _use_lines(table, "leave out --machine"))
@@ -124,9 +122,9 @@ def _use_lines(table: Control, otherwise: str) -> str:
     return f"use -f {lines}" if lines else otherwise
 
 
-def _check_modulo(table: Control, form: FormTable, mode: Mode, machine: Machine | None) -> None:
+def _check_modulo(table: Control, form: FormTable, mode: Mode, machine: Machine) -> None:
     """Refuse modulo axes that the control does not send the shorter way, or whose words a curve would have."""
-    if machine is None or not machine.modulo:
+    if not machine.modulo:
         return
     axes, hint = " and ".join(machine.modulo), "leave out modulo in the machine file"
     if form.curve:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -138,20 +139,11 @@ def rotary_angles(
 
 
 def rewound_angles(
-    machine: Machine,
-    tip: Floats,
-    axis: Floats,
-    *,
-    tolerance: float,
-    rapid: Bools,
-    line: Ints,
-    file: str | None,
-    still: Bools | None = None,
-    still_tolerance: float = 0.0,
+    machine: Machine, tip: Floats, axis: Floats, *, rapid: Bools, still: Bools, line: Ints, **how: Any
 ) -> tuple[RotaryPath, Ints, Bools]:
     """Rotary angles of a path in which cuts are left, where nothing else keeps the limits.
 
-    Parameters and errors are those of `rotary_angles`.
+    Parameters, those of `how` among them, and errors are those of `rotary_angles`.
 
     Returns
     -------
@@ -169,14 +161,12 @@ def rewound_angles(
                 machine,
                 tip[source],
                 axis[source],
-                tolerance=tolerance,
                 rapid=rapid[source],
                 left=left,
-                still=None if still is None else still[source],
-                still_tolerance=still_tolerance,
+                still=still[source],
                 divide=number < REWIND_ROUNDS,
                 line=line[source],
-                file=file,
+                **how,
             )
         except CutTooFarError as far:
             behind = far.poses + 1
