@@ -253,7 +253,7 @@ def test_as_few_rewinds_as_can_be() -> None:
     tip = np.stack((np.cos(turn), np.sin(turn), turn), axis=1)
     rapid = np.zeros(len(turn), np.bool_)
     rapid[0] = True
-    how = {"tolerance": 0.001, "rapid": rapid, "line": np.arange(len(turn)), "file": None}
+    how = {"tolerance": 0.001, "rapid": rapid, "still": ~rapid & rapid, "line": np.arange(len(turn)), "file": None}
     path, source, left = rewound_angles(machine, tip, axis, **how)
     assert 4 <= left.sum() <= 5
     np.testing.assert_array_equal(source[left], source[np.flatnonzero(left) - 1])

@@ -54,16 +54,9 @@ class Circles:
 
 
 def plan_circles(program: Program, settings: Settings, form: Form, planes: Planes, upright: Bools) -> Circles:
-    """Choose the arcs that a form can write as circles.
+    """Choose the arcs that a form can write as circles within the tolerance, at the tip and at the axis point.
 
-    Parameters
-    ----------
-    settings : Settings
-        The circle through the written numbers keeps its tolerance, at the tip and at the axis point.
-    planes : Planes
-        In a tilted plane arcs are those of its own coordinates.
-    upright : (n,) bool
-        Poses of tools that stay along Z, without tool tip control.
+    In a tilted plane arcs are those of its own coordinates. `upright` (n,) are poses of tools without tool tip control.
     """
     arcs = program.arcs
     frames, tilted = planes.frames(arcs.pose), planes.of[arcs.pose] >= 0

@@ -22,15 +22,8 @@ def begin_compensation(
 ) -> tuple[int, Blocks] | None:
     """Plane (17, 18 or 19) and blocks of CUTCOM/LEFT|RIGHT[,plane][,n]; None where it is not understood.
 
-    Parameters
-    ----------
-    diameter : float, mm
-        Of the tool; 0 where it is not known.
-
-    Raises
-    ------
-    InputError
-        CS336 for a control that is given none, CS344 where the first move has no way in the plane.
+    `diameter` of the tool in mm, 0 where it is not known. Raises CS336 for a control that is given none, CS344 where
+    the first move has no way in the plane.
     """
     names, numbers, words = words_of(statement), numbers_of(statement), form.table.words
     if not words.compensation_left and names[:1] in (["LEFT"], ["RIGHT"]):

@@ -29,10 +29,7 @@ _ALONG_Z, _SAME_PLACE = 1e-9, 1e-9
 def upright_poses(program: Program, form: Form, *, drills: bool) -> Bools:
     """(n,) whether a pose belongs to a tool that runs without tool tip control, for cycles or cutter compensation.
 
-    Parameters
-    ----------
-    drills : bool
-        Whether holes are to be written as cycles; taps are in any case.
+    `drills` says whether holes are to be written as cycles; taps are in any case.
     """
     chosen = np.zeros(len(program), np.bool_)
     holes = program.kind == Move.HOLE
@@ -54,14 +51,7 @@ def upright_poses(program: Program, form: Form, *, drills: bool) -> Bools:
 
 
 def has_cycles(program: Program, form: Form, part: slice, *, drills: bool) -> bool:
-    """Whether any hole of a part of the poses can be a cycle of the control.
-
-    Parameters
-    ----------
-    part : slice
-    drills : bool
-        As in `upright_poses`.
-    """
+    """Whether any hole of a part of the poses can be a cycle of the control; `drills` as in `upright_poses`."""
     if not (program.kind[part] == Move.HOLE).any():
         return False
     said = _said_cycles(program)

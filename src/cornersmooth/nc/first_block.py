@@ -47,22 +47,10 @@ class FirstBlock:
     line: int  #: of the CL file
 
     def check(self, place: Floats | None, findings: Findings, file: str | None) -> None:
-        """Refuse the block, or warn of it.
+        """Refuse the block, or warn of it; `place` (2,) mm is where X and Y of the spindle nose stand before, if known.
 
-        Parameters
-        ----------
-        place : (2,) float64 or None, mm
-            Where X and Y of the spindle nose stand before; None where that is not known.
-        findings : Findings
-            Takes CS391 where it depends on that place whether the block stays within the travel, and CS392 where the
-            block comes from below its end: tables and fixtures are below the part, and turned beside the tool.
-        file : str or None
-            For messages.
-
-        Raises
-        ------
-        InputError
-            CS374: the block leaves the travel from wherever it starts.
+        CS374: it leaves the travel from wherever it starts. CS391: whether it stays within the travel depends on that
+        place. CS392: it comes from below its end; tables and fixtures are below the part, and turned beside the tool.
         """
         machine, before, starts = self.machine, self._angles_before, self._starts(place)
         if machine is None or before is None or self.angles is None or not len(starts):

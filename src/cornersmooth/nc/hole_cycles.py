@@ -76,15 +76,7 @@ class Cycle:
 def in_force(
     before: tuple[float | str, ...], said: tuple[float | str, ...], program: Program
 ) -> tuple[float | str, ...]:
-    """Arguments of the cycle that holds after a CYCLE statement, every number after the word that says what it is.
-
-    Parameters
-    ----------
-    before : tuple
-        Those that held before it.
-    said : tuple
-        Its own.
-    """
+    """Arguments that hold after a CYCLE statement that has `said` its own, every number after its word."""
     own = _without_on(said)
     if own == ["INIT"]:  # SolidWorks announces a cycle by it
         return before
@@ -128,10 +120,7 @@ def _unit_place(args: Sequence[float | str]) -> int:
 def read_cycle(args: tuple[float | str, ...], program: Program, speed: float | None) -> Cycle | None:
     """Read the arguments of a cycle, as `in_force` gives them; None where any of them is not understood.
 
-    Parameters
-    ----------
-    speed : float or None
-        Revolutions per minute, for a dwell in revolutions.
+    A dwell may count in revolutions of the spindle at a speed, rev/min.
     """
     given = _pairs(args)
     if given is None:
@@ -243,20 +232,7 @@ class HoleCycles:
         self.now = read_cycle(self._args, self.program, speed) if self._on else None
 
     def leave_out(self, why: str, line: int, holes: int) -> None:
-        """Count holes that are not drilled.
-
-        Parameters
-        ----------
-        why : str
-            Why there is no motion for them.
-        line : int
-            Of the first one.
-
-        Raises
-        ------
-        InputError
-            CS342: they may not be left out.
-        """
+        """Count holes that are not drilled, the first at a line; raises CS342 where they may not be left out."""
         if not self.skip:
             raise InputError(
                 "CS342",

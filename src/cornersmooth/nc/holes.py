@@ -191,18 +191,7 @@ def approaches(program: Program) -> Ints:
 
 
 def hole_moves(cycle: Cycle, program: Program, poses: Ints, approach: Ints) -> HoleMoves:
-    """Plain moves for holes at the given poses, all of one cycle.
-
-    Parameters
-    ----------
-    approach : (h,) int64
-        What `approaches` says of the poses.
-
-    Returns
-    -------
-    HoleMoves
-        `hole` counts from 0 in the order of `poses`.
-    """
+    """Plain moves for holes of one cycle; `approach` (h,) is what `approaches` says of their poses."""
     travel, clearance = travel_of(cycle, program, poses, approach)
     heights, rapid, dwell = [travel, clearance], [True, True], [False, False]
 

@@ -237,15 +237,9 @@ class MotionWriter:
         yield from self.emit(Run.straight(self.program, self._again(self.last, passed[:1], near), np.array([move])))
 
     def _again(self, last: Ints, pose: Ints, near: Floats) -> Ints:
-        """Ticks (1, c) of what was written last, by the writer at hand.
+        """Ticks (1, c) of what was written last, a pose (1,), by the writer at hand.
 
-        Parameters
-        ----------
-        last : (c,) int64
-        pose : (1,) int64
-            Of the place that was written.
-        near : (1, 2) or (1, 3) float64
-            Orientation of the first row to come.
+        The orientation of the first row to come is near.
         """
         form = self.writer.form
         if self.last_writer is self.writer:

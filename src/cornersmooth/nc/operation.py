@@ -108,15 +108,7 @@ class Operation:
         return [hold for hold, _ in self.clamps]
 
     def end_tool(self, line: int = 0, *, another: bool = False) -> list[str]:
-        """Blocks after the last motion of a tool.
-
-        Parameters
-        ----------
-        line : int
-            That of the statement that asks for them.
-        another : bool
-            Whether another tool follows.
-        """
+        """Blocks after the last motion of a tool, which a statement at a line asks for; `another` tool may follow."""
         self._stopped_line, self.begun = line, False
         steps = self._tool_end
         if not self._moved:  # a program begins with a tool change, as a rule

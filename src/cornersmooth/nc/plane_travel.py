@@ -26,19 +26,9 @@ _SAME = 1e-7
 
 
 def check_travel_in_planes(planes: Planes, program: Program, form: Form, findings: Findings) -> None:
-    """Refuse poses in tilted planes beyond the travel of the machine, whichever of its angles the control takes.
+    """Refuse poses in tilted planes beyond the travel (CS374), whichever of its angles the control takes.
 
-    Parameters
-    ----------
-    form : Form
-        Without a machine with travel nothing is known.
-    findings : Findings
-        Takes CS379 where only some of the angles will do.
-
-    Raises
-    ------
-    InputError
-        CS374: the first position beyond the travel of an axis.
+    CS379 warns where only some of the angles will do. Without a machine with travel nothing is known.
     """
     machine = form.machine
     if machine is None or not machine.travel:

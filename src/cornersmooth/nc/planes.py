@@ -66,19 +66,8 @@ def plan_planes(
 
     A run has one axis, cuts, and lies between rapids or changes of the tool: there it can go up and be turned. Where a
     new tool begins with a feed move that turns it, the turn is written, outside of any plane. Along Z none is needed
-    but for holes that are cycles of the control, which tool tip control does not take: they stand in a plane
-    that is not tilted.
-
-    Parameters
-    ----------
-    form : Form
-        Where it has no `Form.plane` there are none.
-    upright : (n,) bool
-        Poses of tools that stay along Z, which need no plane.
-    findings : Findings
-        Takes which runs are in planes, and which are not although they could.
-    drills : bool
-        Whether holes are to be written as cycles; taps are in any case.
+    but for holes that are cycles of the control, which tool tip control does not take: they stand in a plane that is
+    not tilted. Poses of `upright` tools need none. `drills` is as in `upright_poses`.
     """
     of = np.full(len(program), -1, np.int64)
     if form.plane is None:
@@ -154,14 +143,9 @@ def _plane(axis: Floats, settings: Settings, form: Form) -> tuple[Plane | None, 
 
 
 def tilting_angles(rotations: str, axis: Floats) -> tuple[float, float, float]:
-    """Angles in degrees of three rotations that bring Z to an axis; the last is zero.
+    """Angles in degrees of three rotations that bring Z to a unit vector (3,); the last is zero.
 
-    Parameters
-    ----------
-    rotations : str
-        Axes of the rotations in their order, each that of the frame which those before it have made, as in ``"zxz"``.
-    axis : (3,) float64
-        Unit vector.
+    `rotations`, as in ``"zxz"``, are their axes, each of the frame which those before it have made.
     """
     one, two = (_UNIT[name] for name in rotations[:2])
     across = np.cross(two, _UNIT["z"])  # where the second rotation leads Z

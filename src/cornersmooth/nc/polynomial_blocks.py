@@ -163,19 +163,9 @@ class _SplFormat:
 
 
 def bezier_points(points: Floats, curve: NDArray[np.int8], spline: Floats) -> Floats:
-    """Bézier points of the knot intervals of curves, in the last rows of each; zero elsewhere.
+    """Bézier points (r, 4, c) of the knot intervals of curves, in the last rows of each; zero elsewhere.
 
-    Parameters
-    ----------
-    points : (r, c) float64
-        Control points; p rows for a curve of p − 3 knot intervals, all weights 1.
-    curve : (r,) int8
-    spline : (r, 3) float64
-        As in `Rows`.
-
-    Returns
-    -------
-    (r, 4, c) float64
+    A curve has p control points (r, c) for p − 3 knot intervals, and all weights 1; `spline` is as in `Rows`.
     """
     intervals = np.zeros((len(points), 4, points.shape[1]))
     first = np.flatnonzero(curve == 1)

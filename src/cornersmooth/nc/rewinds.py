@@ -30,16 +30,9 @@ _PLACES: Final = np.linspace(0.0, 1.0, 10)[1:-1]
 
 
 def swinging(machine: Machine, before: Floats, after: Floats) -> Bools:
-    """Moves in which the tool axis leaves the shortest way by more than `LONGEST_DETOUR`.
+    """Moves (m,) in which the tool axis leaves the shortest way by more than `LONGEST_DETOUR`.
 
-    Parameters
-    ----------
-    before, after : (m, 2) float64, degrees
-        Rotary words, in the order of the machine's axes, which run evenly from the ones to the others.
-
-    Returns
-    -------
-    (m,) bool
+    Rotary words (m, 2), degrees in the order of the machine's axes, run evenly from those before to those after.
     """
     ends = [tool_axis(machine, angles) for angles in (before, after)]
     shortest = _angle(*ends)
@@ -60,17 +53,7 @@ def rows_that_swing(machine: Machine, angles: Floats, rapid: Bools) -> Ints:
 def retracts_before(form: Form, angles: Floats, rapid: Bools, line: Ints, findings: Findings, possible: bool) -> Ints:
     """Rows of a run before which the tool goes up, so that rotary axes turn back there; says so.
 
-    Parameters
-    ----------
-    form : Form
-        With rotary words.
-    angles : (r + 1, 2) float64, degrees
-        Before the run, and of its rows.
-    rapid : (r,) bool
-    line : (r,) int64
-        Of the CL file.
-    possible : bool
-        Whether the control has a retract.
+    `angles` (r + 1, 2), degrees, are those before the run and of its rows; `possible` where the control has a retract.
     """
     assert form.machine is not None
     rows = rows_that_swing(form.machine, angles, np.concatenate(([False], rapid))) - 1
@@ -88,25 +71,9 @@ def retracts_before(form: Form, angles: Floats, rapid: Bools, line: Ints, findin
 def from_zero(form: Form, program: Program, axis: Floats, angles: Floats, move: Ints, rapid: Bools) -> Floats:
     """What is to be added to angles so that none carries over what a tool before has left; constant between retracts.
 
-    Behind a retract the axes turn as they like. A tool that stays along the pole, where the first angle is free, has
+    After a retract the axes turn as they like. A tool that stays along the pole, where the first angle is free, has
     that at zero, not where another tool needs it. Where the rotary axes go to zero before a tool, its angles are
-    without the whole turns of the tools before.
-
-    Parameters
-    ----------
-    form : Form
-        With rotary words.
-    axis : (r, 3) float64
-        Tool axis of each row.
-    angles : (r, 2) float64, degrees
-        NaN where there is none.
-    move : (r,) int64
-        Ascending.
-    rapid : (r,) bool
-
-    Returns
-    -------
-    (r, 2) float64, degrees
+    without the whole turns of the tools before. Angles (r, 2) are in degrees, NaN where there is none.
     """
     machine, table = form.machine, form.table.program
     assert machine is not None

@@ -29,19 +29,9 @@ def curve_rows_of(smoothed: SmoothProgram, form: Form, findings: Findings) -> It
 
 
 def rewound_curve_rows(smoothed: SmoothProgram, form: Form, findings: Findings) -> Iterator[Rows]:
-    """Rows of curves, and of lines between the rapids around a place where a cut is left.
+    """Rows of curves, and of lines (CS381) between the rapids around a place where a cut is left.
 
-    Parameters
-    ----------
-    form : Form
-        Of curves in rotary words, with a rewind.
-    findings : Findings
-        Takes CS381 for each stretch in lines, and what the kinematics notice.
-
-    Raises
-    ------
-    InputError
-        The machine cannot follow the path.
+    Raises InputError where the machine cannot follow the path.
     """
     program = smoothed.program
     in_lines = _left(smoothed, form)

@@ -32,12 +32,8 @@ _STRAIGHT_SHARE = 0.95
 def rotary_curve_rows(smoothed: SmoothProgram, form: Form, findings: Findings) -> Iterator[Rows]:
     """Rows with the angles of the form's machine in `Rows.other`, in the order of its axes, and `Rows.spline`.
 
-    Raises
-    ------
-    InputError
-        The machine cannot follow the path.
-    SettingsError
-        The method has no curves in rotary axes.
+    Raises InputError where the machine cannot follow the path, SettingsError for a method without curves in rotary
+    axes.
     """
     program, settings, machine = smoothed.program, smoothed.settings, machine_of(form)
     step, resolution = form.rounding(program.units), form.angle_rounding

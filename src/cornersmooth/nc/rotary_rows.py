@@ -53,28 +53,11 @@ def rotary_rows(
     long: bool = False,
     in_planes: Bools | None = None,
 ) -> Iterator[tuple[Rows, Ints]]:
-    """Rows of lines with the words of the form's machine in `Rows.other`, in the order of its axes.
+    """Rows of lines with the words of the form's machine in `Rows.other`, and the row of the way that each is.
 
-    Parameters
-    ----------
-    findings : Findings
-        Takes what the kinematics notice.
-    long : bool
-        Whether only those rows are left that ε asks for (`cornersmooth.smoothing.long_lines`).
-    in_planes : (n,) bool, optional
-        Poses in tilted planes, whose rotary axes the control turns, and whose travel is not looked at here.
-
-    Yields
-    ------
-    rows : Rows
-        Some thousand at a time, with the points that lines need.
-    source : (r,) int64
-        Row of the way that each is, -1 for an inserted point.
-
-    Raises
-    ------
-    InputError
-        The machine cannot follow the path.
+    Some thousand come at a time, with the points (row -1) that lines need. Of `long` lines only those are left that ε
+    asks for. Poses (n,) `in_planes`, whose rotary axes the control turns, are not compared with the travel. Raises
+    InputError where the machine cannot follow the path.
     """
     if not len(way.move):
         return

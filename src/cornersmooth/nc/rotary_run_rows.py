@@ -47,19 +47,7 @@ class _Sections:
 def rotary_run_rows(smoothed: SmoothProgram, form: Form, findings: Findings) -> Iterator[Rows]:
     """Rows with the angles of the form's machine in `Rows.other`, in the order of its axes, and `Rows.spline`.
 
-    Parameters
-    ----------
-    smoothed : SmoothProgram
-        With runs.
-    form : Form
-        Of curves in rotary words.
-    findings : Findings
-        Takes what the kinematics notice.
-
-    Raises
-    ------
-    InputError
-        The machine cannot follow the path.
+    Raises InputError where the machine cannot follow the path.
     """
     program, settings, machine, runs = smoothed.program, smoothed.settings, machine_of(form), smoothed.runs
     assert runs is not None

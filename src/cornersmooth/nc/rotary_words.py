@@ -41,18 +41,7 @@ class RotaryWay:
 def rotary_way(rows: Iterator[Rows], smoothed: SmoothProgram, form: Form, findings: Findings) -> RotaryWay:
     """Angles of rows with tool vectors; all rows are held at once.
 
-    Parameters
-    ----------
-    rows : iterator of Rows
-    form : Form
-        With rotary words.
-    findings : Findings
-        Takes what the kinematics notice.
-
-    Raises
-    ------
-    InputError
-        The machine cannot follow the path.
+    Raises InputError where the machine cannot follow the path.
     """
     program, settings, machine = smoothed.program, smoothed.settings, machine_of(form).with_longest_tool()
     tip, axis, move = whole_rows(rows)

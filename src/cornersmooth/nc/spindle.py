@@ -12,15 +12,7 @@ _MM_PER_MINUTE = {"SMM": 1000.0, "SFM": 12.0 * 25.4}
 
 
 def milliseconds(amount: float, in_revolutions: bool, speed: float | None) -> int | None:
-    """Return a dwell in whole milliseconds; None where it is none, or cannot be told without a spindle speed.
-
-    Parameters
-    ----------
-    amount : float
-        Seconds, or revolutions.
-    speed : float or None
-        Revolutions per minute.
-    """
+    """Return a dwell of seconds, or of revolutions at a speed per minute, in whole ms; None where none is known."""
     if in_revolutions:
         if not speed:
             return None

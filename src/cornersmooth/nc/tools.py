@@ -89,20 +89,7 @@ class ToolTravel:
         return found
 
     def check(self, tip: Floats, angles: Floats, move: Ints) -> None:
-        """Refuse rows that the linear axes cannot reach.
-
-        Parameters
-        ----------
-        tip : (r, 3) float64, mm
-        angles : (r, 2) float64, degrees
-        move : (r,) int64
-            Pose of each row.
-
-        Raises
-        ------
-        InputError
-            CS374, as `check_travel` raises it.
-        """
+        """Refuse rows (r,) of poses, tips in mm and angles in degrees, that the linear axes cannot reach (CS374)."""
         if not self.machine.travel:
             return
         tools, file = self._tools[move], self.program.source.name

@@ -121,13 +121,7 @@ class MotionWarnings:
     def of_holes(self, poses: Ints, before: int, travel: Floats, clearance: Floats) -> None:
         """Say that the tool turns on its way to holes right above them: what lies there, the CL file does not say.
 
-        Parameters
-        ----------
-        poses : (h,) int64
-        before : int
-            Pose that the tool comes from; -1 for none.
-        travel, clearance : (h,) float64, mm
-            Heights over the holes to which the tool comes, and from which it feeds.
+        It comes from a pose, -1 for none. Heights (h,) over the holes, mm: to which it comes, and from which it feeds.
         """
         axis = self.program.axis[poses]
         come = self.program.axis[np.concatenate(([max(before, 0)], poses[:-1]))]

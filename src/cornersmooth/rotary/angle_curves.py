@@ -296,17 +296,9 @@ def _lines_finding(smoothed: SmoothProgram, machine: Machine, lines: Ints) -> tu
 
 
 def weight_factors(weights: Floats) -> Floats:
-    """Smallest powers of two that leave the weights of each curve no more decimals than controls keep.
+    """Smallest powers of two (g,) that leave refined weights (g, p) no more decimals than controls keep.
 
-    Parameters
-    ----------
-    weights : (g, p) float64
-        Refined weights of curves whose own five have no more decimals than that.
-
-    Returns
-    -------
-    (g,) float64
-        1 where all weights are 1.
+    The own five weights of each curve have no more decimals than that.
     """
     factors = np.ones(len(weights))
     scale = 10.0**WEIGHT_DECIMALS

@@ -15,15 +15,9 @@ from cornersmooth.vectors import dot, norm, unit
 
 
 def axis_bend(machine: Machine, turn: Floats, start: Floats, end: Floats, slack: float) -> Floats:
-    """Bound (n,) on the second derivative of the tool axis when both rotary axes turn evenly.
+    """Bound (n,) on the second derivative of the tool axis when both rotary axes turn evenly, by `turn` (n, 2) rad.
 
-    Parameters
-    ----------
-    turn : (n, 2) float64, rad
-    start, end : (n, 3) float64
-        Tool axes at both ends.
-    slack : float, rad
-        By how much these may be off.
+    Tool axes (n, 3) at both ends may be off by the slack, rad.
     """
     turn = np.abs(turn)
     away = np.maximum(_sine(machine, start), _sine(machine, end)) + slack + turn[:, 1] / 2

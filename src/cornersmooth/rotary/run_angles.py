@@ -70,12 +70,8 @@ class RunAngles:
 def run_angles(runs: Runs, machine: Machine, guide: Guide, *, tolerance: float, cone: float) -> RunAngles:
     """Angles of runs on a machine with two rotary axes, within a tolerance as far as halving spans brings them there.
 
-    Parameters
-    ----------
-    tolerance : float, degrees
-        Between the tool axis of the angles and that of the run.
-    cone : float, degrees
-        From the pole: within it the first angle follows the guide, as in `continued`.
+    The tolerance, degrees, is between the tool axis of the angles and that of the run. Within the cone of the pole,
+    degrees, the first angle follows the guide, as in `continued`.
     """
     splines, control = Splines(runs.knot, runs.knot_count), runs.control
     for left in range(ROUNDS, -1, -1):
