@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,9 +13,13 @@ from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 from scipy.optimize import NonlinearConstraint, minimize
 
-from cornersmooth import Program, Settings, smooth
+from cornersmooth import Limits, Program, Settings, postprocess, read, smooth
+from cornersmooth.feedrate import plan_text
 from cornersmooth.geometry.bsplines import Splines
+from cornersmooth.kinematics import load_machine
 from cornersmooth.model import Move, Status
+from cornersmooth.nc import choose_form
+from cornersmooth.nc_reader import read_nc
 from cornersmooth.smoothing import global_runs
 from cornersmooth.smoothing.runs.banded import Gather, couplings, keep_in_planes, solve_blocks
 from cornersmooth.smoothing.runs.fitting import fit
@@ -389,3 +395,18 @@ def test_groups_of_runs_are_solved_as_all_of_them_by_any_number_of_processes(mon
             column = getattr(found.corners, name)
             np.testing.assert_allclose(column, getattr(whole.corners, name), rtol=0, atol=1e-9)
         assert found.corners.tip_error[in_run].max() <= whole.runs.tip_bound.max() + 1e-9
+
+
+@pytest.mark.corpus
+def test_a_written_path_has_at_most_a_block_a_pose_and_takes_two_thirds_of_the_time(corpus: Path) -> None:
+    """By the planner of finished programs, head and tail of the program among the blocks."""
+    whole, times = read(corpus / "hecc_point_zigzag.csv"), []
+    program = Program.from_poses(whole.tip[:120], whole.axis[:120], feed=1800.0)
+    for method in ("proportional", "global"):
+        text, chosen = io.BytesIO(), Settings(method=method)
+        written = postprocess(program, text, chosen, form=choose_form("fanuc", "g6.2")).written
+        back = read_nc(text.getvalue(), control="fanuc", tolerance=0.01)
+        law = plan_text(back, Limits(feed=1800.0), settings=chosen, machine=load_machine("table-ac"))
+        times.append(law.total)
+    assert written.blocks <= len(program)
+    assert times[1] <= 0.69 * times[0]

@@ -13,10 +13,10 @@ from cornersmooth.smoothing.runs.windows import Windows
 
 #: share of the tolerances that the fit may use. Less in spans that hold poses: the knots of neighbouring passes differ,
 #: and must not show.
-CLOSE, CLOSE_TO_POSES = 0.5, 0.3
+CLOSE, CLOSE_TO_POSES = 0.7, 0.3
 
 #: poses between the first knots
-STRIDE = 8
+STRIDE = 16
 
 #: control points beside a new knot that are fitted anew
 REACH = 10
@@ -68,17 +68,12 @@ def holding_poses(splines: Splines, lines: Polylines) -> Bools:
 
 
 def first_knots(lines: Polylines) -> Splines:
-    """Both ends of every run, the middles and inner ends of its first and last segment, and some poses between."""
+    """Both ends of every run, the inner ends of its first and last segment, and some poses between."""
     row, place = spread(lines.count)
     last = lines.count[row] - 1
     chosen = (place == 0) | (place == last) | (place == 1) | (place == last - 1)
     chosen |= (place % STRIDE == 1) & (place < last - STRIDE // 2)
-    first, end = lines.first[:-1], lines.first[1:] - 1
-    middles = np.stack((lines.s[first] + lines.s[first + 1], lines.s[end] + lines.s[end - 1]), axis=1) // 2.0
-    run = np.concatenate((row[chosen], np.repeat(np.arange(len(first)), 2)))
-    knot = np.concatenate((lines.s[chosen], middles.reshape(-1)))
-    order = np.lexsort((knot, run))
-    return Splines(knot[order], np.bincount(run, minlength=len(first)))
+    return Splines(lines.s[chosen], np.bincount(row[chosen]))
 
 
 def lines_to_control(lines: Polylines, splines: Splines) -> Floats:
@@ -167,24 +162,21 @@ def _refine(
         splines.knot[splines.span_knot[bad] + 1],
     )
     before, after = lines.poses_around(run, low, high)
-    split = after - before > 1
-    new_run, new_knot = [run[split]], [lines.s[(before[split] + after[split] + 1) // 2]]
-    # inside one segment: beside a sharp corner, else in the middle
-    run, before, after, low, high = run[~split], before[~split], after[~split], low[~split], high[~split]
+    holds = after - before > 1
+    # at the pose in the middle; inside one segment beside a sharp corner, else in the middle: not while the deviation
+    # may be that of a neighbour that is split at a pose
+    coarse = np.zeros(len(splines.span_run) + 2, np.bool_)
+    coarse[bad[holds] + 1] = True
     width = high - low
-    at_low = np.where(lines.s[before] == low, corner[before], np.inf)
-    at_high = np.where(lines.s[after] == high, corner[after], np.inf)
+    at_low = np.where(~holds & (lines.s[before] == low), corner[before], np.inf)
+    at_high = np.where(~holds & (lines.s[after] == high), corner[after], np.inf)
     near_low, near_high = at_low < 0.35 * width, at_high < 0.35 * width
-    middle = ~(near_low | near_high)
-    new_run += [run[near_low], run[near_high], run[middle]]
-    new_knot += [
-        np.round(low + at_low)[near_low],
-        np.round(high - at_high)[near_high],
-        ((low + high) // 2.0)[middle],
-    ]
-    far_low, far_high = near_low & (WINGS * at_low < 0.45 * width), near_high & (WINGS * at_high < 0.45 * width)
-    new_run += [run[far_low], run[far_high]]
-    new_knot += [np.round(low + WINGS * at_low)[far_low], np.round(high - WINGS * at_high)[far_high]]
+    middle = np.where(holds, lines.s[(before + after + 1) // 2], (low + high) // 2.0)
+    waits = near_low | near_high | (~holds & (coarse[bad] | coarse[bad + 2]))
+    places = [(middle, ~waits), (low + at_low, near_low), (high - at_high, near_high)]
+    places += [(low + WINGS * at_low, near_low & (WINGS * at_low < 0.45 * width))]
+    places += [(high - WINGS * at_high, near_high & (WINGS * at_high < 0.45 * width))]
+    new_run, new_knot = [run[here] for _, here in places], [np.round(place[here]) for place, here in places]
     return _insert(lines, splines, control, off, np.concatenate(new_run), np.concatenate(new_knot))
 
 

@@ -81,7 +81,7 @@ def largest_curvature(lines: Polylines, splines: Splines, control: Floats) -> Fl
     """(n,) 1/mm: largest curvature of the tip curves in the halves of the segments beside each pose of the runs."""
     largest = np.zeros(len(lines.s))
     pieces = Pieces.of(splines, lines)
-    at = np.linspace(0.0, 1.0, 9)
+    at = np.linspace(0.0, 1.0, 17)
     slope = np.stack(((1.0 - at) ** 2, 2.0 * at * (1.0 - at), at**2), axis=1)
     bend = np.stack((1.0 - at, at), axis=1)
     for begin in range(0, len(pieces.span), _TOGETHER):
