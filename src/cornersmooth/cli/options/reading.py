@@ -87,25 +87,18 @@ no_size_limit = option(
     "Reading", "--no-size-limit", is_flag=True, help="Read inputs of more than 2 GB, and gzip files that grow 200-fold."
 )
 
-_READING = {
-    "format": input_format,
-    "dialect": dialect,
-    "units": units,
-    "arc_rule": arc_rule,
-    "operation": operation,
-    "lenient": lenient,
-}
-_TOOL = {"tool_number": tool_number, "spindle": spindle}
+#: arguments of `cornersmooth.read` that options give
+_ARGUMENTS = "format dialect units arc_rule operation lenient tool_number spindle".split()
 
 
 def reading_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """Options of every command that reads CL files."""
-    return all_of(function, (*_READING.values(), no_size_limit))
+    return all_of(function, (input_format, dialect, units, arc_rule, operation, lenient, no_size_limit))
 
 
 def tool_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """Options of the commands that know of a tool which the input does not name."""
-    return all_of(function, _TOOL.values())
+    return all_of(function, (tool_number, spindle))
 
 
 def refuse_operation(given: dict[str, Any]) -> None:
@@ -116,5 +109,4 @@ def refuse_operation(given: dict[str, Any]) -> None:
 
 def reading_of(given: dict[str, Any]) -> dict[str, Any]:
     """Keyword arguments of `cornersmooth.read` that were given."""
-    found = {name: given[name] for name in (*_READING, *_TOOL) if name in given}
-    return found | {"size_limit": not given["no_size_limit"]}
+    return {name: given[name] for name in _ARGUMENTS if name in given} | {"size_limit": not given["no_size_limit"]}

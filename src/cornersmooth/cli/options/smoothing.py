@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -94,19 +95,6 @@ axis_step = option(
     help="Largest change of the tool axis in one line beside a rounded corner.",
 )
 
-_SETTINGS = {
-    "tolerance": tolerance,
-    "axis_length": axis_length,
-    "axis_tolerance": axis_tolerance,
-    "method": method,
-    "weights": weights,
-    "reversal_angle": reversal_angle,
-    "lines": lines,
-    "chord_tolerance": chord_tolerance,
-    "block_time": block_time,
-    "axis_step": axis_step,
-}
-
 
 def curve_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """Options of every command that makes curves, besides their tolerance and method."""
@@ -123,8 +111,7 @@ def settings_of(given: dict[str, Any]) -> Settings:
     from cornersmooth.settings import Settings
 
     check_one_of_axis(given)
-
-    return Settings(**{name: given[name] for name in _SETTINGS if name in given})
+    return Settings(**{item.name: given[item.name] for item in fields(Settings) if item.name in given})
 
 
 def check_one_of_axis(given: dict[str, Any]) -> None:
