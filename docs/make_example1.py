@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from cornersmooth import Settings, choose_form, read, smooth, write
+from cornersmooth.nc_reader import read_nc
 from cornersmooth.report.deviation_profile import Distribution, deviation_along
 
 HERE = Path(__file__).resolve().parent
@@ -30,7 +31,8 @@ def measure(tolerance: float) -> Distribution:
     smoothed = smooth(program, Settings(tolerance=tolerance, method="zhang2016"), form=form)
     text = io.BytesIO()
     write(smoothed, text, form=form)
-    return deviation_along(program, text.getvalue(), tolerance=tolerance, samples=80)
+    nc = read_nc(text.getvalue(), tolerance=tolerance)
+    return deviation_along(program, nc, tolerance=tolerance, samples=80)
 
 
 def graph(found: Distribution, tolerance: float, top: float) -> list[str]:

@@ -109,7 +109,7 @@ def test_tables_on_the_terminal(files, capsys):
 def test_distribution_along_the_path():
     program, lines = job("g6.2")
     found = verify(program, encode(lines), tolerance=0.02)
-    along = deviation_along(program, encode(lines), tolerance=0.02, samples=16)
+    along = deviation_along(program, read_nc(encode(lines), tolerance=0.02), tolerance=0.02, samples=16)
     assert (np.diff(along.way) >= 0).all()
     # the largest deviation is that of a corner from its curve: no written pose is farther off
     assert along.tip.max() == pytest.approx(found.max_tip_deviation_mm, abs=1e-4)

@@ -117,7 +117,6 @@ def command(source: str, text: str, **given: Any) -> int:
     smoothing.check_one_of_axis(given)
     reader = nc_text.reading_back_of(given)
     measures = {name: given[name] for name in ("tolerance", "axis_length", "axis_tolerance")}
-    how = {**measures, **reader}
     program = read(data, name=name, **reading.reading_of(given))
     if given["verbose"] or given["reports"] or given["as_json"]:  # it is looked at more than once
         nc = readable_twice(nc)
@@ -127,7 +126,8 @@ def command(source: str, text: str, **given: Any) -> int:
     found = verify(
         program,
         nc,
-        **how,
+        **measures,
+        **reader,
         trusted=(*own, *trusted),
         accepted=nc_text.control_of(given).trusted,
         weights=head.weights,
@@ -158,13 +158,13 @@ def command(source: str, text: str, **given: Any) -> int:
         control = nc_text.control_of(given)
         return verified_page(
             program,
-            _read_for_page(nc, given, reader),
+            _read_again(nc, given, reader),
             found,
             name=text if text != STANDARD else "",
             control=control.name,
             form=head.form or "",
             source=data,
-            machine=how["machine"],
+            machine=reader["machine"],
             planner=control.lines.planner,
             tool=given["tool"],
         )
@@ -187,7 +187,7 @@ def command(source: str, text: str, **given: Any) -> int:
         for line in _summary(found):
             say_line(line, indent=18)
         if given["verbose"]:
-            for line in _along(found, deviation_along(program, nc, **how)):
+            for line in _along(found, deviation_along(program, _read_again(nc, given, reader), **measures)):
                 say_line(line)
     taken = (Verdict.PASSED,) if given["strict"] else (Verdict.PASSED, Verdict.INCOMPLETE)
     return 0 if found.verdict in taken else 1
@@ -317,7 +317,7 @@ def _nc_file(text: str, nc: bytes | str | os.PathLike[str], form: str | None, gi
     )
 
 
-def _read_for_page(nc: bytes | str | os.PathLike[str], given: dict[str, Any], reader: dict[str, Any]) -> NcProgram:
+def _read_again(nc: bytes | str | os.PathLike[str], given: dict[str, Any], reader: dict[str, Any]) -> NcProgram:
     """Read the text as verification did."""
     from cornersmooth.nc_reader import read_nc
     from cornersmooth.verify.task import length_of

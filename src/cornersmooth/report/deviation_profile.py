@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cornersmooth.model import Floats, Ints, Program
 from cornersmooth.nc_reader.elements import NcProgram
-from cornersmooth.nc_reader.reading import read_nc
 from cornersmooth.nc_reader.tool import written_at
 from cornersmooth.verify.batches import Batches
 from cornersmooth.verify.distances import of_original
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.nearest import nearest_places
 from cornersmooth.verify.task import Task
-
-if TYPE_CHECKING:
-    from cornersmooth.kinematics.machine import Machine
 
 #: segments on either side in which the common pose is looked for
 _REACH = 2
@@ -51,21 +45,18 @@ class Distribution:
 
 def deviation_along(
     program: Program,
-    nc: NcProgram | bytes | str | os.PathLike[str],
+    nc: NcProgram,
     *,
     tolerance: float,
     axis_length: float = 10.0,
     axis_tolerance: float | None = None,
     samples: int = 8,
-    control: str = "fanuc",
-    machine: Machine | None = None,
-    tcp: bool = True,
 ) -> Distribution:
     """Measure the deviation at equally spaced parameters of every path element, and at every original pose.
 
     Parameters
     ----------
-    program, nc, tolerance, axis_length, axis_tolerance, control, machine, tcp
+    program, tolerance, axis_length, axis_tolerance
         As in `verify`.
     samples : int
         Poses per element.
@@ -75,13 +66,9 @@ def deviation_along(
     Distribution
         At the poses of the original that come nearest to tip and axis point together.
     """
-    text = nc
     task = Task.of(program, tolerance, axis_length, axis_tolerance)
-    if not isinstance(text, NcProgram):
-        length = task.axis_length
-        text = read_nc(text, control=control, machine=machine, tcp=tcp, tolerance=tolerance, axis_length=length)
     parts = [np.zeros((0, _COLUMNS))]
-    for batch in Batches(task, text.events).of([text]):
+    for batch in Batches(task, nc.events).of([nc]):
         matched = Match(task, batch)
         parts += [_of_elements(matched, batch.offset, samples), _of_poses(matched)]
     rows = np.concatenate(parts)
