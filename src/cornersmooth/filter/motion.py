@@ -55,8 +55,9 @@ def motion(stretches: Sequence[Stretch], form: Form, spelling: Spelling, setting
     inch = stretches[0].run.state.unit != 1.0
     parts, lines = [_head(form, inch=inch)], [np.zeros(1, np.int64)]
     lines[0] = np.zeros(parts[0].count(b"\n"), np.int64)
-    for stretch in stretches:
-        start = _start(stretch.run, form, spelling)
+    modes = [0, *(stretch.run.state.feed_mode for stretch in stretches)]
+    for stretch, before in zip(stretches, modes, strict=False):
+        start = _start(stretch.run, form, spelling, before)
         text = stretch.text if stretch.text.endswith(b"\n") else stretch.text + b"\n"
         parts += [start, text]
         first = np.full(start.count(b"\n"), -stretch.line, np.int64)
@@ -82,7 +83,7 @@ def program_of(nc: NcProgram, marks: bool = False) -> Program:
         raise InputError("CS503", "a block of a run is no line", "please report this with the program")
     if nc.second_is != "vector":
         raise InputError("CS503", "a run in points of the tool axis", "please report this with the program")
-    starts = np.flatnonzero(rapid if marks else np.zeros(0)).tolist()
+    starts = np.flatnonzero(np.diff(rapid, prepend=False) & rapid & marks).tolist()
     return Program.from_poses(
         nc.tip,
         nc.second,
@@ -108,16 +109,15 @@ def _head(form: Form, *, inch: bool) -> bytes:
     return "".join(f"{line}\n" for line in lines).encode()
 
 
-def _start(run: Run, form: Form, spelling: Spelling) -> bytes:
-    """Blocks that bring the machine to the start of a run and say what holds there."""
+def _start(run: Run, form: Form, spelling: Spelling, before: int | None) -> bytes:
+    """Blocks that bring the machine to the start of a run and say what holds there; `before` is the feed mode."""
     state, words = run.state, form.table.words.feed_mode
     lines = [_block(run.start, state.axes, form, spelling, rapid=True)]
-    if 2 in words:
+    if 2 in words and state.feed_mode != before:
         lines.append(words[2 if state.feed_mode == INVERSE_TIME else 0].encode() + b"\n")
-    code = b"" if form.mode.motion.line in ("L", "LN") else b"G1"
     feed = b" F%.5f" % state.feed if state.feed_mode != INVERSE_TIME and not math.isnan(state.feed) else b""
-    if state.motion == 1.0 or feed:
-        lines.append((code or form.mode.motion.line.encode()) + feed + b"\n")
+    if state.motion == 1.0 or feed:  # a whole block, though nothing moves: it is read with those around it
+        lines.append(_block(run.start, state.axes, form, spelling, rapid=False).rstrip() + feed + b"\n")
     return b"".join(lines)
 
 

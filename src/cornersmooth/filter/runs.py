@@ -202,11 +202,13 @@ class ProgramReader:
         if b"~" in chunk:
             bulk[[k for k in range(stop - first) if b"~" in found.line(first + k)]] = False
         ends = np.concatenate(([0], np.flatnonzero(np.frombuffer(text, np.uint8) == ord("\n")) + 1))
+        columns = lines.columns(np.flatnonzero(bulk)) if bulk.any() else None
+        before = np.concatenate(([0], np.cumsum(bulk)))
         edges = np.flatnonzero(np.diff(bulk, prepend=~bulk[0], append=~bulk[-1]))
         for a, b in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
-            columns = lines.columns(np.arange(a, b)) if bulk[a] else None
-            if columns is not None:
-                yield first + a, columns
+            if bulk[a] and columns is not None:
+                own = slice(before[a], before[b])
+                yield first + a, {name: values[own] for name, values in columns.items()}
                 continue
             for k in range(a, b):
                 yield first + k, text[int(ends[k]) : int(ends[k + 1])]
