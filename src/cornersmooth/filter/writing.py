@@ -79,17 +79,20 @@ def smoothed(job: Job, reading: Reading) -> tuple[dict[int, bytes], dict[int, st
 def _groups(job: Job, reading: Reading) -> list[list[Run]]:
     """Runs that can be written together: near each other, so that memory is bounded, with the same units and turn."""
     found: dict[tuple[object, ...], list[Run]] = {}
-    machine = job.form.machine
-    for run in reading.runs:
-        key: tuple[object, ...] = (int(reading.start[run.first]) // CHUNK, run.state.unit, bool(run.state.rounding))
-        if machine is not None and len(machine.names) == 2:
-            angles = run.start[3:]
-            both = solutions(machine, tool_axis(machine, angles[None])).angles[0]
-            off = np.abs((both - angles + 180.0) % 360.0 - 180.0).max(axis=1)
-            turns = np.round((run.low[3:] + run.high[3:]) / 720.0)
-            key += (int(np.argmin(off)), *turns.tolist())
+    for run, turn in zip(reading.runs, _turns(job.form.machine, reading.runs), strict=True):
+        key = (int(reading.start[run.first]) // CHUNK, run.state.unit, bool(run.state.rounding), turn)
         found.setdefault(key, []).append(run)
     return list(found.values())
+
+
+def _turns(machine: Machine | None, runs: Sequence[Run]) -> list[tuple[float, ...]]:
+    """Solution and turns of the rotary axes in each run, where a machine has two of them."""
+    if machine is None or len(machine.names) != 2 or not runs:
+        return [()] * len(runs)
+    angles = np.array([run.start[3:] for run in runs])
+    off = np.abs((solutions(machine, tool_axis(machine, angles)).angles - angles[:, None] + 180.0) % 360.0 - 180.0)
+    turns = np.round([(run.low[3:] + run.high[3:]) / 720.0 for run in runs])
+    return [tuple(row) for row in np.column_stack((np.argmin(off.max(axis=2), axis=1), turns)).tolist()]
 
 
 def _attempt(job: Job, reading: Reading, runs: Sequence[Run], made: dict[int, bytes], why: dict[int, str]) -> None:
