@@ -11,11 +11,14 @@ import shutil
 import subprocess
 import tomllib
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
 import pytest
 
+import cornersmooth as cs
 from cornersmooth import read
 from cornersmooth.cli.group import COMMANDS
 from cornersmooth.kinematics import parse_machine
@@ -110,9 +113,13 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "mine.toml").write_text('like = "siemens"\n')
     for name, options in {"nc": [], "mpf": ["--control", "siemens"]}.items():
         assert run("smooth", "part.cls", "-e", "0.005", "-o", f"part.{name}", *options, cwd=folder).returncode == DONE
-    (folder / "part.ngc").write_bytes(
-        run("smooth", "part.cls", "--control", "linuxcnc", "--machine", "xyzac-trt", cwd=folder).stdout
-    )
+    program = cs.read(folder / "part.cls")
+    sharp = replace(program, keep=np.ones(len(program), np.uint8))  # as the CAM system writes it, for `filter`
+    form = cs.choose_form("linuxcnc", "g1", machine=cs.load_machine("xyzac-trt"))
+    with (folder / "part.ngc").open("wb") as stream:
+        cs.nc.write(cs.smooth(sharp, form=form), stream, form=form)
+    again = (*"filter part.ngc --control linuxcnc --machine xyzac-trt -o smooth.ngc".split(),)
+    assert run(*again, cwd=folder).returncode == DONE
     return folder
 
 

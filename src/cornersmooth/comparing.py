@@ -88,6 +88,13 @@ class Row:
     axis_point: float | None = None
     limits: tuple[tuple[str, float], ...] = ()
 
+    @classmethod
+    def of(cls, candidate: Candidate) -> Row:
+        """Row of a candidate of which nothing is known yet."""
+        form, settings = candidate.form, candidate.settings
+        words = f"rotary words of {form.machine.name}" if form.rotary and form.machine is not None else "vectors"
+        return cls(form.name, words, settings.method, candidate.lines, candidate.options, verdict="")
+
     @property
     def usable(self) -> bool:
         """Whether the program keeps the tolerance, and has a time."""
@@ -253,14 +260,7 @@ def _row(
     program: Program, candidate: Candidate, unsmoothed: float, axes: Machine | None, blocks: BlockLimits | None
 ) -> Row:
     form, settings = candidate.form, candidate.settings
-    row = Row(
-        form=form.name,
-        words=f"rotary words of {form.machine.name}" if form.rotary and form.machine is not None else "vectors",
-        method=settings.method,
-        lines=candidate.lines,
-        options=candidate.options,
-        verdict="",
-    )
+    row = Row.of(candidate)
     try:
         stream = io.BytesIO()
         result = postprocess(program, stream, settings, form=form, processes=1)

@@ -272,8 +272,8 @@ def test_verify_finds_what_is_wrong_with_a_program_of_anybody() -> None:
     control, machine, text = PROGRAMS["fanuc words"]
     form, settings, old = form_of(control, machine), cs.Settings(tolerance=EPS), text.encode()
     good = filter_program(old, form, settings).data
-    assert verify_programs(old, good, form, settings).wrong == ()
-    assert verify_programs(old, old, form, settings).wrong == ()
+    assert verify_programs(old, good, form, settings).verdict is Verdict.PASSED
+    assert verify_programs(old, old, form, settings).verdict is Verdict.PASSED
     lines = good.splitlines(keepends=True)
     middle = len(lines) // 2
     x = float(re.search(rb"X([\d.]+)", lines[middle])[1])  # type: ignore[index]
@@ -285,7 +285,7 @@ def test_verify_finds_what_is_wrong_with_a_program_of_anybody() -> None:
         ([*lines[:-4], b"G0 Z49.\n", *lines[-3:]], None),
         ([one.replace(b"F1000.", b"F900.") for one in lines], 10),
     ]:
-        found = verify_programs(old, b"".join(wrong), form, settings).wrong
+        found = verify_programs(old, b"".join(wrong), form, settings).checked.wrong
         assert found
         assert line is None or any(one.nc_line == line for one in found), (line, found)
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from cornersmooth.cli.files import check_inputs, check_path, read_input, target_of
+from cornersmooth.cli.files import check_inputs, check_path, read_input, target_of, told_of
 from cornersmooth.cli.options import motion, nc_text, outputs, reading, smoothing
 from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand
@@ -43,6 +43,7 @@ _OWN = frozenset(("as_json", "csv", "verbose", "quiet", "force", "machine", "lim
 @smoothing.curve_options
 @reading.feed
 @reading.reading_options
+@reading.tip_control
 @outputs.as_json
 @motion.rows_csv
 @outputs.force
@@ -54,36 +55,46 @@ def command(source: str, **given: Any) -> int:
     Every program is verified and planned as it is written, under the limits of the axes of --limits, or of --machine.
     The best row is the fastest that keeps the tolerance; the command that writes it follows. Of parts of more than
     2,000 poses whole runs from the middle are compared. -v states by which law lines are planned. The method zhang2016
-    is left out: it is there as published.
+    is left out: it is there as published. IN may be a finished NC program: every way in which filter can smooth it.
 
     \b
     Examples:
       cornersmooth compare part.cls --control siemens --limits table-ac
       cornersmooth compare part.cls --control fanuc --limits mill.toml --csv p.csv
       cornersmooth compare part.cls --control linuxcnc --machine xyzac-trt -v
+      cornersmooth compare part.ngc --control linuxcnc --machine xyzac-trt
     """
     from cornersmooth.cl import read
-    from cornersmooth.comparing import candidates, compare_programs, limits_machine
+    from cornersmooth.cli.filter import axes_of, how_read
+    from cornersmooth.comparing import candidates, compare_programs
     from cornersmooth.feedrate import BlockLimits
+    from cornersmooth.filter.compared import compare_filtered
+    from cornersmooth.nc_reader.recognition import first_block
+    from cornersmooth.provenance import HEAD
     from cornersmooth.saving import with_feed
 
     check_inputs(source)
     if given["csv"]:
         check_path(given["csv"], [source], force=given["force"])
     machine, limits = nc_text.machine_of(given), nc_text.machine_of(given, "limits")
-    axes = limits_machine(limits, machine)
-    if axes is None:
-        raise click.UsageError("compare plans within limits of axes: name a machine that has [dynamics] with --limits")
+    axes = axes_of(given)
     control, settings = nc_text.control_of(given), smoothing.settings_of(given)
     data, name = read_input(source, size_limit=not given["no_size_limit"])
-    program = with_feed(read(data, name=name, **reading.reading_of(given)), given["feed"])
-    tried = candidates(control, settings, limits if machine is None else machine)
-    blocks = BlockLimits(look_ahead=given["look_ahead"])
-    with progress_bar(given["quiet"]) as progress:
+    is_program = bool(first_block(data[:HEAD]))
+    reading.check_kind(given, program=is_program)
+    with told_of(name), progress_bar(given["quiet"]) as progress:
         step = None if progress is None else lambda done, total: progress("programs", done, total)
-        table = compare_programs(program, tried, axes, blocks, progress=step)
+        if is_program:  # it has one kind of words
+            tried = [one for one in candidates(control, settings, machine) if one.form.rotary == (machine is not None)]
+            table = compare_filtered(data, tried, axes, **how_read(given), progress=step)
+        else:
+            program = with_feed(read(data, name=name, **reading.reading_of(given)), given["feed"])
+            tried = candidates(control, settings, limits if machine is None else machine)
+            blocks = BlockLimits(look_ahead=given["look_ahead"])
+            table = compare_programs(program, tried, axes, blocks, progress=step)
     machine_named = given["limits"] if machine is None else given["machine"]
-    commands = [_command(source, given, row, machine_named, control.layout.suffix) for row in table.rows]
+    made_by = ("filter", os.path.splitext(source)[1]) if is_program else ("smooth", control.layout.suffix)
+    commands = [_command(source, given, row, machine_named, *made_by) for row in table.rows]
     if given["csv"]:
         with open_output(target_of(given["csv"])) as output:
             output.stream.write(_csv(table, commands).encode("utf-8"))
@@ -143,7 +154,7 @@ def _cells(row: Row) -> tuple[str, ...]:
     )
 
 
-def _command(source: str, given: dict[str, Any], row: Row, machine: Any, suffix: str) -> str:
+def _command(source: str, given: dict[str, Any], row: Row, machine: Any, command: str, suffix: str) -> str:
     """Options that were typed, and those of the row; a machine is called as the user has called it."""
     context, typed = click.get_current_context(), []
     for option in context.command.params:
@@ -163,8 +174,8 @@ def _command(source: str, given: dict[str, Any], row: Row, machine: Any, suffix:
     options = list(row.options)
     if "--machine" in options:
         options[options.index("--machine") + 1] = called
-    target = os.path.splitext(os.path.basename(source))[0] + suffix
-    return shlex.join(["cornersmooth", "smooth", source, *typed, *options, "-o", target])
+    target = os.path.splitext(os.path.basename(source))[0] + (".smooth" if command == "filter" else "") + suffix
+    return shlex.join(["cornersmooth", command, source, *typed, *options, "-o", target])
 
 
 def _csv(table: Table, commands: list[str]) -> str:

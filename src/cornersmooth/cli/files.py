@@ -14,7 +14,7 @@ from typing import BinaryIO
 import click
 
 from cornersmooth import output
-from cornersmooth.errors import InputError, OutputError
+from cornersmooth.errors import CornersmoothError, InputError, OutputError
 
 STANDARD = "-"
 
@@ -143,3 +143,13 @@ def write_report(path: str, parts: Iterable[str | bytes], *, replace: bool = Tru
     with output.open_output(target_of(path), replace=replace) as made:
         for part in parts:
             made.stream.write(part if isinstance(part, bytes) else part.encode("utf-8", "backslashreplace"))
+
+
+@contextlib.contextmanager
+def told_of(name: str) -> Iterator[None]:
+    """Name the file in errors that do not."""
+    try:
+        yield
+    except CornersmoothError as error:
+        error.file = error.file or name
+        raise

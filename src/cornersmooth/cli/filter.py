@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from cornersmooth.cli.files import STANDARD, check_path, read_input, target_of
-from cornersmooth.cli.headings import option
+from cornersmooth.cli.files import STANDARD, check_path, read_input, suffix_of, target_of, told_of, write_report
 from cornersmooth.cli.inputs import Input, check_together, find_inputs, named_input
-from cornersmooth.cli.options import motion, nc_text, outputs, smoothing
+from cornersmooth.cli.options import motion, nc_text, outputs, reading, smoothing
 from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand, command_line, loosened
 from cornersmooth.cli.show import (
@@ -34,6 +33,7 @@ from cornersmooth.verdict import Verdict
 if TYPE_CHECKING:
     from cornersmooth.filter import Filtered
     from cornersmooth.filter.checking import Checked
+    from cornersmooth.kinematics import Machine
     from cornersmooth.nc import Form
     from cornersmooth.nc_reader import Problem
     from cornersmooth.report import NcFile
@@ -46,16 +46,6 @@ PATTERNS = ("*.nc", "*.ngc", "*.mpf", "*.spf", "*.h", "*.tap", "*.cnc", "*.eia",
 
 #: reasons shown without -v, and problems
 _SHOWN, _WRONG_SHOWN = 10, 20
-
-tip_control = option(
-    "Reading",
-    "--tip-control",
-    is_flag=True,
-    help="Tool tip control is on where the program begins, as in a subprogram, or where the kinematics are always on.",
-)
-units = option(
-    "Reading", "--units", type=click.Choice(["mm", "inch"]), help="Units of a program that does not say them."
-)
 
 
 @click.command(
@@ -71,8 +61,8 @@ units = option(
 @nc_text.control
 @nc_text.machine
 @nc_text.no_tcp
-@tip_control
-@units
+@reading.tip_control
+@reading.units_of_program
 @nc_text.form
 @smoothing.axis_length
 @smoothing.axis_tolerance
@@ -147,16 +137,73 @@ def form_of(given: dict[str, Any]) -> Form:
     if control.dialect not in VOCABULARIES:
         known = ", ".join(sorted(VOCABULARIES))
         raise SettingsError("CS240", f"programs for {control.name} are not read as a filter", f"use one of {known}")
-    return choose_form(control, given.get("form"), machine=nc_text.machine_of(given), tcp=not given["no_tcp"])
+    return choose_form(control, given.get("form"), machine=nc_text.machine_of(given), tcp=not given.get("no_tcp"))
 
 
 def _check_reports(reports: Sequence[Sequence[str]], given: Sequence[str]) -> None:
     """Refuse names of reports that say another form, or are the same for several inputs."""
-    if wrong := [path for path in given if not path.lower().endswith(".json")]:
-        raise click.UsageError(f"--report {wrong[0]}: let the name end in .json")
+    if wrong := [path for path in given if suffix_of(path) not in (".json", ".html")]:
+        raise click.UsageError(f"--report {wrong[0]}: let the name end in .json or .html")
     paths = [*chain.from_iterable(reports)]
     if len(set(paths)) < len(paths):
         raise click.UsageError("two reports have the same name; with several inputs put {stem} into it")
+
+
+def _pages(reports: Sequence[str]) -> bool:
+    return any(suffix_of(path) == ".html" for path in reports)
+
+
+def _write_reports(
+    reports: Sequence[str],
+    contents: Mapping[str, Any],
+    found: Filtered,
+    judgement: Judgement,
+    source: tuple[str, bytes],
+    name: str,
+    form: Form,
+    settings: Settings,
+    axes: Machine | None,
+) -> None:
+    """Write the reports of a filtered program: JSON, and the page of its runs before and after."""
+    from cornersmooth.report import report_json
+
+    for report in reports:
+        if suffix_of(report) != ".html":
+            write_report(report, [report_json(contents)])
+        elif found.motions is None:
+            warn("no page is written: no run differs", report)
+        else:
+            write_report(report, [_page(found, judgement, source, name, form, settings, axes)])
+
+
+def _page(
+    found: Filtered,
+    judgement: Judgement,
+    source: tuple[str, bytes],
+    name: str,
+    form: Form,
+    settings: Settings,
+    axes: Machine | None,
+) -> str:
+    """Page of the runs of a program before and after."""
+    from cornersmooth.filter.checking import measure
+    from cornersmooth.page import verified_page
+
+    assert found.motions is not None
+    program, nc, measured = measure(*found.motions, settings, os.path.basename(source[0]))
+    return verified_page(
+        program,
+        nc,
+        measured,
+        name=name,
+        control=form.table.name,
+        form=form.name,
+        source=source[1],
+        machine=axes or form.machine,
+        planner=form.table.lines.planner,
+        judgement=judgement,
+        origin="old program",
+    )
 
 
 def _target(one: Input, folder: str) -> str:
@@ -170,7 +217,7 @@ def _filter(
 ) -> int:
     """Filter one program; return the exit code."""
     from cornersmooth.filter import filter_program
-    from cornersmooth.report import NcFile, report_json
+    from cornersmooth.report import NcFile
     from cornersmooth.report.record import planned_times
     from cornersmooth.report.verdict import Saving
     from cornersmooth.verify import useful_processes
@@ -181,10 +228,10 @@ def _filter(
         data,
         form,
         settings,
-        tip_from_start=given["tip_control"],
-        inch=given["units"] == "inch",
+        **how_read(given),
         verify=not given["no_verify"],
         axes=axes,
+        paths=_pages(reports),
         processes=useful_processes(),
     )
     bad = found.verdict is Verdict.FAILED or (given["strict"] and found.verdict is not Verdict.PASSED)
@@ -205,9 +252,7 @@ def _filter(
         "lines_out": found.new_lines,
     }
     contents["left_as_it_is"] = [asdict(left) for left in found.left]
-    for report in reports:
-        with open_output(target_of(report)) as output:
-            output.stream.write(report_json(contents).encode("utf-8", "backslashreplace"))
+    _write_reports(reports, contents, found, judgement, (name, data), os.path.basename(target), form, settings, axes)
     line = contents["verdict_text"]
     if given["as_json"]:
         say_json(contents)
@@ -221,27 +266,79 @@ def _filter(
 def verify_with_program(source: str, old: bytes, path: str, given: dict[str, Any]) -> int:
     """Compare an NC program with what was made of it; return the exit code of ``verify``."""
     from cornersmooth.filter import verify_programs
-    from cornersmooth.report import NcFile, report_json
+    from cornersmooth.report import NcFile
     from cornersmooth.report.record import sha256_of
     from cornersmooth.report.verdict import Judgement
     from cornersmooth.verify import useful_processes
 
     new, name = read_input(path)
     settings, form = smoothing.settings_of(given), form_of(given)
-    found = verify_programs(old, new, form, settings, processes=useful_processes())
-    verdict = Verdict.of(problems=len(found.wrong))
-    judgement = Judgement(verdict, 0, 0, "", _problems(found.wrong) or _measured(found, settings.tolerance))
+    found = verify_programs(
+        old, new, form, settings, **how_read(given), paths=_pages(given["reports"]), processes=useful_processes()
+    )
+    checked = found.checked
+    assert checked is not None
+    judgement = Judgement(found.verdict, 0, 0, "", _problems(checked.wrong) or _measured(checked, settings.tolerance))
     written = replace(NcFile.of(None if path == STANDARD else path, sha256_of(new), form), form=None)
-    contents = _report("verify", judgement, found, (source, old), written, settings)
-    for report in given["reports"]:
-        with open_output(target_of(report)) as output:
-            output.stream.write(report_json(contents).encode("utf-8", "backslashreplace"))
-    _show_wrong(name, found.wrong)
+    contents = _report("verify", judgement, checked, (source, old), written, settings)
+    _write_reports(given["reports"], contents, found, judgement, (source, old), name, form, settings, None)
+    _show_wrong(name, checked.wrong)
     if given["as_json"]:
         say_json(contents)
     elif loosened(settings.tolerance) or not given["quiet"]:
         say_line(contents["verdict_text"])
-    return int(verdict is not Verdict.PASSED)
+    return int(found.verdict is not Verdict.PASSED)
+
+
+def time_of_program(data: bytes, name: str, given: dict[str, Any]) -> int:
+    """Say the time of a program as it is and smoothed, or beside another one; return the exit code of ``time``."""
+    from cornersmooth.filter import filter_program, verify_programs
+    from cornersmooth.verify import useful_processes
+
+    form, settings, axes = form_of(given), smoothing.settings_of(given), axes_of(given)
+    how = {**how_read(given), "axes": axes, "processes": useful_processes()}
+    with told_of(name):
+        if given["text"]:
+            found = verify_programs(data, read_input(given["text"])[0], form, settings, **how)
+        else:
+            found = filter_program(data, form, settings, verify=False, **how)
+    if found.checked is not None and found.checked.wrong:
+        _show_wrong(given["text"], found.checked.wrong)
+        return 1
+    before, after = found.seconds or (0.0, 0.0)
+    whole = bool(form.table.lines.planner)
+    if given["as_json"]:
+        contents = {
+            "schema": "cornersmooth-time/1",
+            "seconds": {"unsmoothed": before, "as_written": after},
+            "unsmoothed": "the program as it is",
+            "counted": "program" if whole else "smoothed runs",
+            "cuts": found.cuts,
+            "smoothed": found.smoothed,
+        }
+        say_json(contents)
+    elif not given["quiet"]:
+        say_line(f"{before:>12.3f} s  {name} as it is")
+        share = f" ({100.0 * (after / before - 1.0):+.1f} %)" if before else ""
+        say_line(f"{after:>12.3f} s  {given['text'] or 'smoothed'}{share}")
+        what = "the whole program" if whole else "the runs that differ, without rapids"
+        say_line(f"of {what}; {found.smoothed:,} of {found.cuts:,} cuts differ")
+    return 0
+
+
+def axes_of(given: dict[str, Any]) -> Machine:
+    """Machine under whose limits a program is planned."""
+    from cornersmooth.comparing import limits_machine
+
+    axes = limits_machine(nc_text.machine_of(given, "limits"), nc_text.machine_of(given))
+    if axes is None:
+        raise click.UsageError("programs are planned within limits of axes: name a machine with [dynamics]: --limits")
+    return axes
+
+
+def how_read(given: dict[str, Any]) -> dict[str, Any]:
+    """What is to be known of a program that it does not say."""
+    return {"tip_from_start": given["tip_control"], "inch": given["units"] == "inch"}
 
 
 def describe_program(data: bytes, name: str) -> dict[str, Any]:

@@ -41,7 +41,7 @@ def command(source: str, tolerance: float, axis_length: float, as_json: bool, **
 
     data, name = read_input(source, size_limit=not given["no_size_limit"])
     if first_block(data[:HEAD]):
-        reading.refuse_operation(given)
+        reading.check_kind(given, program=True)
         told = describe_program(data, name)
         if as_json:
             say_json(told)

@@ -55,6 +55,7 @@ LAWS = tuple(_TITLES)
 @motion.look_ahead
 @smoothing.curve_options
 @reading.reading_options
+@reading.tip_control
 @outputs.as_json
 @motion.law
 @motion.motion_csv
@@ -70,6 +71,7 @@ def command(source: str, **given: Any) -> int:
     velocity may then jump by what the acceleration allows in one period. The program is that of smooth with the same
     options, or --text. -v adds the ideal curves of each method, which no control runs. Delays, tool changes and the
     strokes of hole cycles are not counted. Limits are those of the tip, and of the axes of --limits or --machine.
+    IN may be a finished NC program: its time as it is, and as filter smooths it, or beside that of --text.
 
     \b
     Examples:
@@ -79,7 +81,12 @@ def command(source: str, **given: Any) -> int:
       cornersmooth time part.cls -e 0.04 --machine mill.toml --csv axes.csv
       cornersmooth time part.cls -e 0.04 --report times.html
       cornersmooth time part.cls --text part.nc --block-time 1ms --look-ahead 200
+      cornersmooth time part.ngc --control linuxcnc --machine xyzac-trt
     """
+    from cornersmooth.cli.filter import time_of_program
+    from cornersmooth.nc_reader.recognition import first_block
+    from cornersmooth.provenance import HEAD
+
     for path in given["reports"]:
         if not path.lower().endswith(".html"):
             raise click.UsageError(f"--report {path}: let the name end in .html")
@@ -89,6 +96,12 @@ def command(source: str, **given: Any) -> int:
         if path:
             check_path(path, inputs, force=given["force"])
     data, name = read_input(source, size_limit=not given["no_size_limit"])
+    is_program = bool(first_block(data[:HEAD]))
+    reading.check_kind(given, program=is_program)
+    if is_program:
+        if given["csv"] or given["reports"]:
+            raise click.UsageError("--csv and --report: of an NC program only the times are told")
+        return time_of_program(data, name, given)
     control = nc_text.control_of(given)
     if control.lines.planner:
         if given["csv"] or given["reports"]:

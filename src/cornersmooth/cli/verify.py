@@ -65,6 +65,7 @@ _ALIKE = 1e-9
 @nc_text.strict_verdict
 @reading.reading_options
 @reading.tool_options
+@reading.tip_control
 @outputs.found_reports
 @outputs.as_json
 @surface.tool
@@ -108,8 +109,9 @@ def command(source: str, text: str, **given: Any) -> int:
     check_inputs(source, text)
     check_reports(given["reports"], ".json, .csv or .html", [source, text], force=given["force"])
     data, name = read_input(source, size_limit=not given["no_size_limit"])
-    if first_block(data[:HEAD]):
-        reading.refuse_operation(given)
+    is_program = first_block(data[:HEAD])
+    reading.check_kind(given, program=bool(is_program))
+    if is_program:
         return verify_with_program(name, data, text, given)
     nc: bytes | str | os.PathLike[str] = read_input(text)[0] if text == STANDARD else text
     head = _take_over(given, nc, data)

@@ -15,7 +15,7 @@ from cornersmooth.filter.motion import Stretch, motion, program_of
 from cornersmooth.filter.runs import Reading, Run
 from cornersmooth.filter.state import State
 from cornersmooth.filter.writing import Job
-from cornersmooth.model import Floats
+from cornersmooth.model import Floats, Program
 from cornersmooth.nc_reader import NcProgram, Problem
 from cornersmooth.nc_reader.block_tables import CHUNK
 from cornersmooth.nc_reader.rotary import LINE_SHARE
@@ -124,9 +124,11 @@ def check(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> Check
         text = _left_otherwise(place.run, new.at[place.stop])
         if text:
             wrong.append(Problem("CS592", 0, place.stop, f"the program goes on otherwise after the run: {text}"))
-    for own in _shared(old, new, where):
+    for own in shared(old, new, where):
         try:
-            found, others = _measure(job, *_motions(job, old, new, own))
+            before, after = _motions(job, old, new, own)
+            found = measure(before, after, job.settings, processes=job.processes)[2]
+            others = _apart(before, after, job.settings)
         except CornersmoothError as error:
             wrong.append(Problem(error.code, 0, own[0].first + 1, error.what))
             continue
@@ -138,7 +140,7 @@ def check(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> Check
     return Checked(tuple(sorted(wrong, key=lambda one: one.nc_line)), *largest)
 
 
-def _shared(old: Reading, new: Reading, where: Sequence[Place]) -> list[list[Place]]:
+def shared(old: Reading, new: Reading, where: Sequence[Place]) -> list[list[Place]]:
     """Share out places by the bytes that they have, so that memory is bounded, and by their units."""
     size = [
         new.start[place.stop] - new.start[place.first] + old.start[place.run.stop] - old.start[place.run.first]
@@ -152,7 +154,13 @@ def _shared(old: Reading, new: Reading, where: Sequence[Place]) -> list[list[Pla
 
 def motions(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> Iterator[tuple[NcProgram, NcProgram]]:
     """Give the motion of runs before and after, some of them at a time."""
-    return (_motions(job, old, new, own) for own in _shared(old, new, where))
+    return (_motions(job, old, new, own) for own in shared(old, new, where))
+
+
+def whole_motions(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> tuple[NcProgram, NcProgram]:
+    """Give the motion before and after of all runs with the units of the first."""
+    unit = where[0].run.state.unit
+    return _motions(job, old, new, [place for place in where if place.run.state.unit == unit])
 
 
 def _motions(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> tuple[NcProgram, NcProgram]:
@@ -164,19 +172,22 @@ def _motions(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> tu
     )
 
 
-def _measure(job: Job, before: NcProgram, after: NcProgram) -> tuple[Verification, list[Problem]]:
-    """Measure runs with the same units, and decide whether both motions can be run beside each other."""
-    settings = job.settings
+def measure(
+    before: NcProgram, after: NcProgram, settings: Settings, name: str = "", processes: int = 1
+) -> tuple[Program, NcProgram, Verification]:
+    """Measure runs with the same units: the path they had, what they are now, and what verification finds."""
+    program = program_of(before)
+    program = replace(program, source=replace(program.source, name=name, dialect="NC"))
     found = verify(
-        program_of(before),
+        program,
         after,
         tolerance=settings.tolerance,
         axis_length=settings.axis_length,
         axis_tolerance=settings.axis_tolerance,
         words=False,
-        processes=job.processes,
+        processes=processes,
     )
-    return found, _apart(before, after, settings)
+    return program, after, found
 
 
 def _apart(before: NcProgram, after: NcProgram, settings: Settings) -> list[Problem]:

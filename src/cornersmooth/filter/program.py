@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from typing import Final
 
+import numpy as np
+
 from cornersmooth.errors import SettingsError
-from cornersmooth.filter.checking import Checked, Place, check, places
+from cornersmooth.filter.checking import Checked, Place, check, places, whole_motions
 from cornersmooth.filter.runs import ProgramReader, Reading
 from cornersmooth.filter.spelling import SAMPLE, Spelling
 from cornersmooth.filter.times import planned_times
@@ -17,6 +19,7 @@ from cornersmooth.kinematics import Machine
 from cornersmooth.memory import return_free_memory
 from cornersmooth.nc import choose_form, fit_settings
 from cornersmooth.nc.form import Form
+from cornersmooth.nc_reader import NcProgram
 from cornersmooth.settings import Settings
 from cornersmooth.verdict import Verdict
 
@@ -61,6 +64,8 @@ class Filtered:
         Whether the program says its units.
     seconds : (float, float) or None
         Planned time before and after; see `planned_times`.
+    motions : (NcProgram, NcProgram) or None
+        What the control does in the runs before and after, where that was asked for.
     """
 
     data: bytes
@@ -73,6 +78,7 @@ class Filtered:
     checked: Checked | None
     units_said: bool = True
     seconds: tuple[float, float] | None = None
+    motions: tuple[NcProgram, NcProgram] | None = None
 
     @property
     def verdict(self) -> Verdict:
@@ -91,6 +97,8 @@ def filter_program(
     inch: bool = False,
     verify: bool = True,
     axes: Machine | None = None,
+    most: int | None = None,
+    paths: bool = False,
     processes: int = 1,
 ) -> Filtered:
     """Smooth the cutting runs of a finished NC program.
@@ -111,6 +119,10 @@ def filter_program(
         Whether both programs are read and compared. Runs that do not pass stay as they are.
     axes : Machine, optional
         Say the time under the limits of the axes of this machine.
+    most : int, optional
+        Only whole runs from the middle are smoothed, of no more cuts than this.
+    paths : bool
+        Whether the motions are given.
     processes : int
 
     Raises
@@ -121,7 +133,9 @@ def filter_program(
         `axes` does not reach a pose, or CS264: on LinuxCNC a program with arcs has no time.
     """
     settings = Settings() if settings is None else settings
-    job, old = _read(data, form, settings, tip_from_start=tip_from_start, inch=inch, processes=processes)
+    job, old = read_program(data, form, settings, tip_from_start=tip_from_start, inch=inch, processes=processes)
+    if most is not None:
+        left_all_but(old, most)
     texts, why = smoothed(job, old)
     return_free_memory()  # verification takes as much again
     for run in old.runs:
@@ -135,8 +149,8 @@ def filter_program(
         checked = check(job, old, after, where) if verify else Checked(())
         bad = {p.run.first: one.text for p in where for one in checked.wrong if p.first < one.nc_line <= p.stop}
         if not bad:
-            seconds = planned_times(job, old, after, where, axes) if axes is not None and where else None
-            return _result(old, after, where, why, checked if verify else None, seconds)
+            found = _result(old, after, where, why, checked if verify else None)
+            return _with_motion(found, job, (old, after), where, axes, paths=paths)
         texts = {p.run.first: after.lines(p.first, p.stop) for p in where if p.run.first not in bad}
         why |= {first: f"verification found: {text}" for first, text in bad.items()}
 
@@ -149,20 +163,24 @@ def verify_programs(
     *,
     tip_from_start: bool = False,
     inch: bool = False,
+    axes: Machine | None = None,
+    paths: bool = False,
     processes: int = 1,
-) -> Checked:
+) -> Filtered:
     """Compare a program with the one that it was made from, whoever made it; parameters as of `filter_program`."""
     settings = Settings() if settings is None else settings
-    job, before = _read(old, form, settings, tip_from_start=tip_from_start, inch=inch, processes=processes)
+    job, before = read_program(old, form, settings, tip_from_start=tip_from_start, inch=inch, processes=processes)
     where, wrong = places(before, job.reader.read(new))
-    if wrong:
-        return Checked(tuple(wrong))
-    return check(job, before, job.reader.read(new, [place.stop for place in where]), where)
+    after = job.reader.read(new, [place.stop for place in where])
+    checked = Checked(tuple(wrong)) if wrong else check(job, before, after, where)
+    found = _result(before, after, where, {}, checked)
+    return found if wrong else _with_motion(found, job, (before, after), where, axes, paths=paths)
 
 
-def _read(
-    data: bytes, form: Form, settings: Settings, *, tip_from_start: bool, inch: bool, processes: int
+def read_program(
+    data: bytes, form: Form, settings: Settings, *, tip_from_start: bool = False, inch: bool = False, processes: int = 1
 ) -> tuple[Job, Reading]:
+    """Read a program, and see how it is to be written; parameters and errors as of `filter_program`."""
     tcp = form.orientation != "machine"
     reader = ProgramReader(form.table.dialect, form.machine, tcp=tcp, tip_from_start=tip_from_start, inch=inch)
     old = reader.read(data)
@@ -223,14 +241,36 @@ def _spliced(old: Reading, texts: dict[int, bytes]) -> tuple[bytes, list[Place]]
     return b"".join(parts), where
 
 
-def _result(
-    old: Reading,
-    new: Reading,
+def left_all_but(reading: Reading, most: int) -> None:
+    """Leave all runs but some from the middle, of no more cuts than that; one at least."""
+    ends = np.cumsum([0, *map(len, reading.runs)])
+    first = min(int(np.searchsorted(ends, (ends[-1] - most) / 2)), max(len(reading.runs) - 1, 0))
+    stop = max(int(np.searchsorted(ends, ends[first] + most, side="right")) - 1, first + 1)
+    for run in (*reading.runs[:first], *reading.runs[stop:]):
+        reading.why[run.first : run.stop] = reading.number("it was not asked for")
+    reading.runs[:] = reading.runs[first:stop]
+
+
+def _with_motion(
+    found: Filtered,
+    job: Job,
+    readings: tuple[Reading, Reading],
     where: list[Place],
-    why: dict[int, str],
-    checked: Checked | None,
-    seconds: tuple[float, float] | None,
+    axes: Machine | None,
+    *,
+    paths: bool,
 ) -> Filtered:
+    """Say what the control does in the runs, and how long it takes, as far as that is asked for."""
+    if not where:
+        return found
+    return replace(
+        found,
+        seconds=None if axes is None else planned_times(job, *readings, where, axes),
+        motions=whole_motions(job, *readings, where) if paths else None,
+    )
+
+
+def _result(old: Reading, new: Reading, where: list[Place], why: dict[int, str], checked: Checked | None) -> Filtered:
     for run in old.runs:
         if run.first in why:
             old.why[run.first : run.stop] = old.number(why[run.first])
@@ -244,5 +284,4 @@ def _result(
         left=tuple(Left(*one) for one in old.left()),
         checked=checked,
         units_said=_UNITS.search(old.data) is not None,
-        seconds=seconds,
     )

@@ -9,10 +9,12 @@ import numpy as np
 from cornersmooth.feedrate import plan_text
 from cornersmooth.feedrate.linuxcnc import line_times
 from cornersmooth.feedrate.linuxcnc_program import axis_limits, program_lines
-from cornersmooth.filter.checking import Place, motions
+from cornersmooth.filter.checking import Place, motions, shared
+from cornersmooth.filter.motion import motion
 from cornersmooth.filter.runs import Reading
 from cornersmooth.filter.writing import Job
 from cornersmooth.kinematics import Machine
+from cornersmooth.nc_reader import NcProgram
 from cornersmooth.saving import LINUXCNC
 
 
@@ -28,13 +30,32 @@ def planned_times(job: Job, old: Reading, new: Reading, where: Sequence[Place], 
     SettingsError
         CS263: the machine does not say how fast its axes may go.
     """
-    if job.form.table.lines.planner == LINUXCNC:
-        both = [program_lines(one.data.decode("utf-8", "replace")) for one in (old, new)]
-        before, after = (float(line_times(lines, axis_limits(axes))[1][-1]) for lines in both)
-        return before, after
-    total = np.zeros(2)
-    for pair in motions(job, old, new, where):
-        for k, nc in enumerate(pair):
-            law = plan_text(nc, settings=job.settings, machine=axes)
-            total[k] += np.diff(law.times_at(law.edge))[~law.path.rapid].sum()
-    return float(total[0]), float(total[1])
+    if by_own_law(job):
+        return _on_linuxcnc(old, axes), _on_linuxcnc(new, axes)
+    pairs = [(_planned(job, one, axes), _planned(job, two, axes)) for one, two in motions(job, old, new, where)]
+    before, after = np.sum(pairs, axis=0).tolist()
+    return before, after
+
+
+def time_as_it_is(job: Job, reading: Reading, axes: Machine) -> float:
+    """Time of all runs of a program, s; on LinuxCNC and errors as `planned_times`."""
+    if by_own_law(job):
+        return _on_linuxcnc(reading, axes)
+    where = [Place(run, run.first, run.stop) for run in reading.runs]
+    parts = ([job.stretch(reading, place.run) for place in own] for own in shared(reading, reading, where))
+    return sum(_planned(job, motion(part, job.own, job.spelling, job.settings), axes) for part in parts)
+
+
+def by_own_law(job: Job) -> bool:
+    """Whether the control has a planner whose law is known: times are those of whole programs then."""
+    return job.form.table.lines.planner == LINUXCNC
+
+
+def _planned(job: Job, nc: NcProgram, axes: Machine) -> float:
+    law = plan_text(nc, settings=job.settings, machine=axes)
+    return float(np.diff(law.times_at(law.edge))[~law.path.rapid].sum())
+
+
+def _on_linuxcnc(reading: Reading, axes: Machine) -> float:
+    lines = program_lines(reading.data.decode("utf-8", "replace"))
+    return float(line_times(lines, axis_limits(axes))[1][-1])

@@ -19,7 +19,7 @@ from cornersmooth.nc_reader import NcProgram, read_nc
 from cornersmooth.page.document import page
 from cornersmooth.page.scene import Story, Subject
 from cornersmooth.report.surface import passes_text
-from cornersmooth.report.verdict import Saving, first_line, judge, times_text, trusted_blocks
+from cornersmooth.report.verdict import Judgement, Saving, first_line, judge, times_text, trusted_blocks
 from cornersmooth.saving import planned_saving
 from cornersmooth.settings import Settings
 from cornersmooth.surface.tool import Tool
@@ -119,10 +119,13 @@ def verified_page(
     planner: str = "",
     tool: Tool | None = None,
     surface: SurfaceMap | None = None,
+    judgement: Judgement | None = None,
+    origin: str = "CL file",
 ) -> str:
     """Page of a program that somebody wrote, measured against its CL file; with a map of the surface if there is one.
 
-    `name`, `control` and `form` are those of the program, as far as they are known.
+    `name`, `control` and `form` are those of the program, as far as they are known. What was filtered has a `judgement`
+    of its own, and an old program as its `origin`.
     """
     settings = Settings(tolerance=found.tolerance, **_second_of(found))
     limits = Limits() if limits is None else limits
@@ -138,14 +141,15 @@ def verified_page(
         surface=surface,
     )
     findings = (*program.findings, *trusted_blocks(found))
-    judgement = judge(found, findings)
-    facts = [*_input_facts(program, source), *_measured_facts(found), *_limit_facts(limits, machine)]
+    judgement = judge(found, findings) if judgement is None else judgement
+    measured = _measured_facts(found, origin.split()[0])
+    facts = [*_input_facts(program, source, origin), *measured, *_limit_facts(limits, machine)]
     text = judgement.text
     if surface is not None:
         text += "; " + surface_text(surface)
         facts[-1:-1] = [("tool", surface.tool.describe()), ("cutting edge", f"{surface.edge:g} mm")]
-    head = _head(subject, control, form, machine)
-    told = _problems(found, findings), facts, _notes(findings)
+    head = _head(subject, control, form, machine, origin)
+    told = _problems(found, findings), facts, _notes(findings), origin.split()[0]
     return page(subject, Story(_name(name) or program.source.name, text, judgement.verdict, head, *told))
 
 
@@ -203,11 +207,13 @@ def _name(path: str | None) -> str:
     return os.path.basename(path or "")
 
 
-def _head(subject: Subject, control: str, form: str, machine: Machine | None) -> list[tuple[str, str]]:
+def _head(
+    subject: Subject, control: str, form: str, machine: Machine | None, origin: str = "CL file"
+) -> list[tuple[str, str]]:
     """Labels and values of what is always in sight; what is not known is left out."""
     settings, own = subject.settings, subject.settings.axis_tolerance
     facts = [
-        ("CL file", subject.program.source.name),
+        (origin, subject.program.source.name),
         ("control", control),
         ("form", form),
         ("machine", machine.name if machine else ""),
@@ -238,10 +244,10 @@ def _text(finding: Finding) -> str:
     return finding.text + (f" ({finding.count:,} times)" if finding.count > 1 else "")
 
 
-def _input_facts(program: Program, source: bytes) -> list[tuple[str, str]]:
+def _input_facts(program: Program, source: bytes, origin: str = "CL file") -> list[tuple[str, str]]:
     given = program.source
-    facts = [("CL file", f"{given.name}: {given.dialect}, {len(program):,} poses, {program.units}")]
-    return facts + ([("SHA-256 of the CL file", hashlib.sha256(source).hexdigest())] if source else [])
+    facts = [(origin, f"{given.name}: {given.dialect}, {len(program):,} poses, {program.units}")]
+    return facts + ([(f"SHA-256 of the {origin}", hashlib.sha256(source).hexdigest())] if source else [])
 
 
 def _settings_facts(settings: Settings) -> list[tuple[str, str]]:
@@ -257,15 +263,15 @@ def _second_of(found: Verification) -> dict[str, Any]:
     return {"axis_length": found.axis_length} if own is None else {"axis_tolerance": own}
 
 
-def _measured_facts(found: Verification) -> list[tuple[str, str]]:
+def _measured_facts(found: Verification, whose: str) -> list[tuple[str, str]]:
     return [
-        ("tip, largest", f"{found.tip.value:.6g} mm at CL line {found.tip.cl_line}"),
+        ("tip, largest", f"{found.tip.value:.6g} mm at {whose} line {found.tip.cl_line}"),
         *(
-            [("axis point, largest", f"{found.axis_point.value:.6g} mm at CL line {found.axis_point.cl_line}")]
+            [("axis point, largest", f"{found.axis_point.value:.6g} mm at {whose} line {found.axis_point.cl_line}")]
             if found.axis_tolerance is None
             else []
         ),
-        ("tool axis, largest", f"{found.orientation.value:.4g}° at CL line {found.orientation.cl_line}"),
+        ("tool axis, largest", f"{found.orientation.value:.4g}° at {whose} line {found.orientation.cl_line}"),
         ("blocks", f"{found.blocks:,}"),
     ]
 

@@ -72,6 +72,8 @@ class Story:
         Labels and values: settings, versions, hash.
     notes : sequence of str
         Sentences of what was noticed that nobody has to check.
+    origin : str
+        Whose lines the path is of: those of the CL file, or of the old program.
     """
 
     title: str
@@ -81,6 +83,7 @@ class Story:
     problems: Sequence[Mapping[str, Any]] = ()
     facts: Sequence[tuple[str, str]] = ()
     notes: Sequence[str] = ()
+    origin: str = "CL"
 
 
 @dataclass(frozen=True)
@@ -174,6 +177,7 @@ def scene(subject: Subject, story: Story) -> tuple[dict[str, Any], Pack]:
         "title": story.title,
         "verdict": story.verdict,
         "badge": str(story.badge),
+        "origin": story.origin,
         "head": [list(fact) for fact in story.head],
         "problems": [dict(problem) for problem in story.problems],
         "facts": [list(fact) for fact in story.facts],

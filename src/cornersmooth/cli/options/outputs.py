@@ -52,7 +52,9 @@ reports = _reports(
     "Write a report; .json, .csv or .html (a page to look at) decides the form. May be repeated; {stem} is "
     "the input's name."
 )
-json_reports = _reports("Write what was done: .json. May be repeated; {stem} is the input's name.")
+json_reports = _reports(
+    "Write what was done: .json, or .html for a page to look at. May be repeated; {stem} is the input's name."
+)
 found_reports = _reports(
     "Write what was found: .json for the results, .csv for a row per pose, .html for a page to look at. May be "
     "repeated."

@@ -87,6 +87,16 @@ no_size_limit = option(
     "Reading", "--no-size-limit", is_flag=True, help="Read inputs of more than 2 GB, and gzip files that grow 200-fold."
 )
 
+tip_control = option(
+    "Reading",
+    "--tip-control",
+    is_flag=True,
+    help="Tool tip control is on where the NC program begins: a subprogram, or kinematics that are always on.",
+)
+units_of_program = option(
+    "Reading", "--units", type=click.Choice(["mm", "inch"]), help="Units of a program that does not say them."
+)
+
 #: arguments of `cornersmooth.read` that options give
 _ARGUMENTS = "format dialect units arc_rule operation lenient tool_number spindle".split()
 
@@ -101,10 +111,18 @@ def tool_options(function: Callable[..., Any]) -> Callable[..., Any]:
     return all_of(function, (tool_number, spindle))
 
 
-def refuse_operation(given: dict[str, Any]) -> None:
-    """Refuse an operation of an input that is an NC program."""
-    if given["operation"] is not None:
-        raise click.UsageError("--operation is for CL files, and the input is an NC program; leave it out")
+def check_kind(given: dict[str, Any], *, program: bool) -> None:
+    """Refuse options for CL files where the input is an NC program, and the other way round."""
+    context = click.get_current_context()
+    for_files = {"feed", *_ARGUMENTS} - {"units"}
+    for param in context.command.params:
+        name = str(param.name)
+        if context.get_parameter_source(name) != click.core.ParameterSource.COMMANDLINE or not given.get(name):
+            continue
+        if program and name in for_files:
+            raise click.UsageError(f"{param.opts[-1]} is for CL files, and the input is an NC program; leave it out")
+        if not program and name == "tip_control":
+            raise click.UsageError("--tip-control is for NC programs, and the input is a CL file; leave it out")
 
 
 def reading_of(given: dict[str, Any]) -> dict[str, Any]:

@@ -154,7 +154,7 @@ class Corners {
     const place = [0, 1, 2].map((j) => (a.c_tip[3 * i + j] + this.meta.centre[j]).toFixed(4)).join("  ");
     /** @type {[string, string][]} */
     const rows = [
-      ["lines", `CL ${a.c_line[i]}${a.c_nc[i] ? `, NC ${a.c_nc[i]}` : ""}`],
+      ["lines", `${this.meta.origin} ${a.c_line[i]}${a.c_nc[i] ? `, NC ${a.c_nc[i]}` : ""}`],
       ["turn", `${degrees(a.c_turn[i])} at the tip, ${degrees(a.c_axis_turn[i])} at the axis point`],
       ["length", told(a.c_length[i], "mm")],
       ["off at tip", `${offset(a.c_off[i])} of ${limit} mm`],

@@ -11,6 +11,7 @@
  * @property {string} title
  * @property {string} verdict
  * @property {string} badge
+ * @property {string} origin what the path is of: CL file or old program
  * @property {string[][]} head labels and values that are always in sight
  * @property {Problem[]} problems in the order in which they are looked at
  * @property {string[][]} facts

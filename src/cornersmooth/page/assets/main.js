@@ -6,6 +6,7 @@ const NARROW = 900;
 async function start() {
   const meta = readMeta();
   showHead(meta);
+  element("origin").textContent = `${meta.origin} line`;
   const arrays = await readArrays(meta.arrays);
   const view = new View(meta, arrays, element("canvas"));
   const drive = new Drive(meta, arrays, view);

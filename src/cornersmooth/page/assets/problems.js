@@ -24,7 +24,7 @@ class Problems {
 
   /** @param {Problem} problem */
   where({ nc_line: nc, cl_line: cl, code }) {
-    return [nc ? `NC line ${nc}` : "", cl ? `CL line ${cl}` : "", code].filter(Boolean).join(" · ");
+    return [nc ? `NC line ${nc}` : "", cl ? `${this.meta.origin} line ${cl}` : "", code].filter(Boolean).join(" · ");
   }
 
   /** @param {number} k place in the list; -1 for none */

@@ -1,0 +1,108 @@
+"""Every way in which the runs of a program can be smoothed on a control, each verified and planned."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from cornersmooth.comparing import MOST_POSES, Candidate, Row, Table, law_of_lines
+from cornersmooth.errors import CornersmoothError, SettingsError
+from cornersmooth.filter.program import filter_program, left_all_but, read_program
+from cornersmooth.filter.times import by_own_law, time_as_it_is
+from cornersmooth.kinematics import Machine
+from cornersmooth.processes import can_fork, map_in_processes, useful_processes
+from cornersmooth.saving import Timing
+
+#: how many times more cuts are looked at where times need no plan
+_BY_LAW = 10
+
+
+def compare_filtered(
+    data: bytes,
+    tried: Sequence[Candidate],
+    axes: Machine,
+    *,
+    tip_from_start: bool = False,
+    inch: bool = False,
+    processes: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Table:
+    """Smooth, verify and plan the runs of a program in every way.
+
+    Parameters
+    ----------
+    data : bytes
+        The program.
+    tried : sequence of Candidate
+        At least one; their forms have the words of the program.
+    axes : Machine
+        Whose limits are kept.
+    tip_from_start, inch
+        As in `filter_program`.
+    processes : int, optional
+        As many as are useful by default; the rows do not depend on it.
+    progress : callable, optional
+        Called with (rows done, rows in all).
+
+    Raises
+    ------
+    SettingsError
+        CS265: the machine has no limits of axes.
+    InputError
+        CS266: no cut of the program can be smoothed; as `planned_times`.
+    """
+    first = tried[0]
+    job, old = read_program(data, first.form, first.settings, tip_from_start=tip_from_start, inch=inch)
+    timing = Timing.of(first.form, first.settings, axes=axes)
+    if timing is None:
+        raise SettingsError("CS265", "no limits of axes are known", "name a machine that has [dynamics] with --limits")
+    most = MOST_POSES * (_BY_LAW if by_own_law(job) else 1)
+    cuts = max(sum(map(len, old.runs)), 1)
+    left_all_but(old, most)
+    if not old.runs:
+        raise SettingsError(
+            "CS266", "no cut of the program can be smoothed", "'cornersmooth filter' says why for each, with its line"
+        )
+    share = sum(map(len, old.runs)) / cuts
+    before = time_as_it_is(job, old, axes)
+
+    def work(candidate: Candidate) -> Row:
+        return _row(data, candidate, before, axes, most=most, tip_from_start=tip_from_start, inch=inch)
+
+    rows: list[Row] = []
+    count = (useful_processes() if processes is None else processes) if can_fork() else 1
+    for row in map_in_processes(work, tried, count):
+        rows.append(row)
+        if progress is not None:
+            progress(len(rows), len(tried))
+    return Table(before, "the program as it is", share, law_of_lines(timing), tuple(rows))
+
+
+def _row(
+    data: bytes, candidate: Candidate, before: float, axes: Machine, *, most: int, tip_from_start: bool, inch: bool
+) -> Row:
+    row = Row.of(candidate)
+    try:
+        found = filter_program(
+            data,
+            candidate.form,
+            candidate.settings,
+            tip_from_start=tip_from_start,
+            inch=inch,
+            axes=axes,
+            most=most,
+        )
+    except CornersmoothError as failure:
+        return replace(row, verdict=getattr(failure, "what", str(failure)))
+    saved = 0.0 if found.seconds is None else found.seconds[0] - found.seconds[1]
+    checked = found.checked
+    return replace(
+        row,
+        verdict=str(found.verdict),
+        blocks=found.new_lines,
+        bytes=len(found.data),
+        seconds=before - saved,
+        saved=saved,
+        tip=None if checked is None else checked.tip,
+        axis_point=None if checked is None or checked.axis_point != checked.axis_point else checked.axis_point,
+    )

@@ -1,0 +1,114 @@
+"""Finished programs in `time`, `compare`, `verify` and on the page."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from filter.programs import PROGRAMS
+from oracle.command import BAD_INPUT, DONE, USAGE, run
+
+LINUXCNC = ("--control", "linuxcnc", "--machine", "xyzac-trt")
+FANUC = ("--control", "fanuc", "--machine", "table-ac")
+EPS = ("-e", "0.02")
+
+
+def written(folder: Path, name: str) -> Path:
+    path = folder / "part.nc"
+    lines = PROGRAMS[name][2].splitlines(keepends=True)
+    if PROGRAMS[name][0] == "linuxcnc":  # the law of its planner is known for lines only
+        lines = [line for line in lines if not line.startswith("G2 ")]
+    path.write_text("".join(lines), newline="")
+    return path
+
+
+def name_of(control: str, machine: str) -> str:
+    return next(name for name, one in PROGRAMS.items() if one[:2] == (control, machine))
+
+
+@pytest.mark.parametrize("how", [FANUC, LINUXCNC])
+def test_time_of_a_program_as_it_is_and_smoothed(how: tuple[str, ...], tmp_path: Path) -> None:
+    part, new = written(tmp_path, name_of(how[1], how[3])), tmp_path / "new.nc"
+    told = run("time", part, *how, *EPS, "--json")
+    assert told.returncode == DONE, told.stderr
+    times = json.loads(told.stdout)
+    seconds = times["seconds"]
+    assert times["smoothed"] == times["cuts"] > 20
+    assert seconds["as_written"] > 0.0
+    # 24 turns to and fro: who need not brake at them is faster; LinuxCNC blends lines itself
+    assert seconds["as_written"] < (1.1 if how is LINUXCNC else 0.95) * seconds["unsmoothed"]
+    assert run("filter", part, *how, *EPS, "-o", new).returncode == DONE
+    beside = json.loads(run("time", part, "--text", new, *how, *EPS, "--json").stdout)
+    assert beside["seconds"] == pytest.approx(seconds)
+    assert b"as it is" in run("time", part, *how, *EPS).stdout
+
+
+def test_time_beside_a_program_that_is_another_one(tmp_path: Path) -> None:
+    part, new = written(tmp_path, "fanuc words"), tmp_path / "new.nc"
+    new.write_bytes(part.read_bytes().replace(b"T1 M6", b"T2 M6"))
+    told = run("time", part, "--text", new, *FANUC)
+    assert told.returncode == 1
+    assert b"CS591" in told.stderr
+    arc = tmp_path / "arc.nc"
+    arc.write_text(PROGRAMS["linuxcnc, G64, an arc inside"][2])
+    told = run("time", arc, *LINUXCNC)
+    assert told.returncode == BAD_INPUT
+    assert f"{arc}:16: error[CS264]".encode() in told.stderr
+
+
+@pytest.mark.parametrize("how", [FANUC, LINUXCNC])
+def test_compare_tries_every_way(how: tuple[str, ...], tmp_path: Path) -> None:
+    part = written(tmp_path, name_of(how[1], how[3]))
+    table = json.loads(run("compare", part, *how, *EPS, "--json").stdout)
+    rows = table["rows"]
+    assert table["unsmoothed"] == "the program as it is"
+    assert table["share_of_poses"] == 1.0
+    assert {row["method"] for row in rows} == {"proportional", "global"}
+    assert {row["words"] for row in rows} == {f"rotary words of {how[3]}"}
+    assert {row["verdict"] for row in rows if row["seconds"] is not None} == {"PASSED"}
+    best = next(row for row in rows if row["best"])
+    assert best["saved"] == pytest.approx(table["unsmoothed_seconds"] - best["seconds"])
+    words = best["command"].split()
+    assert words[:2] == ["cornersmooth", "filter"]
+    words[words.index("-o") + 1] = str(tmp_path / "best.nc")
+    assert run(*words[1:]).returncode == DONE
+    assert len((tmp_path / "best.nc").read_bytes()) == best["bytes"]
+
+
+def test_compare_looks_at_a_part_of_a_long_program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("cornersmooth.filter.compared.MOST_POSES", 30)
+    control, machine, text = PROGRAMS["fanuc words"]
+    head, _, rest = text.partition("G0 X0.")
+    cuts, _, tail = ("G0 X0." + rest).partition("G0 Z50.")
+    part = tmp_path / "part.nc"
+    part.write_text(head + "".join(f"{cuts}G0 Z20.\n" for _ in range(5)) + "G0 Z50." + tail)
+    table = json.loads(run("compare", part, "--control", control, "--machine", machine, "--json").stdout)
+    assert table["share_of_poses"] == pytest.approx(0.2)
+
+
+def test_page_shows_runs_before_and_after(tmp_path: Path) -> None:
+    part, new, page = written(tmp_path, "fanuc words"), tmp_path / "new.nc", tmp_path / "page.html"
+    for command in (("filter", part, "-o", new), ("verify", part, new)):
+        assert run(*command, *FANUC, *EPS, "--report", page, "--force").returncode == DONE
+        text = page.read_text()
+        assert '"origin": "old"' in text
+        assert "old program" in text
+        assert "PASSED" in text
+
+
+def test_options_of_cl_files_are_refused(tmp_path: Path) -> None:
+    part, cl = written(tmp_path, "fanuc words"), tmp_path / "part.cls"
+    cl.write_text("GOTO/0,0,0,0,0,1\nGOTO/10,0,0,0,0,1\nFINI\n")
+    for command in ("time", "compare"):
+        told = run(command, part, *FANUC, "--lenient")
+        assert told.returncode == USAGE
+        assert b"--lenient is for CL files" in told.stderr
+        told = run(command, cl, *FANUC, "--tip-control")
+        assert told.returncode == USAGE
+        assert b"--tip-control is for NC programs" in told.stderr
+    assert run("time", part, *FANUC, "--csv", tmp_path / "t.csv").returncode == USAGE
+    told = run("time", part, "--control", "fanuc")
+    assert told.returncode == USAGE
+    assert b"--limits" in told.stderr
