@@ -114,10 +114,9 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name, options in {"nc": [], "mpf": ["--control", "siemens"]}.items():
         assert run("smooth", "part.cls", "-e", "0.005", "-o", f"part.{name}", *options, cwd=folder).returncode == DONE
     program = cs.read(folder / "part.cls")
-    sharp = replace(program, keep=np.ones(len(program), np.uint8))  # as the CAM system writes it, for `filter`
+    sharp = replace(program, keep=np.ones(len(program), np.uint8))  # as CAM systems write it, for `filter`
     form = cs.choose_form("linuxcnc", "g1", machine=cs.load_machine("xyzac-trt"))
-    with (folder / "part.ngc").open("wb") as stream:
-        cs.nc.write(cs.smooth(sharp, form=form), stream, form=form)
+    cs.postprocess(sharp, folder / "part.ngc", form=form)
     again = (*"filter part.ngc --control linuxcnc --machine xyzac-trt -o smooth.ngc".split(),)
     assert run(*again, cwd=folder).returncode == DONE
     return folder
