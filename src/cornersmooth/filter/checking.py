@@ -33,34 +33,20 @@ _DISTANCES: Final = re.compile(rb"G91(?=[ \t]*\r?\n?\Z)")
 
 @dataclass(frozen=True)
 class Place:
-    """Where a run of the old program is in the new one.
-
-    Parameters
-    ----------
-    run : Run
-    first, stop : int
-        Lines of the new program, from 0; the latter excluded.
-    """
+    """Where a run of the old program is in the new one."""
 
     run: Run
-    first: int
+    first: int  #: first, stop: lines of the new program, from 0; the latter excluded
     stop: int
 
 
 @dataclass(frozen=True)
 class Checked:
-    """What was found.
-
-    Parameters
-    ----------
-    wrong : tuple of Problem
-    tip, axis_point : float, mm
-        Largest deviation.
-    """
+    """What was found."""
 
     wrong: tuple[Problem, ...]
-    tip: float = 0.0
-    axis_point: float = 0.0  # NaN where the tool axis has a tolerance of its own
+    tip: float = 0.0  #: tip, axis_point: largest deviation, mm
+    axis_point: float = 0.0  #: NaN where the tool axis has a tolerance of its own
 
 
 def places(old: Reading, new: Reading) -> tuple[list[Place], list[Problem]]:

@@ -22,21 +22,11 @@ from cornersmooth.settings import Settings
 
 @dataclass(frozen=True)
 class Stretch:
-    """Blocks that stand for a run, in the program itself or in another.
+    """Blocks that stand for a run, in the program itself or in another."""
 
-    Parameters
-    ----------
-    run : Run
-        Says the state before the blocks.
-    text : bytes
-        Whole lines.
-    line : int
-        Number of the first, from 1.
-    """
-
-    run: Run
-    text: bytes
-    line: int
+    run: Run  #: says the state before the blocks
+    text: bytes  #: whole lines
+    line: int  #: number of the first, from 1
 
 
 def motion(stretches: Sequence[Stretch], form: Form, spelling: Spelling, settings: Settings) -> NcProgram:

@@ -29,55 +29,28 @@ _UNITS: Final = re.compile(rb"(?i)G(20|21|70|71|700|710)(?!\d)|BEGIN PGM")
 
 @dataclass(frozen=True)
 class Left:
-    """Cuts that stay as they are.
-
-    Parameters
-    ----------
-    reason : str
-    line : int
-        The first of them, from 1.
-    count : int
-    """
+    """Cuts that stay as they are."""
 
     reason: str
-    line: int
+    line: int  #: the first of them, from 1
     count: int
 
 
 @dataclass(frozen=True)
 class Filtered:
-    """What became of a program.
+    """What became of a program."""
 
-    Parameters
-    ----------
-    data : bytes
-        The new program.
-    lines, new_lines : int
-        Of the old program and of the new one.
-    cuts, smoothed, runs : int
-        Cuts of the old program, those of them in runs that were replaced, and those runs.
-    left : tuple of Left
-        Why the others stay.
-    checked : Checked or None
-        None where it was not asked for.
-    units_said : bool
-        Whether the program says its units.
-    seconds : (float, float) or None
-        Planned time before and after; see `planned_times`.
-    motions : (NcProgram, NcProgram) or None
-        What the control does in the runs before and after, where that was asked for.
-    """
-
-    data: bytes
-    lines: int
+    data: bytes  #: the new program
+    lines: int  #: lines, new_lines: of the old program and of the new one
     new_lines: int
-    cuts: int
+    cuts: int  #: cuts, smoothed, runs: cuts of the old program, those of them in runs that were replaced, those runs
     smoothed: int
     runs: int
-    left: tuple[Left, ...]
-    checked: Checked | None
-    units_said: bool = True
-    seconds: tuple[float, float] | None = None
+    left: tuple[Left, ...]  #: why the others stay
+    checked: Checked | None  #: None where it was not asked for
+    units_said: bool = True  #: whether the program says its units
+    seconds: tuple[float, float] | None = None  #: planned time before and after; see `planned_times`
+    #: what the control does in the runs before and after, where that was asked for
     motions: tuple[NcProgram, NcProgram] | None = None
 
     @property

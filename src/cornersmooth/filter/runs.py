@@ -38,30 +38,17 @@ _MARK: Final = b"\xef\xbb\xbf"
 
 @dataclass(frozen=True)
 class Run:
-    """Plain cuts that follow one another.
+    """Plain cuts that follow one another, with c words of the axes (`State.axes`)."""
 
-    Parameters
-    ----------
-    first, stop : int
-        Lines, from 0; the latter excluded.
-    state : State
-        Before the first.
-    place : (n, c) float64
-        Last words of each axis (`State.axes`) at the end of each cut, in units of the program: all cuts where the
-        program says distances (G91), else the last one only.
-    low, high : (c,) float64
-        Least and largest of them, start included.
-    feed : float
-        As written, of the last.
-    """
-
-    first: int
+    first: int  #: first, stop: lines, from 0; the latter excluded
     stop: int
-    state: State
+    state: State  #: before the first
+    #: (n, c) words at the end of each cut, in units of the program: all cuts where the program says distances (G91),
+    #: else the last one only
     place: Floats
-    low: Floats
+    low: Floats  #: low, high: (c,) least and largest of them, start included
     high: Floats
-    feed: float
+    feed: float  #: as written, of the last
 
     def __len__(self) -> int:
         return self.stop - self.first
@@ -74,30 +61,16 @@ class Run:
 
 @dataclass
 class Reading:
-    """What was read.
-
-    Parameters
-    ----------
-    data : bytes
-    start : (l + 1,) int64
-        First byte of each line, and the end.
-    runs : list of Run
-    why : (l,) uint16
-        For each line 0 where it is no cut, 1 for a plain cut, else 2 plus the number of the reason in `reasons`.
-    reasons : list of str
-    state : State
-        At the end.
-    at : dict of int to State
-        Before the lines that were asked for.
-    """
+    """What was read."""
 
     data: bytes
-    start: Ints
-    state: State
+    start: Ints  #: (l + 1,) first byte of each line, and the end
+    state: State  #: at the end
     runs: list[Run] = field(default_factory=list)
+    #: (l,) for each line 0 where it is no cut, 1 for a plain cut, else 2 plus the number of the reason in `reasons`
     why: NDArray[np.uint16] = field(init=False)
     reasons: list[str] = field(default_factory=list)
-    at: dict[int, State] = field(default_factory=dict)
+    at: dict[int, State] = field(default_factory=dict)  #: before the lines that were asked for
 
     def __post_init__(self) -> None:
         self.why = np.zeros(len(self.start) - 1, np.uint16)

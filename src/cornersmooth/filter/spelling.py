@@ -21,23 +21,9 @@ _AXES: Final = (b"X", b"Y", b"Z")
 
 @dataclass(frozen=True)
 class Spelling:
-    """How plain cuts look.
+    """How plain cuts look; what is not explained is as in `cornersmooth.nc.control.Motion`."""
 
-    Parameters
-    ----------
-    tip, other, feed : int
-        Decimals at most of X Y Z, of the words of the tool axis, and of F.
-    signs, spaces, leading_zeros, trailing_zeros, feed_point, modal : bool
-        As in `cornersmooth.nc.control.Motion`; modal where words that repeat are left out.
-    line : str
-        The word of lines, such as ``G01``; empty where none is said.
-    numbered : bool
-        Whether most blocks have numbers.
-    end : bytes
-        Line end.
-    """
-
-    tip: int
+    tip: int  #: tip, other, feed: decimals at most of X Y Z, of the words of the tool axis, and of F
     other: int
     feed: int
     signs: bool
@@ -45,10 +31,10 @@ class Spelling:
     leading_zeros: bool
     trailing_zeros: bool
     feed_point: bool
-    modal: bool
-    line: str
-    numbered: bool
-    end: bytes
+    modal: bool  #: whether words that repeat are left out
+    line: str  #: the word of lines, such as ``G01``; empty where none is said
+    numbered: bool  #: whether most blocks have numbers
+    end: bytes  #: line end
 
     @classmethod
     def of(cls, cuts: Iterable[bytes], words: int) -> Spelling:

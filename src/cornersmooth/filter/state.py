@@ -35,50 +35,25 @@ _WORKED_OUT: Final = re.compile(
 
 @dataclass
 class State:
-    """What holds between two blocks.
-
-    Parameters
-    ----------
-    vocabulary : Vocabulary
-    axes : tuple of str
-        Letters of X Y Z and of the words of the tool axis, as the lexer names them.
-    place : dict of str to float
-        Last word of each, in units of the program; where the machine is, if that is known.
-    motion : float
-        0 to 3.
-    absolute : bool or None
-    unit : float, mm
-    feed : float
-        As written.
-    feed_mode : int or None
-    tip : str or None
-        Kind of tool tip control.
-    even : bool
-        Whether words of the tool axis run as they are by themselves: angles evenly, vectors on the great circle.
-    compensated : bool or None
-        Whether the radius of the cutter is taken account of.
-    frames : frozenset of str
-        Words that turn or scale the places of the part.
-    offset : str
-        Work offset in force.
-    rounding : str
-        Words that say how exactly corners are passed.
-    """
+    """What holds between two blocks."""
 
     vocabulary: Vocabulary
-    axes: tuple[str, ...]
+    axes: tuple[str, ...]  #: letters of X Y Z and of the words of the tool axis, as the lexer names them
+    #: last word of each, in units of the program; where the machine is, if that is known
     place: dict[str, float] = field(default_factory=dict)
-    motion: float = math.nan
+    motion: float = math.nan  #: 0 to 3
     absolute: bool | None = True
-    unit: float = 1.0
-    feed: float = math.nan
+    unit: float = 1.0  #: mm
+    feed: float = math.nan  #: as written
     feed_mode: int | None = PER_MINUTE
-    tip: str | None = NONE
-    even: bool = True
-    compensated: bool | None = False
-    frames: frozenset[str] = frozenset()
-    offset: str = ""
-    rounding: str = ""
+    tip: str | None = NONE  #: kind of tool tip control
+    even: bool = (
+        True  #: whether words of the tool axis run as they are by themselves: angles evenly, vectors on a circle
+    )
+    compensated: bool | None = False  #: whether the radius of the cutter is taken account of
+    frames: frozenset[str] = frozenset()  #: words that turn or scale the places of the part
+    offset: str = ""  #: work offset in force
+    rounding: str = ""  #: words that say how exactly corners are passed
 
     def __post_init__(self) -> None:
         self.place = self.place or dict.fromkeys(self.axes, math.nan)

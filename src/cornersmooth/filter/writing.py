@@ -31,23 +31,11 @@ _FEED: Final = re.compile(rb"F([\d.]+)$")
 
 @dataclass(frozen=True)
 class Job:
-    """What runs are smoothed for.
-
-    Parameters
-    ----------
-    reader : ProgramReader
-    form : Form
-        Of the new blocks.
-    own : Form
-        Lines in the words that the program has.
-    spelling : Spelling
-    settings : Settings
-    processes : int
-    """
+    """What runs are smoothed for."""
 
     reader: ProgramReader
-    form: Form
-    own: Form
+    form: Form  #: of the new blocks
+    own: Form  #: lines in the words that the program has
     spelling: Spelling
     settings: Settings
     processes: int = 1
@@ -151,12 +139,7 @@ def _split(job: Job, form: Form, text: bytes, runs: Sequence[Run]) -> list[list[
 
 
 class _Held:
-    """What holds in a text of many runs, and has to be said in each of them on its own.
-
-    Parameters
-    ----------
-    form : Form
-    """
+    """What holds in a text of many runs, and has to be said in each of them on its own."""
 
     def __init__(self, form: Form) -> None:
         self._form, self._look = form, form.mode.motion
