@@ -13,16 +13,11 @@ LINEAR = ("X", "Y", "Z")
 
 @dataclass(frozen=True)
 class Travel:
-    """Lowest and highest position of a linear axis.
-
-    Parameters
-    ----------
-    name : {"X", "Y", "Z"}
-    low, high : float, mm
-        Of the spindle nose with the heads at zero, in the coordinates in which the points of the tables are given.
-    """
+    """Lowest and highest position of a linear axis."""
 
     name: str
+    #: low, high: mm; of the spindle nose with the heads at zero, in the coordinates in which the points of the tables
+    #: are given
     low: float
     high: float
 
@@ -34,20 +29,12 @@ class Travel:
 
 @dataclass(frozen=True)
 class Dynamics:
-    """Limits of one axis of a machine, linear or rotary; infinite where there is none.
-
-    Parameters
-    ----------
-    name : {"X", "Y", "Z", "A", "B", "C"}
-    velocity : float, mm/min or deg/min
-    acceleration : float, mm/s² or deg/s²
-    jerk : float, mm/s³ or deg/s³
-    """
+    """Limits of one axis of a machine, linear or rotary; infinite where there is none."""
 
     name: str
-    velocity: float = math.inf
-    acceleration: float = math.inf
-    jerk: float = math.inf
+    velocity: float = math.inf  #: mm/min or deg/min
+    acceleration: float = math.inf  #: mm/s² or deg/s²
+    jerk: float = math.inf  #: mm/s³ or deg/s³
 
     def __post_init__(self) -> None:
         for key in ("velocity", "acceleration", "jerk"):

@@ -17,42 +17,27 @@ from cornersmooth.vectors import unit as unit_vector
 
 Vector = tuple[float, float, float]
 
-#: Two directions closer than this (rad) count as parallel: no second rotary axis can do its work then.
+#: two directions closer than this (rad) count as parallel: no second rotary axis can do its work then.
 PARALLEL = 1e-3
 
 
 @dataclass(frozen=True)
 class RotaryAxis:
-    """One rotary axis at the position where both rotary axes stand at zero.
+    """One rotary axis at the position where both rotary axes stand at zero."""
 
-    Parameters
-    ----------
-    name : {"A", "B", "C"}
-        The address of its word in the NC text.
-    direction : (float, float, float)
-        Along the axis, any length but zero.
-    carrier : {"table", "head", "none"}
-        Whether it carries the part or the tool; none where it only stands for one that the machine has not.
-    point : (float, float, float), mm
-        A point on the axis: in machine coordinates for a table, from the spindle nose for a head.
-    positive : {"tool", "table"}
-        What turns right-handed about `direction` when the word grows: the tool as seen from the part (ISO 841), or
-        the table itself (LinuxCNC's trunnions). For a head both are the same, and only ``"tool"`` is accepted.
-    limits : (float, float) or None, degrees
-        Lowest and highest word; None for an axis that turns without end.
-    modulo : bool
-        Whether its words are from 0 to 360 degrees, and it goes the shorter way to each.
-    clamp : (str, str) or None
-        M words that hold it, and let it turn.
-    """
-
-    name: str
-    direction: Vector
+    name: str  #: the address of its word in the NC text
+    direction: Vector  #: along the axis, any length but zero
+    #: whether it carries the part or the tool; none where it only stands for one that the machine has not
     carrier: Literal["table", "head", "none"]
+    #: A point on the axis: in machine coordinates for a table, from the spindle nose for a head
     point: Vector = (0.0, 0.0, 0.0)
+    #: what turns right-handed about `direction` when the word grows: the tool as seen from the part (ISO 841), or the
+    #: table itself (LinuxCNC's trunnions). For a head both are the same, and only ``"tool"`` is accepted.
     positive: Literal["tool", "table"] = "tool"
+    #: lowest and highest word; None for an axis that turns without end
     limits: Annotated[tuple[float, float], "write limits = [lowest, highest] in degrees"] | None = None
-    modulo: bool = False
+    modulo: bool = False  #: whether its words are from 0 to 360 degrees, and it goes the shorter way to each
+    #: M words that hold it, and let it turn
     clamp: Annotated[tuple[str, str], 'give two M words, as in ["M10", "M11"]'] | None = None
 
     def __post_init__(self) -> None:
@@ -112,50 +97,32 @@ _NO_AXIS: Final = RotaryAxis("", (0.0, 0.0, 1.0), "none")
 
 @dataclass(frozen=True)
 class Machine:
-    """Up to two rotary axes between the part and the tool; three linear axes along X, Y and Z.
-
-    Parameters
-    ----------
-    axes : tuple of RotaryAxis
-        In the order in which they are met on the way from the part to the tool: for two tables the one that carries
-        the part first, for two heads the one that carries the tool last. Those that a machine has not are made up to
-        two by axes whose carrier is none, which never turn: angles are pairs on every machine.
-    description : str
-        One line for lists.
-    preferred : (str, float) or None
-        Name of an axis and the sign (+1, -1) that it prefers where a program starts.
-    tool_direction : (float, float, float)
-        From the tip to the spindle with both rotary axes at zero.
-    tool_length : float, mm
-        From the spindle nose to the tip; matters for heads without tool centre point control only.
-    tool_lengths : tuple of (int, float), mm
-        The same by number of tool, for those that `tool_length` is not for.
-    home, tool_change : tuple of (str, float)
-        Axes and where they go in machine coordinates, mm or degrees, for retracts and the end of a program, and for a
-        change of tool; the control's own words where there are none.
-    tip_control : tuple of str or None
-        Blocks that switch on and off what keeps the tip, for controls whose kinematics do; empty where these always do;
-        None where that is not known.
-    part_zero : (float, float, float), mm
-        Where the zero of the part sits in the coordinates in which the points of the tables are given.
-    dynamics : tuple of Dynamics
-        Limits of any of the five axes; only the planning of the time asks for them.
-    travel : tuple of Travel
-        How far any of X, Y and Z goes; what is written is checked against it (`cornersmooth.kinematics.travel`).
-    """
+    """Up to two rotary axes between the part and the tool; three linear axes along X, Y and Z."""
 
     name: str
+    #: in the order in which they are met on the way from the part to the tool: for two tables the one that carries the
+    #: part first, for two heads the one that carries the tool last. Those that a machine has not are made up to two by
+    #: axes whose carrier is none, which never turn: angles are pairs on every machine.
     axes: tuple[RotaryAxis, ...]
-    description: str = ""
+    description: str = ""  #: one line for lists
+    #: name of an axis and the sign (+1, -1) that it prefers where a program starts
     preferred: tuple[str, float] | None = None
-    tool_direction: Vector = (0.0, 0.0, 1.0)
+    tool_direction: Vector = (0.0, 0.0, 1.0)  #: from the tip to the spindle with both rotary axes at zero
+    #: mm; from the spindle nose to the tip; matters for heads without tool centre point control only
     tool_length: float = 0.0
+    #: where the zero of the part sits in the coordinates in which the points of the tables are given
     part_zero: Vector = (0.0, 0.0, 0.0)
-    dynamics: tuple[Dynamics, ...] = ()
+    dynamics: tuple[Dynamics, ...] = ()  #: limits of any of the five axes; only the planning of the time asks for them
+    #: how far any of X, Y and Z goes; what is written is checked against it (`cornersmooth.kinematics.travel`)
     travel: tuple[Travel, ...] = ()
+    #: the same by number of tool, for those that `tool_length` is not for
     tool_lengths: tuple[tuple[int, float], ...] = ()
+    #: home, tool_change: axes and where they go in machine coordinates, mm or degrees, for retracts and the end of a
+    #: program, and for a change of tool; the control's own words where there are none
     home: tuple[tuple[str, float], ...] = ()
     tool_change: tuple[tuple[str, float], ...] = ()
+    #: blocks that switch on and off what keeps the tip, for controls whose kinematics do; empty where these always do;
+    #: None where that is not known
     tip_control: Annotated[tuple[str, ...], 'give two blocks, as in ["M428", "M429"], or [] for none'] | None = None
 
     def __post_init__(self) -> None:

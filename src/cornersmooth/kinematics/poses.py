@@ -19,29 +19,23 @@ from cornersmooth.vectors import dot, norm
 
 #: A machine has a pole where k can lie along a₁; sides that differ by less (rad) meet there up to rounding.
 POLE_MATCH = 1e-9
-#: Chords of unit vectors are known to this.
+#: chords of unit vectors are known to this.
 ROUNDING = 1e-7
-#: Axes that are solved at a time: what is computed on the way stays in the processor's cache.
+#: axes that are solved at a time: what is computed on the way stays in the processor's cache.
 CHUNK = 1 << 13
 
 
 @dataclass(frozen=True)
 class Solutions:
-    """Both pairs of rotary angles for each of n axes.
+    """Both pairs of rotary angles for each of n axes."""
 
-    Parameters
-    ----------
-    angles : (n, 2, 2) float64, degrees
-        ``angles[i, branch, axis]`` in (-180, 180].
-    pole_distance : (n,) float64, degrees
-        Angle between the tool axis and the nearest direction in which the first rotary axis has no effect; infinite
-        on a machine without such a direction. At the pole the first angle is free, and what is given is one choice.
-    beyond : (n,) float64, degrees
-        By how much the axis lies outside of what the machine can reach, else 0; the angles are then the nearest.
-    """
-
-    angles: Floats
+    angles: Floats  #: (n, 2, 2), degrees; ``angles[i, branch, axis]`` in (-180, 180]
+    #: (n,), degrees; angle between the tool axis and the nearest direction in which the first rotary axis has no
+    #: effect; infinite on a machine without such a direction. At the pole the first angle is free, and what is given is
+    #: one choice.
     pole_distance: Floats
+    #: (n,), degrees; by how much the axis lies outside of what the machine can reach, else 0; the angles are then the
+    #: nearest
     beyond: Floats
 
     @property

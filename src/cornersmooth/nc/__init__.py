@@ -70,16 +70,9 @@ _TURNING = ("bspline", "poly")
 
 @dataclass(frozen=True)
 class Written:
-    """What `write` put out.
+    """What `write` put out."""
 
-    Parameters
-    ----------
-    blocks : int
-        NC blocks, head and tail included.
-    findings : tuple of Finding
-    """
-
-    blocks: int
+    blocks: int  #: NC blocks, head and tail included
     findings: tuple[Finding, ...]
 
 

@@ -263,25 +263,12 @@ class LineStyle:
 
 @dataclass(frozen=True)
 class Control:
-    """A control as its table describes it; the first form is the default.
-
-    Parameters
-    ----------
-    like : str
-        Control that comes with the program and that it is like; empty for none.
-    systems : mapping of str to Digits
-        Digits to choose from by name, such as increment systems.
-    own : bool
-        Whether the table is the user's own, whose words may mean anything.
-    trusted : frozenset of str
-        Machine functions of the shop that move nothing: verification accepts them where the table or the user writes
-        them.
-    """
+    """A control as its table describes it; the first form is the default."""
 
     name: str
     forms: Mapping[str, FormTable]
     description: str = ""
-    like: str = ""
+    like: str = ""  #: control that comes with the program and that it is like; empty for none
     digits: Digits = Digits()
     program: ProgramTable = field(default_factory=ProgramTable)
     layout: TextStyle = TextStyle()
@@ -289,8 +276,11 @@ class Control:
     extras: Mapping[str, Extra] = field(default_factory=dict)
     lines: LineStyle = LineStyle()
     cycles: Cycles = Cycles()
+    #: digits to choose from by name, such as increment systems
     systems: Mapping[str, Digits] = field(default_factory=dict)
-    own: bool = False
+    own: bool = False  #: whether the table is the user's own, whose words may mean anything
+    #: machine functions of the shop that move nothing: verification accepts them where the table or the user writes
+    #: them
     trusted: frozenset[str] = frozenset()
 
     @property

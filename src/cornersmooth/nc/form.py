@@ -19,34 +19,19 @@ TIP_SHARE = 0.1
 
 @dataclass(frozen=True)
 class Form:
-    """A form of a control in one of its modes: everything the writers go by.
-
-    Parameters
-    ----------
-    name : str
-        As on the command line.
-    machine : Machine or None
-        For rotary words.
-    extras : tuple of Extra
-        Functions of the control that were asked for.
-    upright : Mode or None
-        `FormTable.upright`.
-    rewind : float, mm
-        How far a cut is left along the tool where a rotary axis would pass its limit; 0 where that is an error.
-    plane : Mode or None
-        `FormTable.plane` where tilted planes are asked for.
-    """
+    """A form of a control in one of its modes: everything the writers go by."""
 
     table: Control
-    name: str
+    name: str  #: as on the command line
     curve: CurveStyle
     orientation: Orientation
     mode: Mode
-    machine: Machine | None = None
-    extras: tuple[Extra, ...] = ()
-    upright: Mode | None = None
+    machine: Machine | None = None  #: for rotary words
+    extras: tuple[Extra, ...] = ()  #: functions of the control that were asked for
+    upright: Mode | None = None  #: `FormTable.upright`
+    #: mm; how far a cut is left along the tool where a rotary axis would pass its limit; 0 where that is an error
     rewind: float = 0.0
-    plane: Mode | None = None
+    plane: Mode | None = None  #: `FormTable.plane` where tilted planes are asked for
 
     @property
     def control(self) -> str:

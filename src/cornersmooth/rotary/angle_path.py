@@ -24,30 +24,21 @@ from cornersmooth.rotary.branch_choice import LIMIT_SLACK, PREFERENCE_COST, NoCh
 from cornersmooth.rotary.rewinds import CutTooFarError, parts_of_cut, too_far
 from cornersmooth.rotary.unwrapping import WideSteps, meet_at_pole, unwrap
 
-#: Poses worked on at a time, so that memory is needed for their angles and little else.
+#: poses worked on at a time, so that memory is needed for their angles and little else.
 CHUNK = 1 << 15
-#: Rounds of dividing cuts, after which limits are an error; a round divides all cuts that are too far by themselves.
+#: rounds of dividing cuts, after which limits are an error; a round divides all cuts that are too far by themselves.
 REWIND_ROUNDS = 100
 
 
 @dataclass(frozen=True)
 class RotaryPath:
-    """Rotary words of n poses.
+    """Rotary words of n poses."""
 
-    Parameters
-    ----------
-    angles : (n, 2) float64, degrees
-        In the order of `Machine.axes`, unwrapped but for rewinds in rapids.
-    deviation : (n,) float64, degrees
-        Angle between the axis that the angles give and the one asked for: within the tolerance, 0 but at the pole.
-    branch : (n,) int8
-        Which of `Solutions.angles` they are, -1 at the pole.
-    findings : tuple of Finding
-    """
-
-    angles: Floats
+    angles: Floats  #: (n, 2), degrees; in the order of `Machine.axes`, unwrapped but for rewinds in rapids
+    #: (n,), degrees; angle between the axis that the angles give and the one asked for: within the tolerance, 0 but at
+    #: the pole
     deviation: Floats
-    branch: NDArray[np.int8]
+    branch: NDArray[np.int8]  #: (n,) which of `Solutions.angles` they are, -1 at the pole
     findings: tuple[Finding, ...]
 
 

@@ -24,44 +24,33 @@ from cornersmooth.rotary.axis_findings import limit_error
 from cornersmooth.rotary.chord_bounds import axis_bend, ruled_bend, tip_bend
 from cornersmooth.vectors import dot, unit
 
-#: Rounds of division.
+#: rounds of division.
 ROUNDS = 28
-#: Shares of an interval at which its error is looked at first: an error that vanishes at all three is none.
+#: shares of an interval at which its error is looked at first: an error that vanishes at all three is none.
 SAMPLES = (0.25, 0.5, 0.75)
-#: The most parts that an interval is divided into at once.
+#: the most parts that an interval is divided into at once.
 PARTS = 64
-#: The error of a smooth motion at a quarter of its way is ¾ of its largest. Where that holds to SMOOTH of it, and no
+#: the error of a smooth motion at a quarter of its way is ¾ of its largest. Where that holds to SMOOTH of it, and no
 #: axis turns by more than SMOOTH_TURN (degrees), the error falls with the square of the number of parts, to AIM.
 SMOOTH, SMOOTH_TURN, AIM = 0.1, 30.0, 0.93
-#: An error whose bound is below this share of the tolerance is not looked at; the rest is left to poses at the pole.
+#: an error whose bound is below this share of the tolerance is not looked at; the rest is left to poses at the pole.
 SURE = 0.5
-#: Share of the tolerance that a proof leaves to what lies between its samples, and the most intervals between them.
+#: share of the tolerance that a proof leaves to what lies between its samples, and the most intervals between them.
 PROOF, MOST_SAMPLES = 0.02, 256
-#: Squares of vectors that are nearer to 1 are those of unit vectors.
+#: squares of vectors that are nearer to 1 are those of unit vectors.
 UNIT = 1e-6
-#: Samples of proofs that are worked on at a time.
+#: samples of proofs that are worked on at a time.
 CHUNK = 1 << 15
 
 
 @dataclass(frozen=True)
 class Insertions:
-    """Points to insert into a path of n poses; m rows in path order.
+    """Points to insert into a path of n poses; m rows in path order."""
 
-    Parameters
-    ----------
-    segment : (m,) int64
-        The segment from pose ``segment`` to pose ``segment + 1``.
-    fraction : (m,) float64
-        Share of the segment before the point, in (0, 1).
-    angles : (m, 2) float64, degrees
-    unsolved : (u,) int64
-        Segments that no division brought within the tolerances: the axis jumps there.
-    """
-
-    segment: Ints
-    fraction: Floats
-    angles: Floats
-    unsolved: Ints
+    segment: Ints  #: (m,) the segment from pose ``segment`` to pose ``segment + 1``
+    fraction: Floats  #: (m,) share of the segment before the point, in (0, 1)
+    angles: Floats  #: (m, 2), degrees
+    unsolved: Ints  #: (u,) segments that no division brought within the tolerances: the axis jumps there
 
     def __len__(self) -> int:
         return len(self.segment)
