@@ -17,7 +17,7 @@ from cornersmooth.vectors import unit as unit_vector
 
 Vector = tuple[float, float, float]
 
-#: two directions closer than this (rad) count as parallel: no second rotary axis can do its work then.
+#: Two directions closer than this (rad) count as parallel: no second rotary axis can do its work then.
 PARALLEL = 1e-3
 
 
@@ -29,12 +29,12 @@ class RotaryAxis:
     direction: Vector  #: along the axis, any length but zero
     #: whether it carries the part or the tool; none where it only stands for one that the machine has not
     carrier: Literal["table", "head", "none"]
-    #: A point on the axis: in machine coordinates for a table, from the spindle nose for a head
+    #: mm; a point on the axis: in machine coordinates for a table, from the spindle nose for a head
     point: Vector = (0.0, 0.0, 0.0)
     #: what turns right-handed about `direction` when the word grows: the tool as seen from the part (ISO 841), or the
     #: table itself (LinuxCNC's trunnions). For a head both are the same, and only ``"tool"`` is accepted.
     positive: Literal["tool", "table"] = "tool"
-    #: lowest and highest word; None for an axis that turns without end
+    #: degrees; lowest and highest word; None for an axis that turns without end
     limits: Annotated[tuple[float, float], "write limits = [lowest, highest] in degrees"] | None = None
     modulo: bool = False  #: whether its words are from 0 to 360 degrees, and it goes the shorter way to each
     #: M words that hold it, and let it turn
@@ -110,12 +110,12 @@ class Machine:
     tool_direction: Vector = (0.0, 0.0, 1.0)  #: from the tip to the spindle with both rotary axes at zero
     #: mm; from the spindle nose to the tip; matters for heads without tool centre point control only
     tool_length: float = 0.0
-    #: where the zero of the part sits in the coordinates in which the points of the tables are given
+    #: mm; where the zero of the part sits in the coordinates in which the points of the tables are given
     part_zero: Vector = (0.0, 0.0, 0.0)
     dynamics: tuple[Dynamics, ...] = ()  #: limits of any of the five axes; only the planning of the time asks for them
     #: how far any of X, Y and Z goes; what is written is checked against it (`cornersmooth.kinematics.travel`)
     travel: tuple[Travel, ...] = ()
-    #: the same by number of tool, for those that `tool_length` is not for
+    #: mm; the same by number of tool, for those that `tool_length` is not for
     tool_lengths: tuple[tuple[int, float], ...] = ()
     #: home, tool_change: axes and where they go in machine coordinates, mm or degrees, for retracts and the end of a
     #: program, and for a change of tool; the control's own words where there are none

@@ -19,9 +19,9 @@ from cornersmooth.vectors import dot, norm
 
 #: A machine has a pole where k can lie along a₁; sides that differ by less (rad) meet there up to rounding.
 POLE_MATCH = 1e-9
-#: chords of unit vectors are known to this.
+#: Chords of unit vectors are known to this.
 ROUNDING = 1e-7
-#: axes that are solved at a time: what is computed on the way stays in the processor's cache.
+#: Axes that are solved at a time: what is computed on the way stays in the processor's cache.
 CHUNK = 1 << 13
 
 

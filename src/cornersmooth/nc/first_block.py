@@ -27,7 +27,7 @@ UPRIGHT: Final = 1.0 - 1e-6
 #: places on the way that are looked at
 _PLACES: Final = np.linspace(0.0, 1.0, 65)
 
-#: where X Y stand before, the program does not always say: as far aside as the tool is above, at most, is a fair guess.
+#: Where X Y stand before, the program does not always say: as far aside as the tool is above, at most, is a fair guess.
 _FLAT: Final = math.cos(math.radians(45.0))
 
 #: mm by which the start may be below the position: digits

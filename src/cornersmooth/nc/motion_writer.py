@@ -239,7 +239,7 @@ class MotionWriter:
     def _again(self, last: Ints, pose: Ints, near: Floats) -> Ints:
         """Ticks (1, c) of what was written last, a pose (1,), by the writer at hand.
 
-        The orientation of the first row to come is near.
+        `near` is the orientation of the first row to come.
         """
         form = self.writer.form
         if self.last_writer is self.writer:

@@ -36,17 +36,17 @@ from cornersmooth.rotary.remainders import RotaryMotion, lever_points, rotary_mo
 from cornersmooth.rotary.subdivision import Insertions
 from cornersmooth.settings import WEIGHT_DECIMALS
 
-#: numbers of equal knot intervals of the curves, from the five-point curve on: n intervals have n + 3 control points.
+#: Numbers of equal knot intervals of the curves, from the five-point curve on: n intervals have n + 3 control points.
 SPANS = (2, 4, 8, 16, 32)
-#: knots with more intervals than this would need more than three decimals in [0, 1]: they run to a higher end.
+#: Knots with more intervals than this would need more than three decimals in [0, 1]: they run to a higher end.
 SPANS_PER_UNIT = 8
-#: numbers of knot intervals in the order of trial, and whether the rates of the ruled motion hold at the joints.
+#: Numbers of knot intervals in the order of trial, and whether the rates of the ruled motion hold at the joints.
 TRIALS = tuple((spans, False) for spans in SPANS[:3]) + tuple((spans, True) for spans in SPANS[1:])
-#: share of the allowance that a curve may take at its samples.
+#: Share of the allowance that a curve may take at its samples.
 SHARE = 0.95
-#: an allowance below this share of the tolerance is nothing.
+#: An allowance below this share of the tolerance is nothing.
 LEAST_ALLOWANCE = 1e-3
-#: samples on curves that are worked on at a time: their intermediate arrays fit the processor's cache.
+#: Samples on curves that are worked on at a time: their intermediate arrays fit the processor's cache.
 CHUNK = 1 << 15
 #: A curve on even segments whose angles vary by D (rad) errs by less than this times D² away from the pole. Within the
 #: allowance such an error has one hump on either half, and needs few samples.

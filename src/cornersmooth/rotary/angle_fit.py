@@ -16,13 +16,13 @@ from cornersmooth.kinematics.machine import Machine
 from cornersmooth.kinematics.poses import angle_between, radians, rotate, tool_axis
 from cornersmooth.model import Floats
 
-#: fitted at so many samples in each knot interval, measured at so many.
+#: Fitted at so many samples in each knot interval, measured at so many.
 FIT_SAMPLES, MEASURE_SAMPLES = 6, 8
-#: linearisations.
+#: Linearisations.
 ROUNDS = 3
-#: how much an error of an angle counts by itself beside that of the axis: it only decides where the axis does not.
+#: How much an error of an angle counts by itself beside that of the axis: it only decides where the axis does not.
 TAME = 1e-9
-#: control points at each end that value, first and second derivative determine.
+#: Control points at each end that value, first and second derivative determine.
 FIXED = 3
 
 

@@ -24,9 +24,9 @@ from cornersmooth.rotary.branch_choice import LIMIT_SLACK, PREFERENCE_COST, NoCh
 from cornersmooth.rotary.rewinds import CutTooFarError, parts_of_cut, too_far
 from cornersmooth.rotary.unwrapping import WideSteps, meet_at_pole, unwrap
 
-#: poses worked on at a time, so that memory is needed for their angles and little else.
+#: Poses worked on at a time, so that memory is needed for their angles and little else.
 CHUNK = 1 << 15
-#: rounds of dividing cuts, after which limits are an error; a round divides all cuts that are too far by themselves.
+#: Rounds of dividing cuts, after which limits are an error; a round divides all cuts that are too far by themselves.
 REWIND_ROUNDS = 100
 
 

@@ -12,21 +12,21 @@ import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
 
-#: what a full turn back of an axis in a rapid costs, in degrees of rotation: so much that rotation never outweighs it.
+#: What a full turn back of an axis in a rapid costs, in degrees of rotation: so much that rotation never outweighs it.
 REWIND_COST = 1e9
-#: what a start on the solution that is not preferred costs, in degrees of rotation: more than any start turn.
+#: What a start on the solution that is not preferred costs, in degrees of rotation: more than any start turn.
 PREFERENCE_COST = 1e3
-#: what each turn costs by which a path starts away from zero: it only breaks ties.
+#: What each turn costs by which a path starts away from zero: it only breaks ties.
 START_TURN_COST = 1e-3
-#: what a stretch costs that leaves the limits in every turn.
+#: What a stretch costs that leaves the limits in every turn.
 OUTSIDE_COST = 1e12
-#: words may pass their limits by so much (degrees): rounding of the solution, far below the last digit of a word.
+#: Words may pass their limits by so much (degrees): rounding of the solution, far below the last digit of a word.
 LIMIT_SLACK = 1e-9
-#: an axis with room for more turns is taken as endless first; only where that fails its turns are searched.
+#: An axis with room for more turns is taken as endless first; only where that fails its turns are searched.
 MANY_TURNS = 8
-#: more states than these are not searched: axes with many turns are then kept within `MANY_TURNS` of zero.
+#: More states than these are not searched: axes with many turns are then kept within `MANY_TURNS` of zero.
 MOST_STATES = 1000
-#: numbers that the costs of the steps between states may take up at a time.
+#: Numbers that the costs of the steps between states may take up at a time.
 CHUNK = 1 << 20
 
 

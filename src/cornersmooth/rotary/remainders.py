@@ -21,17 +21,17 @@ from cornersmooth.rotary.subdivision import Insertions, insertions
 from cornersmooth.smoothing.segments import Segments, segments_of
 from cornersmooth.vectors import unit
 
-#: samples at which each transition is followed, as a rule and where the first rotary axis may turn fast.
+#: Samples at which each transition is followed, as a rule and where the first rotary axis may turn fast.
 FEW_SAMPLES, MANY_SAMPLES = 3, 17
-#: it may where the pole is nearer than so many times the axis step at the corner, and so many degrees.
+#: It may where the pole is nearer than so many times the axis step at the corner, and so many degrees.
 NEAR_POLE, NEAR_POLE_DEGREES = 5.0, 1.0
-#: samples on a segment where even angles are compared with the ruled motion, and the share of the tolerance they keep.
+#: Samples on a segment where even angles are compared with the ruled motion, and the share of the tolerance they keep.
 SEGMENT_SAMPLES, SEGMENT_SHARE = tuple(j / 8 for j in range(1, 8)), 0.8
-#: least share of the tolerance that axes at the pole and at the edge of reach have to keep.
+#: Least share of the tolerance that axes at the pole and at the edge of reach have to keep.
 STRICTEST_SHARE = 0.1
-#: step of the derivatives of the ruled angles, in fractions of the segment.
+#: Step of the derivatives of the ruled angles, in fractions of the segment.
 DIFFERENCE = 1e-3
-#: samples worked on at a time: their intermediate arrays fit the processor's cache.
+#: Samples worked on at a time: their intermediate arrays fit the processor's cache.
 CHUNK = 1 << 15
 
 

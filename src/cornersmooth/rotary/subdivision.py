@@ -24,22 +24,22 @@ from cornersmooth.rotary.axis_findings import limit_error
 from cornersmooth.rotary.chord_bounds import axis_bend, ruled_bend, tip_bend
 from cornersmooth.vectors import dot, unit
 
-#: rounds of division.
+#: Rounds of division.
 ROUNDS = 28
-#: shares of an interval at which its error is looked at first: an error that vanishes at all three is none.
+#: Shares of an interval at which its error is looked at first: an error that vanishes at all three is none.
 SAMPLES = (0.25, 0.5, 0.75)
-#: the most parts that an interval is divided into at once.
+#: The most parts that an interval is divided into at once.
 PARTS = 64
-#: the error of a smooth motion at a quarter of its way is ¾ of its largest. Where that holds to SMOOTH of it, and no
+#: The error of a smooth motion at a quarter of its way is ¾ of its largest. Where that holds to SMOOTH of it, and no
 #: axis turns by more than SMOOTH_TURN (degrees), the error falls with the square of the number of parts, to AIM.
 SMOOTH, SMOOTH_TURN, AIM = 0.1, 30.0, 0.93
-#: an error whose bound is below this share of the tolerance is not looked at; the rest is left to poses at the pole.
+#: An error whose bound is below this share of the tolerance is not looked at; the rest is left to poses at the pole.
 SURE = 0.5
-#: share of the tolerance that a proof leaves to what lies between its samples, and the most intervals between them.
+#: Share of the tolerance that a proof leaves to what lies between its samples, and the most intervals between them.
 PROOF, MOST_SAMPLES = 0.02, 256
-#: squares of vectors that are nearer to 1 are those of unit vectors.
+#: Squares of vectors that are nearer to 1 are those of unit vectors.
 UNIT = 1e-6
-#: samples of proofs that are worked on at a time.
+#: Samples of proofs that are worked on at a time.
 CHUNK = 1 << 15
 
 
