@@ -43,28 +43,10 @@ def load_machine(name_or_path: str | Path) -> Machine:
 
 
 def parse_machine(text: str | Table, *, file: str = "<machine>", name: str = "machine") -> Machine:
-    """Machine that a TOML text, or a table read from one, describes.
+    """Machine that a TOML text, or a table read from one, describes; its keys are in docs/machines.md.
 
-    Parameters
-    ----------
-    text : str or dict
-        Keys: ``like`` (a machine that comes with the program; then only what is different), ``name``, ``description``,
-        ``preferred`` (``"A+"``), ``tip_control`` (two blocks, or none), ``tool_direction``, ``tool_length``,
-        ``[tool_lengths]``, ``part_zero`` and up to two
-        tables ``[[axis]]`` (``axis = []`` for none) with ``name``, ``direction``, ``carrier``, ``point``, ``positive``,
-        ``limits``, ``modulo``, ``clamp``; ``[travel]`` with ``X``, ``Y`` and ``Z``, each ``[lowest, highest]``, any of
-        which may be left out; ``[home]`` and ``[tool_change]`` with any axes; and for the planning of the time tables
-        ``[dynamics.X]`` (Y, Z and the rotary axes alike) with ``velocity`` (mm/min or deg/min), ``acceleration`` and
-        ``jerk`` (mm or deg per s² and s³), each of which may be left out.
-    file : str
-        For messages.
-    name : str
-        Where the text has none.
-
-    Raises
-    ------
-    SettingsError
-        The text is not TOML, has an unknown key (with the closest known one), or does not describe a machine.
+    `file` is for messages, `name` for a text that has none. SettingsError: the text is not TOML, has an unknown key
+    (with the closest known one), or does not describe a machine.
     """
     with _SHELF.in_file(file):
         table, _ = _SHELF.parse(text)

@@ -28,12 +28,8 @@ _SAME = 1e-9
 def parse_pose(machine: Machine, text: str) -> dict[str, float]:
     """Words of a pose: ``A30,C45``, with the tip in part coordinates ``A30,C45,X10,Z5``, or bare angles ``30,45``.
 
-    Bare angles are those of the rotary axes in alphabetical order. What is not named is zero.
-
-    Raises
-    ------
-    SettingsError
-        CS375: the text is no pose of this machine.
+    Bare angles are those of the rotary axes in alphabetical order. What is not named is zero. CS375: no pose of this
+    machine.
     """
     names = sorted(machine.names)
     known = (*names, *LINEAR)

@@ -46,31 +46,15 @@ class Solutions:
 
 
 def tool_axis(machine: Machine, angles: Floats) -> Floats:
-    """Axis of the tool in part coordinates that rotary angles give, as unit vectors.
-
-    Parameters
-    ----------
-    angles : (n, 2) float64, degrees
-
-    Returns
-    -------
-    (n, 3) float64
-    """
+    """Unit axes (n, 3) of the tool in part coordinates that rotary angles (n, 2), degrees, give."""
     first, second = machine.axes
     turned = rotate(second.unit, second.sign * radians(angles[:, 1]), machine.tool[None, :])
     return rotate(first.unit, first.sign * radians(angles[:, 0]), turned)
 
 
 def solutions(machine: Machine, axis: Floats) -> Solutions:
-    """Both pairs of rotary angles for unit tool axis vectors.
+    """Both pairs of rotary angles for unit tool axes (n, 3) in part coordinates, from the tip to the spindle.
 
-    Parameters
-    ----------
-    axis : (n, 3) float64
-        In part coordinates, from the tip to the spindle.
-
-    Notes
-    -----
     `tool_axis` of either solution gives the axis back to 1e-15, near the pole too.
     """
     if len(machine.names) < 2:
@@ -155,22 +139,10 @@ def closest_second(machine: Machine, axis: Floats, first_angle: Floats) -> Float
 
 
 def continued(machine: Machine, axis: Floats, guess: Floats, branch: Ints, cone: float) -> tuple[Floats, Ints]:
-    """Angles on a known branch, in the turn that lies nearest to a guess.
+    """Angles (n, 2) on a known branch, in the turn that lies nearest to a guess; degrees.
 
-    Parameters
-    ----------
-    axis : (n, 3) float64
-    guess : (n, 2) float64, degrees
-    branch : (n,) int64
-        As in `Solutions.angles`; -1 for the one nearer to the guess.
-    cone : float, degrees
-        Within this angle of the pole the first angle is the guess, and the second comes closest to the axis.
-
-    Returns
-    -------
-    angles : (n, 2) float64, degrees
-    branch : (n,) int64
-        -1 within the cone.
+    The branch (n,) is as in `Solutions.angles`, -1 for the one nearer to the guess. Within the cone of the pole,
+    degrees, the first angle is the guess, the second comes closest to the axis, and the branch is -1.
     """
     found = solutions(machine, axis)
     near = found.angles + 360 * np.round((guess[:, None, :] - found.angles) / 360)
@@ -187,16 +159,9 @@ def continued(machine: Machine, axis: Floats, guess: Floats, branch: Ints, cone:
 
 
 def passes_pole(machine: Machine, start: Floats, end: Floats, cone: float) -> Bools:
-    """Whether the shortest turn from one axis to the other comes within `cone` degrees of a pole on its way.
+    """Whether (n,) the shortest turn between axes (n, 3) comes within `cone` degrees of a pole on its way.
 
-    Parameters
-    ----------
-    start, end : (n, 3) float64
-
-    Returns
-    -------
-    (n,) bool
-        False where the nearest point is one of the ends.
+    Not where the nearest point is one of the ends.
     """
     passes = np.zeros(len(start), np.bool_)
     if len(machine.names) < 2:

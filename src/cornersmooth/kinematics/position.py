@@ -10,19 +10,10 @@ from cornersmooth.model import Floats
 
 
 def machine_position(machine: Machine, tip: Floats, angles: Floats) -> Floats:
-    """Words of the linear axes that bring the tool tip to points of the part.
+    """Words of the linear axes, (n, 3) mm, that bring the tool tip to points of the part at angles (n, 2), degrees.
 
-    Parameters
-    ----------
-    tip : (n, 3) float64, mm
-        In part coordinates.
-    angles : (n, 2) float64, degrees
-
-    Returns
-    -------
-    (n, 3) float64, mm
-        Counted from the zero of the part and with the length of the tool compensated: with both rotary axes at zero
-        they are the tip itself. LinuxCNC's trtfuncs.c computes the same joints (its offsets are the points here).
+    They count from the zero of the part, with the length of the tool compensated: with both rotary axes at zero they
+    are the tip itself. LinuxCNC's trtfuncs.c computes the same joints (its offsets are the points here).
     """
     turned = tip + machine.part_zero
     for index, axis in enumerate(machine.axes):
@@ -44,22 +35,10 @@ def tip_position(machine: Machine, position: Floats, angles: Floats) -> Floats:
 
 
 def inverse_time(length: Floats, feed: Floats, turn: Floats, rotary_feed: float) -> Floats:
-    """Feed words of G93: moves per minute, so that the tip runs with its feed.
+    """Feed words of G93, (n,) 1/min: so that the tip runs its way, mm, with its feed, mm/min; infinite for no move.
 
-    Parameters
-    ----------
-    length : (n,) float64, mm
-        Way of the tip along the part.
-    feed : (n,) float64, mm/min
-    turn : (n,) float64, degrees
-        The larger turn of the two rotary axes.
-    rotary_feed : float, degrees/min
-        What no rotary axis exceeds; the only limit where the tip stands still.
-
-    Returns
-    -------
-    (n,) float64, 1/min
-        Infinite for a move of nothing.
+    `turn` is the larger one of the two rotary axes, degrees, and `rotary_feed`, deg/min, what none of them exceeds: the
+    only limit where the tip stands still.
     """
     minutes = np.maximum(length / feed, turn / rotary_feed)
     some = minutes > 0

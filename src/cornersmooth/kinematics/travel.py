@@ -15,39 +15,19 @@ _ROUNDING = 1e-6
 
 
 def nose_position(machine: Machine, tip: Floats, angles: Floats) -> Floats:
-    """Where the linear axes stand: positions of the spindle nose with the heads at zero.
+    """Where the linear axes stand, (n, 3) mm: the spindle nose with the heads at zero, as the points of the tables.
 
-    Parameters
-    ----------
-    tip : (n, 3) float64, mm
-        In part coordinates.
-    angles : (n, 2) float64, degrees
-
-    Returns
-    -------
-    (n, 3) float64, mm
-        In the coordinates in which the points of the tables are given. A control under tool tip control moves its axes
-        there although the words are the tip.
+    Tips are (n, 3) mm in part coordinates, angles (n, 2) degrees. A control under tool tip control moves its axes there
+    although the words are the tip.
     """
     position: Floats = machine_position(machine, tip, angles) + machine.part_zero + machine.tool_length * machine.tool
     return position
 
 
 def check_travel(machine: Machine, tip: Floats, angles: Floats, line: Ints, file: str | None = None) -> None:
-    """Refuse positions that the linear axes cannot reach.
+    """Refuse positions that the linear axes cannot reach (CS374): tips (n, 3) mm in the part, angles (n, 2) degrees.
 
-    Parameters
-    ----------
-    tip : (n, 3) float64, mm
-        In part coordinates.
-    angles : (n, 2) float64, degrees
-    line : (n,) int64
-        Source lines, 0 for none.
-
-    Raises
-    ------
-    InputError
-        CS374: the first position beyond the travel of an axis.
+    Source lines (n,) are 0 for none.
     """
     if not machine.travel or not len(tip):
         return

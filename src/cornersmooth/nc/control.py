@@ -289,17 +289,9 @@ class Control:
         return self.like if self.own else self.name
 
     def with_digits(self, choice: str) -> Control:
-        """Return the control with other digits.
+        """Return the control with other digits: one of `systems` by name, or a number of decimals of lengths in mm.
 
-        Parameters
-        ----------
-        choice : str
-            Name of one of `systems`, or the number of decimals of lengths in mm; those in inches have one more.
-
-        Raises
-        ------
-        SettingsError
-            CS228: neither, or more than the control takes.
+        Those in inches have one more. CS228: neither, or more than the control takes.
         """
         known = {name.lower(): digits for name, digits in self.systems.items()}
         if choice.lower() in known:

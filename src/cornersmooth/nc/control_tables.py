@@ -110,17 +110,8 @@ def _built_in(given: str) -> Control:
 def parse_control(text: str | Table, *, file: str = "<control>", name: str = "control") -> Control:
     """Control that a TOML text, or a table read from one, describes.
 
-    Parameters
-    ----------
-    file : str
-        For messages.
-    name : str
-        Where the text has none.
-
-    Raises
-    ------
-    SettingsError
-        The text is not TOML, has an unknown key (with the closest known one), or does not describe a control.
+    `file` is for messages, `name` for a text that has none. SettingsError: the text is not TOML, has an unknown key
+    (with the closest known one), or does not describe a control.
     """
     with _SHELF.in_file(file):
         table, like = _SHELF.parse(text)

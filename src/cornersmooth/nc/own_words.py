@@ -40,16 +40,9 @@ FRAME = "program frame"
 def own_words(table: Control) -> tuple[str, ...]:
     """Blocks and names that verification is to take on trust with a table; none with one that comes with the program.
 
-    Parameters
-    ----------
-    table : Control
-        Like one that comes with the program.
-
-    Returns
-    -------
-    tuple of str
-        Blocks that the table has and the other one has not, their braces as they are; names of kinds of statements that
-        it says in its own way, with all blocks of these; `FRAME` where it has its own blocks around the motion.
+    Those are the blocks that the table has and the one that it is like has not, their braces as they are; names of
+    kinds of statements that it says in its own way, with all blocks of these; `FRAME` where it has its own blocks
+    around the motion.
     """
     if not table.own:
         return ()

@@ -23,19 +23,10 @@ _PATH_FUNCTIONS = re.compile(r"M(89|9\d|1[0-4]\d)")
 
 
 def trusted_words(patterns: Iterable[str], dialect: str) -> frozenset[str]:
-    """Return all words that some patterns hold.
+    """Return all words that some patterns of machine functions, M with its number, hold for a control.
 
-    Parameters
-    ----------
-    patterns : iterable of str
-        Regular expressions of machine functions: M with its number.
-    dialect : str
-        Control that the table is like.
-
-    Raises
-    ------
-    ValueError
-        It says why: a pattern of other words, of none, or of words that may move the tool or that the control knows.
+    ValueError says why not: a pattern of other words, of none, or of words that may move the tool or that the control
+    knows.
     """
     found: set[str] = set()
     rules = word_list(dialect).words if dialect in CONTROLS else ()

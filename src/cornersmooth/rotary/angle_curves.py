@@ -127,25 +127,10 @@ def rotary_curves(
 ) -> RotaryCurves:
     """Control points of the rotary angles for all smoothed corners, on the knots and weights of their tip curves.
 
-    Parameters
-    ----------
-    smoothed : SmoothProgram
-        Made with a method in which one parameter drives P and Q.
-    machine : Machine
-    tolerance : float, degrees
-        Largest angle between the tool axis and that of the ruled motion on straight motion.
-    allowance : (k,) float64, degrees, optional
-        The same on the curve of each row of `Corners` (`angle_allowance`); `tolerance` for all by default. Corners with
-        nothing left become `lines`.
-    angle_resolution : float, degrees
-        Step of the written angles.
-
-    Raises
-    ------
-    SettingsError
-        Another method (CS254), or a tolerance that is not positive (CS255).
-    InputError
-        The machine cannot follow the path (`rotary_angles`).
+    The tool axis may be off that of the ruled motion by the tolerance, degrees, on straight motion, and by the
+    allowance (k,) (`angle_allowance`) on the curve of each row of `Corners`; those with nothing left become `lines`.
+    `angle_resolution` is the step of the written angles. CS254: a method in which more than one parameter drives P and
+    Q. CS255: a tolerance that is not positive. InputError as in `rotary_angles`.
     """
     if not METHODS[smoothed.settings.method].one_parameter:
         raise SettingsError(

@@ -27,15 +27,8 @@ def parts_of_cut(
 ) -> Ints | None:
     """Rows (k,) of a stretch after which the cut is left, so that all parts of it are inside the limits.
 
-    None where a single move, or the way in, leaves the limits.
-
-    Parameters
-    ----------
-    angles, low, high : (m, 2, 2) float64, degrees
-        ``[row, branch, axis]``, unwrapped: at each row, and extremes on the way into it.
-    limits : (2, 2) float64, degrees
-    stuck : NoChoiceError, optional
-        Says in which states the stretch can be entered; any that the limits allow otherwise.
+    None where a single move, or the way in, leaves the limits. Angles (m, 2, 2) are ``[row, branch, axis]`` in degrees,
+    unwrapped: at each row, and extremes on the way into it. `stuck` says in which states the stretch can be entered.
     """
     count, begin = len(angles), 0
     left: list[int] = []

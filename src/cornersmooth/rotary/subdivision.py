@@ -312,11 +312,8 @@ class RuledMotion:
     def _errors(self, part: Intervals, ends: list[Floats], fraction: Floats) -> Iterator[tuple[Floats, Floats, Floats]]:
         """Errors at one share of each interval, the ruled motion paired with the real one in two ways.
 
-        Yields
-        ------
-        along, tip, axis : (p,) float64
-            Share of the ruled motion, first the same one, then where it is nearest to the tip; errors there of tip and
-            axis over their tolerances. Where the tip hardly moves the nearest share says nothing.
+        Yields the share of the ruled motion, first the same one, then where it is nearest to the tip, and errors there
+        of tip and axis over their tolerances, (p,) each. Where the tip hardly moves the nearest share says nothing.
         """
         share = fraction[:, None]
         words = part.start_angles * (1 - share) + part.end_angles * share
