@@ -13,7 +13,7 @@ import numpy as np
 from cornersmooth.errors import SettingsError
 from cornersmooth.kinematics.dynamics import LINEAR
 from cornersmooth.kinematics.machine import Machine
-from cornersmooth.kinematics.poses import Solutions, solutions, tool_axis
+from cornersmooth.kinematics.poses import Solutions, solutions, tool_axis, wrap
 from cornersmooth.kinematics.position import machine_position
 from cornersmooth.kinematics.travel import nose_position
 from cornersmooth.model import Floats
@@ -94,7 +94,7 @@ class Posed:
         """(2,) other angles with the same tool vector, degrees; None where there are none, and at the pole."""
         if self._found.singular[0] or len(self.machine.names) != 2:
             return None
-        others = [pair for pair in self._found.angles[0] if np.abs(_turned(pair - self.angles)).max() > _SAME]
+        others = [pair for pair in self._found.angles[0] if np.abs(wrap(pair - self.angles)).max() > _SAME]
         return others[0] if others else None
 
     @property
@@ -150,12 +150,6 @@ def _rotary(machine: Machine, angles: np.ndarray) -> str:
     """Rotary words in alphabetical order."""
     named = sorted(zip(machine.names, angles.tolist(), strict=False))
     return _words([name for name, _ in named], np.array([angle for _, angle in named]))
-
-
-def _turned(angles: np.ndarray) -> np.ndarray:
-    """Angles without whole turns."""
-    turned: np.ndarray = angles - 360.0 * np.round(angles / 360.0)
-    return turned
 
 
 def _words(names: Sequence[str], values: np.ndarray, decimals: int = 4) -> str:

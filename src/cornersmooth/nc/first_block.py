@@ -92,10 +92,9 @@ class FirstBlock:
         """(2,) degrees of the rotary axes where the block begins."""
         if self.angles is None:
             return None
-        begin = self.form.table.program.begin if self.form.mode.begin is None else self.form.mode.begin
         assert self.machine is not None
         zero = np.clip(0.0, *self.machine.limits.T)
-        return zero if "{rotary_zero}" in begin else self.angles
+        return zero if "{rotary_zero}" in self.form.begin else self.angles
 
     def _starts(self, place: Floats | None) -> Floats:
         """Where the spindle nose may stand before, (k, 3) mm; none where the machine's file does not say enough."""

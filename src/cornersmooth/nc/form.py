@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import MM_PER_UNIT, Units
 from cornersmooth.nc.control import Control, CurveStyle, Extra, Mode, Orientation
+from cornersmooth.nc.program_table import Blocks
 from cornersmooth.settings import Settings
 
 #: share of ε, at the axis point, that rotary axes may take between and at the written words
@@ -37,6 +38,11 @@ class Form:
     def control(self) -> str:
         """Name of the control."""
         return self.table.name
+
+    @property
+    def begin(self) -> Blocks:
+        """Steps before the first motion of each tool."""
+        return self.table.program.begin if self.mode.begin is None else self.mode.begin
 
     @property
     def curves(self) -> bool:

@@ -75,14 +75,13 @@ def from_zero(form: Form, program: Program, axis: Floats, angles: Floats, move: 
     that at zero, not where another tool needs it. Where the rotary axes go to zero before a tool, its angles are
     without the whole turns of the tools before. Angles (r, 2) are in degrees, NaN where there is none.
     """
-    machine, table = form.machine, form.table.program
+    machine = form.machine
     assert machine is not None
     shift = np.zeros_like(angles)
-    if not table.retract:
+    if not form.table.program.retract:
         return shift
-    begin = table.begin if form.mode.begin is None else form.mode.begin
     endless = np.array([each.limits is None and not each.modulo for each in machine.axes])
-    endless &= "{rotary_zero}" in begin
+    endless &= "{rotary_zero}" in form.begin
     homes = [one.pose for one in program.statements if one.word == "GOHOME" and not one.args]
     starts = np.unique([*tool_starts(program), *homes]).astype(np.int64)
     rows = np.searchsorted(move, starts)

@@ -17,6 +17,7 @@ from cornersmooth.nc.rotary_words import RotaryWay, machine_of, note_inserted
 from cornersmooth.nc.tools import ToolTravel
 from cornersmooth.rotary import FilledPath, fill, insertions, rapid_moves
 from cornersmooth.settings import Settings
+from cornersmooth.slices import some_rows
 from cornersmooth.smoothing.long_lines import LineLimits, Vertices, fewest_lines, segments_of_rows, vertices
 from cornersmooth.smoothing.sampling import Rows
 from cornersmooth.vectors import norm
@@ -95,7 +96,7 @@ def rotary_rows(
         if long:
             found = chunk.vertices(filled, smoothed)
             kept = fewest_lines(found, limits)
-            filled = filled.only(kept)
+            filled = some_rows(filled, kept)
             blend = corner_blends(found, kept, way.free[here][filled.pose], limits, settings, form)
         own = slice(1 if begin else 0, None)
         filled, rate = times.of(filled, chunk, own)
@@ -216,7 +217,8 @@ def _merged(
     )
     if not METHODS[smoothed.settings.method].one_parameter:
         fixed = fixed | _beside_far_corners(found, chunk.at_pose[filled.pose] & ~filled.inserted, limits)
-    return filled.only(fewest_lines(replace(found, fixed=fixed | ends | ~between, position=position), limits))
+    kept = fewest_lines(replace(found, fixed=fixed | ends | ~between, position=position), limits)
+    return some_rows(filled, kept)
 
 
 def _beside_far_corners(rows: Vertices, at_pose: Bools, limits: LineLimits) -> Bools:

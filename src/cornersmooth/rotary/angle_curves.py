@@ -21,7 +21,7 @@ from cornersmooth.geometry import nurbs
 from cornersmooth.kinematics.machine import Machine
 from cornersmooth.kinematics.poses import continued
 from cornersmooth.methods import DEFAULT_METHOD, METHODS
-from cornersmooth.model import Bools, Floats, Ints, SmoothProgram
+from cornersmooth.model import Floats, Ints, SmoothProgram
 from cornersmooth.rotary.angle_fit import (
     MEASURE_SAMPLES,
     Targets,
@@ -48,9 +48,6 @@ SHARE = 0.95
 LEAST_ALLOWANCE = 1e-3
 #: Samples on curves that are worked on at a time: their intermediate arrays fit the processor's cache.
 CHUNK = 1 << 15
-#: A curve on even segments whose angles vary by D (rad) errs by less than this times D² away from the pole. Within the
-#: allowance such an error has one hump on either half, and needs few samples.
-GENTLE, GENTLE_SAMPLES = 0.8, 4
 
 
 @dataclass(frozen=True)
@@ -186,36 +183,18 @@ class _Work:
             even = self.motion.even[corners.pose[rows]] & self.motion.even[corners.after[rows]]
             open_.append(chosen[~even])
             chosen = chosen[even]
-        gentle = self.gentle(chosen)
-        for some, samples in ((chosen[gentle], GENTLE_SAMPLES), (chosen[~gentle], MEASURE_SAMPLES)):
-            size = max(1, CHUNK // (samples * spans))
-            for begin in range(0, len(some), size):
-                part = some[begin : begin + size]
-                points, error = self.curves(spans, ruled, part, samples)
-                met = error <= SHARE * self.allowed[self.motion.rows[part]]
-                if met.any():
-                    found.append(_Found(part[met], points[met]))
-                open_.append(part[~met])
+        size = max(1, CHUNK // (MEASURE_SAMPLES * spans))
+        for begin in range(0, len(chosen), size):
+            part = chosen[begin : begin + size]
+            points, error = self.curves(spans, ruled, part)
+            met = error <= SHARE * self.allowed[self.motion.rows[part]]
+            if met.any():
+                found.append(_Found(part[met], points[met]))
+            open_.append(part[~met])
         return found, np.sort(np.concatenate(open_))
 
-    def gentle(self, chosen: Ints) -> Bools:
-        """Corners on even segments whose angles vary so little that few samples tell their error."""
-        corners, motion = self.smoothed.corners, self.motion
-        rows = motion.rows[chosen]
-        pose, after = corners.pose[rows], corners.after[rows]
-        here = motion.pose_angles[pose]
-        turn = np.abs(motion.end.angles[pose] - here).sum(axis=1) + np.abs(motion.start.angles[after] - here).sum(
-            axis=1
-        )
-        small = GENTLE * np.radians(turn) ** 2 <= SHARE * np.radians(self.allowed[rows])
-        gentle: Bools = small & motion.even[pose] & motion.even[after]
-        return gentle
-
-    def curves(self, spans: int, ruled: bool, chosen: Ints, samples: int) -> tuple[Floats, Floats]:
-        """Angle control points (g, p, 2) of some corners, and their errors (g,) at `samples` in each knot interval.
-
-        The errors are infinite outside of the limits.
-        """
+    def curves(self, spans: int, ruled: bool, chosen: Ints) -> tuple[Floats, Floats]:
+        """Angle control points (g, p, 2) of some corners, and their errors (g,): infinite outside of the limits."""
         refined, targets = nurbs.refinement(spans), self.targets(chosen, ruled)
         if spans == SPANS[0]:
             start, end = end_points(refined, targets)
@@ -224,7 +203,7 @@ class _Work:
         else:
             fitted = fit_samples(refined)
             points = fit(self.machine, refined, targets, self.exact(targets, chosen, fitted), fitted)
-        error, extremes = measured(self.machine, refined, targets, points, samples)
+        error, extremes = measured(self.machine, refined, targets, points)
         limits = self.machine.limits
         slack = self.allowed[self.motion.rows[chosen], None]
         inside = (extremes[:, :, 0] >= limits[:, 0] - slack) & (extremes[:, :, 1] <= limits[:, 1] + slack)

@@ -111,14 +111,12 @@ def fit_samples(refined: Refinement) -> Floats:
     return (np.arange(count) + 0.5) / count
 
 
-def measured(
-    machine: Machine, refined: Refinement, targets: Targets, points: Floats, count: int = MEASURE_SAMPLES
-) -> tuple[Floats, Floats]:
+def measured(machine: Machine, refined: Refinement, targets: Targets, points: Floats) -> tuple[Floats, Floats]:
     """Largest angle (g,) between the axis of the angles and the one wanted, and extremes of the angles, degrees.
 
-    The extremes are (g, 2, 2) ``[curve, axis, lowest or highest]``; `count` samples lie in each knot interval.
+    The extremes are (g, 2, 2) ``[curve, axis, lowest or highest]``.
     """
-    samples = np.linspace(0.0, 1.0, count * refined.spans + 1)
+    samples = np.linspace(0.0, 1.0, MEASURE_SAMPLES * refined.spans + 1)
     angles = refined.rational_basis(samples, refined.homogeneous(targets.weights)) @ points
     axis = tool_axis(machine, angles.reshape(-1, 2)).reshape(*angles.shape[:2], 3)
     error = angle_between(axis, targets.axis(samples)).max(axis=1)

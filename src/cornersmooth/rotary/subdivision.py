@@ -66,10 +66,6 @@ class FilledPath:
     axis: Floats
     angles: Floats  # degrees
 
-    def only(self, rows: Ints) -> FilledPath:
-        """The path without its other rows."""
-        return FilledPath(self.pose[rows], self.inserted[rows], self.tip[rows], self.axis[rows], self.angles[rows])
-
 
 def insertions(
     machine: Machine,
