@@ -116,18 +116,16 @@ class HoleWriter:
         for k, pose in enumerate(poses.tolist()):
             tip = program.tip[pose]
             over = writer.ticks((tip + travel[k] * frame[:, 2])[None], program.axis[[pose]])
-            above = Run.straight(program, over, poses[[k]])
-            level = above.ticks[0, 2]
-            if not said or motion.position is None or motion.position[2] != level:
+            if not said or motion.position is None or motion.position[2] != over[0, 2]:
                 yield from motion.text(table.off if said else ())
                 said = ()
-                yield from motion.emit(motion.moving(replace(above, rapid=np.ones(1, np.bool_))))
+                yield from motion.emit(motion.moving(Run.straight(program, over, poses[[k]], rapid=True)))
                 yield from motion.text(motion.operation.go_on())
                 yield from motion.text(writer.feed_mode(int(modes[0])))
             blocks = self._blocks(cycle, kind, tip @ frame, travel[k], clearance[k], feeds[k], int(modes[k]))
             yield from motion.text(blocks[once:] if said == blocks[:once] and said else blocks)
             said = blocks[:once] or blocks
-            motion.position = motion.last = above.ticks[0]
+            motion.position = motion.last = over[0]
         yield from motion.text(table.off)
         writer.forget_feed()
 
@@ -170,8 +168,7 @@ class HoleWriter:
                 f"{letter}{format_number(value, decimals)}" for letter, value in zip("XYZ", tip, strict=True)
             )
             yield from motion.text(motion.statements.warning_comment(f"NOT DRILLED: HOLE AT {place}"))
-            run = Run.straight(program, ticks[index : index + 1], poses[index : index + 1])
-            run = replace(run, rapid=np.ones(1, np.bool_))
+            run = Run.straight(program, ticks[index : index + 1], poses[index : index + 1], rapid=True)
             yield from motion.emit_above(motion.moving(run))
 
 

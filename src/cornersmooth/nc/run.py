@@ -30,10 +30,10 @@ class Run:
     left: Bools | None = None  #: (r,) as in `Rows`
 
     @classmethod
-    def straight(cls, program: Program, ticks: Ints, move: Ints) -> Run:
-        """Straight moves at the feeds of moves of the program."""
+    def straight(cls, program: Program, ticks: Ints, move: Ints, *, rapid: bool = False) -> Run:
+        """Straight moves in rapid, or at the feeds of moves of the program."""
         count, mode = len(ticks), program.feed_mode[move].astype(np.int64)
-        return cls(ticks, move, np.zeros(count, np.bool_), program.feed[move], mode, np.zeros(count, np.int8))
+        return cls(ticks, move, np.full(count, rapid), program.feed[move], mode, np.zeros(count, np.int8))
 
     def __len__(self) -> int:
         return len(self.ticks)

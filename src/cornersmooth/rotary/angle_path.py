@@ -98,10 +98,9 @@ def rotary_angles(
     run = np.cumsum(rapid | left, dtype=np.int32)
     branch, swaps = np.full(n, -1, np.int8), np.zeros(0, np.int64)
     if len(poses.steady):
-        angles, branch[poses.steady], swaps = _steady_angles(
-            machine, axis, poses.steady, both, run, tolerance, line, file, divide=divide
-        )
-        del both
+        steady_poses = _Steady(machine, axis, poses.steady, both, run, line, file)
+        angles, branch[poses.steady], swaps = steady_poses.angles(tolerance, divide=divide)
+        del both, steady_poses
         if len(poses.cone):
             steady, angles = angles, np.full((n, 2), np.nan)
             angles[poses.steady] = steady
@@ -121,7 +120,7 @@ def rotary_angles(
             if (over := deviation[off[here]] > tolerance).any():
                 pose = int(off[here][np.argmax(over)])
                 both = solutions(machine, axis[pose : pose + 1]).angles[0]
-                raise limit_error(machine, both, machine.limits, None, int(line[pose]), 0, file)
+                raise limit_error(machine, both, None, int(line[pose]), file)
     findings = pole_finding(machine, tip, axis, angles, rapid | left, line)
     findings += rewind_finding(machine, angles, rapid & ~left, line)
     if len(machine.names) == 2:
@@ -220,66 +219,99 @@ def _sorted_poses(
     return _Poses(np.concatenate(cone), steady[:count], np.concatenate(beyond)), angles[:count]
 
 
-def _steady_angles(
-    machine: Machine,
-    axis: Floats,
-    steady: Ints,
-    unwrapped: Floats,
-    run: NDArray[np.int32],
-    tolerance: float,
-    line: Ints,
-    file: str | None,
-    *,
-    divide: bool,
-) -> tuple[Floats, NDArray[np.int8], Ints]:
-    """Angles (s, 2) and branches (s,) of the poses outside the cone, and poses before which a rapid changes branch.
+@dataclass(frozen=True)
+class _Steady:
+    """Poses outside the cone of the pole."""
 
-    Their solutions `unwrapped` change in place.
-    """
-    dislike = _dislike(machine, unwrapped[0])
-    free, first = [np.ones(1, np.bool_)], [np.zeros(1, np.int64)]
-    wide = [WideSteps(np.zeros(0, np.int64), *np.zeros((2, 0, 2, 2)))]
-    for here in _chunks(len(steady)):
-        rows = slice(max(here.start, 1), here.stop)
-        start, end = steady[rows.start - 1 : rows.stop - 1], steady[rows]
-        rests = run[start] != run[end]
-        broken = rests | (end - start > 1) | passes_pole(machine, axis[start], axis[end], tolerance / 2)
-        found = unwrap(machine, axis, start, end, unwrapped[rows.start - 1 : rows.stop], broken)
-        wide.append(WideSteps(found.row + rows.start, found.low, found.high))
-        breaks = np.flatnonzero(broken)
-        first.append(rows.start + breaks)
-        free.append(rests[breaks])
-    begins = np.concatenate(first)
-    enter, leave = unwrapped[begins], unwrapped[np.append(begins[1:], len(steady)) - 1]
-    meet_at_pole(machine, axis, steady, begins, ~np.concatenate(free), enter, leave)
-    low, high = np.minimum.reduceat(unwrapped, begins, axis=0), np.maximum.reduceat(unwrapped, begins, axis=0)
-    way = WideSteps(*(np.concatenate([getattr(part, name) for part in wide]) for name in ("row", "low", "high")))
-    owner = np.searchsorted(begins, way.row, side="right") - 1
-    np.minimum.at(low, owner, way.low)
-    np.maximum.at(high, owner, way.high)
-    stretches = Stretches(
-        first=enter,
-        last=leave,
-        low=low,
-        high=high,
-        free=np.concatenate(free),
-        dislike=dislike,
-    )
-    stretch = np.repeat(np.arange(len(begins), dtype=np.int32), np.diff(begins, append=len(steady)))
-    try:
-        branch, turns = choose(stretches, machine.limits)
-    except NoChoiceError as stuck:
-        left = _divided(stretches, stuck, begins, unwrapped, way, machine.limits) if divide else None
-        if left is not None:
-            raise CutTooFarError(steady[left]) from None
-        raise _stuck_error(machine, stuck, stretch, axis, unwrapped, way, steady, run, line, file) from stuck
-    angles, chosen = np.empty((len(steady), 2)), np.empty(len(steady), np.int8)
-    for here in _chunks(len(steady)):
-        own = stretch[here]
-        chosen[here] = branch[own]
-        angles[here] = unwrapped[here][np.arange(len(own)), branch[own]] + 360 * turns[own]
-    swaps = begins[1:][stretches.free[1:] & (branch[1:] != branch[:-1])]
-    return angles, chosen, steady[swaps]
+    machine: Machine
+    axis: Floats  #: of all poses, as those below but for the solutions
+    steady: Ints  #: (s,) which they are
+    unwrapped: Floats  #: (s, 2, 2) their solutions, which change in place
+    run: NDArray[np.int32]
+    line: Ints
+    file: str | None
+
+    def angles(self, tolerance: float, *, divide: bool) -> tuple[Floats, NDArray[np.int8], Ints]:
+        """Angles (s, 2) and branches (s,), and poses before which a rapid changes branch."""
+        machine, axis, steady, unwrapped, run = self.machine, self.axis, self.steady, self.unwrapped, self.run
+        dislike = _dislike(machine, unwrapped[0])
+        free, first = [np.ones(1, np.bool_)], [np.zeros(1, np.int64)]
+        wide = [WideSteps(np.zeros(0, np.int64), *np.zeros((2, 0, 2, 2)))]
+        for here in _chunks(len(steady)):
+            rows = slice(max(here.start, 1), here.stop)
+            start, end = steady[rows.start - 1 : rows.stop - 1], steady[rows]
+            rests = run[start] != run[end]
+            broken = rests | (end - start > 1) | passes_pole(machine, axis[start], axis[end], tolerance / 2)
+            found = unwrap(machine, axis, start, end, unwrapped[rows.start - 1 : rows.stop], broken)
+            wide.append(WideSteps(found.row + rows.start, found.low, found.high))
+            breaks = np.flatnonzero(broken)
+            first.append(rows.start + breaks)
+            free.append(rests[breaks])
+        begins = np.concatenate(first)
+        enter, leave = unwrapped[begins], unwrapped[np.append(begins[1:], len(steady)) - 1]
+        meet_at_pole(machine, axis, steady, begins, ~np.concatenate(free), enter, leave)
+        low, high = np.minimum.reduceat(unwrapped, begins, axis=0), np.maximum.reduceat(unwrapped, begins, axis=0)
+        way = WideSteps(*(np.concatenate([getattr(part, name) for part in wide]) for name in ("row", "low", "high")))
+        owner = np.searchsorted(begins, way.row, side="right") - 1
+        np.minimum.at(low, owner, way.low)
+        np.maximum.at(high, owner, way.high)
+        stretches = Stretches(enter, leave, low, high, np.concatenate(free), dislike)
+        stretch = np.repeat(np.arange(len(begins), dtype=np.int32), np.diff(begins, append=len(steady)))
+        try:
+            branch, turns = choose(stretches, machine.limits)
+        except NoChoiceError as stuck:
+            left = self._divided(stretches, stuck, begins, way) if divide else None
+            if left is not None:
+                raise CutTooFarError(steady[left]) from None
+            raise self._error(stuck, stretch, way) from stuck
+        angles, chosen = np.empty((len(steady), 2)), np.empty(len(steady), np.int8)
+        for here in _chunks(len(steady)):
+            own = stretch[here]
+            chosen[here] = branch[own]
+            angles[here] = unwrapped[here][np.arange(len(own)), branch[own]] + 360 * turns[own]
+        swaps = begins[1:][stretches.free[1:] & (branch[1:] != branch[:-1])]
+        return angles, chosen, steady[swaps]
+
+    def _extremes(self, members: Ints, way: WideSteps) -> tuple[Floats, Floats]:
+        """Lowest and highest angles on the way into rows that follow one another: twice (m, 2, 2)."""
+        low, high = self.unwrapped[members], self.unwrapped[members]
+        own = (way.row >= members[0]) & (way.row <= members[-1])
+        row = way.row[own] - members[0]
+        low[row], high[row] = np.minimum(low[row], way.low[own]), np.maximum(high[row], way.high[own])
+        return low, high
+
+    def _divided(self, stretches: Stretches, stuck: NoChoiceError, begins: Ints, way: WideSteps) -> Ints | None:
+        """Rows after which cuts are to be left: in the one that is stuck, and in all that can be in no turn."""
+        limits = self.machine.limits
+        ends = np.append(begins[1:], len(self.unwrapped))
+        left = []
+        for number in np.union1d(too_far(stretches, limits), stuck.stretch).tolist():
+            members = np.arange(begins[number], ends[number])
+            low, high = self._extremes(members, way)
+            entered = stuck if number == stuck.stretch else None
+            rows = parts_of_cut(self.unwrapped[members], low, high, limits, entered)
+            if rows is None:
+                return None
+            left.append(members[rows])
+        rows = np.concatenate(left)
+        return rows if len(rows) else None
+
+    def _error(self, stuck: NoChoiceError, stretch: NDArray[np.int32], way: WideSteps) -> InputError:
+        """Message for the pose that no choice gets beyond."""
+        limits = self.machine.limits
+        members = np.flatnonzero(stretch == stuck.stretch)
+        low, high = self._extremes(members, way)
+        furthest, words = 0, self.unwrapped[members[0], 0]
+        for branch, *turns in stuck.states:
+            least, most = low[:, branch] + 360 * np.array(turns), high[:, branch] + 360 * np.array(turns)
+            below, above = least < limits[:, 0] - LIMIT_SLACK, most > limits[:, 1] + LIMIT_SLACK
+            first = int(np.argmax((below | above).any(axis=1)))
+            if first >= furthest:
+                furthest, words = first, np.where(below[first], least[first], most[first])
+        pose = int(self.steady[members[furthest]])
+        start = int(np.searchsorted(self.run, self.run[pose]))
+        both = solutions(self.machine, self.axis[pose : pose + 1]).angles[0]
+        return limit_error(self.machine, both, words, int(self.line[pose]), self.file, int(self.line[start]))
 
 
 def _dislike(machine: Machine, start: Floats) -> Floats:
@@ -320,62 +352,6 @@ def _fill_cone(
     second = closest_second(machine, axis[poses], first)
     angles[poses, 0] = first
     angles[poses, 1] = second + 360 * np.round((guess - second) / 360)
-
-
-def _extremes(members: Ints, unwrapped: Floats, way: WideSteps) -> tuple[Floats, Floats]:
-    """Lowest and highest angles on the way into rows that follow one another: twice (m, 2, 2)."""
-    low, high = unwrapped[members], unwrapped[members]
-    own = (way.row >= members[0]) & (way.row <= members[-1])
-    row = way.row[own] - members[0]
-    low[row], high[row] = np.minimum(low[row], way.low[own]), np.maximum(high[row], way.high[own])
-    return low, high
-
-
-def _divided(
-    stretches: Stretches, stuck: NoChoiceError, begins: Ints, unwrapped: Floats, way: WideSteps, limits: Floats
-) -> Ints | None:
-    """Rows after which cuts are to be left: in the one that is stuck, and in all that can be in no turn."""
-    ends = np.append(begins[1:], len(unwrapped))
-    left = []
-    for number in np.union1d(too_far(stretches, limits), stuck.stretch).tolist():
-        members = np.arange(begins[number], ends[number])
-        low, high = _extremes(members, unwrapped, way)
-        entered = stuck if number == stuck.stretch else None
-        rows = parts_of_cut(unwrapped[members], low, high, limits, entered)
-        if rows is None:
-            return None
-        left.append(members[rows])
-    rows = np.concatenate(left)
-    return rows if len(rows) else None
-
-
-def _stuck_error(
-    machine: Machine,
-    stuck: NoChoiceError,
-    stretch: NDArray[np.int32],
-    axis: Floats,
-    unwrapped: Floats,
-    way: WideSteps,
-    steady: Ints,
-    run: NDArray[np.int32],
-    line: Ints,
-    file: str | None,
-) -> InputError:
-    """Message for the pose that no choice gets beyond."""
-    limits = machine.limits
-    members = np.flatnonzero(stretch == stuck.stretch)
-    low, high = _extremes(members, unwrapped, way)
-    furthest, words = 0, unwrapped[members[0], 0]
-    for branch, *turns in stuck.states:
-        least, most = low[:, branch] + 360 * np.array(turns), high[:, branch] + 360 * np.array(turns)
-        below, above = least < limits[:, 0] - LIMIT_SLACK, most > limits[:, 1] + LIMIT_SLACK
-        first = int(np.argmax((below | above).any(axis=1)))
-        if first >= furthest:
-            furthest, words = first, np.where(below[first], least[first], most[first])
-    pose = int(steady[members[furthest]])
-    start = int(np.searchsorted(run, run[pose]))
-    both = solutions(machine, axis[pose : pose + 1]).angles[0]
-    return limit_error(machine, both, limits, words, int(line[pose]), int(line[start]), file)
 
 
 def _lengths(tip: Floats) -> Floats:

@@ -30,19 +30,14 @@ def reach_error(machine: Machine, axis: Floats, beyond: float, line: int, file: 
 
 
 def limit_error(
-    machine: Machine,
-    both: Floats,
-    limits: Floats,
-    words: Floats | None,
-    line: int,
-    since: int,
-    file: str | None,
+    machine: Machine, both: Floats, words: Floats | None, line: int, file: str | None, since: int = 0
 ) -> InputError:
     """Say that a rotary word leaves its limits: with either solution alone, or because the cut began on the other one.
 
     `both` (2, 2) are the solutions of the pose, `words` (2,) those at which the furthest choice leaves the limits; the
     cut starts at the line `since`, 0 where unknown.
     """
+    limits = machine.limits
     turned = both + 360 * np.round((limits.clip(-1e6, 1e6).mean(axis=1) - both) / 360)
     excess = np.maximum(np.maximum(limits[:, 0] - turned, turned - limits[:, 1]), 0.0)
     alone = bool((excess.max(axis=1) > NO_TURN).all())

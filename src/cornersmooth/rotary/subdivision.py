@@ -128,7 +128,7 @@ def insertions(
         here = slice(first, first + 1)
         both = solutions(machine, ruled(tip, axis, segment[here], fraction[here])[1]).angles[0]
         number = 0 if line is None else int(line[segment[first] + 1])
-        raise limit_error(machine, both, limits, inner[first], number, 0, file)
+        raise limit_error(machine, both, inner[first], number, file)
     return Insertions(segment, fraction, inside, np.unique(open_.segment))
 
 
