@@ -44,7 +44,6 @@ def rotary_curve_rows(smoothed: SmoothProgram, form: Form, findings: Findings) -
         tolerance=_STRAIGHT_SHARE * math.degrees(left) - resolution,
         allowance=angle_allowance(smoothed, resolution),
         angle_resolution=resolution,
-        file=program.source.name,
     )
     findings.add_all(found.findings)
     jumps = np.union1d(found.inserted.unsolved, smoothed.corners.pose[found.lines.unsolved])

@@ -120,7 +120,6 @@ def rotary_curves(
     tolerance: float,
     allowance: Floats | None = None,
     angle_resolution: float = 0.0,
-    file: str | None = None,
 ) -> RotaryCurves:
     """Control points of the rotary angles for all smoothed corners, on the knots and weights of their tip curves.
 
@@ -140,13 +139,13 @@ def rotary_curves(
     if not tolerance > 0:
         raise SettingsError("CS255", f"orientation tolerance is {tolerance:g} deg", "give a positive angle")
     allowed = np.where(allowed < LEAST_ALLOWANCE * tolerance, 0.0, allowed)
-    motion = rotary_motion(smoothed, machine, tolerance, allowed, angle_resolution, file)
+    motion = rotary_motion(smoothed, machine, tolerance, allowed, angle_resolution)
     work = _Work(smoothed, machine, motion, allowed)
     found, pending = [], np.arange(len(motion.rows))
     for spans, ruled in TRIALS:
         more, pending = work.trial(spans, ruled, pending)
         found += more
-    lines = corner_lines(smoothed, machine, motion, pending, file)
+    lines = corner_lines(smoothed, machine, motion, pending)
     findings = motion.findings + _lines_finding(smoothed, machine, motion.rows[pending])
     rows, pose_angles, inserted = motion.rows, motion.pose_angles, motion.inserted
     del work, motion  # as large as what is made of it

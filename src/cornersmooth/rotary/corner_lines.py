@@ -28,9 +28,7 @@ class CornerLines:
     unsolved: Ints  #: (v,) rows of `Corners` in which the axis jumps: no division helps
 
 
-def corner_lines(
-    smoothed: SmoothProgram, machine: Machine, motion: RotaryMotion, chosen: Ints, file: str | None
-) -> CornerLines:
+def corner_lines(smoothed: SmoothProgram, machine: Machine, motion: RotaryMotion, chosen: Ints) -> CornerLines:
     """Points of corners with the numbers `chosen` in `RotaryMotion.rows`, ascending: those of dense lines and more.
 
     Raises
@@ -61,7 +59,7 @@ def corner_lines(
     owner = np.repeat(rows, counts)
     between = np.zeros(total, np.bool_)
     between[first] = True
-    line = program.line[corners.pose[owner]]
+    line, file = program.line[corners.pose[owner]], program.source.name
     more = insertions(machine, tip, lever, angles, tolerance=2 * motion.cone, rapid=between, line=line, file=file)
     filled = fill(tip, lever, angles, more)
     return CornerLines(owner[filled.pose], filled.tip, filled.angles, np.unique(owner[more.unsolved]))
