@@ -270,10 +270,7 @@ class _BackgroundWriter:
         self._waiting.append(data)
         self._size += len(data)
         if self._size >= self._CHUNK:
-            self._hand_on()
-
-    def _hand_on(self) -> None:
-        if self._done is not None:
-            self._done.result()
-        self._done = self._pool.submit(self._stream.write, b"".join(self._waiting))
-        self._waiting, self._size = [], 0
+            if self._done is not None:
+                self._done.result()
+            self._done = self._pool.submit(self._stream.write, b"".join(self._waiting))
+            self._waiting, self._size = [], 0

@@ -103,17 +103,9 @@ class Form:
             between = self.rotary_tolerance(settings.tolerance, settings.axis_scale)
             reserve = axis_length * math.radians(between + self.angle_rounding)
             return 2.0 / math.sqrt(3.0) * reserve
-        in_plane = (
-            0.0
-            if self.plane is None
-            else 2.0 / math.sqrt(3.0) * self.plane_reserve(settings.axis_point_allowed, axis_length)
-        )
-        return max(axis_length * self.vector_step, in_plane)
-
-    @property
-    def vector_step(self) -> float:
-        """Step of the last digit of tool vectors, as a share of their length."""
-        return float(10.0**-self.table.digits.vector / self.table.digits.vector_length)
+        in_plane = 0.0 if self.plane is None else self.plane_reserve(settings.axis_point_allowed, axis_length)
+        digits = self.table.digits
+        return max(axis_length * float(10.0**-digits.vector / digits.vector_length), 2.0 / math.sqrt(3.0) * in_plane)
 
     def plane_reserve(self, tolerance: float, axis_length: float) -> float:
         """By how much the angles of a tilted plane may be off at the axis point, mm: a step of their last digit."""

@@ -70,9 +70,8 @@ class Operation:
         own = self.mode.begin
         blocks = [block for what in self.on for block in self._stopped.get(what, ())]
         if self._stopped:
-            text = (
-                f"{' and '.join(self._stopped)} not given again in translated words after a tool change: on as before"
-            )
+            what = " and ".join(self._stopped)
+            text = f"{what} not given again in translated words after a tool change: on as before"
             self.findings.add("CS331", "warning", self._stopped_line, text)
         self.on |= self._stopped
         self._halted -= self._stopped.keys()
@@ -80,12 +79,8 @@ class Operation:
         steps = self.form.table.program.begin if own is None else own
         blocks += self._let_turn()
         blocks += self._expand(steps, rotary if self.retracted else _NO_ROTARY)
-        return [*blocks, *(self._hold() if self._stands else ())]
-
-    @property
-    def _stands(self) -> bool:
-        """Whether the rotary axes stand while the tool moves."""
-        return self.mode in (self.form.upright, self.form.plane)
+        standing = self.mode in (self.form.upright, self.form.plane)
+        return [*blocks, *(self._hold() if standing else ())]
 
     @property
     def turning(self) -> bool:
@@ -157,9 +152,10 @@ class Operation:
     def end(self, rotary: RotaryBlocks = _NO_ROTARY) -> list[str]:
         """Blocks after everything else."""
         steps, blocks = self.form.table.program.end, self.end_tool()
-        home = self._home_position()
+        position = self._own_position("home")
+        home = self._to_position({name: value for name, value in position.items() if name != "Z"})
         zero = rotary["rotary_zero"]
-        if any(name not in LINEAR for name in self._own_position("home")):  # they stand there, and are held
+        if any(name not in LINEAR for name in position):  # they stand there, and are held
             zero = ()
         elif zero and "{rotary_zero}" in steps:
             zero = (*self._let_turn(), *zero, *self._hold())
@@ -218,10 +214,6 @@ class Operation:
         position = self._own_position("tool_change")
         high = {"Z": position.pop("Z")} if "Z" in position else {}
         return [*self._to_position(position), *self._to_position(high)]
-
-    def _home_position(self) -> list[str]:
-        """Blocks that bring the other axes home, after the last retract."""
-        return self._to_position({name: value for name, value in self._own_position("home").items() if name != "Z"})
 
     def _own_position(self, key: str) -> dict[str, float]:
         """Position that the machine's file has, where the control has words for it."""

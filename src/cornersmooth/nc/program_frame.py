@@ -151,6 +151,8 @@ class Frame:
             raise SettingsError("CS216", f"{form.control} takes no work offset {self.work_offset!r}", hint)
         blocks = table.work_offset_block if offset else ()
         switch = (form.machine.tip_control if form.machine is not None and form.rotary else None) or ()
+        layout, texts = form.table.layout, self.provenance if self.comments else ()
+        made_of = [line for text in texts for line in comment_lines(text, layout.comment, layout.comment_orders)]
         steps = (*table.start, *table.begin, *table.tool_end, *table.end)
         for name, lines in (("header", self.header), ("footer", self.footer)):
             if lines and f"{{{name}}}" not in steps:
@@ -160,7 +162,7 @@ class Frame:
             "kinematics_on": switch[:1],
             "kinematics_off": switch[1:],
             "plane_reset": () if form.plane is None else form.plane.reset,
-            "header": (*self._head_comments(form.table.layout), *_filled(self.header, values)),
+            "header": (*made_of, *_filled(self.header, values)),
             "footer": tuple(_filled(self.footer, values)),
         }
 
@@ -187,11 +189,6 @@ class Frame:
         offset = table.program.work_offset if self.work_offset is None else self.work_offset
         usual = load_control(table.dialect).program.work_offset if table.dialect in control_names() else ""
         return "" if offset == usual else offset.replace(" ", "_") or "none"
-
-    def _head_comments(self, layout: TextStyle) -> Blocks:
-        """Comments on what the program is made of."""
-        texts = self.provenance if self.comments else ()
-        return tuple(line for text in texts for line in comment_lines(text, layout.comment, layout.comment_orders))
 
     def start(self, stream: Stream, form: Form) -> FramedText:
         """One text, nothing written yet."""
