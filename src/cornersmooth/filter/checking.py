@@ -21,11 +21,12 @@ from cornersmooth.nc_reader.block_tables import CHUNK
 from cornersmooth.nc_reader.rotary import LINE_SHARE
 from cornersmooth.settings import Settings
 from cornersmooth.verify import Verification, verify
-from cornersmooth.verify.motions import written_motion
-from cornersmooth.verify.passage import passage
 
 #: words that are the same number, and directions that are the same in six digits
 _SAME, _SAME_DIRECTION = 1e-9, 2e-6
+
+#: of the tolerance: rotary words are read as lines, which may be off by a part of it before and after
+_SHARE: Final = 1.0 - 2.0 * LINE_SHARE
 
 #: the last block of a run in distances
 _DISTANCES: Final = re.compile(rb"G91(?=[ \t]*\r?\n?\Z)")
@@ -112,13 +113,11 @@ def check(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> Check
             wrong.append(Problem("CS592", 0, place.stop, f"the program goes on otherwise after the run: {text}"))
     for own in shared(old, new, where):
         try:
-            before, after = _motions(job, old, new, own)
-            found = measure(before, after, job.settings, processes=job.processes)[2]
-            others = _apart(before, after, job.settings)
+            found = measure(*_motions(job, old, new, own), job.settings, share=_SHARE, processes=job.processes)[2]
         except CornersmoothError as error:
             wrong.append(Problem(error.code, 0, own[0].first + 1, error.what))
             continue
-        wrong += others + [
+        wrong += [
             replace(one, nc_line=abs(one.nc_line), text=one.text.replace("CL file", "old program"))
             for one in found.problems
         ]
@@ -159,35 +158,24 @@ def _motions(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> tu
 
 
 def measure(
-    before: NcProgram, after: NcProgram, settings: Settings, name: str = "", processes: int = 1
+    before: NcProgram, after: NcProgram, settings: Settings, name: str = "", *, share: float = 1.0, processes: int = 1
 ) -> tuple[Program, NcProgram, Verification]:
-    """Measure runs with the same units: the path they had, what they are now, and what verification finds."""
-    program = program_of(before)
+    """Measure runs with the same units within a share of the tolerance.
+
+    Gives the path they had, what they are now, and what verification finds.
+    """
+    program, own_axis = program_of(before), settings.axis_tolerance
     program = replace(program, source=replace(program.source, name=name, dialect="NC"))
     found = verify(
         program,
         after,
-        tolerance=settings.tolerance,
+        tolerance=share * settings.tolerance,
         axis_length=settings.axis_length,
-        axis_tolerance=settings.axis_tolerance,
+        axis_tolerance=None if own_axis is None else share * own_axis,
         words=False,
         processes=processes,
     )
     return program, after, found
-
-
-def _apart(before: NcProgram, after: NcProgram, settings: Settings) -> list[Problem]:
-    """Where the motions of two programs cannot be run beside each other within ε, both forward only."""
-    own_axis = settings.axis_tolerance is not None
-    ways = [written_motion(nc, settings.tolerance, settings.axis_scale, own_axis=own_axis) for nc in (before, after)]
-    old, new = ways
-    bends = [np.maximum(way.bend, LINE_SHARE * settings.tolerance) for way in ways]
-    found = passage(new.six, old.six, settings.tolerance, own_bend=bends[1], path_bend=bends[0])
-    lines = np.abs(after.line[new.owner[[one.row for one in found.breaks]]]).tolist()
-    if not (found.breaks or found.whole):
-        lines = [int(abs(after.line[0]))]
-    text = "the motion cannot be run beside that of the old program within the tolerance"
-    return [Problem("CS523", 0, line, text) for line in lines]
 
 
 def _absolute(text: bytes) -> bytes:
