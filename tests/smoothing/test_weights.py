@@ -81,7 +81,7 @@ def test_the_pose_of_the_original_motion_only_moves_forward(w1, w2, ratio):
 @pytest.mark.parametrize("weights", [*((1.0, w2) for w2 in (0.9, 0.6, 0.3, 0.05)), *ANY_WEIGHTS])
 @pytest.mark.parametrize("ratio", [0.5, 2 / 3, 0.9])
 def test_shape_factors_bound_the_error_of_lines(weights, ratio):
-    bend, turn = shape_factors(np.array([weights]), np.array([ratio]))
+    bend, turn = shape_factors(weights, ratio)
     for number in (1, 2, 3, 5, 7, 12, 40, 100):
         for exponent, allowed in ((2 / 3, 1.0), (1.0, 2.25)):
             ends = (np.arange(number + 1) / number) ** exponent
@@ -91,8 +91,8 @@ def test_shape_factors_bound_the_error_of_lines(weights, ratio):
             sigma = -coefficients[..., 1] - beta
             slope = (beta[:, -1:] - beta[:, :1]) / (sigma[:, -1:] - sigma[:, :1])
             error = np.abs(beta[:, :1] + slope * (sigma - sigma[:, :1]) - beta).max()
-            assert error <= bend[0] * PAPER_ERROR * allowed / number**2
-        assert np.abs(np.diff(sigma[:, [0, -1]], axis=1)).max() <= turn[0] / number * (1 + 1e-9)
+            assert error <= bend * PAPER_ERROR * allowed / number**2
+        assert np.abs(np.diff(sigma[:, [0, -1]], axis=1)).max() <= turn / number * (1 + 1e-9)
 
 
 @pytest.mark.parametrize(

@@ -28,9 +28,9 @@ DEGREE = 3
 _BINARY_DIGIT = 2.0**-20
 
 
-def deviation_factor(weights: Floats, ratio: Floats) -> Floats:
-    """(k,) the factor c of weights (k, 2) and ratios (k,)."""
-    factor: Floats = ratio * weights[:, 0] / (2.0 * (weights[:, 0] + weights[:, 1]))
+def deviation_factor(weights: Floats, ratio: Floats | float) -> Floats:
+    """(...,) the factor c of weights (..., 2) and ratios (...,)."""
+    factor: Floats = ratio * weights[..., 0] / (2.0 * (weights[..., 0] + weights[..., 1]))
     return factor
 
 

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 from cornersmooth.methods import AUTO, DEFAULT_METHOD, METHODS
 from cornersmooth.model import Corners, Floats, Ints, Program, SmoothProgram
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing.corner_table import Placed, Remainders, ShapedCorners
+from cornersmooth.smoothing.corner_table import Legs, Placed, Remainders
 from cornersmooth.smoothing.transition import place_corners
 
 #: what `Corners.extra` may have: largest curvature of the curve of a run beside each of its corners, 1/mm
@@ -35,7 +35,7 @@ class Construction(ABC):
         return SmoothProgram(program=program, corners=corners, settings=settings, findings=program.findings)
 
     @abstractmethod
-    def place(self, shaped: ShapedCorners, settings: Settings) -> Placed:
+    def place(self, legs: Legs, settings: Settings) -> Placed:
         """Transitions of g corners."""
 
     @abstractmethod

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.model import Corners, Floats, Ints, Program, Status
-from cornersmooth.settings import Settings
+from cornersmooth.model import Corners, Floats, Ints, Program
 from cornersmooth.vectors import norm
 
 #: corners worked on at once: their intermediate arrays fit the processor's cache
@@ -50,40 +48,6 @@ def divide(numerator: Floats | float, denominator: Floats) -> Floats:
     """Quotient; infinity where the denominator is zero."""
     quotient: Floats = np.divide(numerator, denominator, out=np.full_like(denominator, np.inf), where=denominator > 0.0)
     return quotient
-
-
-class ShapedCorners(NamedTuple):
-    """Corners with the weights (g, 2) and the ratios (g,) of their curves."""
-
-    legs: Legs
-    weights: Floats
-    ratio: Floats
-
-
-@dataclass(frozen=True)
-class CornerTable:
-    """All corners of a program, looked at in batches.
-
-    `status` (k,) is known without the geometry of the corner; `pose`, `before` and `after` are as in `Corners`.
-    """
-
-    program: Program
-    settings: Settings
-    pose: Ints
-    before: Ints
-    after: Ints
-    status: NDArray[np.uint8]
-
-    def batches(self) -> Iterator[tuple[int, Ints]]:
-        """Start of each batch and its rows that nothing forbids to smooth."""
-        for start in range(0, len(self.pose), BATCH):
-            yield start, start + np.flatnonzero(self.status[start : start + BATCH] == Status.SMOOTHED)
-
-    def shaped(self, rows: Ints) -> ShapedCorners:
-        """Segments at some corners, and the shape of their curves."""
-        legs = legs_at(self.program, self.settings.axis_length, self.pose[rows], self.before[rows], self.after[rows])
-        weights = np.broadcast_to(np.array(self.settings.weights), (len(rows), 2))
-        return ShapedCorners(legs, weights, np.broadcast_to(np.float64(self.settings.ratio), (len(rows),)))
 
 
 class Remainders(NamedTuple):

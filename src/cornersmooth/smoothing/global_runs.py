@@ -51,7 +51,10 @@ class GlobalRuns(Proportional):
         """
         corners = place_corners(program, settings, self)
         pose, count, steep = find_runs(program, settings, corners)
-        findings = program.findings if not len(steep) else (*program.findings, _steep(program, steep))
+        findings = program.findings
+        if len(steep):
+            text = f"corner rounded by itself: the tool axis turns by more than {STEEPEST:g} deg in one move of its run"
+            findings = (*findings, Finding("CS229", "note", int(program.line[steep[0]]), text, len(steep)))
         if not len(count):
             return SmoothProgram(program, corners, settings, findings)
         first = batches(count, GROUP)
@@ -105,23 +108,14 @@ def _solve(
     lines = Polylines.through(point[_turned(count, back)], count, STEP * min(tolerances))
     curves = _turned_curves(solve_runs(lines, tolerances, settings.axis_length, progress, processes=processes), back)
     lines, splines, kept = curves.lines, curves.splines, curves.kept
+    bounds = curves.tip_bound, curves.axis_bound
+    runs = Runs(pose, count, lines.s, lines.step, splines.knot, splines.count, curves.control, *bounds)
     run, place = spread(count)
     inner = (place > 0) & (place < count[run] - 1)
     known = inner & kept[run]
     names = ("tip_error", "axis_error", "orientation_error", RUN_CURVATURE)
-    runs = Runs(
-        pose=pose[kept[run]],
-        count=count[kept],
-        s=lines.s[kept[run]],
-        step=lines.step,
-        knot=splines.knot[np.repeat(kept, splines.count)],
-        knot_count=splines.count[kept],
-        control=curves.control[kept[splines.control_run]],
-        tip_bound=curves.tip_bound[kept],
-        axis_bound=curves.axis_bound[kept],
-    )
     columns = {name: values[known] for name, values in zip(names, measured(curves), strict=True)}
-    return _Solved(runs, pose[known], columns, pose[inner & ~kept[run]])
+    return _Solved(some_runs(runs, kept), pose[known], columns, pose[inner & ~kept[run]])
 
 
 def _mark(corners: Corners, solved: _Solved) -> None:
@@ -217,19 +211,12 @@ def find_runs(program: Program, settings: Settings, corners: Corners) -> tuple[I
     first = segment[begins]
     number = np.bincount(run)
     wanted = np.bincount(run, bent[segment]) > 0
-    if not settings.round_feed_changes:
-        turn = angle_between(program.axis[pose[segment]], program.axis[pose[segment + 1]])
-        steep = wanted & (np.bincount(run, turn > np.radians(STEEPEST)) > 0)
-        wanted &= ~steep
-    else:
-        steep = np.zeros(len(wanted), np.bool_)
+    turn = angle_between(program.axis[pose[segment]], program.axis[pose[segment + 1]])
+    steepest = np.inf if settings.round_feed_changes else np.radians(STEEPEST)
+    steep = wanted & (np.bincount(run, turn > steepest) > 0)
+    wanted &= ~steep
     left = pose[ranges(first[steep] + 1, number[steep] - 1)]
     return pose[ranges(first[wanted], number[wanted] + 1)], number[wanted] + 1, left
-
-
-def _steep(program: Program, pose: Ints) -> Finding:
-    text = f"corner rounded by itself: the tool axis turns by more than {STEEPEST:g} deg in one move of its run"
-    return Finding("CS229", "note", int(program.line[pose[0]]), text, len(pose))
 
 
 CONSTRUCTION = GlobalRuns()

@@ -8,7 +8,7 @@ itself decides, as the path runs on the inner side of it and turns in one sense.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -36,26 +36,25 @@ class _Transitions:
     tip: Floats  # trimmed legs of the tip, (g, 2, 3), mm
     turn: Floats  # those of the lever H·axis
     lever: Floats  # H·axis of the corner, (g, 3), mm
-    weights: Floats
-    ratio: Floats
+    weights: Floats  # (2,)
+    ratio: float
     height: float
 
     @classmethod
     def of(cls, smoothed: SmoothProgram, rows: Ints) -> _Transitions:
-        program, corners, height = smoothed.program, smoothed.corners, smoothed.settings.axis_length
+        program, corners, settings = smoothed.program, smoothed.corners, smoothed.settings
+        height = settings.axis_length
         _, *tip = nurbs.trimmed_legs(program.tip, corners, rows)
         axis, *turn = nurbs.trimmed_legs(program.axis, corners, rows)
         legs = np.stack(tip, axis=1), height * np.stack(turn, axis=1)
-        return cls(*legs, height * axis, corners.weights[rows], corners.ratio[rows], height)
+        return cls(*legs, height * axis, np.array(settings.weights), settings.ratio, height)
 
     def only(self, rows: Ints) -> _Transitions:
-        return _Transitions(
-            self.tip[rows], self.turn[rows], self.lever[rows], self.weights[rows], self.ratio[rows], self.height
-        )
+        return replace(self, tip=self.tip[rows], turn=self.turn[rows], lever=self.lever[rows])
 
     def at(self, u: Floats) -> tuple[Floats, Floats]:
         """Tips less the corner and levers, (g, m, 3), at parameters (m,) or (g, m)."""
-        shares = nurbs.leg_coefficients(np.broadcast_to(u, (len(self.ratio), u.shape[-1])), self.weights, self.ratio)
+        shares = nurbs.leg_coefficients(u, self.weights, self.ratio)
         tip, lever = shares[..., 1:] @ self.tip, self.lever[:, None, :] + shares[..., 1:] @ self.turn
         return tip, lever * (self.height / norm(lever))[..., None]
 

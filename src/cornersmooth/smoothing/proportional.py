@@ -12,7 +12,7 @@ from cornersmooth.geometry import nurbs
 from cornersmooth.model import Floats, Ints, LimitedBy, Program, SmoothProgram, Status
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.construction import Construction
-from cornersmooth.smoothing.corner_table import Legs, Placed, Remainders, ShapedCorners, divide, half_angle_cosine
+from cornersmooth.smoothing.corner_table import Legs, Placed, Remainders, divide, half_angle_cosine
 from cornersmooth.vectors import dot, norm, square, unit
 
 #: parameters u at which the deviation at constant H is evaluated; it is largest near u = ½
@@ -49,8 +49,8 @@ class Wanted:
     """
 
     legs: Legs
-    weights: Floats
-    ratio: Floats
+    weights: Floats  # (2,)
+    ratio: float
     axis_length: float
     status: NDArray[np.uint8]  # as far as the geometry of the corner decides it
     length_in: Floats  # m(D⁻), mm
@@ -58,13 +58,13 @@ class Wanted:
     by_tolerance: Floats  # lengths that the tolerances allow, mm
     bend_tip: Floats  # (U⁺ − U⁻)_A
     bend_turn: Floats  # (U⁺ − U⁻)_B − (U⁺ − U⁻)_A
-    factor: Floats
+    factor: float
     half_cosine: Floats
     per_length: tuple[Floats, Floats, Floats]  # deviation over length: tip, axis point, axis point less tip
 
     def middle(self, length: Floats, rows: Ints | slice = slice(None)) -> Floats:
         """|b′−b| at u = ½, where b is the axis point of the corner itself, mm."""
-        offset = (self.factor[rows] * length)[:, None]
+        offset = (self.factor * length)[:, None]
         lever = self.axis_length * self.legs.axis[rows]
         turned = lever + offset * self.bend_turn[rows]  # Q − P
         turned *= (self.axis_length / norm(turned))[:, None]
@@ -80,10 +80,10 @@ class Wanted:
 
     def probe(self, length: Floats, rows: Ints | slice = slice(None)) -> Floats:
         """Largest |b′−b| at common parameters over both halves, mm."""
-        reach, inner = length[:, None], self.ratio[rows][:, None]
-        sway = nurbs.rational_basis(_PROBES, self.weights[rows])  # (g, probes, 5)
-        beta = inner * sway[..., 3]
-        sigma = sway[..., 0] + inner * (sway[..., 1] - sway[..., 3])
+        reach = length[:, None]
+        sway = nurbs.rational_basis(_PROBES, self.weights)  # (probes, 5)
+        beta = self.ratio * sway[..., 3]
+        sigma = sway[..., 0] + self.ratio * (sway[..., 1] - sway[..., 3])
         lever = self.axis_length * self.legs.axis[rows][:, None, :]
         shift = (beta * reach)[..., None]
         tip_shift = shift * self.bend_tip[rows][:, None, :]
@@ -101,9 +101,9 @@ class Wanted:
         return largest
 
 
-def wanted(legs: Legs, weights: Floats, ratio: Floats, settings: Settings) -> Wanted:
-    """Measure g corners; weights (g, 2) and ratios (g,) are those of their curves."""
-    axis_length = settings.axis_length
+def wanted(legs: Legs, settings: Settings) -> Wanted:
+    """Measure g corners."""
+    axis_length, weights, ratio = settings.axis_length, np.array(settings.weights), settings.ratio
     axis_in, axis_out = legs.tip_in + legs.turn_in, legs.tip_out + legs.turn_out
     length_in = np.sqrt((square(legs.tip_in) + square(axis_in)) / 2.0)
     length_out = np.sqrt((square(legs.tip_out) + square(axis_out)) / 2.0)
@@ -111,7 +111,7 @@ def wanted(legs: Legs, weights: Floats, ratio: Floats, settings: Settings) -> Wa
     bend_tip = legs.tip_out * per_out - legs.tip_in * per_in  # (U⁺ − U⁻)_A
     bend_turn = legs.turn_out * per_out - legs.turn_in * per_in  # (U⁺ − U⁻)_B − (U⁺ − U⁻)_A
     bend_axis = bend_tip + bend_turn  # (U⁺ − U⁻)_B
-    factor = nurbs.deviation_factor(weights, ratio)
+    factor = float(nurbs.deviation_factor(weights, ratio))
     per_length_tip, per_length_axis, per_length_turn = (factor * norm(v) for v in (bend_tip, bend_axis, bend_turn))
     by_tolerance = np.minimum(
         divide(settings.tip_tolerance, per_length_tip), divide(settings.axis_point_tolerance, per_length_axis)
@@ -191,41 +191,28 @@ def _largest_in_the_middle(asked: Wanted, length: Floats, turned: Floats) -> NDA
     legs = asked.legs
     turn = np.maximum(norm(legs.turn_in) * (1.0 / asked.length_in), norm(legs.turn_out) * (1.0 / asked.length_out))
     turn *= length / asked.axis_length
-    paper = (asked.weights == 1.0).all(axis=1) & (np.abs(asked.ratio - 2.0 / 3.0) < EXACT)
+    paper = (asked.weights == 1.0).all() and abs(asked.ratio - 2.0 / 3.0) < EXACT
     tilt = 2.0 * turn * turned
-    largest: NDArray[np.bool_] = (tilt <= np.where(paper, _TILT_PAPER, _TILT_ANY) * asked.middle(length)) & (turn < 0.5)
+    largest: NDArray[np.bool_] = (tilt <= (_TILT_PAPER if paper else _TILT_ANY) * asked.middle(length)) & (turn < 0.5)
     return largest
 
 
 class Proportional(Construction):
     """Tip and axis-point segment are trimmed by the same fraction, and one parameter drives both curves."""
 
-    def place(self, shaped: ShapedCorners, settings: Settings) -> Placed:
+    def place(self, legs: Legs, settings: Settings) -> Placed:
         """Give every corner the length that the tolerances and its segments allow."""
-        return place_proportional(wanted(*shaped, settings), settings)
+        return place_proportional(wanted(legs, settings), settings)
 
     def points(self, smoothed: SmoothProgram, rows: Ints, u: Floats) -> tuple[Floats, Floats]:
         """Both curves at the same parameters."""
-        program, corners = smoothed.program, smoothed.corners
-        u = np.concatenate(([0.0], u))
-        weights, ratio = corners.weights[rows], corners.ratio[rows]
+        program, settings = smoothed.program, smoothed.settings
+        shares = nurbs.leg_coefficients(np.concatenate(([0.0], u)), np.array(settings.weights), settings.ratio)
         tips, levers = (
-            np.stack(nurbs.trimmed_legs(values, corners, rows), axis=1) for values in (program.tip, program.axis)
+            shares @ np.stack(nurbs.trimmed_legs(values, smoothed.corners, rows), axis=1)
+            for values in (program.tip, program.axis)
         )
-        # corners with all weights 1 share one table of coefficients, the others at least its numerators
-        plain = (weights == 1.0).all(axis=1) & (ratio == ratio[0])
-        coefficients = nurbs.leg_coefficients(u, np.ones(2), ratio[0])
-        points, vectors = coefficients @ tips, coefficients @ levers
-        other = np.flatnonzero(~plain)
-        if len(other):
-            shares = nurbs.basis(u)
-            sums = nurbs.full_weights(weights[other]) @ shares.T
-            inner = (ratio[other] * weights[other, 0])[:, None]
-            incoming = -(shares[:, 0] + inner * shares[:, 1]) / sums
-            outgoing = (shares[:, 4] + inner * shares[:, 3]) / sums
-            along = np.stack((np.ones_like(incoming), incoming, outgoing), axis=-1)
-            points[other], vectors[other] = along @ tips[other], along @ levers[other]
-        return points, vectors
+        return tips, levers
 
     def divide(
         self, program: Program, settings: Settings, remainders: Remainders, number: int

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -189,7 +190,7 @@ def lines_of(smoothed: SmoothProgram, rows: Ints) -> Ints:
         (tip_out + turn_out) * corners.axis_trim_out[rows][:, None]
         - (tip_in + turn_in) * corners.axis_trim_in[rows][:, None],
     )
-    more_bend, more_turn = shape_factors(corners.weights[rows], corners.ratio[rows])
+    more_bend, more_turn = shape_factors(settings.weights, settings.ratio)
     bend = np.sqrt(np.maximum(square(bends[0]), square(bends[1]))) * more_bend
     by_chord = np.sqrt(bend / (_BEND_PER_CHORD * settings.chord))
     way = np.minimum(norm(tip_in) * corners.trim_in[rows], norm(tip_out) * corners.trim_out[rows])
@@ -214,22 +215,18 @@ def lines_of(smoothed: SmoothProgram, rows: Ints) -> Ints:
     return number_of_lines
 
 
-def shape_factors(weights: Floats, ratio: Floats) -> tuple[Floats, Floats]:
-    """Factors (g,) by which bend and turn of transitions count more for their weights (g, 2) and ratios (g,).
+@cache
+def shape_factors(weights: tuple[float, float], ratio: float) -> tuple[float, float]:
+    """Factors by which bend and turn of transitions count more for their weights and ratio.
 
     The chord error of n lines is at most ``bend·PAPER_ERROR·|b − a|/n²``, 9/4 of it on even nodes; on even nodes σ (see
     `cornersmooth.geometry.nurbs`) changes by at most ``turn/n`` in a line.
     """
-    # for w1 = 1, w2 ≤ 1 and the ratio 2/3 both are at most 6c, c the deviation factor (tests/smoothing/test_weights.py)
-    factor = np.maximum(6.0 * nurbs.deviation_factor(weights, ratio), 1.0)
-    bend, turn = factor, factor.copy()
-    other = np.flatnonzero((weights[:, 0] != 1.0) | (weights[:, 1] > 1.0) | (np.abs(ratio - 2.0 / 3.0) > 1e-12))
-    if len(other):
-        shapes = np.column_stack((weights[other], ratio[other]))
-        distinct, which = np.unique(shapes, axis=0, return_inverse=True)
-        measured = np.array([_measure(shape[:2], float(shape[2])) for shape in distinct])
-        bend[other], turn[other] = measured[which.reshape(-1)].T
-    return bend, turn
+    if weights[0] != 1.0 or weights[1] > 1.0 or abs(ratio - 2.0 / 3.0) > 1e-12:
+        return _measure(np.array(weights), ratio)
+    # then both are at most 6c, c the deviation factor (tests/smoothing/test_weights.py)
+    factor = max(6.0 * float(nurbs.deviation_factor(np.array(weights), ratio)), 1.0)
+    return factor, factor
 
 
 def _measure(weights: Floats, ratio: float) -> tuple[float, float]:

@@ -32,7 +32,7 @@ def sharp_rows(smoothed: SmoothProgram) -> Ints:
     straight = [np.zeros(0, np.bool_)]
     for part in np.split(known, np.arange(BATCH, len(known), BATCH)):
         legs = legs_at(program, settings.axis_length, corners.pose[part], corners.before[part], corners.after[part])
-        measured = wanted(legs, corners.weights[part], corners.ratio[part], settings)
+        measured = wanted(legs, settings)
         straight.append(measured.status == Status.STRAIGHT)
     turns[turns] = ~np.concatenate(straight)
     return rows[turns]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from cornersmooth.methods import METHODS
 from cornersmooth.model import Corners, FeedMode, Ints, Move, Program, Status
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing.corner_table import BATCH, CornerTable, Placed
+from cornersmooth.smoothing.corner_table import BATCH, Placed, legs_at
 from cornersmooth.smoothing.neighbours import find_neighbours
 
 if TYPE_CHECKING:
@@ -39,7 +39,6 @@ def place_corners(
     pose = np.flatnonzero(around.inner)
     before, after = around.previous[pose], around.following[pose]
     status = _what_forbids(program, settings, pose, after, around.duplicate[pose])
-    table = CornerTable(program, settings, pose, before, after, status)
 
     k = len(pose)
     weights = np.broadcast_to(np.array(settings.weights), (k, 2))
@@ -52,10 +51,11 @@ def place_corners(
     if METHODS[settings.method].one_parameter:  # the same fractions on both curves: one array
         whole.axis_trim_in, whole.axis_trim_out = whole.trim_in, whole.trim_out
 
-    def settle(batch: tuple[int, Ints]) -> int:
-        start, rows = batch
+    def settle(start: int) -> int:
+        rows = start + np.flatnonzero(status[start : start + BATCH] == Status.SMOOTHED)
         if len(rows):
-            part = construction.place(table.shaped(rows), settings)
+            legs = legs_at(program, settings.axis_length, pose[rows], before[rows], after[rows])
+            part = construction.place(legs, settings)
             for name in ("status", "limited_by", *_MEASURES):
                 getattr(whole, name)[rows] = getattr(part, name)
             for name, values in part.extra.items():
@@ -63,7 +63,7 @@ def place_corners(
         return min(start + BATCH, k)
 
     with ThreadPoolExecutor(THREADS) as pool:  # numpy leaves the interpreter free; batches share no rows
-        for done in (pool.map if k > BATCH else map)(settle, table.batches()):
+        for done in (pool.map if k > BATCH else map)(settle, range(0, k, BATCH)):
             if progress is not None:
                 progress(done, k)
     ratio = np.broadcast_to(np.float64(settings.ratio), (k,))

@@ -16,7 +16,6 @@ from cornersmooth.smoothing.corner_table import (
     Legs,
     Placed,
     Remainders,
-    ShapedCorners,
     divide,
     half_angle_cosine,
     with_rows,
@@ -51,7 +50,7 @@ _TOGETHER: Final = 1.8
 _LEAST_BACK: Final = 1e-4
 
 
-def place_zhang2016(legs: Legs, weights: Floats, ratio: Floats, settings: Settings) -> Placed:
+def place_zhang2016(legs: Legs, settings: Settings) -> Placed:
     """Trim tip and axis-point segments each on its own, as the paper does: equations (10), (15), (16) and (19).
 
     (16) and (19) give the curve with the larger sine the tolerance and the other one its share by the ratio of the
@@ -62,6 +61,8 @@ def place_zhang2016(legs: Legs, weights: Floats, ratio: Floats, settings: Settin
     axis_lengths = norm(axis_in), norm(axis_out)
     sine_tip = _half_turn_sine(legs.tip_in, legs.tip_out, *tip_lengths)
     sine_axis = _half_turn_sine(axis_in, axis_out, *axis_lengths)
+    weights = np.broadcast_to(np.array(settings.weights), (len(sine_tip), 2))
+    ratio = np.broadcast_to(np.float64(settings.ratio), (len(sine_tip),))
     factor = 2.0 * nurbs.deviation_factor(weights, ratio)  # 2·w1/(3(w1+w2)) at the paper's ratio
     by_tolerance = np.minimum(
         divide(settings.common_tolerance, factor * sine_tip), divide(settings.axis_point_tolerance, factor * sine_axis)
@@ -150,9 +151,9 @@ class Zhang2016(Construction):
                 smoothed = replace(smoothed, corners=_left_sharp(smoothed.corners, rows))
         return smoothed
 
-    def place(self, shaped: ShapedCorners, settings: Settings) -> Placed:
+    def place(self, legs: Legs, settings: Settings) -> Placed:
         """Trim by the paper's equations; half of each segment is the most."""
-        return place_zhang2016(*shaped, settings)
+        return place_zhang2016(legs, settings)
 
     def points(self, smoothed: SmoothProgram, rows: Ints, u: Floats) -> tuple[Floats, Floats]:
         """The axis-point curve at the synchronised parameters."""

@@ -130,22 +130,17 @@ def line_places(runs: Runs, lines: Polylines, program: Program, settings: Settin
     row, place = spread(number)
     last = place == number[row] - 1
     # equal shares of the effort; a little is added so that it grows everywhere
-    grown = effort + 1e-9 * (pieces.high - pieces.low) / np.repeat(
-        np.add.reduceat(pieces.high - pieces.low, first), np.diff(np.append(first, len(effort)))
-    )
+    width, beyond = pieces.high - pieces.low, np.append(first[1:], len(effort))
+    grown = effort + 1e-9 * width / np.repeat(np.add.reduceat(width, first), beyond - first)
     reached = np.concatenate(([0.0], np.cumsum(grown)))
-    begin, end = reached[first], reached[np.append(first[1:], len(grown))]
+    begin, end = reached[first], reached[beyond]
     target = begin[row] + (place + 1) / number[row] * (end - begin)[row]
-    piece = np.clip(
-        np.searchsorted(reached, target, side="left") - 1, first[row], np.append(first[1:], len(grown))[row] - 1
-    )
+    piece = np.clip(np.searchsorted(reached, target, side="left") - 1, first[row], beyond[row] - 1)
     share = (target - reached[piece]) / grown[piece]
-    s = pieces.low[piece] + np.clip(share, 0.0, 1.0) * (pieces.high - pieces.low)[piece]
-    final = np.append(first[1:], len(grown)) - 1
-    s[last], piece[last] = pieces.high[final], final
-    ends = starts(runs.count)[1:] - 1
+    s = pieces.low[piece] + np.clip(share, 0.0, 1.0) * width[piece]
+    s[last], piece[last] = pieces.high[beyond - 1], beyond - 1
     pose_row = segment[row] + 1
-    end = np.where(last & np.isin(pose_row, ends), pose_row, -1)
+    end = np.where(last & np.isin(pose_row, lines.first[1:] - 1), pose_row, -1)
     return LinePlaces(runs.pose[pose_row], pieces.span[piece], s, end)
 
 
