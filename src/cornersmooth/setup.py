@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from cornersmooth import nc
 from cornersmooth.errors import InputError, SettingsError
@@ -26,7 +27,6 @@ from cornersmooth.feedrate import Limits
 from cornersmooth.feedrate.path import Path, build_path
 from cornersmooth.kinematics import Machine, check_travel, nose_position
 from cornersmooth.kinematics.machine import PARALLEL
-from cornersmooth.kinematics.poses import rotate
 from cornersmooth.model import Floats, Move, Program
 from cornersmooth.nc import Form
 from cornersmooth.pipeline import smooth
@@ -62,16 +62,16 @@ class Setup:
     @property
     def matrix(self) -> Floats:
         """(3, 3) rotation from today's coordinates of the part to those of the machine."""
-        found = np.eye(3)
-        for direction, degrees in (((0, 0, 1), self.turn), ((1, 0, 0), self.tilt_x), ((0, 1, 0), self.tilt_y)):
-            angle = np.full(3, math.radians(degrees))
-            found = rotate(np.array(direction, np.float64), angle, found.T).T
-        return found
+        matrix: Floats = self._rotation.as_matrix()
+        return matrix
+
+    @property
+    def _rotation(self) -> Rotation:
+        return Rotation.from_euler("zxy", (self.turn, self.tilt_x, self.tilt_y), degrees=True)
 
     def angle_to(self, other: Setup) -> float:
         """Angle of the rotation from one setup to another, degrees."""
-        cosine = (np.trace(self.matrix @ other.matrix.T) - 1.0) / 2.0
-        return math.degrees(math.acos(min(1.0, max(-1.0, cosine))))
+        return math.degrees((self._rotation * other._rotation.inv()).magnitude())
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import tracemalloc
 from itertools import product
 from pathlib import Path
 
@@ -395,6 +396,21 @@ def test_groups_of_runs_are_solved_as_all_of_them_by_any_number_of_processes(mon
             column = getattr(found.corners, name)
             np.testing.assert_allclose(column, getattr(whole.corners, name), rtol=0, atol=1e-9)
         assert found.corners.tip_error[in_run].max() <= whole.runs.tip_bound.max() + 1e-9
+
+
+def test_memory_grows_by_the_curves_and_corners_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """About 120 bytes a pose are kept of a corner, 60 of a curve."""
+    monkeypatch.setattr(global_runs, "GROUP", 500)
+    peaks = []
+    for count in (1000, 3000):
+        points, kind = winding(count), np.full(count, Move.LINEAR)
+        kind[::250] = Move.RAPID
+        program = Program.from_poses(points[:, :3], points[:, 3:] - points[:, :3], kind=kind, feed=900.0)
+        tracemalloc.start()
+        assert smooth(program, Settings(method="global")).runs is not None
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] - peaks[0] <= 300 * 2000
 
 
 @pytest.mark.corpus

@@ -115,16 +115,9 @@ def vertices(
     start: Ints,
     at_pose: Bools,
 ) -> Vertices:
-    """Find where the original motion is at the rows of the smoothed one.
+    """Find where the original motion is at the rows of the smoothed one, which are as in `Rows` and `Vertices`.
 
-    Parameters
-    ----------
-    smoothed : SmoothProgram
-    tip, axis : (r, 3) float64
-        In path order, as in `dense_rows`.
-    words : (r, d) float64
-    move, start, at_pose : (r,) int64 and bool
-        As in `Rows`, and from `segments_of_rows`.
+    `start` and `at_pose` are those of `segments_of_rows`.
     """
     program, height = smoothed.program, smoothed.settings.axis_length
     known = np.maximum(start, 0)
@@ -205,12 +198,7 @@ def lags(tip: Floats, lever: Floats, blend: float) -> Floats:
 
     Two lines of length l run together over half of the shorter one, so a change of the axis point's way per way of the
     tip by κ is worth up to κ·l/4. Where unit tangents of the tip differ by δ, κ·blend/δ is the most.
-
-    Parameters
-    ----------
-    tip, lever : (v, 3) float64, mm
-        Vertices; H times the tool axis there.
-    blend : float, mm
+    `lever` is H times the tool axis.
     """
     found = np.zeros(len(tip))
     way = np.diff(tip, axis=0)

@@ -67,15 +67,7 @@ class _Transitions:
 def path_distances(smoothed: SmoothProgram, rows: Ints, *, dense: bool) -> tuple[Floats, Floats]:
     """Distances (g,) of tip path and axis-point path from the original ones at some corners, mm; 0 where not smoothed.
 
-    For the paper's method they are the errors by its equation (10).
-
-    Parameters
-    ----------
-    smoothed : SmoothProgram
-    rows : (g,) int64
-        Rows of `SmoothProgram.corners`.
-    dense : bool
-        Whether transitions are written as lines, not as curves.
+    For the paper's method they are the errors by its equation (10). With `dense`, transitions are written as lines.
     """
     corners = smoothed.corners
     tip, axis_point = corners.tip_error[rows].copy(), corners.axis_error[rows].copy()

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -24,27 +24,19 @@ _STEPS: Final = 3
 _LEAST: Final = 1e-30
 
 
-class Common(NamedTuple):
-    """Distances (g, m) of tip and of axis point from one pose of the original, mm."""
-
-    tip: Floats
-    axis_point: Floats
-
-
 def distances(
     program: Program, axis_length: float, poses: Ints, tip: Floats, axis: Floats, *, own_axis: bool = False
-) -> tuple[Floats, Floats, Common, Floats]:
-    """How far sampled poses (g, m) are from the original motion through some poses (g, q) of a program.
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """How far sampled poses (g, m) are from the original motion through some poses (g, q) of a program, mm.
 
     With `own_axis` the axis point is H times the axis wherever the tip is.
 
     Returns
     -------
-    tip, axis_point : (g, m) float64, mm
-        From the path of the tip, and from the path of the axis point.
-    common : Common
-        From the pose that is nearest in six dimensions.
-    backwards : (g,) float64, mm
+    tip, axis_point, together : (g, m) float64
+        From the path of the tip, from the path of the axis point, and of both from the pose that is nearest in six
+        dimensions.
+    backwards : (g,) float64
         By how much that pose goes back along the original, at most.
     """
     own = tip, axis_length * axis if own_axis else tip + axis_length * axis
@@ -56,17 +48,17 @@ def distances(
     size = np.stack([np.sqrt(square(leg.tip_end - leg.tip_start) + square(leg.swing)) for leg in legs])
     start = np.cumsum(size, axis=0) - size
 
-    def nearest(*chosen: int) -> tuple[Common, Floats]:
-        """Distances from the pose at which those `chosen` are nearest together, and its length."""
+    def nearest(*chosen: int) -> tuple[Floats, Floats, Floats]:
+        """Distances of both from the pose at which those `chosen` are nearest together, and its length."""
         found = [leg.nearest(own, chosen) for leg in legs]
         which = np.stack([row[0] for row in found]).argmin(axis=0)[None]
         share, *away = (np.take_along_axis(np.stack([row[k] for row in found]), which, axis=0)[0] for k in (1, 2, 3))
         row = np.arange(len(poses))[:, None]
-        return Common(*away), start[which[0], row] + share * size[which[0], row]
+        return *away, start[which[0], row] + share * size[which[0], row]
 
-    common, length = nearest(0, 1)
+    *common, length = nearest(0, 1)
     back = (np.maximum.accumulate(length, axis=1) - length).max(axis=1)
-    return nearest(0)[0].tip, nearest(1)[0].axis_point, common, back
+    return nearest(0)[0], nearest(1)[1], np.maximum(*common), back
 
 
 def passing(point: Floats, path: Floats) -> Floats:

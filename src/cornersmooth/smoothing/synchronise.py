@@ -150,23 +150,15 @@ def synchronisation_report(
     ratio: Floats,
     axis_length: float,
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    """How far the paper's synchronisation of some corners is from what it asks for.
+    """How far the paper's synchronisation of g corners is from what it asks for, (g,) each.
 
-    Parameters
-    ----------
-    tip_legs, axis_legs : pairs of (g, 3) float64, mm
-        Vectors from the first control point to the corner and from the corner to the last one.
-    lever : (g, 3) float64, mm
-        H times the axis at the corner.
+    `tip_legs` and `axis_legs` (g, 3), mm, lead from the first control point to the corner and from there to the last
+    one; `lever` is H times the axis at the corner.
 
     Returns
     -------
-    residual : (g,) float64, mm
-        Largest ``||Q−P|−H|`` over `REPORT_PARAMETERS`.
-    jump_in, jump_out : (g,) float64, rad
-        Angle between the axis of the adjoining straight motion and that of the transition at its two ends.
-    orientation : (g,) float64, rad
-        Largest angle between the axis on the transition and the axis at the corner, at u = ½.
+    Largest ``||Q−P|−H|`` over `REPORT_PARAMETERS` (mm); angles (rad) between the axis of the transition and that of the
+    straight motion before it and after it, and between the axis at u = ½ and that at the corner.
     """
     origin = np.zeros_like(lever)
     tip_curve = nurbs.five_points(origin, *tip_legs, ratio)

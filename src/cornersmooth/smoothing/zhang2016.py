@@ -305,8 +305,9 @@ def _off_the_motion(smoothed: SmoothProgram, poses: Ints, tip: Floats, axis: Flo
     """(g,) whether samples are farther from the original through `poses`, or go back along it by more, than allowed."""
     settings = smoothed.settings
     height, own_axis = settings.axis_scale, settings.axis_tolerance is not None
-    alone_tip, alone_axis, common, backwards = distances(smoothed.program, height, poses, tip, axis, own_axis=own_axis)
-    together = np.maximum(common.tip, common.axis_point)
+    alone_tip, alone_axis, together, backwards = distances(
+        smoothed.program, height, poses, tip, axis, own_axis=own_axis
+    )
     off = together if own_axis else np.maximum(np.maximum(alone_tip, alone_axis), together / _TOGETHER)
     steps = settings.tip_resolution, settings.axis_point_resolution * (height / settings.axis_length), _LEAST_BACK
     beyond: Bools = (off.max(axis=1) > _HAIR * settings.common_tolerance) | (backwards > 2.0 * max(steps))

@@ -132,16 +132,8 @@ def solve_windows(
 ) -> Floats:
     """Return new control points (c, 6), mm, of the windows, rows as in `windows.control`.
 
-    Parameters
-    ----------
-    control : (controls, 6) float64, mm
-        To begin with; the outer ones of each window stay.
-    tight : (pieces, 2) float64
-        Share of what they may use that tip and axis point of each piece are left.
-    gaps : tuple of float
-        What may be left to gain, over the objective, in each round.
-    near : bool
-        Whether `control` is near the solution.
+    `tight` (pieces, 2) is the share of what they may use that tip and axis point of each piece are left, `gaps` what
+    may be left to gain, over the objective, in each round, and `near` whether `control` is near the solution.
     """
     moved = control[windows.control].copy()
     there = _Places.of(problem, windows, tight)
@@ -236,7 +228,7 @@ class _Places:
         radius = np.where(flat, tip / np.sqrt(1.0 + stretch), tip)
         stretch = np.where(flat, 1.0 / (1.0 + stretch) - 1.0, stretch)
         radius = np.maximum(radius, _size(direction, stretch, self.rough[:, :3]) + ROOM)
-        return self._task(weight, direction, stretch, radius)
+        return Task(*self._common, weight, direction, stretch, radius)
 
     def axis_task(self, weight: Floats, tip_off: Floats, normal: Floats) -> Task:
         """The axis point, from the deviation (m, 3) of the tip; control points do not go along the normals (c, 3)."""
@@ -244,23 +236,12 @@ class _Places:
         radius = self.short * np.sqrt(np.maximum(self.limit[:, 1] ** 2 - along**2, 0.0))
         stretch = np.full(len(radius), ALONG - 1.0)
         radius = np.maximum(radius, _size(self.axis, stretch, self.rough[:, 3:]) + ROOM)
-        return self._task(weight, self.axis, stretch, radius, normal)
+        return Task(*self._common, weight, self.axis, stretch, radius, normal)
 
-    def _task(
-        self, weight: Floats, axis: Floats, stretch: Floats, radius: Floats, normal: Floats | None = None
-    ) -> Task:
-        return Task(
-            near=self.near,
-            smooth=self.smooth,
-            windows=self.windows,
-            sample_window=self.sample_window,
-            penalty=self.penalty,
-            weight=weight,
-            axis=axis,
-            stretch=stretch,
-            radius=radius,
-            normal=normal,
-        )
+    @property
+    def _common(self) -> tuple[Gather, Gather, Windows, Ints, Floats]:
+        """What all tasks have, the first of their fields."""
+        return self.near, self.smooth, self.windows, self.sample_window, self.penalty
 
 
 def across(normal: Floats, vectors: Floats) -> Floats:
