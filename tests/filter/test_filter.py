@@ -216,6 +216,33 @@ def test_tilted_planes_come_out_byte_for_byte(control: str, machine: str, text: 
     assert found.left
 
 
+@pytest.mark.parametrize(
+    ("name", "block"),
+    [
+        *(("siemens words", block) for block in ("ROT X30", "ROT RPL=30", "AROT Z5", "SCALE X2", "MIRROR X0")),
+        ("siemens words", "TRANS X5\nROT X30"),
+        *(("heidenhain words", block) for block in ("TRANS ROTATION ROT+30", "TRANS MIRROR AXIS X")),
+        ("heidenhain words", "CYCL DEF 10.0 ROTATION\nCYCL DEF 10.1 ROT+30"),
+        ("linuxcnc, G91", "G10 L2 P1 R30"),
+        ("fanuc words", "G68 X0 Y0 R30."),
+        ("haas, inch, G93", "G268 X0 Y0 Z0 I0 J30. K0"),
+    ],
+)
+def test_turned_places_come_out_byte_for_byte(name: str, block: str) -> None:
+    control, machine, text = PROGRAMS[name]
+    rapid = next(line for line in text.splitlines() if re.search(r"G0 X|FMAX M3", line))
+    whole = text.replace(rapid, f"{block}\n{rapid}")
+    found = filtered(control, machine, whole)
+    assert found.data == whole.encode()
+    assert found.cuts
+
+
+@pytest.mark.parametrize("block", ["ROT", "TRANS", "ROT X30\nROT", "N5 SCALE"])
+def test_frames_of_siemens_end_with_their_word_alone(block: str) -> None:
+    control, machine, text = PROGRAMS["siemens words"]
+    assert filtered(control, machine, text.replace("G0 X0", f"{block}\nG0 X0", 1)).smoothed == 24
+
+
 def test_the_turn_of_the_program_is_kept() -> None:
     body = cuts(WORDS, feed="F1000.")
     turned = re.sub(r"C([\d.]+)", lambda match: f"C{float(match[1]) - 720:.3f}", body)

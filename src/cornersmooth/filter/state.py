@@ -149,9 +149,9 @@ class State:
         names = {word.name for word in words}
         for word in words:
             if word.name in ("G", "M"):
-                done |= self._code(word)
+                done |= self._code(word, names)
             elif len(word.name) > 1 and not self._spelt(word):
-                done |= self._do(word.name + ("()" if re.search(r"\(\s*\)", word.text) else ""), "(" in word.text)
+                done |= self._do(word.name + ("()" if re.search(r"\(\s*\)", word.text) else ""), alone=len(names) == 1)
             elif word.name in "DTH=" and len(word.name) == 1:
                 does = self.vocabulary.does(word.name)
                 done |= {does} if does is not Does.ALL else {Does.LENGTH} if word.name in "DH" else set()
@@ -209,7 +209,7 @@ class State:
         else:
             self.place[letter] = value + (0.0 if self.absolute else self.place[letter])
 
-    def _code(self, word: Word) -> set[Does]:
+    def _code(self, word: Word, names: set[str]) -> set[Does]:
         """Take a G or M word; return what it does beside changing the state."""
         value, name = word.value, f"{word.name}{word.value:g}"
         if word.name == "G" and "M128" in self.vocabulary.tip_control:  # a block of DIN/ISO among those of Klartext
@@ -240,14 +240,14 @@ class State:
         elif name == "M136" or name == "M137":
             self.feed_mode = PER_REVOLUTION if name == "M136" else PER_MINUTE
         else:
-            return self._do(name, False)
+            return self._do(f"{name} R" if name == "G10" and "R" in names else name)
         return set()
 
-    def _do(self, name: str, with_arguments: bool) -> set[Does]:
-        """Do what a word says, by the vocabulary."""
+    def _do(self, name: str, *, alone: bool = False) -> set[Does]:
+        """Do what a word says, by the vocabulary; `alone` where the block has no other."""
         words = self.vocabulary
-        if name in ("ROT", "SCALE", "MIRROR", "TRANS") and not with_arguments:
-            name = "ROT0" if "TRAORI" in words.tip_control else name
+        if alone and name in ("ROT", "SCALE", "MIRROR", "TRANS") and "TRAORI" in words.tip_control:
+            name = "ROT0"
         if name.startswith("ORI"):
             kind = {"ORIVECT": VECTOR, "ORIPLANE": VECTOR, "ORIWKS": VECTOR, "ORIAXES": ANGLES, "ORIMKS": ANGLES}
             wanted = VECTOR if "I" in self.axes else ANGLES
@@ -280,7 +280,7 @@ class State:
             self.tip = law if plain else None
             self.lose_place()
         else:
-            done = self._do(text, False)
+            done = self._do(text)
             if Does.ALL in done:
                 self.lose_all()
             elif done - {Does.DWELL}:
