@@ -117,13 +117,7 @@ def fit_settings(settings: Settings, form: Form, units: Units) -> Settings:
 
 
 def check_fitted(settings: Settings, form: Form, units: Units) -> None:
-    """Refuse settings that know less of the written digits than `fit_settings` would say: ε would be exceeded.
-
-    Raises
-    ------
-    SettingsError
-        CS205, or what `fit_settings` raises.
-    """
+    """Refuse settings that know less of the written digits than `fit_settings` would (CS205): they would exceed ε."""
     fitted = fit_settings(settings, form, units)
     if (
         settings.tip_resolution < fitted.tip_resolution

@@ -172,13 +172,7 @@ def _extra(table: Control, form: str, name: str) -> Extra:
 
 
 def check_program(form: Form, program: Program, settings: Settings) -> None:
-    """Refuse a program that the form cannot hold.
-
-    Raises
-    ------
-    SettingsError
-        The tool is not parallel to Z, or turns on an arc, and the form has no words for that.
-    """
+    """Refuse a program whose tool is not along Z, or turns on an arc, where the form has no words for that (CS219)."""
     if form.orientation == "fixed":
         tilt = norm(program.axis - (0.0, 0.0, 1.0))
         tilt[program.kind == Move.FROM] = 0.0

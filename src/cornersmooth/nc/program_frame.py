@@ -99,13 +99,7 @@ class Frame:
     line_ends: str | None = None
 
     def values(self, form: Form, program: Program, settings: Settings) -> dict[str, str]:
-        """What stands for braces in the blocks around the motion and in those of extras.
-
-        Raises
-        ------
-        SettingsError
-            The control takes no such program name.
-        """
+        """What stands for braces in blocks around the motion and in those of extras; refuses a program name (CS216)."""
         table = form.table.program
         if self.program is not None and not re.fullmatch(table.name_pattern or ".*", self.program):
             raise SettingsError(
@@ -133,11 +127,8 @@ class Frame:
     def texts(self, form: Form, values: dict[str, str]) -> dict[str, Blocks]:
         """Blocks of the steps that a user gives: work offset, header and footer.
 
-        Raises
-        ------
-        SettingsError
-            The control has no such work offset, no retract to go to or come from along the tool, or no step for header
-            or footer; or a line of these has unknown braces or characters that NC text cannot hold.
+        CS216: the control has no such work offset, no retract to go to or come from along the tool, or no step for
+        header or footer; or a line of these has unknown braces or characters that an NC program cannot hold.
         """
         table = form.table.program
         if (self.approach or self.retract) and not table.retract:
@@ -167,13 +158,7 @@ class Frame:
         }
 
     def refuse_tool(self, form: Form, program: Program) -> None:
-        """Refuse a header that loads a tool where the program then takes the length of another.
-
-        Raises
-        ------
-        SettingsError
-            CS249.
-        """
+        """Refuse a header that loads a tool where the program then takes the length of another (CS249)."""
         moving = program.kind != Move.FROM
         loaded = any(not moving[:pose].any() for pose, _ in tool_loads(program))
         if loaded or not any("{offset}" in block for block in form.mode.on):

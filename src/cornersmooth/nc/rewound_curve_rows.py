@@ -49,8 +49,7 @@ def rewound_curve_rows(smoothed: SmoothProgram, form: Form, findings: Findings) 
         else:
             rows = curve_rows_of(part, form, findings)
         for some in rows:
-            spline = np.tile((0.0, 1.0, 0.0), (len(some.move), 1)) if some.spline is None else some.spline
-            yield replace(some, move=some.move + first, spline=spline)
+            yield replace(some, move=some.move + first)
 
 
 def _left(smoothed: SmoothProgram, form: Form) -> Bools:

@@ -184,18 +184,16 @@ def _with_sections(path: RotaryWay, runs: Runs, rows: _RunRows, sections: _Secti
 
 def _with_curves(lines: Rows, section: Ints, sections: _Sections | None) -> Rows:
     """Rows of lines with the control points of sections in the place of the rows that end them."""
-    counts = np.ones(len(section), np.int64)
     curved = section >= 0
-    if sections is not None:
-        counts[curved] = np.diff(sections.first)[section[curved]]
-    owner, _ = spread(counts)
-    rows = replace(some_rows(lines, owner), spline=np.tile((0.0, 1.0, 0.0), (len(owner), 1)))
     if sections is None or not curved.any():
-        return rows
+        return lines
+    counts = np.ones(len(section), np.int64)
+    counts[curved] = np.diff(sections.first)[section[curved]]
+    owner, _ = spread(counts)
+    rows, own, spline = some_rows(lines, owner), sections.rows, np.zeros((len(owner), 3))
     at = np.flatnonzero(curved[owner])
     points = ranges(sections.first[section[curved]], counts[curved])
-    assert rows.spline is not None
-    rows.tip[at], rows.other[at] = sections.rows.points[points, :3], sections.rows.points[points, 3:]
-    rows.curve[at], rows.joined[at] = sections.rows.number[points], sections.rows.number[points] == 1
-    rows.spline[at, 0], rows.spline[at, 2] = sections.rows.knot[points], sections.rows.last_knot[points]
-    return rows
+    rows.tip[at], rows.other[at] = own.points[points, :3], own.points[points, 3:]
+    rows.curve[at], rows.joined[at] = own.number[points], own.number[points] == 1
+    spline[at, 0], spline[at, 1], spline[at, 2] = own.knot[points], 1.0, own.last_knot[points]
+    return replace(rows, spline=spline)

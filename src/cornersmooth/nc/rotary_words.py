@@ -69,13 +69,7 @@ def rotary_way(rows: Iterator[Rows], smoothed: SmoothProgram, form: Form, findin
 
 
 def machine_of(form: Form) -> Machine:
-    """Machine of a form with rotary words.
-
-    Raises
-    ------
-    SettingsError
-        CS215: it has none.
-    """
+    """Machine of a form with rotary words; CS215 where it has none."""
     if form.machine is None:
         raise SettingsError("CS215", f"{form.control} form {form.name} needs a machine", "name it with --machine")
     return form.machine

@@ -58,31 +58,13 @@ def rotary_angles(
 ) -> RotaryPath:
     """Rotary angles of a path: one solution and one turn per pose, chosen with a look ahead over the whole path.
 
-    Parameters
-    ----------
-    machine : Machine
-    tip, axis : (n, 3) float64, mm and unit vectors
-    tolerance : float, degrees
-        By how much the axis may deviate near the pole, where the first angle is then free to turn ahead of time, and
-        may lie outside the reach of the machine.
-    rapid, left : (n,) bool
-        Poses in whose moves solution and turn may change: these do not cut, or the pose repeats the one before, after
-        which a cut is left.
-    divide : bool
-        Whether cuts that leave the limits are to be divided.
-    still : (n,) bool
-        Nothing is cut on the way through the pose (`still_poses`), so that it need not deviate near the pole.
-    still_tolerance : float, degrees
-        By how much the axis may deviate there all the same: what the digits of the words account for.
-    line, file : (n,) int64 and str, optional
-        For messages.
-
-    Raises
-    ------
-    InputError
-        The machine cannot reach an axis (CS361), or not within the limits of its rotary axes (CS362).
-    CutTooFarError
-        Instead of CS362 where cuts are to be divided, and can be.
+    Tips (n, 3) are in mm, axes unit vectors. Near the pole the axis may deviate by the tolerance, degrees, so that the
+    first angle can turn ahead of time, and as far may it lie outside the reach of the machine. Solution and turn may
+    change in moves to `rapid` poses (n,), which do not cut, and to `left` ones, which repeat the pose before, after
+    which a cut is left. Through `still` poses (`still_poses`) nothing is cut: there the axis need not deviate but by
+    `still_tolerance`, degrees, what the digits of the words account for. CS361: the machine cannot reach an axis.
+    CS362: not within the limits of its rotary axes; CutTooFarError instead where cuts that leave the limits are to be
+    divided, and can be.
     """
     n = len(axis)
     line = np.zeros(n, np.int64) if line is None else line
@@ -133,16 +115,9 @@ def rewound_angles(
 ) -> tuple[RotaryPath, Ints, Bools]:
     """Rotary angles of a path in which cuts are left, where nothing else keeps the limits.
 
-    Parameters, those of `how` among them, and errors are those of `rotary_angles`.
-
-    Returns
-    -------
-    path : RotaryPath
-        Of m rows: where a cut is left its pose is there twice, before and after the turn of the axes.
-    source : (m,) int64
-        Row of the path given.
-    left : (m,) bool
-        Second rows of such pairs.
+    Parameters, those of `how` among them, and errors are those of `rotary_angles`. Where a cut is left its pose is in
+    the path twice, before and after the turn of the axes; returns besides the row of the path given (m,), and the
+    second rows (m,) of such pairs.
     """
     source, left = np.arange(len(tip)), np.zeros(len(tip), np.bool_)
     for number in range(REWIND_ROUNDS + 1):

@@ -61,13 +61,9 @@ class NoChoiceError(Exception):
 
 
 def choose(stretches: Stretches, limits: Floats) -> tuple[Ints, Floats]:
-    """Branch (p,) of every stretch, and whole turns (p, 2) to add to its angles.
+    """Branch (p,) of every stretch, and whole turns (p, 2) to add to its angles; NoChoiceError where there are none.
 
     The limits (2, 2), degrees, are the lowest and highest word of each axis, infinite where there is none.
-
-    Raises
-    ------
-    NoChoiceError
     """
     branch = _cheapest_branches(stretches, limits)
     turns = _nearest_turns(stretches, branch)

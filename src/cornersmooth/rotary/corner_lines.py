@@ -29,13 +29,7 @@ class CornerLines:
 
 
 def corner_lines(smoothed: SmoothProgram, machine: Machine, motion: RotaryMotion, chosen: Ints) -> CornerLines:
-    """Points of corners with the numbers `chosen` in `RotaryMotion.rows`, ascending: those of dense lines and more.
-
-    Raises
-    ------
-    InputError
-        CS362: a rotary axis would leave its limits.
-    """
+    """Points of corners with ascending numbers in `RotaryMotion.rows`: those of dense lines and more (or CS362)."""
     program, corners = smoothed.program, smoothed.corners
     rows = motion.rows[chosen]
     halves = lines_of(smoothed, rows)

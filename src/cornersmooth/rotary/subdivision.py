@@ -82,26 +82,10 @@ def insertions(
 ) -> Insertions:
     """Points that a path needs so that straight blocks between its rotary words stay on the ruled motion.
 
-    Parameters
-    ----------
-    tip, axis : (n, 3) float64, mm and unit vectors
-    angles : (n, 2) float64, degrees
-        From `rotary_angles` with the same tolerance.
-    tolerance : float, degrees
-        Bound on the angle between the tool axis and that of the ruled motion.
-    rapid : (n,) bool
-        Moves that need no points.
-    tip_tolerance : float or None, mm
-        Bound on the distance of the tip from its line; None where the control keeps the tip on its line.
-    max_step : float or None, degrees
-        Largest turn of a rotary axis in one block.
-    line, file : (n,) int64 and str, optional
-        For messages.
-
-    Raises
-    ------
-    InputError
-        CS362: a rotary axis would leave its limits between two poses within them.
+    Tips (n, 3) are in mm, axes unit vectors, angles (n, 2) degrees from `rotary_angles`. The tool axis may be off that
+    of the ruled motion by the tolerance, degrees, and the tip off its line by `tip_tolerance`, mm, None where the
+    control keeps it there. A rotary axis may turn by `max_step` degrees in one block. `rapid` moves (n,) need no
+    points. CS362: a rotary axis would leave its limits between two poses within them.
     """
     rapid = np.zeros(len(axis), np.bool_) if rapid is None else rapid
     motion = RuledMotion(machine, tip, axis, tolerance, tip_tolerance, max_step)
