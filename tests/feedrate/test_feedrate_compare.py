@@ -12,7 +12,8 @@ from linear_programmes import reference_time
 
 from cornersmooth.cl import read
 from cornersmooth.feedrate import Limits, compare, direct, plan
-from cornersmooth.feedrate.compare import peaks, slowest
+from cornersmooth.feedrate.compare import slowest
+from cornersmooth.feedrate.reached import peaks
 from cornersmooth.model import Program
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth

@@ -234,7 +234,8 @@ def _tell_feeds(program: Program, feed: float | None) -> None:
 def _tables(compared: Comparison, verbose: bool) -> Iterator[str]:
     """Times and savings; with `verbose` what was reached, and the places that lose most."""
     from cornersmooth.feedrate import limiting
-    from cornersmooth.feedrate.compare import peaks, slowest, stops, turning_seconds
+    from cornersmooth.feedrate.compare import slowest, stops, turning_seconds
+    from cornersmooth.feedrate.reached import peaks
     from cornersmooth.report.verdict import times_text
 
     settings, saving = compared.settings, compared.saving_percent

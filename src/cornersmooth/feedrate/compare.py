@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.planner import direct, plan
-from cornersmooth.feedrate.reached import axis_peaks
+from cornersmooth.feedrate.reached import axis_peaks, peaks
 from cornersmooth.feedrate.timelaw import TimeLaw
 from cornersmooth.kinematics import Machine
 from cornersmooth.methods import METHODS
@@ -26,26 +27,13 @@ BASELINES = ("direct_exact_stop", "direct_velocity_jump")
 #: row of a text
 AS_WRITTEN = "as_written"
 
-#: states looked at together for peaks
-_TOGETHER = 65536
-
 Progress = Callable[[str, int, int], None]
 
 
-@dataclass(frozen=True)
-class SlowMove:
-    """A move that takes longer than its length over its feed.
+class SlowMove(NamedTuple):
+    """A move that takes longer than its length over its feed: its CL line, where it ends (mm), what it takes and loses.
 
-    Parameters
-    ----------
-    line : int
-        CL line.
-    x, y, z : float, mm
-        Where the move ends.
-    seconds, lost_seconds : float
-        Its time, and what that is more than at the programmed speed.
-    slowest_mm_per_s : float
-        Least speed at the ends of its parts.
+    `slowest_mm_per_s` is the least speed at the ends of its parts.
     """
 
     line: int
@@ -56,19 +44,6 @@ class SlowMove:
     lost_seconds: float
     length_mm: float
     slowest_mm_per_s: float
-
-
-@dataclass(frozen=True)
-class Peaks:
-    """Largest values met at the multiples of the period."""
-
-    speed_mm_per_s: float
-    accel_mm_per_s2: float
-    centripetal_mm_per_s2: float
-    jerk_mm_per_s3: float
-    angular_speed_deg_per_s: float
-    angular_accel_deg_per_s2: float
-    angular_jerk_deg_per_s3: float
 
 
 @dataclass(frozen=True)
@@ -130,8 +105,8 @@ class Comparison:
             "length_mm": {name: law.length for name, law in self.laws.items()},
             "stops": {name: stops(law) for name, law in self.laws.items()},
             "turning_seconds": {name: turning_seconds(law) for name, law in self.laws.items()},
-            "peaks": {name: vars(peaks(law)) for name, law in self.laws.items()},
-            "slowest": {name: [vars(move) for move in slowest(law, slow_moves)] for name, law in self.laws.items()},
+            "peaks": {name: peaks(law)._asdict() for name, law in self.laws.items()},
+            "slowest": {name: [move._asdict() for move in slowest(law, slow_moves)] for name, law in self.laws.items()},
         }
         if self.machine is not None:
             contents["machine"] = self.machine.name
@@ -174,18 +149,12 @@ def compare(
     limits = Limits() if limits is None else limits
 
     def step(name: str) -> Callable[[int, int], None] | None:
-        return None if progress is None else lambda done, total: progress(name, done, total)
+        return None if progress is None else partial(progress, name)
 
+    stopping, jumping = BASELINES
     laws = {
-        "direct_exact_stop": direct(program, limits, "exact_stop", settings=settings, machine=machine),
-        "direct_velocity_jump": direct(
-            program,
-            limits,
-            "velocity_jump",
-            settings=settings,
-            machine=machine,
-            progress=step("direct_velocity_jump"),
-        ),
+        stopping: direct(program, limits, "exact_stop", settings=settings, machine=machine),
+        jumping: direct(program, limits, "velocity_jump", settings=settings, machine=machine, progress=step(jumping)),
     }
     for name in methods:
         chosen = settings.but(method=name, **METHODS[name].prescribed)
@@ -221,36 +190,7 @@ def slowest(law: TimeLaw, count: int = 10) -> list[SlowMove]:
     lost = np.add.reduceat(took - path.length / path.speed, first)
     length = np.add.reduceat(np.where(path.turning, 0.0, path.length), first)
     least = np.minimum.reduceat(np.minimum(speeds[:-1], speeds[1:]), first)
-    moves = []
-    for row in np.argsort(-lost, kind="stable")[:count]:
-        pose = int(path.move[first[row]])
-        x, y, z = path.program.tip[pose].tolist()
-        moves.append(
-            SlowMove(
-                line=int(path.program.line[pose]),
-                x=x,
-                y=y,
-                z=z,
-                seconds=float(seconds[row]),
-                lost_seconds=float(lost[row]),
-                length_mm=float(length[row]),
-                slowest_mm_per_s=float(least[row]),
-            )
-        )
-    return moves
-
-
-def peaks(law: TimeLaw) -> Peaks:
-    """Largest speed, accelerations and jerk of a law at the multiples of the period."""
-    times = law.every_period()
-    largest = np.zeros((2, 4))
-    for begin in range(0, len(times), _TOGETHER):
-        states = law.at(times[begin : begin + _TOGETHER])
-        rows = np.abs(np.stack((states.v, states.a, states.centripetal, states.j)))
-        for turning in (False, True):
-            chosen = rows[:, states.turning == turning]
-            if chosen.shape[1]:
-                largest[int(turning)] = np.maximum(largest[int(turning)], chosen.max(axis=1))
-    v, a, centripetal, j = largest[0].tolist()
-    angular_v, angular_a, _, angular_j = np.degrees(largest[1]).tolist()
-    return Peaks(v, a, centripetal, j, angular_v, angular_a, angular_j)
+    pose = path.move[first]
+    columns = (path.program.line[pose], *path.program.tip[pose].T, seconds, lost, length, least)
+    rows = np.argsort(-lost, kind="stable")[:count]
+    return [SlowMove(*row) for row in zip(*(column[rows].tolist() for column in columns), strict=True)]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,16 +21,22 @@ _TIMES, _TOGETHER = 20_000, 65_536
 _ORDERS = ("speed", "acceleration", "jerk")
 
 
-@dataclass(frozen=True)
-class AxisPeaks:
-    """Largest values of one axis met at the multiples of the period, and its limits; in mm or degrees, and seconds.
+class Peaks(NamedTuple):
+    """Largest values met at the multiples of the period."""
 
-    Parameters
-    ----------
-    reached : (float, float, float)
-        Speed, acceleration, jerk.
-    limits : (float, float, float)
-        Infinite where there is none.
+    speed_mm_per_s: float
+    accel_mm_per_s2: float
+    centripetal_mm_per_s2: float
+    jerk_mm_per_s3: float
+    angular_speed_deg_per_s: float
+    angular_accel_deg_per_s2: float
+    angular_jerk_deg_per_s3: float
+
+
+class AxisPeaks(NamedTuple):
+    """Speed, acceleration and jerk of one axis: largest values met, and limits (inf for none); in mm or degrees, and s.
+
+    The largest ones are those at the multiples of the period.
     """
 
     name: str
@@ -52,17 +59,34 @@ class AxisPeaks:
         }
 
 
+def peaks(law: TimeLaw) -> Peaks:
+    """Largest speed, accelerations and jerk of a law at the multiples of the period."""
+
+    def reached(times: Floats) -> Floats:
+        states = law.at(times)
+        rows = np.abs(np.stack((states.v, states.a, states.centripetal, states.j)))
+        return np.stack([np.where(states.turning == turning, rows, 0.0).max(axis=1) for turning in (False, True)])
+
+    tip, turn = _largest(law, reached, np.zeros((2, 4)))
+    return Peaks(*tip.tolist(), *np.degrees(turn[[0, 1, 3]]).tolist())
+
+
 def axis_peaks(law: TimeLaw) -> list[AxisPeaks]:
     """Peaks of the five axes of a law's machine; none where it was planned without one."""
-    if law.machine_axes is None:
+    axes = law.machine_axes
+    if axes is None:
         return []
+    found = _largest(law, lambda times: np.abs(law.axes_at(times)[1:]).max(axis=1), np.zeros(axes.limits.shape))
+    rows = zip(axes.names, found.T.tolist(), axes.limits.T.tolist(), strict=True)
+    return [AxisPeaks(name, tuple(values), tuple(most)) for name, values, most in rows]
+
+
+def _largest(law: TimeLaw, reached: Callable[[Floats], Floats], least: Floats) -> Floats:
+    """What a law reaches at the multiples of the period, looked at in parts."""
     times = law.every_period()
-    largest = np.zeros((3, len(law.machine_axes.names)))
     for begin in range(0, len(times), _TOGETHER):
-        _, *orders = law.axes_at(times[begin : begin + _TOGETHER])
-        largest = np.maximum(largest, [np.abs(order).max(axis=0) for order in orders])
-    rows = zip(law.machine_axes.names, largest.T.tolist(), law.machine_axes.limits.T.tolist(), strict=True)
-    return [AxisPeaks(name, (v, a, j), (most_v, most_a, most_j)) for name, (v, a, j), (most_v, most_a, most_j) in rows]
+        least = np.maximum(least, reached(times[begin : begin + _TOGETHER]))
+    return least
 
 
 def limiting(law: TimeLaw) -> list[tuple[str, float]]:

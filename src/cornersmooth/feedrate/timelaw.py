@@ -92,24 +92,27 @@ class TimeLaw:
 
     def kinematics(self, t: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """Path coordinate, speed, acceleration and jerk at times t (m,)."""
-        t = np.clip(np.atleast_1d(np.asarray(t, np.float64)), 0.0, self.total)
+        t = self._clipped(t)
         if not len(self.speed):
             return (np.zeros_like(t),) * 4
         phase = self._phases(t)
         return self._inside(phase, t - self.time[phase])
 
+    def _clipped(self, t: Floats) -> Floats:
+        return np.clip(np.atleast_1d(np.asarray(t, np.float64)), 0.0, self.total)
+
     def _phases(self, t: Floats) -> Ints:
         phase: Ints = np.clip(np.searchsorted(self.time, t, side="right") - 1, 0, len(self.speed) - 1)
         return phase
 
-    def _elements(self, t: Floats, x: Floats) -> Ints:
-        """(m,) element at times and path coordinates (m,): of those that the phase goes through.
+    def _elements(self, t: Floats, x: Floats) -> tuple[Ints, Floats]:
+        """(m,) element at times and path coordinates (m,), of those that the phase goes through, and the way on it.
 
         A tip that comes to a stand is at the edge, in the last digit, before the phase ends: jerk is that of the phase.
         """
         last = np.searchsorted(self.edge, self.way[self._phases(t) + 1], side="left") - 1
-        element: Ints = np.minimum(np.searchsorted(self.edge, x, side="right") - 1, last)
-        return np.clip(element, 0, len(self.path) - 1)
+        element = np.clip(np.minimum(np.searchsorted(self.edge, x, side="right") - 1, last), 0, len(self.path) - 1)
+        return element, np.clip(x - self.edge[element], 0.0, self.path.length[element])
 
     def _inside(self, phase: Ints, tau: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         v, a, j, rate = self.speed[phase], self.accel[phase], self.jerk[phase], self.rate[phase]
@@ -149,14 +152,11 @@ class TimeLaw:
 
     def at(self, t: Floats) -> States:
         """State at times t (m,), clipped to the duration."""
-        t = np.clip(np.atleast_1d(np.asarray(t, np.float64)), 0.0, self.total)
-        x, v, a, j = self.kinematics(t)
-        path = self.path
+        t, (x, v, a, j), path = self._clipped(t), self.kinematics(t), self.path
         if not len(path):
             nothing = np.zeros((len(t), 3))
             return States(t, x, v, a, j, x, x > 0.0, x.astype(np.int64), nothing, nothing)
-        element = self._elements(t, x)
-        local = np.clip(x - self.edge[element], 0.0, path.length[element])
+        element, local = self._elements(t, x)
         travel = np.concatenate(([0.0], np.cumsum(np.where(path.turning, 0.0, path.length))))
         turning = path.turning[element]
         s = travel[element] + np.where(turning, 0.0, local)
@@ -176,14 +176,12 @@ class TimeLaw:
         """
         if self.machine_axes is None:
             raise ValueError("the law was not planned for a machine")
-        t = np.clip(np.atleast_1d(np.asarray(t, np.float64)), 0.0, self.total)
-        x, v, a, j = (order[:, None] for order in self.kinematics(t))
-        path = self.path
-        if not len(path):
+        t, (x, *orders) = self._clipped(t), self.kinematics(t)
+        if not len(self.path):
             return (np.zeros((len(x), 5)),) * 4
-        element = self._elements(t, x[:, 0])
-        local = np.clip(x[:, 0] - self.edge[element], 0.0, path.length[element])
-        q, one, two, three = self.machine_axes.orders(element, shares_at(path, element, local))
+        element, local = self._elements(t, x)
+        v, a, j = (order[:, None] for order in orders)
+        q, one, two, three = self.machine_axes.orders(element, shares_at(self.path, element, local))
         # a tip that comes to a stand has no derivatives by its way
         one, two, three = (np.where(np.isfinite(order), order, 0.0) for order in (one, two, three))
         return q, one * v, two * v * v + one * a, three * v**3 + 3.0 * two * v * a + one * j
