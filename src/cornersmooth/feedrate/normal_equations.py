@@ -8,10 +8,13 @@ import numpy as np
 
 from cornersmooth.feedrate.speed_problem import Batch, ahead, behind, weight_of_z
 from cornersmooth.lapack import dpbtrf, dpbtrs
-from cornersmooth.model import Floats, Ints
+from cornersmooth.model import Floats
 
 #: what is added to the main diagonal of the normal equations, relative to it, where they cannot be solved without
 _RIDGES = (0.0, 1e-12, 1e-9, 1e-6, 1e-3)
+
+#: stiffness of what ties coefficients, over that of the limits
+_STIFF = 1e8
 
 
 @dataclass(frozen=True)
@@ -71,7 +74,7 @@ class Equations:
         beside += behind(w_z * near * far + w_zs * (near - far) - w_s + bb * r0 * r1 + r0 * k1 + r1 * k0)
         beside += behind(behind(bb * r1 * r2 + r1 * k2 + r2 * k1))
         beyond += behind(behind(bb * r0 * r2 + r0 * k2 + r2 * k0))
-        _eliminate(batch, bands)
+        _tie(batch, bands)
         return cls(batch, weights, -0.5 * batch.weight * c**-1.5, _factors(bands))
 
     def step(self, pressure: Floats) -> Floats:
@@ -89,10 +92,10 @@ class Equations:
         node_z, node_s = on_z[0] + behind(on_z[1]), s * (on_slope[0] + behind(on_slope[1]))
         gradient = on_z[2] + self.downhill + near * node_z - node_s + r0 * on_bend
         gradient += behind(far * node_z + node_s + r1 * on_bend + on_z[3]) + behind(behind(r2 * on_bend))
-        _fold(batch, gradient)
         step = np.zeros(n) if self.factors is None else np.asarray(dpbtrs(self.factors, -gradient)[0], np.float64)
         if not np.isfinite(step).all():
             step = np.zeros(n)
+        step[batch.frozen] = 0.0
         batch.follow(step)
         return step
 
@@ -111,37 +114,14 @@ def _factors(bands: Floats) -> Floats | None:
     return None
 
 
-def _eliminate(batch: Batch, bands: Floats) -> None:
-    """Take coefficients that follow others, or stay, out of the matrix; their rows become identities."""
-    beyond, beside, diagonal = bands
-    for at, part, inward in _followers(batch):
+def _tie(batch: Batch, bands: Floats) -> None:
+    """Tie coefficients next to a rest to their neighbours, and those that stay to their values, by stiff springs."""
+    _, beside, diagonal = bands
+    for end, ratio, inward in ((batch.first, batch.first_ratio, 1), (batch.last, batch.last_ratio, -1)):
+        at, part = end[~np.isnan(ratio)], ratio[~np.isnan(ratio)]
         to = at + inward
-        pair = np.maximum(at, to)  # column of the entry that joins both
-        diagonal[to] += part * (part * diagonal[at] + 2.0 * beside[pair])
-        beside[np.maximum(to, to + inward)] += part * beyond[np.maximum(at, at + 2 * inward)]
-        _isolate(bands, at)
-    _isolate(bands, np.flatnonzero(batch.frozen))
-
-
-def _fold(batch: Batch, gradient: Floats) -> None:
-    """The same for a right side."""
-    for at, part, inward in _followers(batch):
-        gradient[at + inward] += part * gradient[at]
-        gradient[at] = 0.0
-    gradient[batch.frozen] = 0.0
-
-
-def _followers(batch: Batch) -> tuple[tuple[Ints, Floats, int], ...]:
-    """Coefficients next to a rest, their ratio to the neighbour, and on which side that is: at starts, at ends."""
-    sides = ((batch.first, batch.first_ratio, 1), (batch.last, batch.last_ratio, -1))
-    return tuple((end[~np.isnan(ratio)], ratio[~np.isnan(ratio)], inward) for end, ratio, inward in sides)
-
-
-def _isolate(bands: Floats, rows: Ints) -> None:
-    beyond, beside, diagonal = bands
-    diagonal[rows] = 1.0
-    beside[rows] = 0.0
-    beyond[rows] = 0.0
-    n = len(diagonal)
-    beside[rows[rows + 1 < n] + 1] = 0.0
-    beyond[rows[rows + 2 < n] + 2] = 0.0
+        spring = _STIFF * (diagonal[at] + diagonal[to])
+        diagonal[at] += spring
+        diagonal[to] += part**2 * spring
+        beside[np.maximum(at, to)] -= part * spring
+    diagonal[batch.frozen] *= _STIFF
