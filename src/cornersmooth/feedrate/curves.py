@@ -30,9 +30,6 @@ from cornersmooth.smoothing.runs.polylines import Pieces
 from cornersmooth.smoothing.runs.rows import polylines_of
 from cornersmooth.vectors import norm
 
-#: part of its mean speed below which the tip of a curve is slow
-_SLOW = 0.8
-
 #: speed of the tip over that of the axis point below which the tip stands
 _STANDING = 3e-4
 
@@ -60,8 +57,6 @@ class Curves:
         Halves of transitions between a motion of the tip and a turn on the spot.
     length, angle : (k,) float64
         Of the tip, mm; that the axis turns, rad, where the tip stands still.
-    slow : (k,) bool
-        Pieces on which the tip gets much slower, by their parameter, than it is.
     """
 
     tip: Floats
@@ -75,7 +70,6 @@ class Curves:
     resting: Bools
     length: Floats
     angle: Floats
-    slow: Bools
 
     def __len__(self) -> int:
         return len(self.half)
@@ -101,16 +95,15 @@ class Curves:
         """
         count = len(tip)
         half = np.full(count, WHOLE) if half is None else half
-        length, angle, slow = np.zeros(count), np.zeros(count), np.zeros(count, np.bool_)
+        length, angle = np.zeros(count), np.zeros(count)
         for rows in groups(np.arange(count)):
             length[rows] = interval_lengths(tip[rows], interval_borders(half[rows])).sum(axis=1)
             whole = rows[half[rows] == WHOLE]
             if len(whole):
-                least = slowest(tip[whole])[1].min(axis=1)
+                least = slowest(tip[whole])
                 ends = np.tile([0.0, 1.0], (len(whole), 1))
                 lever = evaluate(axis_point[whole], ends) - evaluate(tip[whole], ends)
                 length[whole[least < _STANDING * norm(lever[:, 1] - lever[:, 0])]] = 0.0
-                slow[whole] = least < _SLOW * length[whole]
             still = rows[length[rows] <= STANDSTILL]
             angle[still] = turned_angle(tip[still], axis_point[still], half[still])
         nothing = np.zeros(count, np.bool_)
@@ -126,7 +119,6 @@ class Curves:
             nothing if resting is None else resting,
             length,
             angle,
-            slow,
         )
 
     @classmethod

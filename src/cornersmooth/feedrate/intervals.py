@@ -9,7 +9,7 @@ needed, never lower: every limit is kept.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,23 +22,24 @@ from cornersmooth.feedrate.path import Kind, Path
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.vectors import norm
 
-#: intervals of a line or arc
+#: intervals of a line or arc to begin with
 INTERVALS = 4
-#: intervals on either side of the point nearest to the pole of a machine, and the first of them over the way on which
-#: the pole is felt
-POLE_INTERVALS, FIRST_INTERVAL = 40, 0.05
 #: the cone at the pole in which derivatives are cut off here, over the cone of the machine: smaller, to be safe
 WITHIN = 0.5
 #: a radius of curvature below this is a cusp and is passed with the speed for this radius, mm
 SMALLEST_RADIUS = 1e-6
-#: places inside of every interval at which derivatives are sampled
-_QUARTERS = np.array([0.25, 0.5, 0.75])
-#: elements sampled together
-_TOGETHER = 4096
-#: most that parabolas may miss of derivatives where the tip all but stands
-_EVEN = 0.05
+#: places of every interval at which derivatives are sampled
+_QUARTERS = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
+#: intervals sampled together
+_TOGETHER = 8192
 #: what parabolas miss at most, over what they miss at the quarters
 _MISSED = 2.0
+#: an interval is halved where parabolas miss so much of the largest derivative on its element, and of a limit
+_EVEN, _FELT = 0.05, 1e-6
+#: and where the part of a limit of speed that is used at one speed varies so much
+_VARIED = 0.05
+#: most halvings
+_DEEPEST = 14
 
 
 @dataclass(frozen=True)
@@ -130,84 +131,193 @@ def path_limits(path: Path, limits: Limits, machine_axes: MachineAxes | None = N
     """Limits of speed, of tip and tool axis as vectors, and of the axes of a machine.
 
     Transitions between a motion of the tip and a turn on the spot are left out but for the tip: by the way of the tip
-    the derivatives of everything else have no bound there. Pieces of runs and of NC programs on which the tip all but
-    stands while the axis turns are looked at closely where it is slowest.
+    the derivatives of everything else have no bound there. Elements are divided until parabolas show how derivatives
+    go: closely at the pole of a machine, and where the tip all but stands while the axis turns.
     """
     steady, moving = ~path.of_curves(path.curves.resting), ~path.turning
-    slow = path.of_curves(path.curves.slow) & moving
-    close, bounds = slow.copy(), np.stack(limits.vector_limits, axis=1)
+    bounds = np.stack(limits.vector_limits, axis=1)
     if machine_axes is not None:
         machine_axes = replace(machine_axes, cone=WITHIN * machine_axes.cone)
         bounds = np.concatenate((bounds, machine_axes.limits), axis=1)
-        close |= machine_axes.near_pole() & steady
-    columns = bounds.shape[1]
-    counts = np.stack((moving, moving & steady, *[steady] * (columns - 2)), axis=1)
-    curved = _curved(path, limits.centripetal_accel)
-    asked = curved | counts[:, np.isfinite(bounds).any(axis=0)].any(axis=1)
+    counts = np.stack((moving, moving & steady, *[steady] * (bounds.shape[1] - 2)), axis=1)
+    look = _Look(path, machine_axes, limits.centripetal_accel, bounds, counts)
+    asked = _curved(path, limits.centripetal_accel) | counts[:, np.isfinite(bounds).any(axis=0)].any(axis=1)
+    found = _divided(look, asked)
+    seen = np.bincount(found["element"], minlength=len(path))
 
     # one interval for the junction before each element, then its own
-    divided = np.where(close, 2 * POLE_INTERVALS, np.where(path.bent, rational_curves.INTERVALS, INTERVALS))
-    count = np.where(asked, divided, 1)
     joined = np.isfinite(path.junction_speed[:-1]) & (path.junction_speed[:-1] > 0.0)
-    begin = np.concatenate(([0], np.cumsum(count + joined)))
-    total, first = int(begin[-1]), begin[:-1] + joined
+    count = joined + np.maximum(seen, 1)
+    begin = np.concatenate(([0], np.cumsum(count)))
+    into = np.arange(len(found["element"])) + (begin[:-1] + joined - np.cumsum(seen) + seen)[found["element"]]
+    junctions = begin[:-1][joined]
+
+    def placed(values: NDArray[Any], other: Floats | float = 0.0) -> NDArray[Any]:
+        whole = np.empty((*values.shape[1:], begin[-1]), values.dtype)
+        whole[...] = other
+        whole[..., into] = np.moveaxis(values, 0, -1)
+        return whole
+
     fastest = path.speed**2
     arc = np.flatnonzero((path.kind == Kind.ARC) & moving)
     kappa = curvature(arcs.series(path.program, path.move[arc], 0.0))
     fastest[arc] = np.minimum(fastest[arc], limits.centripetal_accel / kappa)
-    width, cap = (np.repeat(values, count + joined) for values in (path.length, fastest))
-    rows = np.zeros((2, 5, total))  # of vectors, of the machine
-    width[begin[:-1][joined]] = 0.0
-    cap[begin[:-1][joined]] = path.junction_speed[:-1][joined] ** 2
-    machine_cap = cap.copy()
-    value = np.zeros((3, columns - 2, total, 3), np.float32)
-    missed = np.zeros(value.shape[:-1], np.float32)
-    middle, known = np.full(total, 0.5), np.ones(total, np.bool_)
-    for bent, near in ((True, True), (True, False), (False, True), (False, False)):
-        chosen = np.flatnonzero(asked & (path.bent == bent) & (close == near))
-        size = _TOGETHER // 8 if near else _TOGETHER
-        for at in range(0, len(chosen), size):
-            element = chosen[at : at + size]
-            graded = _graded(path, element, slow[element], machine_axes) if near else None
-            fine, share, quarters = _divided(path, element, bent, graded)
-            into = first[element][:, None] + np.arange(share.shape[1])
-            width[into] = share * path.length[element][:, None]
-            along = _sampled(path, element, fine, machine_axes)
-            amounts = np.where(counts[element][:, None], _largest(along), 0.0)
-            most, rows[0][:, into] = _judge(amounts[..., :2], bounds[:, :2])
-            most = np.minimum(most, _judge(amounts[:1], bounds[:1])[0])
-            if bent:
-                most = np.minimum(most, limits.centripetal_accel / np.maximum(amounts[1, ..., 0], 1e-300))
-                most = np.maximum(most, limits.centripetal_accel * SMALLEST_RADIUS)
-            cap[into] = np.minimum(cap[into], most)
-            if machine_axes is None:
-                continue
-            amounts, along = amounts[..., 2:], along[..., 2:]
-            most, rows[1][:, into] = _judge(amounts, bounds[:, 2:])
-            machine_cap[into] = np.minimum(cap[into], most)
-            finite = np.isfinite(along).all(axis=(0, 3, 4))
-            middle[into] = quarters[1]
-            along = np.where((finite & steady[element][:, None])[..., None, None], along, 0.0)
-            off = np.stack([_missed(values, quarters) for values in along])
-            value[:, :, into] = along[..., ::2, :].transpose(0, 4, 1, 2, 3)
-            missed[:, :, into] = off.transpose(0, 3, 1, 2)
-            # where the tip all but stands, and derivatives change much, huge terms cancel
-            even = (off <= _EVEN * np.abs(along).max(axis=3)).all(axis=(0, 3)) | ~slow[element][:, None]
-            known[into] = (finite & even) | ~steady[element][:, None]
+    cap = np.minimum(placed(found["cap"], np.inf), np.repeat(fastest, count))
+    cap[junctions] = path.junction_speed[:-1][joined] ** 2
+    rows, width = placed(found["rows"]), placed(found["width"], np.repeat(path.length, count))
+    width[junctions] = 0.0
 
     stops = np.flatnonzero(path.junction_speed == 0.0) if len(path) else np.zeros(1, np.int64)
     kinds = np.array(((limits.accel, limits.jerk), limits.rapid_limits[1:], limits.angular_limits[1:]))
     accel, jerk = kinds[np.where(path.turning[stops[:-1]], 2, path.rapid[stops[:-1]])].T
     along_path = np.repeat((0.5 / accel, 1.0 / jerk), np.diff(begin[stops]), axis=1)
-    rows[0][[0, 2]] = np.maximum(rows[0][[0, 2]], along_path)
+    rows[[0, 2]] = np.maximum(rows[[0, 2]], along_path)
     before = np.cumsum(width) - width
-    ways = np.repeat((path.edge[:-1], before[begin[:-1]]), count + joined, axis=1)  # to each element
+    ways = np.repeat((path.edge[:-1], before[begin[:-1]]), count, axis=1)  # to each element
     edge = np.append(before - ways[1] + ways[0], path.edge[-1])  # exact where elements begin
-    vectors = Intervals(np.maximum.accumulate(edge), cap, rows[0], begin[stops], accel, jerk)
+    vectors = Intervals(np.maximum.accumulate(edge), cap, rows, begin[stops], accel, jerk)
     if machine_axes is None:
         return PathLimits(vectors, vectors, None)
-    whole = replace(vectors, cap=np.minimum(cap, machine_cap), rows=rows.max(axis=0))
-    return PathLimits(whole, vectors, AxisSamples(value, missed, middle, known, *machine_axes.limits[1:]))
+    whole = replace(
+        vectors,
+        cap=np.minimum(cap, placed(found["machine_cap"], np.inf)),
+        rows=np.maximum(rows, placed(found["machine_rows"])),
+    )
+    samples = AxisSamples(
+        np.moveaxis(placed(found["value"]), 2, -1),
+        placed(found["missed"]),
+        placed(found["middle"], 0.5),
+        placed(found["known"], 1.0),
+        *machine_axes.limits[1:],
+    )
+    return PathLimits(whole, vectors, samples)
+
+
+@dataclass(frozen=True)
+class _Look:
+    """What is limited: the tip and the tool axis by their lengths, then the axes of a machine with their signs.
+
+    Parameters
+    ----------
+    centripetal : float, mm/s²
+    bounds : (3, d) float64
+        Limits of speed, acceleration and jerk.
+    counts : (m, d) bool
+        Whether they are limited on each element.
+    """
+
+    path: Path
+    machine_axes: MachineAxes | None
+    centripetal: float
+    bounds: Floats
+    counts: Bools
+
+    @property
+    def columns(self) -> np.dtype[np.void]:
+        """What is known of an interval of an element; names as in `Intervals` and `AxisSamples`."""
+        axes = self.bounds.shape[1] - 2
+        numbers = [(name, np.float64) for name in ("low", "width", "cap", "machine_cap", "middle")]
+        rows = [(name, np.float64, (5,)) for name in ("rows", "machine_rows")]
+        samples = [("value", np.float32, (3, axes, 3)), ("missed", np.float32, (3, axes))]
+        return np.dtype([("element", np.int64), ("known", np.bool_), *numbers, *rows, *samples])
+
+    def at(self, element: Ints, low: Floats, high: Floats, largest: Floats) -> tuple[NDArray[np.void], Bools]:
+        """Limits over intervals (p,), and whether parabolas miss too much of a derivative in them.
+
+        Parameters
+        ----------
+        element : (p,) int64
+        low, high : (p,) float64
+            Ends, as `share` in `taylor_along`.
+        largest : (3, m, d) float64
+            Largest derivatives seen on each element; those of these intervals are added.
+        """
+        path, bounds = self.path, self.bounds
+        fine = low[:, None] + (high - low)[:, None] * _QUARTERS
+        lengths = np.diff(fine, axis=1) * path.length[element][:, None]
+        bent = path.bent[element]
+        if bent.any():
+            powers = path.curves.tip[path.row[element[bent]]]
+            lengths[bent] = rational_curves.interval_lengths(powers, fine[bent])
+        width = lengths.sum(axis=1)
+        even = np.broadcast_to(0.25, lengths.shape)
+        parts = np.divide(lengths, width[:, None], out=even.copy(), where=width[:, None] > 0.0)
+        quarters = np.cumsum(parts, axis=1)[:, :3].T
+        along = self._sampled(element, fine)
+        amounts = np.where(self.counts[element], _largest(along), 0.0)
+        for order, amount in zip(largest, amounts, strict=True):
+            np.maximum.at(order, element, amount)
+        cap, rows = _judge(amounts[..., :2], bounds[:, :2])
+        fastest = np.minimum(_judge(amounts[:1], bounds[:1])[0], path.speed[element] ** 2)
+        cap = np.minimum(cap, fastest)
+        bend = self.centripetal / np.maximum(amounts[1, :, 0], 1e-300)
+        cap = np.where(bent, np.minimum(cap, np.maximum(bend, self.centripetal * SMALLEST_RADIUS)), cap)
+        machine_cap, machine_rows = _judge(amounts[..., 2:], bounds[:, 2:])
+
+        finite = np.isfinite(along).all(axis=(0, 2)) & self.counts[element]
+        along = np.where(finite[:, None], along, 0.0)
+        off = np.stack([_missed(values, quarters) for values in along])
+        speed = np.sqrt(np.minimum(cap, machine_cap))[:, None]
+        used = off * speed ** np.arange(1, 4)[:, None, None] / bounds[:, None]
+        uneven = ((off > _EVEN * largest[:, element]) & (used > _FELT)).any(axis=(0, 2))
+        # one limit of speed holds in the whole interval
+        uneven |= (np.ptp(np.abs(along[0]), axis=1) * np.sqrt(fastest)[:, None] > _VARIED * bounds[0]).any(axis=1)
+        found = np.zeros(len(element), self.columns)
+        found["element"], found["low"], found["width"], found["middle"] = element, low, width, quarters[1]
+        found["cap"], found["rows"], found["machine_cap"], found["machine_rows"] = (
+            cap,
+            rows.T,
+            machine_cap,
+            machine_rows.T,
+        )
+        found["known"] = (finite | ~self.counts[element])[:, 2:].all(axis=1)
+        found["value"] = along[:, :, ::2, 2:].transpose(1, 0, 3, 2)
+        found["missed"] = off[..., 2:].transpose(1, 0, 2)
+        return found, uneven
+
+    def _sampled(self, element: Ints, fine: Floats) -> Floats:
+        """First three derivatives (3, p, 5, d) at the ends and quarters `fine` (p, 5) of intervals."""
+        which, share = np.repeat(element, fine.shape[1]), fine.ravel()
+        tip, axis, speed = taylor_along(self.path, which, share)
+        more = [] if self.machine_axes is None else [self.machine_axes.positions(which, share, tip, axis)]
+        orders = np.stack(known_by_way(np.concatenate((tip, axis, *more), axis=-1), speed))
+        lengths = np.stack((norm(orders[..., :3]), norm(orders[..., 3:6])), axis=-1)
+        values = np.concatenate((lengths, orders[..., 6:]), axis=-1).reshape(3, *fine.shape, -1)
+        # a curve that turns back between two samples has a cusp
+        back = _turns_back(tip[1].reshape(*fine.shape, 3)) & self.path.bent[element][:, None]
+        values[1, :, 1:, 0][back] = 1.0 / SMALLEST_RADIUS
+        return values
+
+
+def _divided(look: _Look, asked: Bools) -> NDArray[np.void]:
+    """Intervals (`_Look.columns`) of the elements that are asked for, in order."""
+    path, start = look.path, []
+    for bent in (False, True):
+        element = np.flatnonzero(asked & (path.bent == bent))
+        borders = np.tile(np.linspace(0.0, 1.0, INTERVALS + 1), (len(element), 1))
+        if bent:
+            borders = rational_curves.interval_borders(path.curves.half[path.row[element]])
+        start.append((np.repeat(element, borders.shape[1] - 1), borders[:, :-1].ravel(), borders[:, 1:].ravel()))
+    element, low, high = (np.concatenate(part) for part in zip(*start, strict=True))
+    done, largest = [], np.zeros((3, *look.counts.shape))
+    for depth in range(_DEEPEST + 1):
+        closer = []
+        for at in range(0, len(element), _TOGETHER):
+            some = slice(at, at + _TOGETHER)
+            found, uneven = look.at(element[some], low[some], high[some], largest)
+            again = uneven & (depth < _DEEPEST)
+            done.append(found[~again])
+            closer.append((element[some][again], low[some][again], high[some][again]))
+        if not closer:
+            break
+        element, low, high = (np.repeat(np.concatenate(part), 2) for part in zip(*closer, strict=True))
+        low[1::2] = high[::2] = 0.5 * (low[::2] + high[::2])
+    found = np.concatenate(done) if done else np.zeros(0, look.columns)
+    found = found[np.lexsort((found["low"], found["element"]))]
+    # the length of an element was measured on other intervals
+    measured = np.bincount(found["element"], found["width"], len(path))[found["element"]]
+    found["width"] *= path.length[found["element"]] / measured
+    return found
 
 
 def _curved(path: Path, most: float) -> Bools:
@@ -228,74 +338,8 @@ def _turns_back(tangents: Floats) -> Bools:
     return back
 
 
-def _sampled(path: Path, element: Ints, fine: Floats, machine_axes: MachineAxes | None) -> Floats:
-    """First three derivatives (3, g, p, 5, d) in intervals whose ends and quarters are at `fine` (g, 4·p + 1).
-
-    Of the tip and the tool axis their lengths, then of the axes of a machine with their signs.
-    """
-    which, share = np.repeat(element, fine.shape[1]), fine.ravel()
-    tip, axis, speed = taylor_along(path, which, share)
-    of_machine = [] if machine_axes is None else [machine_axes.positions(which, share, tip, axis)]
-    orders = np.stack(known_by_way(np.concatenate((tip, axis, *of_machine), axis=-1), speed))
-    lengths = np.stack((norm(orders[..., :3]), norm(orders[..., 3:6])), axis=-1)
-    values = np.concatenate((lengths, orders[..., 6:]), axis=-1).reshape(3, *fine.shape, -1)
-    # a curve that turns back between two samples has a cusp
-    back = _turns_back(tip[1].reshape(*fine.shape, 3)) & path.bent[element][:, None]
-    values[1, :, 1:, 0][back] = 1.0 / SMALLEST_RADIUS
-    return values[:, :, np.arange(0, fine.shape[1] - 1, 4)[:, None] + np.arange(5)]
-
-
-def _graded(path: Path, element: Ints, slow: Bools, machine_axes: MachineAxes | None) -> Floats:
-    """Borders (g, p + 1) of intervals that are small where the axis is nearest to the pole, or the tip slowest."""
-    borders = np.zeros((len(element), 2 * POLE_INTERVALS + 1))
-    swift = np.flatnonzero(~slow)
-    if len(swift) and machine_axes is not None:
-        borders[swift] = _around(*machine_axes.closest(element[swift]), POLE_INTERVALS)
-    if slow.any():
-        places, _, felt = rational_curves.slowest(path.curves.tip[path.row[element[slow]]])
-        both = [_around(places[:, k], felt[:, k], POLE_INTERVALS // 2) for k in range(2)]
-        borders[slow] = np.sort(np.concatenate(both, axis=1), axis=1)[:, :-1]  # two of them are the end
-    return borders
-
-
-def _around(closest: Floats, felt: Floats, intervals: int) -> Floats:
-    """Borders (g, p + 1) of so many intervals on either side of a point, which grow with the distance from it."""
-    smallest = FIRST_INTERVAL * felt[:, None]
-    steps = np.linspace(0.0, 1.0, intervals + 1)
-    away = smallest * np.sinh(steps * np.arcsinh(1.0 / smallest))
-    both = np.concatenate((closest[:, None] - away[:, :0:-1], closest[:, None] + away), axis=1)
-    borders: Floats = np.clip(both, 0.0, 1.0)
-    return borders
-
-
-def _divided(path: Path, element: Ints, curve: bool, given: Floats | None) -> tuple[Floats, Floats, Floats]:
-    """Ends and quarters (g, 4·p + 1) of intervals that divide elements, their shares (g, p) of the length.
-
-    Third come the shares (3, g, p) of the length of an interval that are before the quarters of its parameter.
-    """
-    row = path.row[element]
-    if given is not None:
-        borders = given
-    elif curve:
-        borders = rational_curves.interval_borders(path.curves.half[row])
-    else:
-        borders = np.tile(np.linspace(0.0, 1.0, INTERVALS + 1), (len(element), 1))
-    step = np.diff(borders, axis=1)
-    fine = np.repeat(borders, 4, axis=1)[:, :-3]
-    for number in (1, 2, 3):
-        fine[:, number::4] = borders[:, :-1] + _QUARTERS[number - 1] * step
-    if not curve:
-        return fine, step, np.broadcast_to(_QUARTERS[:, None, None], (3, *step.shape))
-    before = rational_curves.lengths_before(path.curves.tip[row], path.curves.half[row], fine)
-    before = np.maximum.accumulate(before, axis=1)
-    along = before[:, 1:].reshape(*step.shape, 4) - before[:, :-1:4, None]
-    whole = along[..., 3]
-    quarters = np.where(whole[..., None] > 0.0, along[..., :3] / np.maximum(whole, 1e-300)[..., None], _QUARTERS)
-    return fine, whole / whole.sum(axis=1, keepdims=True), quarters.transpose(2, 0, 1)
-
-
 def _judge(amounts: Floats, bounds: Floats) -> tuple[Floats, Floats]:
-    """Bounds of v² (g, p) and rows (5, g, p) from the largest amounts (3, g, p, d) of derivatives, or (1, g, p, d)."""
+    """Bounds of v² (p,) and rows (5, p) from the largest amounts (3, p, d) of derivatives, or (1, p, d)."""
     with np.errstate(divide="ignore"):
         power = 2.0 / np.arange(1, len(amounts) + 1)
         steady = [(bound / most) ** n for bound, most, n in zip(bounds, amounts, power, strict=True)]
@@ -318,24 +362,24 @@ def parabola(share: Floats, middle: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _missed(values: Floats, shares: Floats) -> Floats:
-    """(g, p, d) by how much parabolas over the length miss the quarters of the parameter; values (g, p, 5, d)."""
-    found = np.zeros((*values.shape[:2], values.shape[-1]))
+    """(p, d) by how much parabolas over the length miss the quarters of the parameter; values (p, 5, d)."""
+    found = np.zeros((len(values), values.shape[-1]))
     for at in (1, 3):
         expected = np.zeros_like(found)
         for number, factor in enumerate(parabola(shares[at - 1], shares[1])):
-            expected += factor[..., None] * values[:, :, 2 * number]
-        np.maximum(found, np.abs(values[:, :, at] - expected), out=found)
+            expected += factor[:, None] * values[:, 2 * number]
+        np.maximum(found, np.abs(values[:, at] - expected), out=found)
     return _MISSED * found
 
 
 def _largest(along: Floats) -> Floats:
-    """Largest amounts (3, g, p, d) of derivatives in every interval, from samples (3, g, p, 5, d).
+    """Largest amounts (3, p, d) of derivatives in every interval, from samples (3, p, 5, d).
 
     Not at an end where the tip comes to a stand and they are infinite. Between two samples a smooth function leaves
     their range by at most an eighth of its second difference.
     """
     known = np.isfinite(along)
     along = np.where(known, along, 0.0)
-    between = np.where(known.all(axis=3), np.abs(np.diff(along, n=2, axis=3)).max(axis=3) / 8.0, 0.0)
-    largest: Floats = np.abs(along).max(axis=3) + between
+    between = np.where(known.all(axis=2), np.abs(np.diff(along, n=2, axis=2)).max(axis=2) / 8.0, 0.0)
+    largest: Floats = np.abs(along).max(axis=2) + between
     return largest

@@ -19,18 +19,14 @@ import numpy as np
 from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate import taylor
 from cornersmooth.feedrate.motion import known_by_way, taylor_along
-from cornersmooth.feedrate.path import NO_TURN, Path
+from cornersmooth.feedrate.path import Path
 from cornersmooth.feedrate.rational_curves import WHOLE
-from cornersmooth.kinematics import Machine, solutions
+from cornersmooth.kinematics import Machine
 from cornersmooth.kinematics.machine import PARALLEL
-from cornersmooth.kinematics.poses import angle_between, continued
-from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.kinematics.poses import continued
+from cornersmooth.model import Floats, Ints
 from cornersmooth.rotary import rapid_moves, rotary_angles
 
-#: an element whose axis comes nearer to the pole than so many times its own turn is looked at closely there
-NEAR_POLE = 5.0
-#: points at which such an element is searched for its nearest point to the pole, and rounds of closer search
-_SEARCHED, _ROUNDS = 17, 4
 #: rotary angles may lie beyond the reach by so many times the cone: as many as `rotary_angles` lets pass
 _CONES = 2.0
 
@@ -158,33 +154,6 @@ class MachineAxes:
             allowed[joint] = np.fmin(allowed, steady)[joint]
             found[sharp] = np.where(np.isnan(allowed), np.inf, allowed).min(axis=1)
         return found
-
-    def near_pole(self) -> Bools:
-        """(m,) bool: elements on which the first rotary axis may turn fast over a small part of the length."""
-        path = self.path
-        axis = path.program.axis
-        start, end = path.start, path.move
-        turn = angle_between(axis[start], axis[end])
-        distance = solutions(self.machine, axis).pole_distance
-        near = np.minimum(distance[start], distance[end]) <= NEAR_POLE * turn
-        found: Bools = near & (turn > np.degrees(NO_TURN)) & ~path.rapid
-        return found
-
-    def closest(self, element: Ints) -> tuple[Floats, Floats]:
-        """Shares (m,) at which the axis is nearest to the pole on these elements, and how far (m,) it is felt there."""
-        about = self.machine.axes[0].unit
-        low, high = np.zeros(len(element)), np.ones(len(element))
-        rows = np.arange(len(element))
-        for _ in range(_ROUNDS):
-            share = low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, _SEARCHED)
-            _, axis, _ = taylor_along(self.path, np.repeat(element, _SEARCHED), share.ravel())
-            aside = np.linalg.norm(np.cross(about, axis[0]), axis=-1).reshape(share.shape)
-            speed = np.linalg.norm(axis[1], axis=-1).reshape(share.shape)
-            at = aside.argmin(axis=1)
-            low, high = share[rows, np.maximum(at - 1, 0)], share[rows, np.minimum(at + 1, _SEARCHED - 1)]
-        distance = np.maximum(aside[rows, at], math.sin(math.radians(self.cone)))
-        felt: Floats = np.minimum(distance / np.maximum(speed[rows, at], distance), 1.0)
-        return share[rows, at], felt
 
 
 def follow(machine: Machine, path: Path) -> MachineAxes:

@@ -35,9 +35,8 @@ _NODES, _WEIGHTS = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
 INTERVALS = 12
 _PROGRESS = 1.0 - np.linspace(1.0, 0.0, INTERVALS + 1) ** 1.7
 _NEWTON_STEPS = 3
-#: points among which the slowest of a curve is searched for, rounds of closer search, and the least share of the curve
-#: over which a slow point may be felt
-_SEARCHED, _ROUNDS, _LEAST_FELT = 25, 4, 1e-6
+#: points among which the slowest of a curve is searched for, and rounds of closer search
+_SEARCHED, _ROUNDS = 25, 3
 #: parameter beside an end at which the tangent is taken where there is none at the end itself
 _BESIDE = 1e-3
 
@@ -137,58 +136,23 @@ def interval_borders(half: Ints) -> Floats:
 
 def interval_lengths(powers: Floats, borders: Floats) -> Floats:
     """Arc lengths (g, p) between neighbouring parameters `borders` (g, p + 1), by Gauss-Legendre with 5 points."""
-    return _lengths(powers, borders[:, :-1], np.diff(borders, axis=1))
-
-
-def _lengths(powers: Floats, low: Floats, step: Floats) -> Floats:
-    """Arc lengths (g, p) from the parameters `low` to `low` + `step`."""
-    g, p = low.shape
-    t = low[..., None] + step[..., None] * _NODES
-    speed = _size(_derivatives(powers, t.reshape(g, p * len(_NODES)), 1)[1]).reshape(g, p, len(_NODES))
+    step = np.diff(borders, axis=1)
+    t = borders[:, :-1, None] + step[..., None] * _NODES
+    speed = _size(_derivatives(powers, t.reshape(len(t), -1), 1)[1]).reshape(t.shape)
     lengths: Floats = np.einsum("gpn,n->gp", speed, _WEIGHTS) * step
     return lengths
 
 
-def lengths_before(powers: Floats, half: Ints, t: Floats) -> Floats:
-    """Arc lengths (g, q) from the start of halves to parameters t (g, q), of which `parameters_at` is the inverse.
-
-    Where the tip all but stands the quadrature misses a little, here and there alike.
-    """
-    borders = interval_borders(half)
-    lengths = np.concatenate((np.zeros((len(powers), 1)), np.cumsum(interval_lengths(powers, borders), axis=1)), axis=1)
-    interval = np.clip((borders[:, None, :] <= t[..., None]).sum(axis=2) - 1, 0, INTERVALS - 1)
-    low = np.take_along_axis(borders, interval, axis=1)
-    return np.take_along_axis(lengths, interval, axis=1) + _lengths(powers, low, t - low)
-
-
-def slowest(powers: Floats) -> tuple[Floats, Floats, Floats]:
-    """Where curves are slowest by their parameter, that speed (mm), and the share over which it is felt, (g, 2) each.
-
-    The square of the speed of a cubic has up to two minima; where there is one, both columns are the same. Sampled, and
-    sampled again ever more closely.
-    """
-    g = len(powers)
-    t = np.broadcast_to(np.linspace(0.0, 1.0, _SEARCHED), (g, _SEARCHED))
-    speed = np.broadcast_to(_size(_derivatives(powers, t, 1)[1]), t.shape)
-    wide = np.concatenate((speed[:, :1], speed, speed[:, -1:]), axis=1)
-    smallest = np.where((speed <= wide[:, :-2]) & (speed <= wide[:, 2:]), speed, np.inf)
-    both = np.argsort(smallest, axis=1, kind="stable")[:, :2]
-    rows = np.arange(g)
-    both[:, 1] = np.where(np.isfinite(smallest[rows, both[:, 1]]), both[:, 1], both[:, 0])
-    places, speeds, shares = np.zeros((g, 2)), np.zeros((g, 2)), np.zeros((g, 2))
-    for column, at in enumerate(both.T):
+def slowest(powers: Floats) -> Floats:
+    """Least speed (g,) of curves by their parameter, mm; sampled, and sampled again ever more closely."""
+    rows, low, high = np.arange(len(powers)), np.zeros(len(powers)), np.ones(len(powers))
+    for _ in range(_ROUNDS):
+        t = low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, _SEARCHED)
+        speed = np.broadcast_to(_size(_derivatives(powers, t, 1)[1]), t.shape)
+        at = speed.argmin(axis=1)
         low, high = t[rows, np.maximum(at - 1, 0)], t[rows, np.minimum(at + 1, _SEARCHED - 1)]
-        for _ in range(_ROUNDS):
-            near = low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, 9)
-            _, d1, d2 = _derivatives(powers, near, 2)
-            speed = np.broadcast_to(_size(d1), near.shape)
-            at = speed.argmin(axis=1)
-            low, high = near[rows, np.maximum(at - 1, 0)], near[rows, np.minimum(at + 1, 8)]
-        least, bend = speed[rows, at], np.broadcast_to(_size(d2), near.shape)[rows, at]
-        places[:, column], speeds[:, column] = near[rows, at], least
-        felt = least / np.maximum(bend, np.maximum(least, np.finfo(np.float64).tiny))
-        shares[:, column] = np.clip(felt, _LEAST_FELT, 1.0)
-    return places, speeds, shares
+    least: Floats = speed[rows, at]
+    return least
 
 
 def parameters_at(powers: Floats, half: Ints, which: Ints, distance: Floats) -> Floats:
