@@ -270,7 +270,7 @@ class _Look:
             machine_cap,
             machine_rows.T,
         )
-        found["known"] = (finite | ~self.counts[element])[:, 2:].all(axis=1)
+        found["known"] = (finite | ~self.counts[element])[:, 2:].all(axis=1) & ~uneven
         found["value"] = along[:, :, ::2, 2:].transpose(1, 0, 3, 2)
         found["missed"] = off[..., 2:].transpose(1, 0, 2)
         return found, uneven

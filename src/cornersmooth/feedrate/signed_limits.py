@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 
 from cornersmooth.feedrate.grid import Grid, cell_intervals
 from cornersmooth.feedrate.interior_point import GAP
@@ -258,7 +259,9 @@ def faster(grid: Grid, free: Grid, places: Places, batch: Batch, best: Floats) -
             unseen = np.maximum(used - seen, 0.0) / np.maximum(used, 1.0)
             held, left = (np.take_along_axis(part, axes, axis=0) for part in (used, unseen))
             summed |= ((held > 1.0) & (held - 1.0 + left > _MOST)).any(axis=0)  # signs do not help there
-            axes[:] = np.argpartition(-used, AXES - 1, axis=0)[:AXES]
+            # an axis that is beyond its limit in a cell may be so in the next plan beside it
+            near = maximum_filter1d(used, 2 ** (number + 1) + 1, axis=1)
+            axes[:] = np.argpartition(-near, AXES - 1, axis=0)[:AXES]
             shares.append(1.0 / (1.0 - np.minimum(unseen + _ROOM, _MOST)))
         # the cell of a slot is the next one of the grid; sums use the same share of their limits
         sums = ~stop & np.append(False, summed[:-1])
