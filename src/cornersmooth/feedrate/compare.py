@@ -127,23 +127,15 @@ def compare(
 ) -> Comparison:
     """Plan a program directly, with stops and with jumps of velocity, and the ideal curves of methods.
 
+    It raises what `cornersmooth.feedrate.plan` does.
+
     Parameters
     ----------
     settings : Settings, optional
-    limits : Limits, optional
     methods : sequence of str
         Whose curves are planned.
-    machine : Machine, optional
-        Keep the limits of its five axes, too.
     progress : callable, optional
         Called with (name of the law, work done, work in all).
-
-    Raises
-    ------
-    SettingsError
-        A feed move has no feed in mm/min and `Limits.feed` is not given, or the machine has no dynamics.
-    InputError
-        The machine does not reach a tool axis.
     """
     settings = Settings() if settings is None else settings
     limits = Limits() if limits is None else limits

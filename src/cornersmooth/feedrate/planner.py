@@ -48,7 +48,6 @@ def plan(
 
     Parameters
     ----------
-    limits : Limits, optional
     machine : Machine, optional
         Keep the limits of its five axes.
     progress : callable, optional
@@ -79,9 +78,10 @@ def direct(
 ) -> TimeLaw:
     """Plan the motion along the original path.
 
+    It raises what `cornersmooth.feedrate.plan` does.
+
     Parameters
     ----------
-    limits : Limits, optional
     baseline : {"exact_stop", "velocity_jump"}
         What happens at corners: a stop at the end of every move, or a jump of velocity of at most ``accel · period``,
         that is a speed of at most ``accel · period / (2·sin(α/2))``; where corners follow one another within a
@@ -90,13 +90,6 @@ def direct(
         Says which repeated poses are one.
     machine : Machine, optional
         Keep the limits of its five axes; at corners none jumps by more than its acceleration allows in one period.
-
-    Raises
-    ------
-    SettingsError
-        A feed move has no feed in mm/min and `Limits.feed` is not given, or the machine has no dynamics.
-    InputError
-        The machine does not reach a tool axis.
     """
     limits = Limits() if limits is None else limits
     settings = Settings() if settings is None else settings

@@ -274,6 +274,8 @@ def plan_text(
 ) -> TimeLaw:
     """Plan an NC text as its control would run it.
 
+    It raises what `cornersmooth.feedrate.plan` does.
+
     Corners of lines are passed with a change of velocity of at most ``accel · period``, with a machine of no axis by
     more than its own acceleration allows in one period. Curves are those of the written numbers, so that rounded digits
     bend them: where they join with a kink, what holds for corners holds; and no axis of a machine changes its
@@ -283,24 +285,13 @@ def plan_text(
     ----------
     nc : NcProgram
         As `cornersmooth.nc_reader.read_nc` gives it.
-    limits : Limits, optional
     name : str
         File name for messages.
     blocks : BlockLimits, optional
     settings : Settings, optional
         Says at what distance the axis point is, and which repeated poses are one.
-    machine : Machine, optional
-        Keep the limits of its five axes.
     progress : callable, optional
         Called with (work done, work in all).
-
-    Raises
-    ------
-    SettingsError
-        A feed move has no feed in mm/min and `Limits.feed` is not given; the machine has no
-        dynamics.
-    InputError
-        The machine does not reach a tool axis.
     """
     limits = Limits() if limits is None else limits
     settings = Settings() if settings is None else settings
