@@ -16,6 +16,7 @@ from cornersmooth.feedrate import Limits, direct, plan, planner, signed_limits
 from cornersmooth.feedrate.machine_axes import MachineAxes, follow
 from cornersmooth.feedrate.motion import poses, shares_at
 from cornersmooth.feedrate.path import Path, build_path
+from cornersmooth.feedrate.scurve import rest_to_rest
 from cornersmooth.feedrate.timelaw import TimeLaw
 from cornersmooth.kinematics import Dynamics, Machine, load_machine, machine_position, solutions, tool_axis
 from cornersmooth.model import Floats, Ints, Move, Program
@@ -167,6 +168,18 @@ def test_passing_the_pole(aside: float) -> None:
         turn = np.degrees(2.0 * np.arctan(0.2 / aside))
         assert law.total > turn / 180.0  # the way of C at its largest speed
         assert law.total < turn / 180.0 + 3.0
+
+
+@pytest.mark.parametrize("aside", [0.01, 0.001, 0.0003])
+def test_passing_the_pole_is_no_slower_than_a_stop_there(aside: float) -> None:
+    """A tip that comes to rest at the pole, while C turns by half a turn, keeps every limit too."""
+    machine = load_machine("table-ac")
+    lean = np.linspace(-0.2, 0.2, 4)
+    axis = np.stack((np.sin(lean), np.full(4, aside), np.cos(lean)), axis=1)
+    program = Program.from_poses(np.outer(np.linspace(0.0, 40.0, 4), (1.0, 0.0, 0.0)), axis, feed=3000.0)
+    limits = np.array([[50.0, 1000.0, 5000.0], next(axis.per_second for axis in machine.dynamics if axis.name == "C")])
+    way, turn = rest_to_rest(np.array([20.0, 180.0]), *limits.T)[0].sum(axis=1)
+    assert plan(smooth(program), machine=machine).total < 2.0 * way + turn
 
 
 def test_through_the_pole_and_at_it(recwarn: pytest.WarningsRecorder) -> None:
