@@ -45,23 +45,25 @@ class RotaryAxis:
         if self.carrier == "none":
             return
         if self.name not in ("A", "B", "C"):
-            raise _wrong(f"rotary axis name {self.name!r} is not an address", "use A, B or C")
+            raise SettingsError("CS253", f"rotary axis name {self.name!r} is not an address", "use A, B or C")
         if self.carrier not in ("table", "head"):
-            raise _wrong(f"{where}: carrier is {self.carrier!r}", "use table or head")
+            raise SettingsError("CS253", f"{where}: carrier is {self.carrier!r}", "use table or head")
         if self.positive not in ("tool", "table") or (self.carrier == "head" and self.positive != "tool"):
             choice = "use tool" if self.carrier == "head" else "use tool or table"
-            raise _wrong(f"{where}: positive is {self.positive!r}", choice)
+            raise SettingsError("CS253", f"{where}: positive is {self.positive!r}", choice)
         _check_vectors(where, direction=self.direction, point=self.point)
         if not any(self.direction):
-            raise _wrong(f"{where}: direction is zero", "give a vector along the axis")
+            raise SettingsError("CS253", f"{where}: direction is zero", "give a vector along the axis")
         if self.clamp is not None and not all(re.fullmatch(r"M[1-9]\d{0,3}", word) for word in self.clamp):
-            raise _wrong(f"{where}: clamp is {self.clamp!r}", 'give two M words, as in ["M10", "M11"]')
+            raise SettingsError("CS253", f"{where}: clamp is {self.clamp!r}", 'give two M words, as in ["M10", "M11"]')
         if self.limits is not None and self.modulo:
-            raise _wrong(f"{where}: a modulo axis with limits", "leave out one of both")
+            raise SettingsError("CS253", f"{where}: a modulo axis with limits", "leave out one of both")
         if self.limits is not None:
             low, high = self.limits
             if not (math.isfinite(low) and math.isfinite(high) and low < high):
-                raise _wrong(f"{where}: limits are {low:g} and {high:g}", "give the lower one first, in degrees")
+                raise SettingsError(
+                    "CS253", f"{where}: limits are {low:g} and {high:g}", "give the lower one first, in degrees"
+                )
 
     @property
     def sign(self) -> float:
@@ -124,49 +126,54 @@ class Machine:
     def __post_init__(self) -> None:
         where = f"machine {self.name}"
         if len(self.axes) > 2:
-            raise _wrong(f"{where} has {len(self.axes)} rotary axes", "describe two at most")
+            raise SettingsError("CS253", f"{where} has {len(self.axes)} rotary axes", "describe two at most")
         _check_vectors(where, tool_direction=self.tool_direction, part_zero=self.part_zero)
         if not any(self.tool_direction):
-            raise _wrong(f"{where}: tool_direction is zero", "give a vector along the tool")
+            raise SettingsError("CS253", f"{where}: tool_direction is zero", "give a vector along the tool")
         for length in (self.tool_length, *dict(self.tool_lengths).values()):
             if not (math.isfinite(length) and length >= 0):
-                raise _wrong(f"{where}: tool_length is {length:g}", "give 0 mm or more")
+                raise SettingsError("CS253", f"{where}: tool_length is {length:g}", "give 0 mm or more")
         object.__setattr__(self, "axes", (*self.axes, _NO_AXIS, _NO_AXIS)[:2])
         if len(self.names) == 2:
             self._check_pair(where, *self.axes)
         if not self.names and not _parallel(self.tool, np.array((0.0, 0.0, 1.0))):
             hint = "leave out tool_direction: the tool is along Z"
-            raise _wrong(f"{where}: no rotary axis, and a tool_direction that is not Z", hint)
+            raise SettingsError("CS253", f"{where}: no rotary axis, and a tool_direction that is not Z", hint)
         signed = [name + sign for name in self.names for sign in "+-"]
         if self.preferred is not None and (self.preferred[0] not in self.names or self.preferred[1] not in (-1.0, 1.0)):
-            raise _wrong(
+            raise SettingsError(
+                "CS253",
                 f"{where}: preferred names {self.preferred[0]!r}",
                 f"use {', '.join(signed[:-1])} or {signed[-1]}" if signed else "leave it out",
             )
         switch = self.tip_control or ()
         if len(set(switch)) not in (0, 2) or not all(re.fullmatch(_SWITCH, block) for block in switch):
             hint = 'give the blocks that switch it on and off, as in ["M428", "M429"], or [] for none'
-            raise _wrong(f"{where}: tip_control is {list(switch)!r}", hint)
+            raise SettingsError("CS253", f"{where}: tip_control is {list(switch)!r}", hint)
         for key in ("home", "tool_change"):
             self._check_position(f"{where}: {key}", getattr(self, key))
         for item in self.dynamics:
             if item.name not in (*LINEAR, *self.names):
                 known = ", ".join((*LINEAR, *self.names))
-                raise _wrong(f"{where}: dynamics of {item.name}, which it has not", f"use {known}")
+                raise SettingsError("CS253", f"{where}: dynamics of {item.name}, which it has not", f"use {known}")
 
     def _check_pair(self, where: str, first: RotaryAxis, second: RotaryAxis) -> None:
         """Refuse two axes that do not make a machine."""
         if first.name == second.name:
-            raise _wrong(f"{where}: both rotary axes are called {first.name}", "give two names")
+            raise SettingsError("CS253", f"{where}: both rotary axes are called {first.name}", "give two names")
         if first.carrier == "head" and second.carrier == "table":
-            raise _wrong(
+            raise SettingsError(
+                "CS253",
                 f"{where}: the head axis {first.name} comes before the table axis {second.name}",
                 "list the axes from the part to the tool",
             )
         if _parallel(first.unit, second.unit):
-            raise _wrong(f"{where}: {first.name} and {second.name} are parallel", "give two different directions")
+            raise SettingsError(
+                "CS253", f"{where}: {first.name} and {second.name} are parallel", "give two different directions"
+            )
         if _parallel(second.unit, self.tool):
-            raise _wrong(
+            raise SettingsError(
+                "CS253",
                 f"{where}: {second.name} turns the tool about itself",
                 "check the directions and their order, from the part to the tool",
             )
@@ -180,7 +187,7 @@ class Machine:
             low, high = spans.get(name, (-math.inf, math.inf))
             if not math.isfinite(value) or not low <= value <= high:
                 hint = "give positions of the machine's axes that they can go to"
-                raise _wrong(f"{where}: {name} is {value:g}", hint)
+                raise SettingsError("CS253", f"{where}: {name} is {value:g}", hint)
 
     def with_tool(self, number: int | None) -> Machine:
         """Return the machine with the length of a tool; None for one that is not known."""
@@ -264,14 +271,10 @@ def endless(machine: Machine) -> Machine:
     return replace(machine, axes=tuple(replace(axis, limits=None) for axis in machine.axes))
 
 
-def _wrong(what: str, hint: str) -> SettingsError:
-    return SettingsError("CS253", what, hint)
-
-
 def _check_vectors(where: str, **vectors: Vector) -> None:
     for key, vector in vectors.items():
         if len(vector) != 3 or not all(map(math.isfinite, vector)):
-            raise _wrong(f"{where}: {key} is not a point of space", "give three numbers")
+            raise SettingsError("CS253", f"{where}: {key} is not a point of space", "give three numbers")
 
 
 def _parallel(one: Floats, other: Floats) -> bool:
