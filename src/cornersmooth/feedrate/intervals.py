@@ -240,8 +240,7 @@ class _Look:
             powers = path.curves.tip[path.row[element[bent]]]
             lengths[bent] = rational_curves.interval_lengths(powers, fine[bent])
         width = lengths.sum(axis=1)
-        even = np.broadcast_to(0.25, lengths.shape)
-        parts = np.divide(lengths, width[:, None], out=even.copy(), where=width[:, None] > 0.0)
+        parts = np.divide(lengths, width[:, None], out=np.full(lengths.shape, 0.25), where=width[:, None] > 0.0)
         quarters = np.cumsum(parts, axis=1)[:, :3].T
         along = self._sampled(element, fine)
         amounts = np.where(self.counts[element], _largest(along), 0.0)
@@ -263,16 +262,20 @@ class _Look:
         # one limit of speed holds in the whole interval
         uneven |= (np.ptp(np.abs(along[0]), axis=1) * np.sqrt(fastest)[:, None] > _VARIED * bounds[0]).any(axis=1)
         found = np.zeros(len(element), self.columns)
-        found["element"], found["low"], found["width"], found["middle"] = element, low, width, quarters[1]
-        found["cap"], found["rows"], found["machine_cap"], found["machine_rows"] = (
-            cap,
-            rows.T,
-            machine_cap,
-            machine_rows.T,
-        )
-        found["known"] = (finite | ~self.counts[element])[:, 2:].all(axis=1) & ~uneven
-        found["value"] = along[:, :, ::2, 2:].transpose(1, 0, 3, 2)
-        found["missed"] = off[..., 2:].transpose(1, 0, 2)
+        for name, values in (
+            ("element", element),
+            ("known", (finite | ~self.counts[element])[:, 2:].all(axis=1) & ~uneven),
+            ("low", low),
+            ("width", width),
+            ("cap", cap),
+            ("machine_cap", machine_cap),
+            ("middle", quarters[1]),
+            ("rows", rows.T),
+            ("machine_rows", machine_rows.T),
+            ("value", along[:, :, ::2, 2:].transpose(1, 0, 3, 2)),
+            ("missed", off[..., 2:].transpose(1, 0, 2)),
+        ):
+            found[name] = values
         return found, uneven
 
     def _sampled(self, element: Ints, fine: Floats) -> Floats:
@@ -324,8 +327,10 @@ def _curved(path: Path, most: float) -> Bools:
     """(m,) bool: curves whose curvature may ask for less than the feed, by a look at few places."""
     found = np.zeros(len(path), np.bool_)
     for element in rational_curves.groups(np.flatnonzero(path.bent)):
-        borders = rational_curves.interval_borders(path.curves.half[path.row[element]])
-        tip, _, _ = taylor_along(path, np.repeat(element, borders.shape[1]), borders.ravel(), 3)
+        row = path.row[element]
+        borders = rational_curves.interval_borders(path.curves.half[row])
+        powers = np.repeat(path.curves.tip[row], borders.shape[1], axis=0)
+        tip = rational_curves.taylor_series(powers, borders.ravel(), 3)
         bend = curvature(tip).reshape(borders.shape).max(axis=1)
         back = _turns_back(tip[1].reshape(*borders.shape, 3)).any(axis=1)
         found[element] = (2.0 * bend * path.speed[element] ** 2 > most) | back
