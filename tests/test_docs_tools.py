@@ -42,6 +42,9 @@ RUN_BY = {
     "make bench BEFORE=FOLDER": "test_make_bench_compares_checkouts",
     # minutes of LinuxCNC's whole controller in real time: here it gives a made-up answer
     "make controller": "test_make_controller_prints_its_table",
+    "python tests/nc/controller_filter.py impeller-7bl-xyzac.ngc --cuts 300 --lines long": (
+        "tests/filter/test_filter_on_a_controller.py"
+    ),
     "pip install .": ".ci/packages",
     "pip install 'cornersmooth[plot]'": "test_extras_that_are_named_exist",
     "python docs/make_codes.py": "tests/test_codes.py",

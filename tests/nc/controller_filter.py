@@ -14,11 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parent))
-
-from linuxcnc_controller import MACHINE, STATED, STEP, Floats, deviations, run_controller, tool
+sys.path.insert(0, str(Path(__file__).parent.parent))
 
 import cornersmooth as cs
+from nc.linuxcnc_controller import MACHINE, STATED, STEP, Floats, deviations, run_controller, tool
 
 WORD = re.compile(r"([XYZAC])\s*([-+]?[\d.]+)")
 
@@ -50,7 +49,7 @@ def programmed(text: str, axis_length: float) -> list[Floats]:
     return [np.concatenate(run) for run in runs if run]
 
 
-def main() -> int:
+def main(arguments: list[str] | None = None) -> int:
     """Print time and deviation of both programs."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("program", type=Path)
@@ -58,7 +57,7 @@ def main() -> int:
     parser.add_argument("-e", "--tolerance", type=float, default=0.01, help="mm")
     parser.add_argument("--lines", default="long", choices=("dense", "long"))
     parser.add_argument("--add", default="", help="a block at the beginning of both, such as 'G64 P0.01'")
-    given = parser.parse_args()
+    given = parser.parse_args(arguments)
     settings = cs.Settings(tolerance=given.tolerance, lines=given.lines)
     old = head(f"{given.add}\n" * bool(given.add) + given.program.read_text(), given.cuts)
     form = cs.choose_form("linuxcnc", machine=cs.load_machine(MACHINE))
