@@ -229,10 +229,13 @@ CONSTRUCTION = Zhang2016()
 
 def _straying_transitions(smoothed: SmoothProgram) -> Ints:
     """Rows of corners whose transitions stray."""
-    rows = np.flatnonzero(smoothed.corners.smoothed)
-    strays = [_strays(smoothed, rows[at : at + _MEASURED]) for at in range(0, len(rows), _MEASURED)]
-    straying: Ints = rows[np.concatenate([np.zeros(0, np.bool_), *strays])]
-    return straying
+    return _those(np.flatnonzero(smoothed.corners.smoothed), lambda rows: _strays(smoothed, rows))
+
+
+def _those(rows: Ints, stray: Callable[[Ints], Bools]) -> Ints:
+    """Rows that stray, looked at some at once."""
+    parts = np.split(rows, np.arange(_MEASURED, len(rows), _MEASURED))
+    return np.concatenate([part[stray(part)] for part in parts if len(part)] or [rows])
 
 
 def _straying_remainders(smoothed: SmoothProgram) -> Ints:
@@ -243,11 +246,8 @@ def _straying_remainders(smoothed: SmoothProgram) -> Ints:
     segments = segments_of(smoothed, dense=False)
     unlike = (segments.entry != segments.axis_entry) | (segments.exit != segments.axis_exit)
     pose = np.flatnonzero(unlike & segments.has_line & (segments.start >= 0))
-    strays = np.zeros(len(pose), np.bool_)
-    for at in range(0, len(pose), _MEASURED):
-        strays[at : at + _MEASURED] = _remainder_strays(smoothed, segments, pose[at : at + _MEASURED])
-    ends = np.concatenate((segments.start[pose[strays]], pose[strays]))
-    rows = np.unique(segments.row[ends])
+    pose = _those(pose, lambda some: _remainder_strays(smoothed, segments, some))
+    rows = np.unique(segments.row[np.concatenate((segments.start[pose], pose))])
     beside: Ints = rows[rows >= 0]
     return beside
 

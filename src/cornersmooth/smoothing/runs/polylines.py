@@ -19,10 +19,9 @@ _LEAST = 4
 #: samples of a piece whose share of its span is above each of these; a cubic within bounds at quarters is nearly so
 #: between them, and short pieces lie close together
 _SHARES = (0.1, 0.4)
-_NUMBERS = (1, 2, 3)
 
-#: places of the samples in a piece, for each number: with the end, where Chebyshev polynomials have their extremes
-_PLACES = {1: (0.0,), 2: (0.0, 0.5), 3: (0.0, 0.25, 0.75)}
+#: places of one, two or three samples in a piece: with the end, where Chebyshev polynomials have their extremes
+_PLACES = np.array(((0.0, np.nan, np.nan), (0.0, 0.5, np.nan), (0.0, 0.25, 0.75)))
 
 
 @dataclass(frozen=True)
@@ -144,11 +143,10 @@ class Samples:
     def of(cls, splines: Splines, lines: Polylines, pieces: Pieces) -> Samples:
         """Samples in order; the starts of runs, which are kept anyway, are among them."""
         width = pieces.high - pieces.low
-        number = np.array(_NUMBERS)[np.searchsorted(_SHARES, width / splines.width[pieces.span])]
-        piece, place = spread(number)
+        kind = np.searchsorted(_SHARES, width / splines.width[pieces.span])
+        piece, place = spread(kind + 1)
         span, segment = pieces.span[piece], pieces.segment[piece]
-        shares = np.array([_PLACES[many] + (0.0,) * (max(_NUMBERS) - many) for many in _NUMBERS])
-        s = pieces.low[piece] + width[piece] * shares[np.searchsorted(_NUMBERS, number[piece]), place]
+        s = pieces.low[piece] + width[piece] * _PLACES[kind[piece], place]
         share = (s - lines.s[segment]) / (lines.s[segment + 1] - lines.s[segment])
         target = lines.point[segment] + share[:, None] * (lines.point[segment + 1] - lines.point[segment])
         return cls(piece, span, s, splines.basis(span, s), target)

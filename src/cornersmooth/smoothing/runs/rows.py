@@ -10,7 +10,8 @@ control points are the blossoms of the run's spline at the knots of the section.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.geometry.ragged import batches, search, spread, starts
 from cornersmooth.model import Floats, Ints, Program, Runs
 from cornersmooth.settings import STANDING, Settings
+from cornersmooth.slices import some_runs
 from cornersmooth.smoothing.runs.polylines import Pieces, Polylines
 from cornersmooth.smoothing.segments import turn_limit
 from cornersmooth.vectors import angle_between, norm, unit
@@ -55,20 +57,10 @@ def polylines_of(runs: Runs, program: Program, axis_length: float) -> Polylines:
 
 def some_at_once(runs: Runs) -> Iterator[Runs]:
     """Parts of the runs, so that arrays stay small."""
-    first = batches(runs.count, _POSES)
-    edges = [first] + [starts(count)[first] for count in (runs.count, runs.knot_count, runs.knot_count + 2)]
-    for run, pose, knot, control in zip(*(map(slice, edge[:-1], edge[1:]) for edge in edges), strict=True):
-        yield replace(
-            runs,
-            pose=runs.pose[pose],
-            count=runs.count[run],
-            s=runs.s[pose],
-            knot=runs.knot[knot],
-            knot_count=runs.knot_count[run],
-            control=runs.control[control],
-            tip_bound=runs.tip_bound[run],
-            axis_bound=runs.axis_bound[run],
-        )
+    for begin, end in pairwise(batches(runs.count, _POSES).tolist()):
+        here = np.zeros(len(runs), np.bool_)
+        here[begin:end] = True
+        yield some_runs(runs, here)
 
 
 def points_at(control: Floats, splines: Splines, span: Ints, s: Floats) -> tuple[Floats, Floats]:
