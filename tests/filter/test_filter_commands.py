@@ -77,6 +77,28 @@ def test_compare_tries_every_way(how: tuple[str, ...], tmp_path: Path) -> None:
     assert len((tmp_path / "best.nc").read_bytes()) == best["bytes"]
 
 
+def test_time_of_a_program_in_which_nothing_can_be_smoothed(tmp_path: Path) -> None:
+    part = tmp_path / "part.nc"
+    part.write_text(written(tmp_path, "fanuc words").read_text().replace("G43.4", "G43"))
+    for command in ("time", "compare"):
+        told = run(command, part, *FANUC)
+        assert told.returncode == USAGE
+        assert f"{part}: error[CS266]".encode() in told.stderr
+    text = "G21 G90 G94\nM428\nG0 X0 Y0 Z9 A0 C0\nG1 X60 F600\nM429\nM30\n"  # 60 mm at 10 mm/s, and ramps
+    part.write_text(text)
+    seconds = json.loads(run("time", part, *LINUXCNC, "--json").stdout)["seconds"]
+    assert seconds["unsmoothed"] == seconds["as_written"] == pytest.approx(6.0, abs=0.1)
+
+
+def test_errors_of_times_say_the_file_and_the_line(tmp_path: Path) -> None:
+    arc, new = tmp_path / "arc.nc", tmp_path / "new.nc"
+    arc.write_text(PROGRAMS["linuxcnc, G64, an arc inside"][2])
+    told = run("filter", arc, *LINUXCNC, "--limits", "xyzac-trt", "-o", new)
+    assert told.returncode == BAD_INPUT
+    assert f"{arc}:16: error[CS264]".encode() in told.stderr
+    assert not new.exists()
+
+
 def test_compare_looks_at_a_part_of_a_long_program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cornersmooth.filter.compared.MOST_POSES", 30)
     control, machine, text = PROGRAMS["fanuc words"]

@@ -224,16 +224,17 @@ def _filter(
 
     data, name = read_input(source)
     axes = nc_text.machine_of(given, "limits")
-    found = filter_program(
-        data,
-        form,
-        settings,
-        **how_read(given),
-        verify=not given["no_verify"],
-        axes=axes,
-        paths=_pages(reports),
-        processes=useful_processes(),
-    )
+    with told_of(name):
+        found = filter_program(
+            data,
+            form,
+            settings,
+            **how_read(given),
+            verify=not given["no_verify"],
+            axes=axes,
+            paths=_pages(reports),
+            processes=useful_processes(),
+        )
     bad = found.verdict is Verdict.FAILED or (given["strict"] and found.verdict is not Verdict.PASSED)
     with open_output(target_of(target), hold=bad, replace=given["force"]) as output:
         output.failed = bad
@@ -293,6 +294,8 @@ def verify_with_program(source: str, old: bytes, path: str, given: dict[str, Any
 def time_of_program(data: bytes, name: str, given: dict[str, Any]) -> int:
     """Say the time of a program as it is and smoothed, or beside another one; return the exit code of ``time``."""
     from cornersmooth.filter import filter_program, verify_programs
+    from cornersmooth.filter.program import read_program
+    from cornersmooth.filter.times import time_as_it_is
     from cornersmooth.verify import useful_processes
 
     form, settings, axes = form_of(given), smoothing.settings_of(given), axes_of(given)
@@ -302,10 +305,14 @@ def time_of_program(data: bytes, name: str, given: dict[str, Any]) -> int:
             found = verify_programs(data, read_input(given["text"])[0], form, settings, **how)
         else:
             found = filter_program(data, form, settings, verify=False, **how)
+        if found.seconds is None and not (found.checked and found.checked.wrong):  # nothing differs
+            alone = time_as_it_is(*read_program(data, form, settings, **how_read(given)), axes)
+            found = replace(found, seconds=(alone, alone))
     if found.checked is not None and found.checked.wrong:
         _show_wrong(given["text"], found.checked.wrong)
         return 1
-    before, after = found.seconds or (0.0, 0.0)
+    assert found.seconds is not None
+    before, after = found.seconds
     whole = bool(form.table.lines.planner)
     if given["as_json"]:
         contents = {

@@ -8,7 +8,7 @@ from dataclasses import replace
 from cornersmooth.comparing import MOST_POSES, Candidate, Row, Table, law_of_lines
 from cornersmooth.errors import CornersmoothError, SettingsError
 from cornersmooth.filter.program import filter_program, left_all_but, read_program
-from cornersmooth.filter.times import by_own_law, time_as_it_is
+from cornersmooth.filter.times import by_own_law, no_runs, time_as_it_is
 from cornersmooth.kinematics import Machine
 from cornersmooth.processes import can_fork, map_in_processes, useful_processes
 from cornersmooth.saving import Timing
@@ -60,9 +60,7 @@ def compare_filtered(
     cuts = max(sum(map(len, old.runs)), 1)
     left_all_but(old, most)
     if not old.runs:
-        raise SettingsError(
-            "CS266", "no cut of the program can be smoothed", "'cornersmooth filter' says why for each, with its line"
-        )
+        raise no_runs()
     share = sum(map(len, old.runs)) / cuts
     before = time_as_it_is(job, old, axes)
 

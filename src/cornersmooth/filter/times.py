@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate import plan_text
 from cornersmooth.feedrate.linuxcnc import line_times
 from cornersmooth.feedrate.linuxcnc_program import axis_limits, program_lines
@@ -38,12 +39,20 @@ def planned_times(job: Job, old: Reading, new: Reading, where: Sequence[Place], 
 
 
 def time_as_it_is(job: Job, reading: Reading, axes: Machine) -> float:
-    """Time of all runs of a program, s; on LinuxCNC and errors as `planned_times`."""
+    """Time of all runs of a program, s; on LinuxCNC and errors as `planned_times`, and CS266: it has no runs."""
     if by_own_law(job):
         return _on_linuxcnc(reading, axes)
+    if not reading.runs:
+        raise no_runs()
     where = [Place(run, run.first, run.stop) for run in reading.runs]
     parts = ([job.stretch(reading, place.run) for place in own] for own in shared(reading, reading, where))
     return sum(_planned(job, motion(part, job.own, job.spelling, job.settings), axes) for part in parts)
+
+
+def no_runs() -> SettingsError:
+    """Make the error of a program in which nothing can be smoothed."""
+    hint = "'cornersmooth filter' says why for each, with its line"
+    return SettingsError("CS266", "no cut of the program can be smoothed", hint)
 
 
 def by_own_law(job: Job) -> bool:
