@@ -48,23 +48,14 @@ class SlowMove(NamedTuple):
 
 @dataclass(frozen=True)
 class Comparison:
-    """Time laws of one program.
-
-    Parameters
-    ----------
-    settings : Settings
-        Of the smoothing; its `method` is replaced by each method in turn.
-    laws : mapping of str to TimeLaw
-        The two `BASELINES`, every method by its name, and `AS_WRITTEN` where there is a text.
-    machine : Machine or None
-        Whose axes keep their limits.
-    """
+    """Time laws of one program."""
 
     program: Program
-    settings: Settings
+    settings: Settings  #: of the smoothing; its `method` is replaced by each method in turn
     limits: Limits
+    #: the two `BASELINES`, every method by its name, and `AS_WRITTEN` where there is a text
     laws: Mapping[str, TimeLaw]
-    machine: Machine | None = None
+    machine: Machine | None = None  #: whose axes keep their limits
 
     def with_text(self, law: TimeLaw) -> Comparison:
         """Return the same with the time law of an NC text (`cornersmooth.feedrate.plan_text`)."""
@@ -131,7 +122,6 @@ def compare(
 
     Parameters
     ----------
-    settings : Settings, optional
     methods : sequence of str
         Whose curves are planned.
     progress : callable, optional

@@ -36,38 +36,20 @@ _STANDING = 3e-4
 
 @dataclass(frozen=True)
 class Curves:
-    """Curved elements, k rows.
+    """Curved elements, k rows."""
 
-    Parameters
-    ----------
-    tip, axis_point : (k, d + 1, 4) float64
-        Powers of t of w·P and w, as in `polynomial`, relative to `origin`.
-    origin : (k, 3) float64, mm
-    half : (k,) int64
-        0 and 1 for the halves of a transition, `WHOLE` for a piece of a run or of a curve of an NC program.
-    move : (k,) int64
-        Pose that the move of each ends in.
-    span : (k, 2) float64
-        Part of the move.
-    inner : (k,) bool
-        It goes on where another element ends, with the same tangent and curvature.
-    corner : (k,) int64
-        Row of the corners for halves of transitions, else -1.
-    resting : (k,) bool
-        Halves of transitions between a motion of the tip and a turn on the spot.
-    length, angle : (k,) float64
-        Of the tip, mm; that the axis turns, rad, where the tip stands still.
-    """
-
+    #: (k, d + 1, 4): powers of t of w·P and w, as in `polynomial`, relative to `origin`
     tip: Floats
     axis_point: Floats
-    origin: Floats
+    origin: Floats  #: (k, 3) mm
+    #: (k,): 0 and 1 for the halves of a transition, `WHOLE` for a piece of a run or of a curve of an NC program
     half: Ints
-    move: Ints
-    span: Floats
-    inner: Bools
-    corner: Ints
-    resting: Bools
+    move: Ints  #: (k,): pose that the move of each ends in
+    span: Floats  #: (k, 2): part of the move
+    inner: Bools  #: (k,): it goes on where another element ends, with the same tangent and curvature
+    corner: Ints  #: (k,): row of the corners for halves of transitions, else -1
+    resting: Bools  #: (k,): halves of transitions between a motion of the tip and a turn on the spot
+    #: (k,): of the tip, mm; that the axis turns, rad, where the tip stands still
     length: Floats
     angle: Floats
 

@@ -21,46 +21,23 @@ SMALLEST = 1e-12
 
 @dataclass(frozen=True)
 class Resolution:
-    """How fine the cells are.
+    """How fine the cells are."""
 
-    Parameters
-    ----------
-    part : float
-        Length of a cell at a change of the speed limit, over v·√(v/J).
-    growth : float
-        Growth of the cells per length.
-    end : float
-        Length of the cell next to a stop, over the way covered while the jerk is constant there.
-    fewest : int
-        Cells in a run at least.
-    """
-
-    part: float = 0.1
-    growth: float = 0.06
-    end: float = 0.7
-    fewest: int = 40
+    part: float = 0.1  #: length of a cell at a change of the speed limit, over v·√(v/J)
+    growth: float = 0.06  #: growth of the cells per length
+    end: float = 0.7  #: length of the cell next to a stop, over the way covered while the jerk is constant there
+    fewest: int = 40  #: cells in a run at least
 
 
 @dataclass(frozen=True)
 class Grid:
-    """Cells of some runs, in order.
+    """Cells of some runs, in order."""
 
-    Parameters
-    ----------
-    start, width : (n,) float64, mm
-    cap : (n,) float64
-        Bound of v² over the whole cell.
-    rows : (5, n) float64
-        Largest rows of `Intervals` in the cell.
-    first : (r,) int64
-        First cell of each run.
-    """
-
-    start: Floats
-    width: Floats
-    cap: Floats
-    rows: Floats
-    first: Ints
+    start: Floats  #: (n,) mm
+    width: Floats  #: (n,) mm
+    cap: Floats  #: (n,): bound of v² over the whole cell
+    rows: Floats  #: (5, n): largest rows of `Intervals` in the cell
+    first: Ints  #: (r,): first cell of each run
 
     @property
     def last(self) -> Ints:

@@ -44,26 +44,15 @@ _DEEPEST = 14
 
 @dataclass(frozen=True)
 class Intervals:
-    """Limits over intervals of the path coordinate x, which runs on over all elements.
+    """Limits over intervals of the path coordinate x, which runs on over all elements."""
 
-    Parameters
-    ----------
-    edge : (k + 1,) float64, mm or rad
-        Interval i lies between ``edge[i]`` and ``edge[i + 1]``; a junction has an interval without width.
-    cap : (k,) float64
-        Bound of v² in interval i.
-    rows : (5, k) float64
-        Of z′ and z in a limit of acceleration, and of z″/2, z′ and z in one of jerk, over the limit.
-    run : (r + 1,) int64
-        Intervals ``run[i]`` to ``run[i + 1]`` lie between two stops.
-    accel, jerk : (r,) float64
-        Limits along the path of each run.
-    """
-
+    #: (k + 1,): interval i lies between ``edge[i]`` and ``edge[i + 1]``; a junction has an interval without width
     edge: Floats
-    cap: Floats
+    cap: Floats  #: (k,): bound of v² in interval i
+    #: (5, k): of z′ and z in a limit of acceleration, and of z″/2, z′ and z in one of jerk, over the limit
     rows: Floats
-    run: Ints
+    run: Ints  #: (r + 1,): intervals ``run[i]`` to ``run[i + 1]`` lie between two stops
+    #: (r,): limits along the path of each run
     accel: Floats
     jerk: Floats
 
@@ -85,26 +74,13 @@ Singles = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class AxisSamples:
-    """Derivatives of the axes of a machine, signs and all, at start, middle and end of the same intervals.
+    """Derivatives of the axes of a machine, signs and all, at start, middle and end of the same intervals."""
 
-    Parameters
-    ----------
-    value : (3, d, k, 3) float32
-        First, second and third derivative of every axis.
-    missed : (3, d, k) float32
-        By how much the parabolas through these three miss what was seen between them.
-    middle : (k,) float64
-        Share of the length of an interval that is before its middle.
-    known : (k,) bool
-        Whether all derivatives are finite.
-    accel, jerk : (d,) float64
-        Limits of the axes, inf for none.
-    """
-
-    value: Singles
-    missed: Singles
-    middle: Floats
-    known: Bools
+    value: Singles  #: first, second and third derivative of every axis
+    missed: Singles  #: by how much the parabolas through these three miss what was seen between them
+    middle: Floats  #: (k,): share of the length of an interval that is before its middle
+    known: Bools  #: (k,): whether all derivatives are finite
+    #: (d,): limits of the axes, inf for none
     accel: Floats
     jerk: Floats
 
@@ -195,22 +171,13 @@ def path_limits(path: Path, limits: Limits, machine_axes: MachineAxes | None = N
 
 @dataclass(frozen=True)
 class _Look:
-    """What is limited: the tip and the tool axis by their lengths, then the axes of a machine with their signs.
-
-    Parameters
-    ----------
-    centripetal : float, mm/s²
-    bounds : (3, d) float64
-        Limits of speed, acceleration and jerk.
-    counts : (m, d) bool
-        Whether they are limited on each element.
-    """
+    """What is limited: the tip and the tool axis by their lengths, then the axes of a machine with their signs."""
 
     path: Path
     machine_axes: MachineAxes | None
     centripetal: float
-    bounds: Floats
-    counts: Bools
+    bounds: Floats  #: (3, d): limits of speed, acceleration and jerk
+    counts: Bools  #: (m, d): whether they are limited on each element
 
     @property
     def columns(self) -> np.dtype[np.void]:

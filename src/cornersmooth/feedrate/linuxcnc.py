@@ -33,42 +33,24 @@ _ARC_SHARE = np.sqrt(3.0) / 2.0
 
 @dataclass(frozen=True)
 class AxisLimits:
-    """Limits of a LinuxCNC configuration.
+    """Limits of a LinuxCNC configuration."""
 
-    Parameters
-    ----------
-    velocity, acceleration : (6,) float64, mm or degrees per s, s²
-        ``[AXIS_*] MAX_VELOCITY`` and ``MAX_ACCELERATION`` of X Y Z A B C; inf for none.
-    linear_velocity : float, mm/s
-        ``[TRAJ] MAX_LINEAR_VELOCITY``.
-    servo_period : float, s
-        ``[EMCMOT] SERVO_PERIOD``.
-    """
-
+    #: (6,): ``[AXIS_*] MAX_VELOCITY`` and ``MAX_ACCELERATION`` of X Y Z A B C; inf for none
     velocity: Floats
     acceleration: Floats
-    linear_velocity: float = np.inf
-    servo_period: float = 0.001
+    linear_velocity: float = np.inf  #: ``[TRAJ] MAX_LINEAR_VELOCITY``
+    servo_period: float = 0.001  #: s: ``[EMCMOT] SERVO_PERIOD``
 
 
 @dataclass(frozen=True)
 class Lines:
-    """Lines of a program, n of them, one after another.
+    """Lines of a program, n of them, one after another."""
 
-    Parameters
-    ----------
-    start, end : (n, 6) float64, mm and degrees
-        Words X Y Z A B C.
-    feed : (n,) float64, mm/s
-        inf for a rapid.
-    blend : (n,) float64, mm
-        P of G64; 0 for G64 without P; NaN in exact stop mode.
-    """
-
+    #: (n, 6): words X Y Z A B C
     start: Floats
     end: Floats
-    feed: Floats
-    blend: Floats
+    feed: Floats  #: (n,): inf for a rapid
+    blend: Floats  #: (n,) mm: P of G64; 0 for G64 without P; NaN in exact stop mode.
 
     def __len__(self) -> int:
         return len(self.feed)

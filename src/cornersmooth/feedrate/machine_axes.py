@@ -33,22 +33,13 @@ _CONES = 2.0
 
 @dataclass(frozen=True)
 class MachineAxes:
-    """The motion of a machine's axes along a path: X, Y, Z in mm, then the rotary axes in degrees.
-
-    Parameters
-    ----------
-    angles : (n, 2) float64, degrees
-        Rotary angles at the poses of the program.
-    branch : (n,) int64
-        Solution that a move into a pose is on; -1 where it passes from one to the other.
-    cone : float, degrees
-    """
+    """The motion of a machine's axes along a path: X, Y, Z in mm, then the rotary axes in degrees."""
 
     machine: Machine
     path: Path
-    angles: Floats
-    branch: Ints
-    cone: float
+    angles: Floats  #: (n, 2) degrees: rotary angles at the poses of the program
+    branch: Ints  #: (n,): solution that a move into a pose is on; -1 where it passes from one to the other
+    cone: float  #: degrees
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -19,22 +19,12 @@ _STIFF = 1e8
 
 @dataclass(frozen=True)
 class Equations:
-    """The normal equations of the barrier problem for the change of the coefficients.
-
-    Parameters
-    ----------
-    by_z : tuple of (n,) float64
-        Of each row the derivative of left minus right side by z.
-    downhill : (n,) float64
-        Derivative of the time by the coefficients.
-    factors : (3, n) float64 or None
-        Of the matrix; None where it has no positive pivots, even stiffened.
-    """
+    """The normal equations of the barrier problem for the change of the coefficients."""
 
     batch: Batch
-    by_z: tuple[Floats, ...]
-    downhill: Floats
-    factors: Floats | None
+    by_z: tuple[Floats, ...]  #: of each row the derivative of left minus right side by z
+    downhill: Floats  #: (n,): derivative of the time by the coefficients
+    factors: Floats | None  #: (3, n): Of the matrix; None where it has no positive pivots, even stiffened.
 
     @classmethod
     def of(cls, batch: Batch, c: Floats, stiffness: Floats, bites: list[Floats]) -> Equations:

@@ -38,48 +38,23 @@ class Kind(IntEnum):
 
 @dataclass(frozen=True)
 class Path:
-    """Elements of a motion, m rows in order.
-
-    Parameters
-    ----------
-    corners : Corners or None
-        The transitions that some curves are halves of; None for the direct path.
-    kind : (m,) uint8
-        `Kind`.
-    turning : (m,) bool
-        The tip stands still; the coordinate is the angle of the axis, rad.
-    start : (m,) int64
-        Pose that the move starts from.
-    move : (m,) int64
-        Pose that the move ends in; with it go feed and CL line.
-    row : (m,) int64
-        Row of `curves`, else -1.
-    span : (m, 2) float64
-        Part of the move.
-    axis_span : (m, 2) float64
-        The same for the axis-point segment of a line.
-    length : (m,) float64, mm or rad
-    speed : (m,) float64, mm/s or rad/s
-        Feed, rapid speed or angular speed.
-    rapid : (m,) bool
-    junction_speed : (m + 1,) float64
-        Largest speed at the start of element i, and at the end of the last: 0 for a stop, inf for none.
-    """
+    """Elements of a motion, m rows in order."""
 
     program: Program
-    corners: Corners | None
+    corners: Corners | None  #: The transitions that some curves are halves of; None for the direct path.
     settings: Settings
     curves: Curves
-    kind: NDArray[np.uint8]
-    turning: Bools
-    start: Ints
-    move: Ints
-    row: Ints
-    span: Floats
-    axis_span: Floats
-    length: Floats
-    speed: Floats
-    rapid: Bools
+    kind: NDArray[np.uint8]  #: (m,): `Kind`
+    turning: Bools  #: (m,): the tip stands still; the coordinate is the angle of the axis, rad
+    start: Ints  #: (m,): pose that the move starts from
+    move: Ints  #: (m,): pose that the move ends in; with it go feed and CL line
+    row: Ints  #: (m,): row of `curves`, else -1
+    span: Floats  #: (m, 2): part of the move
+    axis_span: Floats  #: (m, 2): the same for the axis-point segment of a line
+    length: Floats  #: (m,)
+    speed: Floats  #: (m,): feed, rapid speed or angular speed
+    rapid: Bools  #: (m,)
+    #: (m + 1,): largest speed at the start of element i, and at the end of the last: 0 for a stop, inf for none
     junction_speed: Floats
 
     def __len__(self) -> int:

@@ -85,31 +85,16 @@ class _Signed(NamedTuple):
 
 @dataclass(frozen=True)
 class Places:
-    """Where axes are looked at: samples of the intervals, and ends and middles of all cells; p places by their slots.
+    """Where axes are looked at: samples of intervals, and ends and middles of all cells; p places by their slots."""
 
-    Parameters
-    ----------
-    slot : (p,) int64
-        Whose cell the place lies in; ascending.
-    way : (p,) float64
-        From the start of that cell.
-    value : (3, d, p) float64
-        Derivatives of the axes.
-    bump : (3, d, p) float64
-        By how much they may be larger between this place and the next.
-    accel, jerk : (d,) float64
-        Limits.
-    unknown : (n,) bool
-        Slots whose cell meets an interval in which derivatives are not finite.
-    """
-
-    slot: Ints
-    way: Floats
-    value: Floats
-    bump: Floats
+    slot: Ints  #: (p,): whose cell the place lies in; ascending
+    way: Floats  #: (p,): from the start of that cell
+    value: Floats  #: (3, d, p): derivatives of the axes
+    bump: Floats  #: (3, d, p): by how much they may be larger between this place and the next
+    #: (d,): limits
     accel: Floats
     jerk: Floats
-    unknown: Bools
+    unknown: Bools  #: (n,): slots whose cell meets an interval in which derivatives are not finite
 
     @classmethod
     def of(cls, grid: Grid, runs: Ints, limits: PathLimits) -> Places:

@@ -60,36 +60,22 @@ class Batch:
 
     Slot k of a run holds coefficient k, node k (between coefficients k and k+1; m + 1 of them) and cell k (coefficients
     k to k+2; m of them). Slots without node or cell hold inert rows.
-
-    Parameters
-    ----------
-    near, far, slope : (n,) float64
-        Node k: z = near·c[k] + far·c[k+1], z′ = slope·(c[k+1] − c[k]).
-    bend : (3, n) float64
-        Cell k: z″/2 = Σ bend[i]·c[k+i].
-    weight : (n,) float64
-        The time is about Σ weight/√c.
-    first, last : (r,) int64
-        Slots of the first and last coefficient of each run.
-    first_ratio, last_ratio : (r,) float64
-        That coefficient over its neighbour where the run starts (ends) at rest; NaN where it does not.
-    frozen : (n,) bool
-        Coefficients that keep their value.
-    rows : tuple of Row
-        All limits.
     """
 
+    #: (n,): node k: z = near·c[k] + far·c[k+1], z′ = slope·(c[k+1] − c[k])
     near: Floats
     far: Floats
     slope: Floats
-    bend: Floats
-    weight: Floats
+    bend: Floats  #: (3, n): cell k: z″/2 = Σ bend[i]·c[k+i]
+    weight: Floats  #: (n,): the time is about Σ weight/√c
+    #: (r,): slots of the first and last coefficient of each run
     first: Ints
     last: Ints
+    #: (r,): That coefficient over its neighbour where the run starts (ends) at rest; NaN where it does not.
     first_ratio: Floats
     last_ratio: Floats
-    frozen: Bools
-    rows: tuple[Row, ...]
+    frozen: Bools  #: (n,): coefficients that keep their value
+    rows: tuple[Row, ...]  #: all limits
 
     def __len__(self) -> int:
         return len(self.near)

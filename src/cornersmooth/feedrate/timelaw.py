@@ -17,35 +17,19 @@ _HALVINGS = 60
 
 @dataclass(frozen=True)
 class States:
-    """The motion at some times, m rows.
+    """The motion at some times, m rows."""
 
-    Parameters
-    ----------
-    t : (m,) float64, s
-    s : (m,) float64, mm
-        Way of the tip since the start.
-    v, a, j : (m,) float64, mm/s, mm/s², mm/s³
-        Path speed, tangential acceleration and jerk; in rad where `turning`.
-    centripetal : (m,) float64, mm/s²
-        κ·v² of the tip.
-    turning : (m,) bool
-        The tip stands still and the axis turns: `v`, `a`, `j` are angular.
-    line : (m,) int64
-        CL line of the move under way.
-    tip : (m, 3) float64, mm
-    axis : (m, 3) float64
-    """
-
-    t: Floats
-    s: Floats
+    t: Floats  #: (m,) s
+    s: Floats  #: (m,) mm: way of the tip since the start
+    #: (m,): path speed, tangential acceleration and jerk; in rad where `turning`
     v: Floats
     a: Floats
     j: Floats
-    centripetal: Floats
-    turning: Bools
-    line: Ints
-    tip: Floats
-    axis: Floats
+    centripetal: Floats  #: (m,): κ·v² of the tip
+    turning: Bools  #: (m,): The tip stands still and the axis turns: `v`, `a`, `j` are angular.
+    line: Ints  #: (m,): CL line of the move under way
+    tip: Floats  #: (m, 3) mm
+    axis: Floats  #: (m, 3)
 
 
 @dataclass(frozen=True)

@@ -41,17 +41,10 @@ _DWELL = 4.0
 
 @dataclass(frozen=True)
 class BlockLimits:
-    """What a control makes of blocks, however fast the machine.
+    """What a control makes of blocks, however fast the machine."""
 
-    Parameters
-    ----------
-    block_time : float, s
-        Shortest time for one block; 0 for none.
-    look_ahead : int or None
-        Blocks that the control knows besides the one that it runs: within them it must be able to stop. None for all.
-    """
-
-    block_time: float = 0.0
+    block_time: float = 0.0  #: s: shortest time for one block; 0 for none
+    #: Blocks that the control knows besides the one that it runs: within them it must be able to stop. None for all.
     look_ahead: int | None = None
 
     def __post_init__(self) -> None:
@@ -63,26 +56,16 @@ class BlockLimits:
 
 @dataclass(frozen=True)
 class WrittenMotion:
-    """A text as a program to plan.
+    """A text as a program to plan."""
 
-    Parameters
-    ----------
-    program : Program
-        A pose at the end of every element, and at every knot inside of a curve; statements where the motion stops.
-    curves : Curves or None
-        Pieces of the curves between neighbouring knots, each a whole move.
-    blocks : (n,) float64
-        Blocks of the text that the move into each pose takes: a part of one where a block is several moves.
-    element : (n,) int64
-        Element of the text that the move into each pose is, or is a part of.
-    within : (n,) bool
-        The move goes on with what rotary words make of one block: the kinks between such moves are not the machine's.
-    """
-
+    #: a pose at the end of every element, and at every knot inside of a curve; statements where the motion stops
     program: Program
-    curves: Curves | None
+    curves: Curves | None  #: pieces of the curves between neighbouring knots, each a whole move
+    #: (n,): blocks of the text that the move into each pose takes: a part of one where a block is several moves
     blocks: Floats
-    element: Ints
+    element: Ints  #: (n,): element of the text that the move into each pose is, or is a part of
+    #: (n,): the move goes on with what rotary words make of one block: the kinks between such moves are not the
+    #: machine's
     within: Bools
 
 
@@ -287,7 +270,6 @@ def plan_text(
         As `cornersmooth.nc_reader.read_nc` gives it.
     name : str
         File name for messages.
-    blocks : BlockLimits, optional
     settings : Settings, optional
         Says at what distance the axis point is, and which repeated poses are one.
     progress : callable, optional

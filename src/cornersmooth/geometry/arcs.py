@@ -54,7 +54,6 @@ def arc_points(program: Program, rows: Ints, share: Floats) -> tuple[Floats, Flo
 
     Parameters
     ----------
-    program : Program
     rows : (m,) int64
         Rows of `Program.arcs`, one for each point.
     share : (m,) float64

@@ -17,18 +17,10 @@ from cornersmooth.model import Floats, Ints
 
 @dataclass(frozen=True)
 class Splines:
-    """Knot vectors of r splines.
+    """Knot vectors of r splines."""
 
-    Parameters
-    ----------
-    knot : (k,) float64
-        Distinct knots of all splines, ascending from 0 in each.
-    count : (r,) int64
-        Distinct knots of each spline, at least 2.
-    """
-
-    knot: Floats
-    count: Ints
+    knot: Floats  #: (k,): distinct knots of all splines, ascending from 0 in each
+    count: Ints  #: (r,): distinct knots of each spline, at least 2
 
     @cached_property
     def first(self) -> Ints:

@@ -8,12 +8,7 @@ from cornersmooth.nc_reader.elements import Elements
 
 
 class Ahead:
-    """Elements of a text as they are read: those that have been read and are still wanted.
-
-    Parameters
-    ----------
-    chunks : iterable of Elements
-    """
+    """Elements of a text as they are read: those that have been read and are still wanted."""
 
     def __init__(self, chunks: Iterable[Elements]) -> None:
         self._chunks = iter(chunks)

@@ -65,8 +65,6 @@ def read_lines(
     Parameters
     ----------
     data : bytes or file, open at its start
-    name : str or None
-        For messages.
     lexer : Lexer
         Of the control.
     patterns : LinePatterns, optional
@@ -153,7 +151,6 @@ class LetteredLines:
     ----------
     text : bytes
         Ends with a line end.
-    lexer : Lexer
     """
 
     def __init__(self, text: bytes, lexer: Lexer) -> None:
@@ -190,18 +187,11 @@ class LetteredLines:
 
 @dataclass(frozen=True)
 class Numbers:
-    """Where the numbers of a text are that differ from block to block (`Lexer.measure`), m of them.
+    """Where the numbers of a text are that differ from block to block (`Lexer.measure`), m of them."""
 
-    Parameters
-    ----------
-    text : (n,) uint8
-        Ends with a line end.
-    start, stop : (m,) int64
-    """
-
-    text: NDArray[np.uint8]
-    start: Ints
-    stop: Ints
+    text: NDArray[np.uint8]  #: (n,): ends with a line end
+    start: Ints  #: (m,)
+    stop: Ints  #: (m,)
 
     def marked(self) -> bytes:
         """The text with a mark instead of each number."""
@@ -267,18 +257,10 @@ def _digit(raw: NDArray[np.uint8]) -> Bools:
 
 @dataclass(frozen=True, eq=False)
 class _LineKind:
-    """What lines have in common that differ in their numbers only.
+    """What lines have in common that differ in their numbers only."""
 
-    Parameters
-    ----------
-    count : int
-        Numbers of a line.
-    columns : dict of str to int or float
-        Which of them stands in a column, or the value that all lines have there.
-    """
-
-    count: int
-    columns: dict[str, int | float]
+    count: int  #: numbers of a line
+    columns: dict[str, int | float]  #: which of them stands in a column, or the value that all lines have there
 
     @classmethod
     def of(cls, kind: bytes, lexer: Lexer) -> _LineKind | None:

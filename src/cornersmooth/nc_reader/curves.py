@@ -76,24 +76,13 @@ def _ratio(above: Floats, below: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class CurveGroup:
-    """Curves with the same order and knots, k of them, with p control points each.
+    """Curves with the same order and knots, k of them, with p control points each."""
 
-    Parameters
-    ----------
-    index : (k,) int64
-        Rows of `Curves`.
-    order : int
-    knot : (p + order,) float64
-    points : (k, p, 6) float64
-        Control points of tip and vector or axis point.
-    weight : (k, p) float64
-    """
-
-    index: Ints
+    index: Ints  #: (k,): rows of `Curves`
     order: int
-    knot: Floats
-    points: Floats
-    weight: Floats
+    knot: Floats  #: (p + order,)
+    points: Floats  #: (k, p, 6): control points of tip and vector or axis point
+    weight: Floats  #: (k, p)
 
     @cached_property
     def spans(self) -> Floats:

@@ -39,29 +39,18 @@ class FeedIs(IntEnum):
 
 @dataclass(frozen=True)
 class Curves:
-    """Control points and knots of the curves, c of them, one after another.
+    """Control points and knots of the curves, c of them, one after another."""
 
-    Parameters
-    ----------
-    element : (c,) int64
-        Index of the path element each curve is, ascending; while a run is executed, of the block it begins with.
-    order, points : (c,) int64
-        Degree plus one, and how many control points there are.
-    point : (p, 6) float64
-        Control points of tip and of tool vector or axis point, mm (vectors: 1).
-    weight : (p,) float64
-    knot : (q,) float64
-        ``points + order`` of each curve.
-    end : (c,) int64
-        The block each curve ends with, while a run is executed.
-    """
-
+    #: (c,): index of the path element each curve is, ascending; while a run is executed, of the block it begins with
     element: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    #: (c,): degree plus one, and how many control points there are
     order: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     points: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    #: (p, 6): control points of tip and of tool vector or axis point, mm (vectors: 1)
     point: Floats = field(default_factory=lambda: np.zeros((0, 6)))
-    weight: Floats = field(default_factory=lambda: np.zeros(0))
-    knot: Floats = field(default_factory=lambda: np.zeros(0))
+    weight: Floats = field(default_factory=lambda: np.zeros(0))  #: (p,)
+    knot: Floats = field(default_factory=lambda: np.zeros(0))  #: (q,): ``points + order`` of each curve
+    #: (c,): the block each curve ends with, while a run is executed
     end: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
 
     def __len__(self) -> int:
@@ -138,23 +127,13 @@ def slices(size: Ints, chosen: Ints) -> Ints:
 
 @dataclass(frozen=True)
 class NcArcs:
-    """The circular elements, k of them.
+    """The circular elements, k of them."""
 
-    Parameters
-    ----------
-    element : (k,) int64
-    centre : (k, 3) float64, mm
-        A point of the arc's axis.
-    normal : (k, 3) float64
-        Unit vector; the rotation is right-handed about it.
-    sweep : (k,) float64, rad
-        Always positive.
-    """
-
-    element: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
-    centre: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    element: Ints = field(default_factory=lambda: np.zeros(0, np.int64))  #: (k,)
+    centre: Floats = field(default_factory=lambda: np.zeros((0, 3)))  #: (k, 3) mm: a point of the arc's axis
+    #: (k, 3): unit vector; the rotation is right-handed about it
     normal: Floats = field(default_factory=lambda: np.zeros((0, 3)))
-    sweep: Floats = field(default_factory=lambda: np.zeros(0))
+    sweep: Floats = field(default_factory=lambda: np.zeros(0))  #: (k,) rad: always positive
 
     def __len__(self) -> int:
         return len(self.element)
@@ -177,50 +156,25 @@ class NcArcs:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """A word that neither moves the tool nor tells how.
+    """A word that neither moves the tool nor tells how."""
 
-    Parameters
-    ----------
-    element : int
-        Index of the path element it stands before (the number of elements after the last one).
-    line : int
-        NC line, from 1.
-    letter : str
-        ``"T"``, ``"S"``, ``"M"``, ``"G"``, ``"H"``, ``"D"``, or ``"("`` for a comment.
-    value : float
-        The number of the word; for ``G4`` the dwell in milliseconds is in `text`.
-    text : str
-        The word as written; the comment's text.
-    """
-
-    element: int
-    line: int
-    letter: str
-    value: float
-    text: str = ""
+    element: int  #: index of the path element it stands before (the number of elements after the last one)
+    line: int  #: NC line, from 1
+    letter: str  #: ``"T"``, ``"S"``, ``"M"``, ``"G"``, ``"H"``, ``"D"``, or ``"("`` for a comment
+    value: float  #: the number of the word; for ``G4`` the dwell in milliseconds is in `text`
+    text: str = ""  #: the word as written; the comment's text
 
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """Something wrong in the NC text, or between it and the CL data.
+    """Something wrong in the NC text, or between it and the CL data."""
 
-    Parameters
-    ----------
-    code : str
-        ``"CS5xx"``.
-    cl_line, nc_line : int
-        Where, from 1; 0 where no line applies.
-    text : str
-        One sentence in the user's words.
-    amount : float
-        How much, mm, where that says something; else NaN.
-    """
-
-    code: str
+    code: str  #: ``"CS5xx"``
+    #: where, from 1; 0 where no line applies
     cl_line: int
     nc_line: int
-    text: str
-    amount: float = float("nan")
+    text: str  #: one sentence in the user's words
+    amount: float = float("nan")  #: how much, mm, where that says something; else NaN
 
     def message(self, place: str, beside: str = "") -> str:
         """Give it as it is printed, with another place in brackets."""
@@ -229,54 +183,28 @@ class Problem:
 
 @dataclass(frozen=True, kw_only=True)
 class Elements:
-    """Path elements of a text or of a part of it, m of them.
+    """Path elements of a text or of a part of it, m of them."""
 
-    Parameters
-    ----------
-    kind : (m,) uint8
-        `Element`.
-    tip : (m, 3) float64, mm
-        Tip at the end of each element.
-    second : (m, 3) float64
-        Tool vector or axis point (mm) at the end of each element; always full.
-    line : (m,) int64
-        NC line of each element (curves: of their first block).
-    feed : (m,) float64
-        mm/min or mm/rev; NaN for rapids and where none was given.
-    per_revolution : (m,) bool
-    feed_is : (m,) uint8
-        `FeedIs`.
-    feed_room : (m,) float64
-        mm/min or mm/rev by which the feed is not known: digits of F, and of times and ways where it is timed.
-    second_room : (m,) float64
-        By how much, as `second`, directions that must be exact may be off beside the printed digits.
-    tip_room : (m,) float64, mm
-        The same for each coordinate of tips: digits of a tilted plane are not along X, Y and Z.
-    curves : Curves
-    arcs : NcArcs
-    second_is : {"vector", "point"}
-    tip_step, second_step : float
-        Value of the last printed digit of tip (mm) and of vector (1) or axis point (mm).
-    rotary : bool
-        Whether the text has rotary words.
-    """
-
-    kind: NDArray[np.uint8]
-    tip: Floats
-    second: Floats
-    line: Ints
-    feed: Floats
-    per_revolution: NDArray[np.bool_]
-    feed_is: NDArray[np.uint8]
+    kind: NDArray[np.uint8]  #: (m,): `Element`
+    tip: Floats  #: (m, 3) mm: tip at the end of each element
+    second: Floats  #: (m, 3): tool vector or axis point (mm) at the end of each element; always full
+    line: Ints  #: (m,): NC line of each element (curves: of their first block)
+    feed: Floats  #: (m,): mm/min or mm/rev; NaN for rapids and where none was given.
+    per_revolution: NDArray[np.bool_]  #: (m,)
+    feed_is: NDArray[np.uint8]  #: (m,): `FeedIs`
+    #: (m,): mm/min or mm/rev by which the feed is not known: digits of F, and of times and ways where it is timed
     feed_room: Floats
+    #: (m,): by how much, as `second`, directions that must be exact may be off beside the printed digits
     second_room: Floats
+    #: (m,) mm: the same for each coordinate of tips: digits of a tilted plane are not along X, Y and Z
     tip_room: Floats
     curves: Curves = field(default_factory=Curves)
     arcs: NcArcs = field(default_factory=NcArcs)
     second_is: Second = "vector"
+    #: value of the last printed digit of tip (mm) and of vector (1) or axis point (mm)
     tip_step: float = 0.0
     second_step: float = 0.0
-    rotary: bool = False
+    rotary: bool = False  #: whether the text has rotary words
 
     def __len__(self) -> int:
         return len(self.kind)

@@ -26,38 +26,21 @@ _WHOLE: Final = 2e-3
 
 @dataclass(frozen=True)
 class Modal:
-    """What holds from one block to the next.
+    """What holds from one block to the next."""
 
-    Parameters
-    ----------
-    code : float
-        G word of group 01; NaN before the first.
-    tip, second : tuple of 3 floats
-        In units of the text; NaN where not known yet.
-    feed : float
-    per_revolution, inverse_time, inch : bool
-        `inverse_time`: feeds are moves per minute.
-    plane : int
-        17, 18 or 19.
-    points : bool
-        U V W have been met: they are the axis point.
-    rotary : str
-        Addresses of the rotary axes, nearest to the part first; empty for texts without any.
-    vector_length : float
-        Of the shortest tool vector so far.
-    """
-
-    code: float = float("nan")
+    code: float = float("nan")  #: G word of group 01; NaN before the first.
+    #: In units of the text; NaN where not known yet.
     tip: tuple[float, ...] = (float("nan"),) * 3
     second: tuple[float, ...] = (float("nan"),) * 3
     feed: float = float("nan")
+    #: `inverse_time`: feeds are moves per minute
     per_revolution: bool = False
     inverse_time: bool = False
     inch: bool = False
-    plane: int = 17
-    points: bool = False
-    rotary: str = ""
-    vector_length: float = math.inf
+    plane: int = 17  #: 17, 18 or 19
+    points: bool = False  #: u V W have been met: they are the axis point
+    rotary: str = ""  #: addresses of the rotary axes, nearest to the part first; empty for texts without any
+    vector_length: float = math.inf  #: of the shortest tool vector so far
 
     def but(self, **changes: Any) -> Modal:
         """Return a copy with some values changed."""

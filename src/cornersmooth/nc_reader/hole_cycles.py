@@ -33,41 +33,19 @@ _MOST_PECKS: Final = 10_000
 
 @dataclass(frozen=True)
 class HoleCycle:
-    """A hole cycle, in units of the text; heights are those of Z.
+    """A hole cycle, in units of the text; heights are those of Z."""
 
-    Parameters
-    ----------
-    travel : float
-        Where the tool goes in the end.
-    clearance : float
-        Where feeding begins.
-    bottom : float
-    feed : float or None
-        In units of F; None for the one in force.
-    step : float
-        Of a peck; 0 for one feed.
-    from_clearance : bool
-        Whether pecks are counted from `clearance`, or from `top`.
-    top : float
-    chip : bool
-        Whether a peck only moves up a little.
-    dwell : float, ms
-    feed_out : bool
-    pitch : float or None
-        Of a tap, per revolution.
-    """
-
-    travel: float
-    clearance: float
+    travel: float  #: where the tool goes in the end
+    clearance: float  #: where feeding begins
     bottom: float
-    feed: float | None = None
-    step: float = 0.0
-    from_clearance: bool = True
+    feed: float | None = None  #: In units of F; None for the one in force.
+    step: float = 0.0  #: of a peck; 0 for one feed
+    from_clearance: bool = True  #: whether pecks are counted from `clearance`, or from `top`
     top: float = 0.0
-    chip: bool = False
+    chip: bool = False  #: whether a peck only moves up a little
     dwell: float = 0.0
     feed_out: bool = False
-    pitch: float | None = None
+    pitch: float | None = None  #: of a tap, per revolution
 
 
 def drill(cycle: HoleCycle, x: float, y: float, line: Line, state: State) -> None:

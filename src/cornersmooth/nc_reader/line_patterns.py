@@ -76,35 +76,21 @@ def merged(groups: Iterable[Group], count: int) -> dict[str, Floats]:
 
 @dataclass(frozen=True)
 class LinePattern:
-    """What the lines of one pattern have in common.
+    """What the lines of one pattern have in common."""
 
-    Parameters
-    ----------
-    names : tuple of str or None
-        Columns, those of `constants` at the end; None for lines that are read on their own.
-    constants : bytes
-        Float64 of the columns that are the same in all lines.
-    literal, care : bytes
-        The bytes of the line with its end, and 255 for those that are always the same; `LONGEST` of either.
-    fields : bytes
-        For each other column five int64: where in the line the number ends, its digits, its decimals (-1 without a
-        point), the power of ten to divide by and 1 with a minus sign.
-    """
-
+    #: Columns, those of `constants` at the end; None for lines that are read on their own.
     names: tuple[str, ...] | None
-    constants: bytes
+    constants: bytes  #: float64 of the columns that are the same in all lines
+    #: The bytes of the line with its end, and 255 for those that are always the same; `LONGEST` of either.
     literal: bytes
     care: bytes
+    #: for each other column five int64: where in the line the number ends, its digits, its decimals (-1 without a
+    #: point), the power of ten to divide by and 1 with a minus sign
     fields: bytes
 
 
 class LinePatterns:
-    """The patterns of a text met so far.
-
-    Parameters
-    ----------
-    lexer : Lexer
-    """
+    """The patterns of a text met so far."""
 
     def __init__(self, lexer: Lexer) -> None:
         self._lexer = lexer
@@ -173,25 +159,12 @@ class LinePatterns:
 
 @dataclass(frozen=True)
 class Lines:
-    """Lines of a chunk, each with its pattern.
+    """Lines of a chunk, each with its pattern."""
 
-    Parameters
-    ----------
-    raw : (n,) uint8
-        The text between line ends, `MARGIN` before it.
-    words : (n - 7,) of 8 bytes
-        What stands from every place of it on.
-    start : (l,) int64
-        First byte of every line.
-    label : (l,) int64
-        Row of `line_patterns`.
-    patterns : list of LinePattern
-    """
-
-    raw: Bytes
-    words: NDArray[np.void]
-    start: Ints
-    label: Ints
+    raw: Bytes  #: (n,): the text between line ends, `MARGIN` before it
+    words: NDArray[np.void]  #: what stands from every place of it on
+    start: Ints  #: (l,): first byte of every line
+    label: Ints  #: (l,): row of `line_patterns`
     patterns: list[LinePattern]
 
     def bulk(self) -> NDArray[np.bool_]:
@@ -258,37 +231,20 @@ class Lines:
 
 @dataclass(frozen=True)
 class _Column:
-    """How to read one number of lines with the same letters; values of every pattern, or the one of all.
+    """How to read one number of lines with the same letters; values of every pattern, or the one of all."""
 
-    Parameters
-    ----------
-    begin : int64
-        From the start of the line to eight bytes before the end of the number.
-    behind, keep : uint64
-        The bytes behind the point, and the last eight digits.
-    lead_begin : int64
-        From the start of the line to eight bytes before the end of the digits before those.
-    lead_keep : uint64
-        The digits before those.
-    divisor : float64
-    point, long : bool
-        Whether there is a point, and more bytes than a word has, in any pattern.
-    lead : bool
-        Whether there are digits before the last eight, in any pattern.
-    short : int
-        Bytes of the number, its sign included, where they are few and as many in all patterns; else 0.
-    """
-
-    begin: Any
+    begin: Any  #: from the start of the line to eight bytes before the end of the number
+    #: the bytes behind the point, and the last eight digits
     behind: Any
     keep: Any
     divisor: Any
-    lead_begin: Any
-    lead_keep: Any
+    lead_begin: Any  #: from the start of the line to eight bytes before the end of the digits before those
+    lead_keep: Any  #: the digits before those
+    #: whether there is a point, and more bytes than a word has, in any pattern
     point: bool
     long: bool
-    lead: bool
-    short: int
+    lead: bool  #: whether there are digits before the last eight, in any pattern
+    short: int  #: bytes of the number, its sign included, where they are few and as many in all patterns; else 0
 
 
 def _columns(table: Ints) -> list[_Column]:
@@ -335,7 +291,6 @@ def lines_of(text: bytes, patterns: LinePatterns) -> Lines | None:
     ----------
     text : bytes
         Ends with a line end.
-    patterns : LinePatterns
 
     Returns
     -------

@@ -98,8 +98,6 @@ class MachinePositions:
 
         Parameters
         ----------
-        line : Line
-        text : str
         retract : bool
             Whether it is a retract on the control's own list, which holds where the file says nothing of home.
         """

@@ -59,8 +59,6 @@ def modulo_problems(table: Table, machine: Machine, words: str, memory: Mapping[
 
     Parameters
     ----------
-    table : Table
-    machine : Machine
     words : str
         `Dialect.shorter_way`.
     memory : mapping
@@ -91,10 +89,8 @@ def limit_problems(table: Table, run: Elements, machine: Machine, step: float) -
 
     Parameters
     ----------
-    table : Table
     run : Elements
         What becomes of it; of curves, whose control points may lie farther out, the ends.
-    machine : Machine
     step : float, degrees
         Last printed digit.
     """
@@ -119,7 +115,6 @@ def turn_problems(run: Elements, before: Sequence[float], machine: Machine) -> l
         With its rotary words.
     before : sequence of float
         Those before it, NaN where they are not known.
-    machine : Machine
     """
     problems = []
     curves = run.curves
@@ -179,7 +174,6 @@ def kinematics_problem(
     ----------
     run : Elements
         With its rotary words.
-    machine : Machine
     memory : mapping
         `State.memory`.
     tip_control : bool
@@ -198,12 +192,7 @@ def kinematics_problem(
 
 
 class AxisWords:
-    """Complains once for each state of words of the axis that it does not take for what they are.
-
-    Parameters
-    ----------
-    dialect : Dialect
-    """
+    """Complains once for each state of words of the axis that it does not take for what they are."""
 
     def __init__(self, dialect: Dialect) -> None:
         self._wanted = dialect.controls
@@ -216,7 +205,6 @@ class AxisWords:
 
         Parameters
         ----------
-        table : Table
         kind : str
             What its words of the axis are; a key of `Dialect.controls`.
         letters : set of str

@@ -65,7 +65,6 @@ class OwnFrame:
 
     Parameters
     ----------
-    listed : WordList
     trusted : set of str
         States, kinds of words and blocks that are the user's own.
     positions : MachinePositions

@@ -29,27 +29,13 @@ ASIDE: Final = (math.sqrt(3.0) - 1.0) / 2.0
 
 @dataclass(frozen=True)
 class TiltedPlane:
-    """A plane that is on.
+    """A plane that is on."""
 
-    Parameters
-    ----------
-    frame : (3, 3) float64
-        Columns: its axes X', Y', Z' in the part.
-    room : float, rad
-        By how much its printed angles leave the tool axis open.
-    needs : str
-        Tool tip control that its motion needs; empty for none.
-    turned : bool
-        Whether the rotary axes have been sent to it.
-    origin : (float, float, float)
-        Its zero in the part, in units of the text.
-    """
-
-    frame: Floats
-    room: float = 0.0
-    needs: str = ""
-    turned: bool = True
-    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    frame: Floats  #: (3, 3): columns: its axes X', Y', Z' in the part
+    room: float = 0.0  #: rad: by how much its printed angles leave the tool axis open
+    needs: str = ""  #: tool tip control that its motion needs; empty for none
+    turned: bool = True  #: whether the rotary axes have been sent to it
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)  #: its zero in the part, in units of the text
 
     @property
     def tool(self) -> Floats:
@@ -78,8 +64,6 @@ class TiltedPlane:
 
         Parameters
         ----------
-        table : Table
-        run : Elements
         tip_control : str
             In force.
         axis_words : str
@@ -128,7 +112,6 @@ def turned_frame(rotary: Rotary, angles: Sequence[float]) -> Floats | None:
 
     Parameters
     ----------
-    rotary : Rotary
     angles : sequence of two float
         Degrees.
     """

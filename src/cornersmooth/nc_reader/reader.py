@@ -56,10 +56,6 @@ class Reader:
 
     Parameters
     ----------
-    name : str or None
-        For messages.
-    options : ReadingOptions
-    steps : Steps
     lever : float, optional
         Longest distance, mm, at which rotary axes move the tip; as far as the text goes by default.
     """

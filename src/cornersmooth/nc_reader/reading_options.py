@@ -23,18 +23,10 @@ DIGITS_SHARE: Final = 0.5
 
 @dataclass(frozen=True)
 class Steps:
-    """What the last printed digit is worth.
+    """What the last printed digit is worth."""
 
-    Parameters
-    ----------
-    tip : float
-        In units of the text.
-    second : float
-        Of the second triple; 0 without any.
-    """
-
-    tip: float
-    second: float
+    tip: float  #: in units of the text
+    second: float  #: of the second triple; 0 without any
 
     def finer(self, other: Steps) -> Steps:
         """Give the finer of two of the same text."""
@@ -44,22 +36,13 @@ class Steps:
 
 @dataclass(frozen=True)
 class ReadingOptions:
-    """How a text is to be understood.
-
-    Parameters
-    ----------
-    control : str
-    dialect : Dialect
-    machine : Machine or None
-    tcp : bool
-    tolerance, axis_length : float, mm
-        As in `read_nc`.
-    """
+    """How a text is to be understood."""
 
     control: str
     dialect: Dialect
     machine: Machine | None
     tcp: bool
+    #: mm: as in `read_nc`
     tolerance: float
     axis_length: float
 

@@ -58,23 +58,14 @@ _BEYOND = 0.1
 
 @dataclass(frozen=True)
 class Rotary:
-    """How rotary words move the tool.
-
-    Parameters
-    ----------
-    machine : Machine
-    tip_control : bool
-        Whether X Y Z are the tip, or the linear axes of the machine.
-    tolerance, axis_length : float, mm
-        ε and H.
-    tip_step, angle_step : float
-        Last printed digits, mm and degrees.
-    """
+    """How rotary words move the tool."""
 
     machine: Machine
-    tip_control: bool
+    tip_control: bool  #: whether X Y Z are the tip, or the linear axes of the machine
+    #: mm: ε and H
     tolerance: float
     axis_length: float
+    #: last printed digits, mm and degrees
     tip_step: float
     angle_step: float
 

@@ -253,7 +253,6 @@ def poly_curves(
     before : (6,) float64
         Position in front of the run.
     poly : (r,) bool
-    letters : str
     problems : list of Problem
         Takes what breaks the rules.
     """

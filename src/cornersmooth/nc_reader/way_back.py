@@ -92,7 +92,6 @@ class WayBack:
 
         Parameters
         ----------
-        run : Elements
         aside : (k,) int64
             Lines with words of X or Y: others only turn the rotary axes.
         problems : list of Problem

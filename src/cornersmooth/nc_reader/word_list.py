@@ -98,18 +98,7 @@ class WordRule:
 
 @dataclass(frozen=True)
 class WordList:
-    """The words of a control.
-
-    Parameters
-    ----------
-    begin, end : tuple of pattern
-    header : pattern or None
-    points : frozenset of str
-    switches : bool
-    orders : pattern or None
-    words, blocks : tuple of WordRule
-        What is the control's own comes first.
-    """
+    """The words of a control."""
 
     begin: tuple[re.Pattern[str], ...] = ()
     end: tuple[re.Pattern[str], ...] = ()
@@ -117,6 +106,7 @@ class WordList:
     points: frozenset[str] = frozenset()
     switches: bool = False
     orders: re.Pattern[str] | None = None
+    #: what is the control's own comes first
     words: tuple[WordRule, ...] = ()
     blocks: tuple[WordRule, ...] = field(default=())
 

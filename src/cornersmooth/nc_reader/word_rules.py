@@ -27,10 +27,8 @@ class WordRules:
 
     Parameters
     ----------
-    listed : WordList
     positions : sequence of WordRule
         Blocks beyond the list: positions of the machine that its file has.
-    lexer : Lexer
     tolerance : float
         ε in units of the text.
     """

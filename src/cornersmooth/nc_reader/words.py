@@ -28,7 +28,6 @@ class Word(NamedTuple):
     ----------
     name : str
         The same for all controls where it means the same: vectors are I J K, second points U V W.
-    value : float
     text : str
         As written.
     start, stop : int
@@ -54,18 +53,10 @@ Columns = dict[str, Word | float]
 
 @dataclass(frozen=True)
 class Table:
-    """A run of motion blocks: one column per letter, NaN where a block has no such word.
+    """A run of motion blocks: one column per letter, NaN where a block has no such word."""
 
-    Parameters
-    ----------
-    line : (r,) int64
-        NC line of each block.
-    columns : dict of str to (r,) float64
-        Only letters that occur.
-    """
-
-    line: Ints
-    columns: dict[str, Floats]
+    line: Ints  #: (r,): NC line of each block
+    columns: dict[str, Floats]  #: only letters that occur
 
     def __len__(self) -> int:
         return len(self.line)
@@ -102,27 +93,14 @@ class Table:
 
 @dataclass(frozen=True)
 class Line:
-    """One line that is not part of a run.
-
-    Parameters
-    ----------
-    number : int
-    words : tuple of Word
-        Without the block number.
-    comments : tuple of str
-    block_number : Word or None
-    skipped : bool
-        Whether a slash stands before the block: the operator chooses whether it is executed.
-    tape : bool
-        Whether it is a bare ``%``.
-    """
+    """One line that is not part of a run."""
 
     number: int
-    words: tuple[Word, ...]
+    words: tuple[Word, ...]  #: without the block number
     comments: tuple[str, ...] = ()
     block_number: Word | None = None
-    skipped: bool = False
-    tape: bool = False
+    skipped: bool = False  #: whether a slash stands before the block: the operator chooses whether it is executed
+    tape: bool = False  #: whether it is a bare ``%``
 
 
 def table_of(rows: list[tuple[int, dict[str, float]]]) -> Table:

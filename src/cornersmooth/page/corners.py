@@ -30,40 +30,23 @@ KINDS = ("out of tolerance", "sharp", "rounded: tolerance", "rounded: segment", 
 
 @dataclass(frozen=True)
 class CornerList:
-    """Corners in the order of what matters: out of tolerance, sharp by turn, rounded by their deviation.
+    """Corners in the order of what matters: out of tolerance, sharp by turn, rounded by their deviation."""
 
-    Parameters
-    ----------
-    pose : (k,) int64
-    kind : (k,) uint8
-        Index into `KINDS`.
-    reason : (k,) int64
-        Index into `reasons`.
-    reasons : tuple of str
-    turn, axis_turn : (k,) float64, degrees
-        Change of direction of the tip path and of the axis-point path.
-    length : (k,) float64, mm
-        What the transition takes of the tip path.
-    tip_off, axis_off : (k,) float64, mm
-        Deviation at the corner: measured in the text where it was, else that of the construction.
-    cl_line, nc_line : (k,) int64
-        0 where no text was read.
-    counts : dict of str to int
-        All corners of the program by kind, listed or not; straight ones as ``"straight"``.
-    """
-
-    pose: Ints
-    kind: Ints
-    reason: Ints
+    pose: Ints  #: (k,)
+    kind: Ints  #: (k,): index into `KINDS`
+    reason: Ints  #: (k,): index into `reasons`
     reasons: tuple[str, ...]
+    #: (k,) degrees: change of direction of the tip path and of the axis-point path
     turn: Floats
     axis_turn: Floats
-    length: Floats
+    length: Floats  #: (k,) mm: what the transition takes of the tip path
+    #: (k,) mm: deviation at the corner: measured in the text where it was, else that of the construction
     tip_off: Floats
     axis_off: Floats
+    #: (k,): 0 where no text was read
     cl_line: Ints
     nc_line: Ints
-    counts: dict[str, int]
+    counts: dict[str, int]  #: all corners of the program by kind, listed or not; straight ones as ``"straight"``
 
     def __len__(self) -> int:
         return len(self.pose)

@@ -48,7 +48,6 @@ def page_and_saving(
 
     Parameters
     ----------
-    result : Result
     source : bytes
         The CL file, for its hash.
     frame : Frame, optional

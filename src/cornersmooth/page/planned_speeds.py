@@ -29,24 +29,14 @@ _LOOKS = 6
 
 @dataclass(frozen=True)
 class Planned:
-    """Time laws of one program, and where they are on the original path.
+    """Time laws of one program, and where they are on the original path."""
 
-    Parameters
-    ----------
-    laws : mapping of str to TimeLaw
-        ``"direct"`` (the original path), ``"written"`` (the program); those that were planned.
-    ways : mapping of str to ((k,) float64, (k,) float64)
-        For each law path coordinates, ascending, and the way along the original path there, mm.
-    seconds : (m,) float64 or None
-        When the tool passes the points of the written path.
-    left_out : tuple of str
-        What was not planned, and why, in sentences.
-    """
-
+    #: ``"direct"`` (the original path), ``"written"`` (the program); those that were planned
     laws: Mapping[str, TimeLaw]
+    #: for each law path coordinates, ascending, and the way along the original path there, mm
     ways: Mapping[str, tuple[Floats, Floats]]
-    seconds: Floats | None
-    left_out: tuple[str, ...]
+    seconds: Floats | None  #: (m,): when the tool passes the points of the written path
+    left_out: tuple[str, ...]  #: what was not planned, and why, in sentences
 
 
 def plan_all(

@@ -55,75 +55,34 @@ _NO_WAY = 1e-9
 
 @dataclass(frozen=True)
 class Story:
-    """What the page says in words.
+    """What the page says in words."""
 
-    Parameters
-    ----------
-    title : str
-        Name of the program, else of the CL file.
-    verdict : str
-        One sentence; the words of the terminal.
-    badge : Verdict
-    head : sequence of (str, str)
-        Labels and values that are always in sight.
-    problems : sequence of dict
-        What is wrong or to check, in the order in which it is looked at: severity, lines, text, code.
-    facts : sequence of (str, str)
-        Labels and values: settings, versions, hash.
-    notes : sequence of str
-        Sentences of what was noticed that nobody has to check.
-    origin : str
-        Whose lines the path is of: those of the CL file, or of the old program.
-    """
-
-    title: str
-    verdict: str
+    title: str  #: name of the program, else of the CL file
+    verdict: str  #: one sentence; the words of the terminal
     badge: Verdict
-    head: Sequence[tuple[str, str]] = ()
+    head: Sequence[tuple[str, str]] = ()  #: labels and values that are always in sight
+    #: what is wrong or to check, in the order in which it is looked at: severity, lines, text, code
     problems: Sequence[Mapping[str, Any]] = ()
-    facts: Sequence[tuple[str, str]] = ()
-    notes: Sequence[str] = ()
-    origin: str = "CL"
+    facts: Sequence[tuple[str, str]] = ()  #: labels and values: settings, versions, hash
+    notes: Sequence[str] = ()  #: sentences of what was noticed that nobody has to check
+    origin: str = "CL"  #: whose lines the path is of: those of the CL file, or of the old program
 
 
 @dataclass(frozen=True)
 class Subject:
-    """What a page is made of.
-
-    Parameters
-    ----------
-    program : Program
-    nc : NcProgram
-        The written text, read back.
-    settings : Settings
-        At least tolerance and axis length count.
-    verification : Verification or None
-    smoothed : SmoothProgram or None
-        Where the text was made here.
-    dense : bool
-        Whether transitions are written as lines.
-    laws : mapping of str to TimeLaw
-        Laws that are planned already: ``"direct"``.
-    limits : Limits
-    machine : Machine or None
-    planner : str
-        Of the control's table: with a law of its own no speeds are planned.
-    tool : Tool or None
-        Instead of those in the file.
-    surface : SurfaceMap or None
-    """
+    """What a page is made of."""
 
     program: Program
-    nc: NcProgram
-    settings: Settings
+    nc: NcProgram  #: the written text, read back
+    settings: Settings  #: at least tolerance and axis length count
     verification: Verification | None = None
-    smoothed: SmoothProgram | None = None
-    dense: bool = True
-    laws: Mapping[str, TimeLaw] = field(default_factory=dict)
+    smoothed: SmoothProgram | None = None  #: where the text was made here
+    dense: bool = True  #: whether transitions are written as lines
+    laws: Mapping[str, TimeLaw] = field(default_factory=dict)  #: Laws that are planned already: ``"direct"``.
     limits: Limits = field(default_factory=Limits)
     machine: Machine | None = None
-    planner: str = ""
-    tool: Tool | None = None
+    planner: str = ""  #: of the control's table: with a law of its own no speeds are planned
+    tool: Tool | None = None  #: instead of those in the file
     surface: SurfaceMap | None = None
 
 

@@ -26,7 +26,6 @@ def smooth(
 
     Parameters
     ----------
-    program : Program
     settings : Settings, optional
         Defaults: ε 0.01 mm, H 10 mm; without a form the method "auto" is the proportional one.
     progress : callable, optional

@@ -104,10 +104,8 @@ def largest_blends(rows: Vertices, kept: Ints, limits: LineLimits, most: float, 
 
     Parameters
     ----------
-    rows : Vertices
     kept : (k,) int64
         Rows at which lines end, from `fewest_lines`.
-    limits : LineLimits
     most : float, mm
         Largest blend tolerance.
     deviation : float, mm

@@ -37,59 +37,34 @@ _USED = 0.98
 
 @dataclass(frozen=True)
 class Vertices:
-    """Points of the smoothed motion at which lines may end, r rows in path order.
+    """Points of the smoothed motion at which lines may end, r rows in path order."""
 
-    Parameters
-    ----------
-    tip : (r, 3) float64, mm
-    words : (r, d) float64
-        Run evenly along a line: tool vectors, or rotary words in degrees.
-    original_tip, original_axis_point : (r, 3) float64, mm
-    parameter : (r,) float64, mm
-        Never decreasing.
-    fixed : (r,) bool
-        A line ends here in any case.
-    position : (r, 3) float64 or None, mm
-        Of the linear axes, where these run straight and not the tip.
-    """
-
-    tip: Floats
-    words: Floats
-    original_tip: Floats
-    original_axis_point: Floats
-    parameter: Floats
-    fixed: Bools
-    position: Floats | None = None
+    tip: Floats  #: (r, 3) mm
+    words: Floats  #: (r, d): run evenly along a line: tool vectors, or rotary words in degrees
+    original_tip: Floats  #: (r, 3) mm
+    original_axis_point: Floats  #: (r, 3) mm
+    parameter: Floats  #: (r,) mm: never decreasing
+    fixed: Bools  #: (r,): a line ends here in any case
+    position: Floats | None = None  #: (r, 3) mm: of the linear axes, where these run straight and not the tip
 
 
 @dataclass(frozen=True)
 class LineLimits:
-    """What a line must keep.
+    """What a line must keep."""
 
-    Parameters
-    ----------
-    tip, axis_point : float, mm
-        Largest distances from the original motion at a common parameter.
-    turn : float
-        Largest change of any word in one line, in the unit of the words.
-    axis_length : float, mm
-    axis_of, tip_of : callable
-        Unit tool axes (m, 3) of words (m, d); tips (m, 3) of positions of the linear axes (m, 3) and words.
-    rotary : bool
-        Whether words are angles: the tool axis then does not run evenly with them.
-    blend, lag : float, mm
-        How far the tip may be off a corner that the control rounds by itself, and the axis point lag there (`lags`).
-    """
-
+    #: mm: largest distances from the original motion at a common parameter
     tip: float
     axis_point: float
-    turn: float
-    axis_length: float
+    turn: float  #: largest change of any word in one line, in the unit of the words
+    axis_length: float  #: mm
+    #: unit tool axes (m, 3) of words (m, d); tips (m, 3) of positions of the linear axes (m, 3) and words
     axis_of: Callable[[Floats], Floats]
+    #: mm: how far the tip may be off a corner that the control rounds by itself, and the axis point lag there
+    #: (`lags`)
     blend: float = 0.0
     lag: float = np.inf
     tip_of: Callable[[Floats, Floats], Floats] | None = None
-    rotary: bool = False
+    rotary: bool = False  #: whether words are angles: the tool axis then does not run evenly with them
 
 
 def segments_of_rows(move: Ints, begin: int, end: int) -> tuple[Ints, Bools]:

@@ -25,44 +25,29 @@ from cornersmooth.vectors import unit
 
 @dataclass(frozen=True)
 class Rows:
-    """A part of the smoothed motion, r rows in path order.
+    """A part of the smoothed motion, r rows in path order."""
 
-    Parameters
-    ----------
-    tip : (r, 3) float64, mm
-        End of a line, or a control point of the tip curve.
-    other : (r, 3) float64
-        Unit axis vector in dense rows; axis point (mm) or control point of the axis-point curve in curve rows.
-    move : (r,) int64
-        Pose whose move the row belongs to; lines after the middle of a transition are of the next. Never decreasing.
-        Feed, kind and the place of statements follow from it.
-    curve : (r,) int8
-        0 for the end of a line; 1 to 5 for a control point of a transition, from 1 on for one of a section of a run.
-    joined : (r,) bool
-        First control points that are the end of the row before, with no line between.
-    arc : (r,) int64 or None
-        Row of `Program.arcs` where the tool gets here on a circle or helix about that arc's axis, -1 where it gets here
-        straight; None where the program has no such rows.
-    rate : (r,) float64 or None
-        Moves per minute (inverse time) of rows that are timed so, NaN for the others; None where none is.
-    spline : (r, 3) float64 or None
-        Of control points: knot, weight and, in the last row of a curve, the last knot, zero elsewhere. None in rows of
-        lines.
-    blend : (r,) float64 or None, mm
-        How far the control may round the corner at each row by itself; None where one value holds for all.
-    left : (r,) bool or None
-        Rows at which the tool comes back into a cut that it has left at the row before; None where there is none.
-    """
-
-    tip: Floats
+    tip: Floats  #: (r, 3) mm: end of a line, or a control point of the tip curve
+    #: (r, 3): unit axis vector in dense rows; axis point (mm) or control point of the axis-point curve in curve rows
     other: Floats
+    #: (r,): Pose whose move the row belongs to; lines after the middle of a transition are of the next. Never
+    #: decreasing. Feed, kind and the place of statements follow from it.
     move: Ints
+    #: 0 for the end of a line; 1 to 5 for a control point of a transition, from 1 on for one of a section of a run
     curve: NDArray[np.int8]
-    joined: Bools
+    joined: Bools  #: (r,): first control points that are the end of the row before, with no line between
+    #: (r,): Row of `Program.arcs` where the tool gets here on a circle or helix about that arc's axis, -1 where it
+    #: gets here straight; None where the program has no such rows.
     arc: Ints | None = None
+    #: (r,): Moves per minute (inverse time) of rows that are timed so, NaN for the others; None where none is.
     rate: Floats | None = None
+    #: (r, 3): Of control points: knot, weight and, in the last row of a curve, the last knot, zero elsewhere. None in
+    #: rows of lines.
     spline: Floats | None = None
+    #: (r,) mm: How far the control may round the corner at each row by itself; None where one value holds for all.
     blend: Floats | None = None
+    #: (r,): Rows at which the tool comes back into a cut that it has left at the row before; None where there is
+    #: none.
     left: Bools | None = None
 
 

@@ -171,7 +171,6 @@ def asked(program: Program, places: Sequence[float], end: float, dwells: Sequenc
 
     Parameters
     ----------
-    program : Program
     places : sequence of float, mm
         Where the statements stand along the path.
     end : float, mm

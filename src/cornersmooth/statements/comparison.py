@@ -92,7 +92,6 @@ def compare(
 
     Parameters
     ----------
-    asked_for, found : list of Token
     room : float, mm
         How far apart along the path the places of the same token may be.
     unsaid : frozenset
@@ -260,25 +259,12 @@ def _without_unasked(
 
 @dataclass(frozen=True)
 class _Around:
-    """Tokens by their places: those that may be near a place are found without looking at all.
+    """Tokens by their places: those that may be near a place are found without looking at all."""
 
-    Parameters
-    ----------
-    tokens_anywhere : list of int
-        Those with other places, or of which it is not known how far along they are.
-    ordered : list of int
-        All others, by place.
-    places : list of float, mm
-        Of these, ascending.
-    spare : float, mm
-        What none of these is uncertain by more.
-    near : _Nearness
-    """
-
-    tokens_anywhere: list[int]
-    ordered: list[int]
-    places: list[float]
-    spare: float
+    tokens_anywhere: list[int]  #: those with other places, or of which it is not known how far along they are
+    ordered: list[int]  #: all others, by place
+    places: list[float]  #: mm: of these, ascending
+    spare: float  #: mm: what none of these is uncertain by more
     near: _Nearness
 
     @classmethod

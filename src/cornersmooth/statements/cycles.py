@@ -31,32 +31,16 @@ _TURNING = ("SPINDL", "CUTTER", "TLDATA")
 
 @dataclass(frozen=True)
 class Drilling:
-    """What a hole should be.
+    """What a hole should be."""
 
-    Parameters
-    ----------
-    depth : float, mm
-        Below the pose, along the tool axis; NaN where the statement leaves it open.
-    feed : float
-        mm/min or mm/rev; NaN for the feed in force.
-    per_revolution : bool
-    dwell : float, ms
-        At the bottom; 0 for none.
-    tap : bool
-        Whether the spindle turns with the feed, and back on the way out.
-    feed_out : bool
-        Whether the tool comes out at feed.
-    clearance, retract : float, mm
-        Above the pose, where rapids into the hole end, and where the tool leaves its line; NaN where the statement
-        leaves it open.
-    """
-
-    depth: float = math.nan
-    feed: float = math.nan
+    depth: float = math.nan  #: mm: Below the pose, along the tool axis; NaN where the statement leaves it open.
+    feed: float = math.nan  #: mm/min or mm/rev; NaN for the feed in force.
     per_revolution: bool = False
-    dwell: float = 0.0
-    tap: bool = False
-    feed_out: bool = False
+    dwell: float = 0.0  #: at the bottom; 0 for none
+    tap: bool = False  #: whether the spindle turns with the feed, and back on the way out
+    feed_out: bool = False  #: whether the tool comes out at feed
+    #: mm: Above the pose, where rapids into the hole end, and where the tool leaves its line; NaN where the statement
+    #: leaves it open.
     clearance: float = math.nan
     retract: float = math.nan
 

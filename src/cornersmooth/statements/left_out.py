@@ -36,7 +36,6 @@ def gone_over(program: Program, nc: NcProgram, *, stays: bool) -> Program | None
 
     Parameters
     ----------
-    program : Program
     nc : NcProgram
         The text, with its comments among the events.
     stays : bool

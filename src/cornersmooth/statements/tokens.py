@@ -13,45 +13,24 @@ TAP = 84.0
 
 @dataclass(frozen=True, slots=True)
 class Token:
-    """One change of state, or one action.
+    """One change of state, or one action."""
 
-    Parameters
-    ----------
-    kind : str
-        ``"tool"``, ``"spindle"``, ``"speed"``, ``"coolant"``, ``"compensation"``, ``"stop"``, ``"dwell"``, ``"tap"``,
-        ``"end"``.
-    value : float
-    place : float, mm
-        Path length from the start of the original motion.
-    line : int
-        CL or NC line.
-    room : float, mm
-        How far the place is uncertain beyond what printed digits account for: rotary words near the pole.
-    reach : float, mm
-        How much farther along it may be, too: what the CL file has there leaves nothing in the text.
-    moment : int
-        Tokens of one moment have no motion, stop or dwell between them: of a state only the last one counts.
-    element : int
-        Element of the text that it stands before; -1 in the CL file.
-    habit : bool
-        Whether posts write it on their own: an optional stop right before another tool.
-    others : tuple of float, mm
-        Other places that it may have, where the path goes to and fro.
-    idle : bool
-        Whether a tool is changed for another, or the program ends, before anything moves.
-    """
-
+    #: ``"tool"``, ``"spindle"``, ``"speed"``, ``"coolant"``, ``"compensation"``, ``"stop"``, ``"dwell"``, ``"tap"``,
+    #: ``"end"``
     kind: str
     value: float
-    place: float
-    line: int
+    place: float  #: mm: path length from the start of the original motion
+    line: int  #: CL or NC line
+    #: mm: how far the place is uncertain beyond what printed digits account for: rotary words near the pole
     room: float = 0.0
+    #: tokens of one moment have no motion, stop or dwell between them: of a state only the last one counts
     moment: int = 0
-    habit: bool = False
-    others: tuple[float, ...] = ()
-    idle: bool = False
+    habit: bool = False  #: whether posts write it on their own: an optional stop right before another tool
+    others: tuple[float, ...] = ()  #: mm: other places that it may have, where the path goes to and fro
+    idle: bool = False  #: whether a tool is changed for another, or the program ends, before anything moves
+    #: mm: how much farther along it may be, too: what the CL file has there leaves nothing in the text
     reach: float = 0.0
-    element: int = -1
+    element: int = -1  #: element of the text that it stands before; -1 in the CL file
 
 
 #: kinds during which a state matters although nothing moves

@@ -19,7 +19,6 @@ class ToolChanges:
 
     Parameters
     ----------
-    program : Program
     events : sequence of Event
         Words of the text, which grow as it is read.
     """

@@ -23,49 +23,24 @@ Inner = Callable[[Floats], Floats]
 
 @dataclass(frozen=True)
 class Rows:
-    """Own vertices one after another.
+    """Own vertices one after another."""
 
-    Parameters
-    ----------
-    begin : int
-        The first, counted by the caller.
-    own : (k, 3h) float64, mm
-    bend : (k - 1,) float64, mm
-    number : (k,) float64
-        Their numbers for `Inner`.
-    """
-
-    begin: int
-    own: Floats
-    bend: Floats
-    number: Floats
+    begin: int  #: the first, counted by the caller
+    own: Floats  #: (k, 3h) mm
+    bend: Floats  #: (k - 1,) mm
+    number: Floats  #: (k,): their numbers for `Inner`
 
 
 @dataclass
 class Around:
-    """Some rows against a part of the path, both perhaps divided more finely, and what of them is reached.
-
-    Parameters
-    ----------
-    space : FreeSpace
-    begin : int
-        The first row.
-    at : (k,) int64
-        Where the rows are among those of the space.
-    places : (m + 1,) float64
-        Of the vertices of the space on the whole path.
-    start : float
-        The place of the first row.
-    reached : list of Reached
-        Row by row of the space, from that place on.
-    """
+    """Some rows against a part of the path, both perhaps divided more finely, and what of them is reached."""
 
     space: FreeSpace
-    begin: int
-    at: Ints
-    places: Floats
-    start: float
-    reached: list[Reached] = field(default_factory=list)
+    begin: int  #: the first row
+    at: Ints  #: (k,): where the rows are among those of the space
+    places: Floats  #: (m + 1,): of the vertices of the space on the whole path
+    start: float  #: the place of the first row
+    reached: list[Reached] = field(default_factory=list)  #: row by row of the space, from that place on
 
     @classmethod
     def of(cls, rows: Rows, path: Path, radius: float, start: float, top: int) -> Around:

@@ -41,32 +41,16 @@ STRETCH: Final = np.dtype(
 
 @dataclass(frozen=True)
 class Batch:
-    """Elements that are decided at once, and then measured.
-
-    Parameters
-    ----------
-    elements : Elements
-    offset : int
-        Number of the first of them in the whole text.
-    stretches : (k,) STRETCH
-        Elements are counted in this batch.
-    motion : Motion
-        The polyline of the elements from the end of the first stretch's `first` on.
-    way : Way
-        The place of each of its vertices, and where the motions part.
-    continued : bool
-        Whether the first stretch begins in the batch before: one more element stands in front of it.
-    goes_on : bool
-        Whether the last stretch goes on in the next batch.
-    """
+    """Elements that are decided at once, and then measured."""
 
     elements: Elements
-    offset: int
-    stretches: NDArray[Any]
-    motion: Motion
-    way: Way
+    offset: int  #: number of the first of them in the whole text
+    stretches: NDArray[Any]  #: elements are counted in this batch
+    motion: Motion  #: the polyline of the elements from the end of the first stretch's `first` on
+    way: Way  #: the place of each of its vertices, and where the motions part
+    #: whether the first stretch begins in the batch before: one more element stands in front of it
     continued: bool = False
-    goes_on: bool = False
+    goes_on: bool = False  #: whether the last stretch goes on in the next batch
 
     @property
     def first(self) -> int:
@@ -93,7 +77,6 @@ class Batches:
 
     Parameters
     ----------
-    task : Task
     events : sequence of Event
         Words of the text, which grow as it is read.
     """

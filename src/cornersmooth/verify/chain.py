@@ -36,25 +36,13 @@ _SLACK, _RADII = 0.05, 100.0
 
 @dataclass(frozen=True)
 class Path:
-    """A polyline with path lengths.
+    """A polyline with path lengths."""
 
-    Parameters
-    ----------
-    points : (m + 1, 3h) float64, mm
-    length : (m + 1,) float64, mm
-        Path length up to every vertex, in 3h dimensions.
-    bend : (m,) float64, mm
-        How far the motion may leave each segment.
-    gate : (m + 1,) float64, mm
-        Radius at each vertex.
-    exact : callable or None
-        Gives points (k, 3h) of the motion at places (k,); None where it is straight.
-    """
-
-    points: Floats
-    length: Floats
-    bend: Floats
-    gate: Floats
+    points: Floats  #: (m + 1, 3h) mm
+    length: Floats  #: (m + 1,) mm: path length up to every vertex, in 3h dimensions
+    bend: Floats  #: (m,) mm: how far the motion may leave each segment
+    gate: Floats  #: (m + 1,) mm: radius at each vertex
+    #: Gives points (k, 3h) of the motion at places (k,); None where it is straight.
     exact: Callable[[Floats], Floats] | None = None
 
     @classmethod
@@ -194,22 +182,15 @@ class Sections:
     """Parts of the own motion that are run beside parts of the path, one after the other, both in order.
 
     What lies between two of them is not looked at.
-
-    Parameters
-    ----------
-    first, last : (s,) int64
-        Own vertices.
-    start, stop : (s,) float64
-        Places on the path beside them; the latter are vertices.
-    open : bool
-        Whether the last section goes on behind its last vertex: that may be anywhere before `stop`.
     """
 
+    #: (s,): own vertices
     first: Ints
     last: Ints
+    #: (s,): places on the path beside them; the latter are vertices
     start: Floats
     stop: Floats
-    open: bool = False
+    open: bool = False  #: whether the last section goes on behind its last vertex: that may be anywhere before `stop`
 
     @classmethod
     def whole(cls, last: int, stop: int, *, open_end: bool = False) -> Sections:
@@ -230,21 +211,11 @@ class Sections:
 
 @dataclass(frozen=True)
 class Chain:
-    """Places of rows, and where they prove nothing.
+    """Places of rows, and where they prove nothing."""
 
-    Parameters
-    ----------
-    place : (n,) float64
-        Ascending.
-    bad : (n,) bool
-        Whether the row, or the step from the row before it, is not proved.
-    far : (n,) bool
-        Whether it is not because vertices are farther apart: dividing the step proves nothing.
-    """
-
-    place: Floats
-    bad: Bools
-    far: Bools
+    place: Floats  #: (n,): ascending
+    bad: Bools  #: (n,): whether the row, or the step from the row before it, is not proved
+    far: Bools  #: (n,): whether it is not because vertices are farther apart: dividing the step proves nothing
 
 
 def points_at(path: Floats, place: Floats, first: int = 0) -> Floats:
@@ -262,7 +233,6 @@ def chain(own: Floats, bend: Floats, path: Path, radius: float, sections: Sectio
     own : (3h, n) float64, mm
     bend : (n - 1,) float64, mm
         Of each segment of it.
-    path : Path
     radius : float, mm
     sections : Sections
         The first begins at the first vertex, and is free there.

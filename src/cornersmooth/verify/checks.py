@@ -29,22 +29,13 @@ CHECKS: Final[tuple[Callable[[Match, Findings], None], ...]] = (
 
 @dataclass(frozen=True)
 class Examined:
-    """What a batch shows.
-
-    Parameters
-    ----------
-    findings : Findings
-    elements : (e,) int64
-        Elements of the whole text at whose ends words stand, as far as they are known to be in this batch.
-    lengths : (e,) float64, mm
-        CL path length at their places.
-    others : dict
-        Those of other poses that elements name and may stand for as well, where the path goes to and fro; by element.
-    """
+    """What a batch shows."""
 
     findings: Findings
+    #: (e,): elements of the whole text at whose ends words stand, as far as they are known to be in this batch
     elements: Ints
-    lengths: Floats
+    lengths: Floats  #: (e,) mm: CL path length at their places
+    #: those of other poses that elements name and may stand for as well, where the path goes to and fro; by element
     others: dict[int, tuple[float, ...]]
 
 
@@ -53,8 +44,6 @@ def examine(task: Task, batch: Batch, asked: Ints, so_far: Largest) -> Examined:
 
     Parameters
     ----------
-    task : Task
-    batch : Batch
     asked : (k,) int64
         Elements of the whole text whose places are asked for; ascending.
     so_far : Largest

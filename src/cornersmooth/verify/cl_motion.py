@@ -28,28 +28,15 @@ _MOST_PARTS: Final = 1 << 13
 
 @dataclass(frozen=True)
 class Trail:
-    """Vertices of a motion, v of them.
+    """Vertices of a motion, v of them."""
 
-    Parameters
-    ----------
-    tip, axis : (v, 3) float64
-        mm, unit vectors.
-    owner : (v,) int64
-        Index of the move that leads to each vertex.
-    fraction : (v,) float64
-        Where on it, 1 at its end.
-    last : (m,) int64
-        Vertex at the end of each move.
-    bend : (v - 1,) float64, mm
-        Of the segment to the next vertex.
-    """
-
+    #: (v, 3): mm, unit vectors
     tip: Floats
     axis: Floats
-    owner: Ints
-    fraction: Floats
-    last: Ints
-    bend: Floats
+    owner: Ints  #: (v,): index of the move that leads to each vertex
+    fraction: Floats  #: (v,): where on it, 1 at its end
+    last: Ints  #: (m,): vertex at the end of each move
+    bend: Floats  #: (v - 1,) mm: of the segment to the next vertex
 
     def __len__(self) -> int:
         return len(self.tip)
@@ -57,20 +44,11 @@ class Trail:
 
 @dataclass(frozen=True)
 class Original:
-    """The CL motion: its poses without those that are only stated, as a trail.
-
-    Parameters
-    ----------
-    program : Program
-    pose : (m,) int64
-        Pose of every move; the first is where the motion starts.
-    trail : Trail
-        Owners are indices into `pose`.
-    """
+    """The CL motion: its poses without those that are only stated, as a trail."""
 
     program: Program
-    pose: Ints
-    trail: Trail
+    pose: Ints  #: (m,): pose of every move; the first is where the motion starts
+    trail: Trail  #: owners are indices into `pose`
 
     def pose_at(self, place: Floats) -> tuple[Floats, Floats]:
         """Tip and unit axis (k, 3) at places of the trail, each a segment plus a fraction of it."""

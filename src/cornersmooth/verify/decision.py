@@ -24,30 +24,16 @@ from cornersmooth.verify.task import ARITHMETIC, Task
 
 @dataclass(frozen=True)
 class Way:
-    """Where the vertices of a batch are on the CL path.
+    """Where the vertices of a batch are on the CL path."""
 
-    Parameters
-    ----------
-    place : (v,) float64
-        Segment plus fraction, ascending; NaN where a vertex is not of a stretch, or could not be reached.
-    breaks : tuple of (Metric, Break)
-        Where the motions part, and what does.
-    whole : bool
-        Whether all was looked at.
-    """
-
+    #: (v,): Segment plus fraction, ascending; NaN where a vertex is not of a stretch, or could not be reached.
     place: Floats
-    breaks: tuple[tuple[Metric, Break], ...]
-    whole: bool
+    breaks: tuple[tuple[Metric, Break], ...]  #: where the motions part, and what does
+    whole: bool  #: whether all was looked at
 
 
 class Decision:
-    """Decides one batch after another.
-
-    Parameters
-    ----------
-    task : Task
-    """
+    """Decides one batch after another."""
 
     def __init__(self, task: Task) -> None:
         self._task = task
@@ -75,7 +61,6 @@ class Decision:
         ----------
         nc : Elements
             Those that the motion is of.
-        motion : Motion
         rows : (k,) int64, (k,) int64
             The first and the last vertex of each stretch.
         stretches : (k,) STRETCH

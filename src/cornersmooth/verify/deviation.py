@@ -64,18 +64,12 @@ def _say(match: Match, found: Findings, metric: Metric, one: Break) -> None:
 
 @dataclass(frozen=True)
 class _Around:
-    """What is around a break.
+    """What is around a break."""
 
-    Parameters
-    ----------
-    rows, segments : (r,), (m,) int64
-        Written vertices from the break to where the motions are together again, and segments of the CL path near them.
-    vertices, steps : (k,), (s,) int64
-        Vertices of the CL path between the two places, and steps of the written motion near them.
-    """
-
+    #: written vertices from the break to where the motions are together again, and segments of the CL path near them
     rows: Ints
     segments: Ints
+    #: vertices of the CL path between the two places, and steps of the written motion near them
     vertices: Ints
     steps: Ints
 

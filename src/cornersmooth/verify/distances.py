@@ -26,24 +26,12 @@ _ROUNDS: Final = 12
 
 @dataclass(frozen=True)
 class Reached:
-    """What vertices of one motion find on the other, k rows.
+    """What vertices of one motion find on the other, k rows."""
 
-    Parameters
-    ----------
-    vertex : (k,) int64
-        The vertices.
-    gap : Gap
-        At a common pose: the nearest but for the bends of the other motion.
-    place : (k,) float64
-        Where on the other polyline: segment plus fraction.
-    mine : bool
-        Whether they are written vertices.
-    """
-
-    vertex: Ints
-    gap: Gap
-    place: Floats
-    mine: bool
+    vertex: Ints  #: (k,): the vertices
+    gap: Gap  #: at a common pose: the nearest but for the bends of the other motion
+    place: Floats  #: (k,): where on the other polyline: segment plus fraction
+    mine: bool  #: whether they are written vertices
 
 
 def of_written(match: Match) -> Reached:

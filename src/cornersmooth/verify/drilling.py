@@ -55,10 +55,7 @@ class Holes:
 
     Parameters
     ----------
-    original : Original
-    ahead : Ahead
     axis_length, tolerance : float, mm
-    changes : ToolChanges
     """
 
     def __init__(

@@ -101,23 +101,15 @@ class Peaks:
 
 @dataclass
 class Largest(Peaks):
-    """Largest deviations.
+    """Largest deviations."""
 
-    Parameters
-    ----------
-    tip, axis_point : Worst, mm
-        Distance of the two tip paths, and of the two axis-point paths, in order along the path.
-    together_tip, together_axis_point : Worst, mm
-        The same at one common pose of the tool line.
-    orientation : Worst, rad
-        At the common pose.
-    """
-
+    #: mm: distance of the two tip paths, and of the two axis-point paths, in order along the path
     tip: Worst = field(default_factory=Worst)
     axis_point: Worst = field(default_factory=Worst)
+    #: mm: the same at one common pose of the tool line
     together_tip: Worst = field(default_factory=Worst)
     together_axis_point: Worst = field(default_factory=Worst)
-    orientation: Worst = field(default_factory=Worst)
+    orientation: Worst = field(default_factory=Worst)  #: rad: at the common pose
 
     def copy(self) -> Largest:
         """Return the same values, to go on from."""
@@ -135,22 +127,13 @@ class Continuity(Peaks):
 
 @dataclass(frozen=True)
 class Poses:
-    """Distances of original poses from the nearest written pose.
+    """Distances of original poses from the nearest written pose."""
 
-    Parameters
-    ----------
-    pose : (k,) int64
-        Poses of the CL program, and for each of them:
-    tip, axis_point : (k,) float64, mm
-    angle : (k,) float64, rad
-    nc_line : (k,) int64
-    """
-
-    pose: Ints
-    tip: Floats
-    axis_point: Floats
-    angle: Floats
-    nc_line: Ints
+    pose: Ints  #: (k,): Poses of the CL program, and for each of them:
+    tip: Floats  #: (k,) mm
+    axis_point: Floats  #: (k,) mm
+    angle: Floats  #: (k,) rad
+    nc_line: Ints  #: (k,)
 
     @classmethod
     def nowhere(cls, count: int) -> Poses:
@@ -188,27 +171,14 @@ class Runs:
 
 @dataclass
 class Findings:
-    """What the checks of a batch find, or those of all batches so far.
+    """What the checks of a batch find, or those of all batches so far."""
 
-    Parameters
-    ----------
-    largest : Largest
-        At least what it started from.
-    continuity : Continuity
-    violations : Violations
-    feeds : Runs
-        Of elements with a wrong feed.
-    poses : list of Poses
-    unlooked : list of (int, str)
-        What was not looked at, and the NC line.
-    """
-
-    largest: Largest = field(default_factory=Largest)
+    largest: Largest = field(default_factory=Largest)  #: at least what it started from
     continuity: Continuity = field(default_factory=Continuity)
     violations: Violations = field(default_factory=Violations)
-    feeds: Runs = field(default_factory=Runs)
+    feeds: Runs = field(default_factory=Runs)  #: of elements with a wrong feed
     poses: list[Poses] = field(default_factory=list)
-    unlooked: list[tuple[int, str]] = field(default_factory=list)
+    unlooked: list[tuple[int, str]] = field(default_factory=list)  #: what was not looked at, and the NC line
 
     def take(self, other: Findings) -> None:
         """Take over what is found elsewhere."""

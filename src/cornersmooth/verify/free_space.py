@@ -66,25 +66,15 @@ def free_interval(point: Floats, start: Floats, way: Floats, radius: Floats) -> 
 
 @dataclass(frozen=True)
 class FreeSpace:
-    """Own polyline against path.
+    """Own polyline against path."""
 
-    Parameters
-    ----------
-    own : (3h, n) float64, mm
-    path : (3h, m + 1) float64, mm
-    radius : float, mm
-    own_bend, path_bend : (n - 1,), (m,) float64, mm
-        How far the motions may leave these segments: it is taken off the radius.
-    gate : (m + 1,) float64, mm
-        Radius at vertices of the path, no larger than the other.
-    """
-
-    own: Floats
-    path: Floats
-    radius: float
+    own: Floats  #: (3h, n) mm
+    path: Floats  #: (3h, m + 1) mm
+    radius: float  #: mm
+    #: mm: how far the motions may leave these segments: it is taken off the radius
     own_bend: Floats
     path_bend: Floats
-    gate: Floats
+    gate: Floats  #: (m + 1,) mm: radius at vertices of the path, no larger than the other
 
     def reversed(self) -> FreeSpace:
         """The same, run backwards."""

@@ -32,10 +32,7 @@ class HoleLines:
 
     Parameters
     ----------
-    original : Original
-    ahead : Ahead
     axis_length, tolerance : float, mm
-    changes : ToolChanges
     """
 
     def __init__(

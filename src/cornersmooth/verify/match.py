@@ -20,32 +20,16 @@ from cornersmooth.verify.task import Task
 
 @dataclass(frozen=True)
 class Passing:
-    """Vertices of the CL path and where the written motion passes them, k of them in order.
+    """Vertices of the CL path and where the written motion passes them, k of them in order."""
 
-    Parameters
-    ----------
-    vertex : (k,) int64
-        Of the CL path.
-    row : (k,) int64
-        Vertex of the written motion that the step begins at.
-    share : (k,) float64
-        Of that step.
-    """
-
-    vertex: Ints
-    row: Ints
-    share: Floats
+    vertex: Ints  #: (k,): of the CL path
+    row: Ints  #: (k,): vertex of the written motion that the step begins at
+    share: Floats  #: (k,): of that step
 
 
 @dataclass(frozen=True)
 class Match:
-    """A batch, v vertices.
-
-    Parameters
-    ----------
-    task : Task
-    batch : Batch
-    """
+    """A batch, v vertices."""
 
     task: Task
     batch: Batch

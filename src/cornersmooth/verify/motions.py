@@ -28,27 +28,13 @@ _MOST_PARTS: Final = 64
 
 @dataclass(frozen=True)
 class Motion:
-    """A motion as a polyline, v vertices.
+    """A motion as a polyline, v vertices."""
 
-    Parameters
-    ----------
-    six : (v, 6) float64, mm
-        Tips and axis points.
-    owner : (v,) int64
-        The element that leads to each vertex, counted in the elements at hand.
-    fraction : (v,) float64
-        Where on it, 1 at its end.
-    last : (m,) int64
-        Vertex at the end of each element.
-    bend : (v - 1,) float64, mm
-        Of the step to the next vertex.
-    """
-
-    six: Floats
-    owner: Ints
-    fraction: Floats
-    last: Ints
-    bend: Floats
+    six: Floats  #: (v, 6) mm: tips and axis points
+    owner: Ints  #: (v,): the element that leads to each vertex, counted in the elements at hand
+    fraction: Floats  #: (v,): where on it, 1 at its end
+    last: Ints  #: (m,): vertex at the end of each element
+    bend: Floats  #: (v - 1,) mm: of the step to the next vertex
 
 
 def written_motion(nc: Elements, tolerance: float, axis_length: float, *, own_axis: bool) -> Motion:
@@ -56,7 +42,6 @@ def written_motion(nc: Elements, tolerance: float, axis_length: float, *, own_ax
 
     Parameters
     ----------
-    nc : Elements
     tolerance, axis_length : float, mm
     own_axis : bool
         Whether the axis point is measured from the tip (see `Task`).

@@ -22,18 +22,11 @@ _BLOCK: Final = 8192
 
 @dataclass(frozen=True)
 class Gap:
-    """How far poses are from a motion, k rows.
+    """How far poses are from a motion, k rows."""
 
-    Parameters
-    ----------
-    tip, axis_point : (k,) float64, mm
-    angle : (k,) float64, rad
-        Between the tool axes.
-    """
-
-    tip: Floats
-    axis_point: Floats
-    angle: Floats
+    tip: Floats  #: (k,) mm
+    axis_point: Floats  #: (k,) mm
+    angle: Floats  #: (k,) rad: between the tool axes
 
     @property
     def larger(self) -> Floats:
@@ -80,7 +73,6 @@ def nearest_places(
         Segments on either side.
     low, high : (k,) int64
         First and last segment allowed.
-    metric : Metric
 
     Returns
     -------

@@ -19,10 +19,6 @@ _STEPS = 2.0
 class OwnRapids:
     """Knows where the CL file goes in rapid.
 
-    Parameters
-    ----------
-    task : Task
-
     Attributes
     ----------
     rapids, holes : (k,) int64
@@ -102,12 +98,7 @@ class OwnRapids:
         return np.where(chosen, np.cumsum(moved), np.nan)
 
     def left_out(self, nc: NcProgram) -> tuple[Elements, list[Event]]:
-        """Elements and events of a text that was read before, where rapids that posts add do not move the tool.
-
-        Parameters
-        ----------
-        nc : NcProgram
-        """
+        """Elements and events of a text that was read before, where rapids that posts add do not move the tool."""
         elements = Elements(**{column.name: getattr(nc, column.name) for column in fields(Elements)})
         tip, second = nc.tip.copy(), nc.second.copy()
         withdrawn = set()

@@ -49,39 +49,22 @@ CHUNK: Final = 8192
 
 @dataclass(frozen=True)
 class Break:
-    """Where the motions part.
+    """Where the motions part."""
 
-    Parameters
-    ----------
-    row : int
-        The first vertex of the own polyline that cannot be reached.
-    place : float
-        Last place on the path (segment plus fraction) that was reached before.
-    proved : bool
-        False: NOT VERIFIED, as what was looked at before it was not enough.
-    """
-
-    row: int
-    place: float
-    proved: bool
+    row: int  #: the first vertex of the own polyline that cannot be reached
+    place: float  #: last place on the path (segment plus fraction) that was reached before
+    proved: bool  #: False: NOT VERIFIED, as what was looked at before it was not enough.
 
 
 @dataclass(frozen=True)
 class Passage:
-    """The answer.
+    """The answer."""
 
-    Parameters
-    ----------
-    place : (n,) float64
-        A place on the path, segment plus fraction, for every vertex of the own polyline, ascending: beside each other
-        the two motions can be run through all of them. NaN where there is none, from a break on.
-    breaks : tuple of Break
-    whole : bool
-        Whether all of the own motion was looked at: not after `MOST_BREAKS`, nor where it never came back to the path.
-    """
-
+    #: (n,): A place on the path, segment plus fraction, for every vertex of the own polyline, ascending: beside each
+    #: other the two motions can be run through all of them. NaN where there is none, from a break on.
     place: Floats
     breaks: tuple[Break, ...] = ()
+    #: whether all of the own motion was looked at: not after `MOST_BREAKS`, nor where it never came back to the path
     whole: bool = True
 
     @property
@@ -146,16 +129,10 @@ def passage(
 
 @dataclass
 class Walk:
-    """Goes along a path as the own motion comes in, chunk by chunk.
-
-    Parameters
-    ----------
-    path : Path
-    radius : float, mm
-    """
+    """Goes along a path as the own motion comes in, chunk by chunk."""
 
     path: Path
-    radius: float
+    radius: float  #: mm
     _own: Floats | None = None  #: (k, 3h) last vertices of a section that goes on, to look back on
     _bend: Floats = field(default_factory=lambda: np.zeros(0))
     _place: Floats = field(default_factory=lambda: np.zeros(0))

@@ -32,7 +32,6 @@ def digit_errors(nc: Elements, element: Ints, tip: Floats, axis: Floats, axis_le
 
     Parameters
     ----------
-    nc : Elements
     element : (k,) int64
     tip, axis : (k, 3) float64
     axis_length : float, mm
@@ -65,7 +64,6 @@ class Rapids:
 
     Parameters
     ----------
-    original : Original
     axis_length : float, mm
     nc : Elements
         Any of the text: its digits decide which rapids of the CL file move the tool.

@@ -21,22 +21,12 @@ _AROUND: Final = 64
 
 @dataclass
 class Reachable:
-    """Places of the vertices of a batch.
-
-    Parameters
-    ----------
-    task : Task
-    motion : Motion
-    place : (v,) float64
-        One place of each; NaN for none.
-    section : (v,) int64
-        The stretch of each.
-    """
+    """Places of the vertices of a batch."""
 
     task: Task
     motion: Motion
-    place: Floats
-    section: Ints
+    place: Floats  #: (v,): One place of each; NaN for none.
+    section: Ints  #: (v,): the stretch of each
     _known: dict[int, Reached] = field(default_factory=dict)
 
     def places(self, vertex: int) -> Reached:

@@ -19,16 +19,10 @@ MOST_PROBLEMS = 1000
 
 @dataclass(frozen=True)
 class Where:
-    """A largest value and where it was met.
-
-    Parameters
-    ----------
-    value : float
-    cl_line, nc_line : int
-        From 1; 0 where there is none.
-    """
+    """A largest value and where it was met."""
 
     value: float
+    #: from 1; 0 where there is none
     cl_line: int
     nc_line: int
 
@@ -60,8 +54,6 @@ class Verification:
         Blocks of the text.
     elements : int
         Path elements: rapids, lines, arcs, curves.
-    curves : int
-    poses : int
     shortest : Where, mm
         Shortest feed element that moves (the longer of the ways of tip and axis point); value is inf without one.
     tangent_jump : Where, degrees

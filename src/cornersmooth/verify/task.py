@@ -30,32 +30,21 @@ MARGIN_SHARE = 0.5
 
 @dataclass(frozen=True)
 class Task:
-    """The CL motion and what is promised of it.
-
-    Parameters
-    ----------
-    original : Original
-    path : Path
-        Its trail as points.
-    exact : (m,) bool
-        Whether the end of every move must be passed exactly: all but the inner poses of chains at which
-        nothing acts.
-    tolerance, axis_length : float, mm
-        ε and H; H is the distance at which the axis tolerance shows as ε, where there is one.
-    axis_tolerance : float or None, degrees
-        That of the tool axis, where it has one of its own. The *axis point* then is H times the axis wherever the tip
-        is: it is off by ε where the axis is off by its tolerance.
-    apart : bool
-        Whether tips and axis points need only be within ε each on its own, and within `APART` ε together: the two
-        curves of the paper do not run at common poses.
-    """
+    """The CL motion and what is promised of it."""
 
     original: Original
-    path: Path
+    path: Path  #: its trail as points
+    #: (m,): whether the end of every move must be passed exactly: all but the inner poses of chains at which nothing
+    #: acts
     exact: Bools
+    #: mm: ε and H; H is the distance at which the axis tolerance shows as ε, where there is one.
     tolerance: float
     axis_length: float
+    #: degrees: That of the tool axis, where it has one of its own. The *axis point* then is H times the axis wherever
+    #: the tip is: it is off by ε where the axis is off by its tolerance.
     axis_tolerance: float | None = None
+    #: whether tips and axis points need only be within ε each on its own, and within `APART` ε together: the two
+    #: curves of the paper do not run at common poses
     apart: bool = False
 
     @property

@@ -60,7 +60,6 @@ class Verifier:
 
     Parameters
     ----------
-    program : Program
     nc : NcProgram, bytes or path
         A file must be there, but need not be whole.
     tolerance : float, mm

@@ -50,8 +50,6 @@ class WordCheck:
 
     Parameters
     ----------
-    control : str
-    lexer : Lexer
     tolerance : float
         ε in units of the text.
     trusted : iterable of str

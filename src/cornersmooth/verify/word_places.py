@@ -31,17 +31,10 @@ _BEFORE: Final = -1.0
 
 @dataclass
 class WordPlaces:
-    """Takes down what is known of the elements that have words behind them, while they are read and measured.
-
-    Parameters
-    ----------
-    task : Task
-    events : list of Event
-        Words of the text, which grow as it is read.
-    """
+    """Takes down what is known of the elements that have words behind them, while they are read and measured."""
 
     task: Task
-    events: list[Event]
+    events: list[Event]  #: words of the text, which grow as it is read
     margin: float = 0.0  #: what printed digits account for, mm
     _lengths: dict[int, float] = field(default_factory=dict)  #: CL path length, mm, at the ends of elements
     _rooms: dict[int, float] = field(default_factory=dict)  #: how far that is uncertain, mm

@@ -29,7 +29,6 @@ def dialect_of(control: str, rotary: str = "") -> Dialect:
 
     Parameters
     ----------
-    control : str
     rotary : str
         Addresses of the rotary axes of a machine; empty for texts without rotary words.
 

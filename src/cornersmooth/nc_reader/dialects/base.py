@@ -83,7 +83,6 @@ class Dialect:
 
     Parameters
     ----------
-    lexer : Lexer
     rotary : str
         Addresses of the rotary axes; empty without a machine.
     """

@@ -39,48 +39,22 @@ _NO_CYCLE = 80.0
 
 @dataclass(frozen=True)
 class IsoWords:
-    """What differs between these controls.
+    """What differs between these controls."""
 
-    Parameters
-    ----------
-    tip_control : mapping
-        Name of what a G word switches on, which takes a length register H with it; ``""`` switches off.
-    controls : mapping
-        `Dialect.controls`.
-    silent : frozenset
-        Further G words that change nothing measured.
-    dwell : float
-        Milliseconds that ``G4 P`` counts in.
-    others : str
-        Letters that say nothing here.
-    unsaid : frozenset
-        `Dialect.unsaid`.
-    curves_need : str
-        `Dialect.curves_need`.
-    semicolon : bool
-        Whether a comment may begin with one.
-    retracts : bool
-        `Dialect.retracts`.
-    cycles_in : str or None
-        Name of the tool tip control under which hole cycles are taken; None where they are not known.
-    rigid : bool
-        Whether ``M29 S`` asks for taps that turn the spindle with the feed.
-    planes : {"", "G68.2", "G254"}
-        What switches tilted planes on.
-    """
-
+    #: Name of what a G word switches on, which takes a length register H with it; ``""`` switches off.
     tip_control: Mapping[float, str]
-    controls: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    silent: frozenset[float] = frozenset()
-    dwell: float = 1.0
-    others: str = "NOQ"
-    unsaid: frozenset[str | tuple[str, float]] = frozenset()
-    curves_need: str = ""
-    semicolon: bool = False
-    retracts: bool = True
+    controls: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  #: `Dialect.controls`
+    silent: frozenset[float] = frozenset()  #: further G words that change nothing measured
+    dwell: float = 1.0  #: milliseconds that ``G4 P`` counts in
+    others: str = "NOQ"  #: letters that say nothing here
+    unsaid: frozenset[str | tuple[str, float]] = frozenset()  #: `Dialect.unsaid`
+    curves_need: str = ""  #: `Dialect.curves_need`
+    semicolon: bool = False  #: whether a comment may begin with one
+    retracts: bool = True  #: `Dialect.retracts`
+    #: Name of the tool tip control under which hole cycles are taken; None where they are not known.
     cycles_in: str | None = "G43"
-    rigid: bool = False
-    planes: str = ""
+    rigid: bool = False  #: whether ``M29 S`` asks for taps that turn the spindle with the feed
+    planes: str = ""  #: what switches tilted planes on
 
 
 _FANUC = {43.0: "G43", 43.4: "G43.4", 43.5: "G43.5", 49.0: ""}

@@ -26,23 +26,12 @@ _PLACES = np.array(((0.0, np.nan, np.nan), (0.0, 0.5, np.nan), (0.0, 0.25, 0.75)
 
 @dataclass(frozen=True)
 class Polylines:
-    """Poses of r runs, one after the other.
+    """Poses of r runs, one after the other."""
 
-    Parameters
-    ----------
-    point : (n, 6) float64, mm
-        Tip and axis point.
-    count : (r,) int64
-        Poses of each run, at least 2.
-    s : (n,) float64
-        Length from the start of the run in steps of `step`, whole numbers, by m(D) (docs/method.md).
-    step : float, mm
-        Small beside ε. Poses and knots lie at whole steps, so that knots can be written with few digits.
-    """
-
-    point: Floats
-    count: Ints
-    s: Floats
+    point: Floats  #: (n, 6) mm: tip and axis point
+    count: Ints  #: (r,): poses of each run, at least 2
+    s: Floats  #: (n,): length from the start of the run in steps of `step`, whole numbers, by m(D) (docs/method.md)
+    #: mm: Small beside ε. Poses and knots lie at whole steps, so that knots can be written with few digits.
     step: float
 
     @classmethod
