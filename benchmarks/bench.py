@@ -23,7 +23,14 @@ from statistics import median
 #: control and form, with the machine where it needs one
 CASES = {
     "fanuc g1": ("--control", "fanuc", "-f", "g1"),
-    "fanuc g6.2": ("--control", "fanuc", "-f", "g6.2"),
+    "fanuc g6.2": (
+        "--control",
+        "fanuc",
+        "-f",
+        "g6.2",
+        "--method",
+        "proportional",
+    ),  # as the C program, corner by corner
     "siemens bspline": ("--control", "siemens", "-f", "bspline"),
     "heidenhain g1": ("--control", "heidenhain", "-f", "g1"),
     "linuxcnc xyzac-trt": ("--control", "linuxcnc", "--machine", "xyzac-trt"),
