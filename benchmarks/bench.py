@@ -20,17 +20,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 
-#: control and form, with the machine where it needs one
+#: control and form, with the machine where it needs one; curves of FANUC corner by corner, as the C program makes them
 CASES = {
     "fanuc g1": ("--control", "fanuc", "-f", "g1"),
-    "fanuc g6.2": (
-        "--control",
-        "fanuc",
-        "-f",
-        "g6.2",
-        "--method",
-        "proportional",
-    ),  # as the C program, corner by corner
+    "fanuc g6.2": ("--control", "fanuc", "-f", "g6.2", "--method", "proportional"),
     "siemens bspline": ("--control", "siemens", "-f", "bspline"),
     "heidenhain g1": ("--control", "heidenhain", "-f", "g1"),
     "linuxcnc xyzac-trt": ("--control", "linuxcnc", "--machine", "xyzac-trt"),
