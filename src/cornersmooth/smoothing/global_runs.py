@@ -200,8 +200,9 @@ def find_runs(program: Program, settings: Settings, corners: Corners) -> tuple[I
     status[corners.pose] = corners.status
     inner = np.zeros(len(pose), np.bool_)
     inner[1:-1] = (chain[1:-1] == chain[:-2]) & (chain[1:-1] == chain[2:])
-    joins = inner & ~np.isin(status[pose], Status.having(Trait.ENDS_RUN))
-    bent = joins & np.isin(status[pose], (Status.SMOOTHED, Status.TOO_SHORT))
+    ends, turns = Status.having(Trait.ENDS_RUN), {*Status.having(Trait.PASSED_BY)} - {*Status.having(Trait.NO_CORNER)}
+    joins = inner & ~np.isin(status[pose], ends)
+    bent = joins & np.isin(status[pose], sorted(turns))
     # a run is a row of segments whose inner poses all join; segment i leads from pose i to pose i + 1
     segment = np.flatnonzero(chain[1:] == chain[:-1])
     if not len(segment):
