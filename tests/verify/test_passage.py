@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from cornersmooth.verify import passage as module
 from cornersmooth.verify.chain import Path, Sections
-from cornersmooth.verify.passage import CHUNK, Walk, passage
+from cornersmooth.verify.passage import CHUNK, Walk
 from oracle.free_space import passes
+from verify.whole_passage import passage, whole_section
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -113,7 +114,7 @@ def test_bent_motions_pass_only_where_they_keep_the_radius(seed, radius, divided
         t = (number - k)[:, None]
         return own[k] + t * (own[k + 1] - own[k]) - second[k] * t * (1 - t) / 2
 
-    walk, sections = Walk(Path.of(path, radius), radius), Sections.whole(len(own) - 1, len(path) - 1)
+    walk, sections = Walk(Path.of(path, radius), radius), whole_section(len(own) - 1, len(path) - 1)
     found = walk.take(own, bend, sections, inner if divided else None)
     assert len(found.place) == len(own)
     if found.passed:  # chords of a twentieth are off by a four-hundredth of the bend

@@ -192,11 +192,6 @@ class Sections:
     stop: Floats
     open: bool = False  #: whether the last section goes on behind its last vertex: that may be anywhere before `stop`
 
-    @classmethod
-    def whole(cls, last: int, stop: int, *, open_end: bool = False) -> Sections:
-        """One section: all of both motions."""
-        return cls(np.array([0]), np.array([last]), np.array([0.0]), np.array([float(stop)]), open_end)
-
     def of(self, rows: Ints) -> tuple[Ints, Bools]:
         """Section of each row, or the one before, and whether it is inside."""
         number = np.maximum(np.searchsorted(self.first, rows, side="right") - 1, 0)
