@@ -118,13 +118,16 @@ class SiemensSplines:
         if match is None:
             if line.startswith(";") and self.last == at - 1:
                 self.last = at  # a comment is no block
+            if re.match(r"G[01]\b", line):
+                self.run = None
             return None
-        if match[1]:
+        if not match[1] and self.run is None:
+            raise TextError(f"{at}: control point outside of a spline")
+        if match[1] or self.last != at - 1:  # statements part two splines: the mode goes on
             assert position is not None
             self.run = SplineRun(at, reader, [position])
             reading.pieces.append(self.run)  # type: ignore[arg-type]
-        elif self.run is None or self.last != at - 1:
-            raise TextError(f"{at}: control point outside of a spline")
+        assert self.run is not None
         weight = float(match.groups()[-1])
         if not 0 < weight <= 3:
             raise TextError(f"{at}: PW out of range")
