@@ -110,14 +110,14 @@ class _Said:
 
 
 def _beside(match: Match, vertex: int) -> Ints:
-    """Moves around its own that a vertex may be on: within the tolerance of its tip, which the feed is of."""
+    """Moves around its own that a vertex may be on: within the tolerance (`Task.radius`) of its tip."""
     low, here, high = int(match.low[vertex]), int(match.segment[vertex]), int(match.high[vertex])
     size = _FEW
     while True:
         first, stop = max(here - size, low), min(here + size, high) + 1
         segments = np.arange(first, stop)
         _, square = on_segments(match.six[vertex, None, None, :3], match.path.points, segments[None], COLUMNS["tip"])
-        off = np.flatnonzero(square[0] > (match.tolerance + ARITHMETIC) ** 2) + first
+        off = np.flatnonzero(square[0] > match.task.radius**2) + first
         begin, end = off[off < here].max(initial=first - 1) + 1, off[off > here].min(initial=stop)
         if (begin > first or first == low) and (end < stop or stop == high + 1):
             owner: Ints = match.original.trail.owner[begin + 1 : end + 1]
