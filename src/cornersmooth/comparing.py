@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -219,17 +219,28 @@ def compare_programs(
     if timing is None:
         raise SettingsError("CS265", "no limits of axes are known", "name a machine that has [dynamics] with --limits")
     unsmoothed, against = timing.unsmoothed(part)
-    count = (useful_processes() if processes is None else processes) if can_fork() else 1
 
     def work(candidate: Candidate) -> Row:
         return _row(part, candidate, unsmoothed, axes, blocks)
 
+    rows = rows_of(tried, work, processes, progress)
+    return Table(unsmoothed, against, len(part) / max(len(program), 1), law_of_lines(timing), rows)
+
+
+def rows_of(
+    tried: Sequence[Candidate],
+    work: Callable[[Candidate], Row],
+    processes: int | None,
+    progress: Callable[[int, int], None] | None,
+) -> tuple[Row, ...]:
+    """Row of every candidate, by as many processes as are useful where no number is given."""
+    count = (useful_processes() if processes is None else processes) if can_fork() else 1
     rows: list[Row] = []
     for row in map_in_processes(work, tried, count):
         rows.append(row)
         if progress is not None:
             progress(len(rows), len(tried))
-    return Table(unsmoothed, against, len(part) / max(len(program), 1), law_of_lines(timing), tuple(rows))
+    return tuple(rows)
 
 
 def law_of_lines(timing: Timing) -> str:

@@ -65,7 +65,7 @@ def command(source: str, **given: Any) -> int:
       cornersmooth compare part.ngc --control linuxcnc --machine xyzac-trt
     """
     from cornersmooth.cl import read
-    from cornersmooth.cli.filter import axes_of, how_read
+    from cornersmooth.cli.programs import axes_of, how_read
     from cornersmooth.comparing import candidates, compare_programs
     from cornersmooth.feedrate import BlockLimits
     from cornersmooth.filter.compared import compare_filtered

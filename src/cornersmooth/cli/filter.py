@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 from itertools import chain
 from typing import TYPE_CHECKING, Any
@@ -14,10 +14,10 @@ from cornersmooth.cli.files import STANDARD, check_path, read_input, suffix_of, 
 from cornersmooth.cli.inputs import Input, check_together, find_inputs, named_input
 from cornersmooth.cli.options import motion, nc_text, outputs, reading, smoothing
 from cornersmooth.cli.options.parameters import PATH
+from cornersmooth.cli.programs import form_of, how_read, show_wrong
 from cornersmooth.cli.shop import ShopCommand, command_line, loosened
 from cornersmooth.cli.show import (
     INDENT,
-    more,
     print_heading,
     print_line,
     print_message,
@@ -44,8 +44,8 @@ if TYPE_CHECKING:
 #: names of NC programs, for folders
 PATTERNS = ("*.nc", "*.ngc", "*.mpf", "*.spf", "*.h", "*.tap", "*.cnc", "*.eia", "*.iso", "*.gcode")
 
-#: reasons shown without -v, and problems
-_SHOWN, _WRONG_SHOWN = 10, 20
+#: reasons shown without -v
+_SHOWN = 10
 
 
 @click.command(
@@ -121,25 +121,6 @@ def command(inputs: tuple[str, ...], **given: Any) -> int:
     return worst
 
 
-def form_of(given: dict[str, Any]) -> Form:
-    """Form of the control that blocks are read and written in.
-
-    Raises
-    ------
-    SettingsError
-        CS240: a control whose programs are not read as a filter.
-    """
-    from cornersmooth.errors import SettingsError
-    from cornersmooth.filter.vocabulary import VOCABULARIES
-    from cornersmooth.nc import choose_form
-
-    control = nc_text.control_of(given)
-    if control.dialect not in VOCABULARIES:
-        known = ", ".join(sorted(VOCABULARIES))
-        raise SettingsError("CS240", f"programs for {control.name} are not read as a filter", f"use one of {known}")
-    return choose_form(control, given.get("form"), machine=nc_text.machine_of(given), tcp=not given.get("no_tcp"))
-
-
 def _check_reports(reports: Sequence[Sequence[str]], given: Sequence[str]) -> None:
     """Refuse names of reports that say another form, or are the same for several inputs."""
     if wrong := [path for path in given if suffix_of(path) not in (".json", ".html")]:
@@ -156,24 +137,18 @@ def _pages(reports: Sequence[str]) -> bool:
 def _write_reports(
     reports: Sequence[str],
     contents: Mapping[str, Any],
-    found: Filtered,
-    judgement: Judgement,
-    source: tuple[str, bytes],
-    name: str,
-    form: Form,
-    settings: Settings,
-    axes: Machine | None,
+    page: Callable[[], str] | None,
 ) -> None:
-    """Write the reports of a filtered program: JSON, and the page of its runs before and after."""
+    """Write the reports of a filtered program: JSON, and the page of its runs before and after, if any differs."""
     from cornersmooth.report import report_json
 
     for report in reports:
         if suffix_of(report) != ".html":
             write_report(report, [report_json(contents)])
-        elif found.motions is None:
+        elif page is None:
             warn("no page is written: no run differs", report)
         else:
-            write_report(report, [_page(found, judgement, source, name, form, settings, axes)])
+            write_report(report, [page()])
 
 
 def _page(
@@ -183,18 +158,17 @@ def _page(
     name: str,
     form: Form,
     settings: Settings,
-    axes: Machine | None,
-) -> str:
-    """Page of the runs of a program before and after."""
+    axes: Machine | None = None,
+) -> Callable[[], str] | None:
+    """What makes the page of the runs of a program before and after; None where no run differs."""
     from cornersmooth.filter.checking import measure
     from cornersmooth.page import verified_page
 
-    assert found.motions is not None
-    program, nc, measured = measure(*found.motions, settings, os.path.basename(source[0]))
-    return verified_page(
-        program,
-        nc,
-        measured,
+    if found.motions is None:
+        return None
+    motions = found.motions
+    return lambda: verified_page(
+        *measure(*motions, settings, os.path.basename(source[0])),
         name=name,
         control=form.table.name,
         form=form.name,
@@ -253,7 +227,8 @@ def _filter(
         "lines_out": found.new_lines,
     }
     contents["left_as_it_is"] = [asdict(left) for left in found.left]
-    _write_reports(reports, contents, found, judgement, (name, data), os.path.basename(target), form, settings, axes)
+    page = _page(found, judgement, (name, data), os.path.basename(target), form, settings, axes)
+    _write_reports(reports, contents, page)
     line = contents["verdict_text"]
     if given["as_json"]:
         say_json(contents)
@@ -282,89 +257,13 @@ def verify_with_program(source: str, old: bytes, path: str, given: dict[str, Any
     judgement = Judgement(found.verdict, 0, 0, "", _problems(checked.wrong) or _measured(checked, settings.tolerance))
     written = replace(NcFile.of(None if path == STANDARD else path, sha256_of(new), form), form=None)
     contents = _report("verify", judgement, checked, (source, old), written, settings)
-    _write_reports(given["reports"], contents, found, judgement, (source, old), name, form, settings, None)
-    _show_wrong(name, checked.wrong)
+    _write_reports(given["reports"], contents, _page(found, judgement, (source, old), name, form, settings))
+    show_wrong(name, checked.wrong)
     if given["as_json"]:
         say_json(contents)
     elif loosened(settings.tolerance) or not given["quiet"]:
         say_line(contents["verdict_text"])
     return int(found.verdict is not Verdict.PASSED)
-
-
-def time_of_program(data: bytes, name: str, given: dict[str, Any]) -> int:
-    """Say the time of a program as it is and smoothed, or beside another one; return the exit code of ``time``."""
-    from cornersmooth.filter import filter_program, verify_programs
-    from cornersmooth.filter.program import read_program
-    from cornersmooth.filter.times import time_as_it_is
-    from cornersmooth.verify import useful_processes
-
-    form, settings, axes = form_of(given), smoothing.settings_of(given), axes_of(given)
-    how = {**how_read(given), "axes": axes, "processes": useful_processes()}
-    with told_of(name):
-        if given["text"]:
-            found = verify_programs(data, read_input(given["text"])[0], form, settings, **how)
-        else:
-            found = filter_program(data, form, settings, verify=False, **how)
-        if found.seconds is None and not (found.checked and found.checked.wrong):  # nothing differs
-            alone = time_as_it_is(*read_program(data, form, settings, **how_read(given)), axes)
-            found = replace(found, seconds=(alone, alone))
-    if found.checked is not None and found.checked.wrong:
-        _show_wrong(given["text"], found.checked.wrong)
-        return 1
-    assert found.seconds is not None
-    before, after = found.seconds
-    whole = bool(form.table.lines.planner)
-    if given["as_json"]:
-        contents = {
-            "schema": "cornersmooth-time/1",
-            "seconds": {"unsmoothed": before, "as_written": after},
-            "unsmoothed": "the program as it is",
-            "counted": "program" if whole else "smoothed runs",
-            "cuts": found.cuts,
-            "smoothed": found.smoothed,
-        }
-        say_json(contents)
-    elif not given["quiet"]:
-        say_line(f"{before:>12.3f} s  {name} as it is")
-        share = f" ({100.0 * (after / before - 1.0):+.1f} %)" if before else ""
-        say_line(f"{after:>12.3f} s  {given['text'] or 'smoothed'}{share}")
-        what = "the whole program" if whole else "the runs that differ, without rapids"
-        say_line(f"of {what}; {found.smoothed:,} of {found.cuts:,} cuts differ")
-    return 0
-
-
-def axes_of(given: dict[str, Any]) -> Machine:
-    """Machine under whose limits a program is planned."""
-    from cornersmooth.comparing import limits_machine
-
-    axes = limits_machine(nc_text.machine_of(given, "limits"), nc_text.machine_of(given))
-    if axes is None:
-        raise click.UsageError("programs are planned within limits of axes: name a machine with [dynamics]: --limits")
-    return axes
-
-
-def how_read(given: dict[str, Any]) -> dict[str, Any]:
-    """What is to be known of a program that it does not say."""
-    return {"tip_from_start": given["tip_control"], "inch": given["units"] == "inch"}
-
-
-def describe_program(data: bytes, name: str) -> dict[str, Any]:
-    """Say what an NC program holds, as far as words tell that need no machine."""
-    from cornersmooth.filter.runs import ProgramReader
-    from cornersmooth.filter.vocabulary import VOCABULARIES
-    from cornersmooth.nc_reader.recognition import recognise_control
-    from cornersmooth.provenance import HEAD
-
-    control = recognise_control(data[:HEAD])
-    reading = ProgramReader(control if control in VOCABULARIES else "fanuc", None).read(data)
-    return {
-        "schema": "cornersmooth-info/2",
-        "name": name,
-        "format": "nc",
-        "looks_like": control or None,
-        "lines": len(reading.why),
-        "cuts": reading.cuts,
-    }
 
 
 def _problems(wrong: Sequence[Problem]) -> str:
@@ -376,13 +275,6 @@ def _measured(found: Checked, tolerance: float) -> str:
     return f"within {tolerance:g} mm: tip {found.tip:.4g} mm{point}"
 
 
-def _show_wrong(name: str, wrong: Sequence[Problem]) -> None:
-    for one in wrong[:_WRONG_SHOWN]:
-        print_message(one.message(f"{name}:{one.nc_line}"))
-    if len(wrong) > _WRONG_SHOWN:
-        print_line(f"{name}: {more(len(wrong) - _WRONG_SHOWN, 'problem')}")
-
-
 def _show(name: str, contents: Mapping[str, Any], found: Filtered, verbose: int, given_units: str | None) -> None:
     """Print the verdict, what was measured, and what was left as it is."""
     verdict, _, what = contents["verdict_text"].partition(": ")
@@ -392,7 +284,7 @@ def _show(name: str, contents: Mapping[str, Any], found: Filtered, verbose: int,
     for part in (*what.split("; "), "all outside of runs is the same byte for byte"):
         print_line(INDENT + part)
     if found.checked is not None:
-        _show_wrong(name, found.checked.wrong)
+        show_wrong(name, found.checked.wrong)
     if found.seconds is not None:
         before, after = found.seconds
         share = 100.0 * (after / before - 1.0)

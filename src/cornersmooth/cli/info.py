@@ -34,7 +34,7 @@ def command(source: str, tolerance: float, axis_length: float, as_json: bool, **
       cornersmooth info part.cls --json > part.json
     """
     from cornersmooth.cl import read
-    from cornersmooth.cli.filter import describe_program
+    from cornersmooth.cli.programs import describe_program
     from cornersmooth.nc_reader.recognition import first_block
     from cornersmooth.provenance import HEAD
     from cornersmooth.report.info import describe

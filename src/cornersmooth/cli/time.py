@@ -83,7 +83,7 @@ def command(source: str, **given: Any) -> int:
       cornersmooth time part.cls --text part.nc --block-time 1ms --look-ahead 200
       cornersmooth time part.ngc --control linuxcnc --machine xyzac-trt
     """
-    from cornersmooth.cli.filter import time_of_program
+    from cornersmooth.cli.programs import time_of_program
     from cornersmooth.nc_reader.recognition import first_block
     from cornersmooth.provenance import HEAD
 

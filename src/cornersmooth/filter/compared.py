@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from cornersmooth.comparing import MOST_POSES, Candidate, Row, Table, law_of_lines
+from cornersmooth.comparing import MOST_POSES, Candidate, Row, Table, law_of_lines, rows_of
 from cornersmooth.errors import CornersmoothError, SettingsError
 from cornersmooth.filter.program import filter_program, left_all_but, read_program
 from cornersmooth.filter.times import by_own_law, no_runs, time_as_it_is
 from cornersmooth.kinematics import Machine
-from cornersmooth.processes import can_fork, map_in_processes, useful_processes
 from cornersmooth.saving import Timing
 
 #: how many times more cuts are looked at where times need no plan
@@ -67,13 +66,8 @@ def compare_filtered(
     def work(candidate: Candidate) -> Row:
         return _row(data, candidate, before, axes, most=most, tip_from_start=tip_from_start, inch=inch)
 
-    rows: list[Row] = []
-    count = (useful_processes() if processes is None else processes) if can_fork() else 1
-    for row in map_in_processes(work, tried, count):
-        rows.append(row)
-        if progress is not None:
-            progress(len(rows), len(tried))
-    return Table(before, "the program as it is", share, law_of_lines(timing), tuple(rows))
+    rows = rows_of(tried, work, processes, progress)
+    return Table(before, "the program as it is", share, law_of_lines(timing), rows)
 
 
 def _row(
