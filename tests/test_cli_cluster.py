@@ -52,7 +52,8 @@ def cluster(shared: Path, **settings: str) -> Iterator[Path]:
             )
             stack.enter_context(process)
             stack.callback(process.terminate)
-        wait_for(lambda: (shared / "scheduler.json").exists())
+        file = shared / "scheduler.json"
+        wait_for(lambda: file.exists() and file.read_text().rstrip().endswith("}"))  # it is written whole
         yield shared / "scheduler.json"
 
 
