@@ -5,29 +5,26 @@ from __future__ import annotations
 Point = list[float]
 
 
-def passes(own: list[Point], path: list[Point], radius: float, gate: list[float]) -> bool:
-    """Whether both can be run beside each other, forward only; every triple of coordinates has to keep the radius.
-
-    `gate` is the radius at the vertices of the path.
-    """
-    own, path, gate = (values * 2 if len(values) == 1 else values for values in (own, path, gate))
+def passes(own: list[Point], path: list[Point], radius: float) -> bool:
+    """Whether both can be run beside each other, forward only; every triple of coordinates has to keep the radius."""
+    own, path = (values * 2 if len(values) == 1 else values for values in (own, path))
     rows, columns = len(own) - 1, len(path) - 1
-    if apart(own[0], path[0]) > gate[0] or apart(own[-1], path[-1]) > gate[-1]:
+    if apart(own[0], path[0]) > radius or apart(own[-1], path[-1]) > radius:
         return False
     below: list[tuple[float, float] | None] = []
     reached = True
     for k in range(columns):
         free = within(own[0], path[k], path[k + 1], radius)
         below.append(free if reached and free and free[0] <= 0 else None)
-        reached = below[-1] is not None and below[-1][1] >= 1 and apart(own[0], path[k + 1]) <= gate[k + 1]
+        reached = below[-1] is not None and below[-1][1] >= 1 and apart(own[0], path[k + 1]) <= radius
     reached = True
     for i in range(rows):
-        free = within(path[0], own[i], own[i + 1], gate[0])
+        free = within(path[0], own[i], own[i + 1], radius)
         left = free if reached and free and free[0] <= 0 else None
         reached = left is not None and left[1] >= 1
         for k in range(columns):
             above = within(own[i + 1], path[k], path[k + 1], radius)
-            right = within(path[k + 1], own[i], own[i + 1], gate[k + 1])
+            right = within(path[k + 1], own[i], own[i + 1], radius)
             entered = below[k]
             below[k] = above if left else _from(entered, above)
             left = right if entered else _from(left, right)

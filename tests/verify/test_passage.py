@@ -66,22 +66,19 @@ def written(rng: np.random.Generator, path: np.ndarray) -> np.ndarray:
     kind=st.sampled_from(KINDS),
     radius=st.sampled_from([1e-6, 0.02, 0.1, 0.3, 0.6, 1.0, 2.0]),
     columns=st.sampled_from([slice(0, 6), slice(0, 3), slice(3, 6)]),
-    gated=st.booleans(),
 )
-def test_verdict_is_that_of_the_whole_diagram(seed, kind, radius, columns, gated):
+def test_verdict_is_that_of_the_whole_diagram(seed, kind, radius, columns):
     rng = np.random.default_rng(seed)
     path = walk(rng, kind, rng.integers(1, 14))
     own, path = written(rng, path)[:, columns], path[:, columns]
-    gate = np.where(rng.random(len(path)) < 0.5, radius, radius * rng.uniform(0.2, 1.0)) if gated else None
-    limits = np.full(len(path), radius) if gate is None else gate
 
     def judge(share):
-        return passes(own.tolist(), path.tolist(), share * radius, (share * limits).tolist())
+        return passes(own.tolist(), path.tolist(), share * radius)
 
     if judge(1 - 1e-9) != judge(1 + 1e-9):
         return  # nobody can tell
     for chunk in (5, CHUNK):
-        found = passage(own, path, radius, gate=gate, chunk=chunk)
+        found = passage(own, path, radius, chunk=chunk)
         assert found.passed == judge(1.0)
         assert found.passed or found.breaks
     if found.passed:
@@ -114,14 +111,14 @@ def test_bent_motions_pass_only_where_they_keep_the_radius(seed, radius, divided
         t = (number - k)[:, None]
         return own[k] + t * (own[k + 1] - own[k]) - second[k] * t * (1 - t) / 2
 
-    walk, sections = Walk(Path.of(path, radius), radius), whole_section(len(own) - 1, len(path) - 1)
+    walk, sections = Walk(Path.of(path), radius), whole_section(len(own) - 1, len(path) - 1)
     found = walk.take(own, bend, sections, inner if divided else None)
     assert len(found.place) == len(own)
     if found.passed:  # chords of a twentieth are off by a four-hundredth of the bend
-        assert passes(dense.tolist(), path.tolist(), radius + bend.max() / 400, [radius + bend.max() / 400] * len(path))
+        assert passes(dense.tolist(), path.tolist(), radius + bend.max() / 400)
     elif divided:
         close = 0.99 * radius - bend.max() / 400
-        assert not passes(dense.tolist(), path.tolist(), close, [close] * len(path))
+        assert not passes(dense.tolist(), path.tolist(), close)
 
 
 def straight(n: int) -> np.ndarray:
@@ -208,7 +205,7 @@ def test_sections_are_judged_each_by_itself(seed, radius):
         pairs.append((path, written(rng, path)))
     verdicts = []
     for path, own in pairs:
-        judged = {passes(own.tolist(), path.tolist(), r, [r] * len(path)) for r in (radius, radius * (1 - 1e-9))}
+        judged = {passes(own.tolist(), path.tolist(), r) for r in (radius, radius * (1 - 1e-9))}
         if len(judged) > 1:
             return
         verdicts += judged
@@ -219,7 +216,7 @@ def test_sections_are_judged_each_by_itself(seed, radius):
     sizes = np.array([[len(one), len(path)] for path, one in pairs])
     path = np.concatenate([path for path, _ in pairs])
     sections = Sections(last + 1 - sizes[:, 0], last, stop + 1.0 - sizes[:, 1], stop.astype(float))
-    found = Walk(Path.of(path, radius), radius).take(own, np.zeros(len(own) - 1), sections)
+    found = Walk(Path.of(path), radius).take(own, np.zeros(len(own) - 1), sections)
     number, inside = sections.of(np.arange(len(own)))
     assert np.isnan(found.place[~inside]).all()
     rows = np.array([one.row for one in found.breaks], int)

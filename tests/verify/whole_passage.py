@@ -21,7 +21,6 @@ def passage(
     path: Floats,
     radius: float,
     *,
-    gate: Floats | None = None,
     own_bend: Floats | None = None,
     path_bend: Floats | None = None,
     chunk: int = CHUNK,
@@ -34,8 +33,6 @@ def passage(
         Vertices: h triples of coordinates, each of which has to keep the radius by itself: tips alone (h = 1), or tips
         and axis points (h = 2). At least one vertex each.
     radius : float, mm
-    gate : (m + 1,) float64, mm, optional
-        Radius at vertices of the path, where that is smaller.
     own_bend, path_bend : (n - 1,), (m,) float64, mm, optional
         By how much the motions may leave each segment: an eighth of the largest second derivative by its fraction.
         They are proved to be within the radius, not their chords.
@@ -50,11 +47,10 @@ def passage(
     """
     if len(path) == 1:
         path, path_bend = np.repeat(path, 2, axis=0), None
-        gate = None if gate is None else np.repeat(gate, 2)
     if len(own) == 1:
-        found = passage(np.repeat(own, 2, axis=0), path, radius, gate=gate, path_bend=path_bend)
+        found = passage(np.repeat(own, 2, axis=0), path, radius, path_bend=path_bend)
         return Passage(found.place[:1], tuple(replace(one, row=0) for one in found.breaks[:1]), found.whole)
-    walk = Walk(Path.of(path, radius, gate=gate, bend=path_bend), radius)
+    walk = Walk(Path.of(path, path_bend), radius)
     bend = np.zeros(len(own) - 1) if own_bend is None else own_bend
     place, breaks, whole = [], [], True
     for first in range(0, len(own) - 1, chunk):

@@ -10,7 +10,7 @@ import numpy as np
 
 from cornersmooth.model import Floats, Ints
 from cornersmooth.verify.chain import Path
-from cornersmooth.verify.free_space import FreeSpace, Reached, holds, largest_square, lowest
+from cornersmooth.verify.free_space import FreeSpace, Reached, holds, lowest
 
 #: bend of steps where what can be reached is worked out exactly, in radii: it is taken off the radius; and the most
 #: parts of a step there
@@ -47,8 +47,7 @@ class Around:
         """Rows against the path from the place of the first up to a vertex."""
         base = min(int(start), top - 1)
         vertices = slice(base, top + 1)
-        points, bend, gate = path.points[vertices].T, path.bend[base:top], path.gate[vertices]
-        space = FreeSpace(rows.own.T, points, radius, rows.bend, bend, gate)
+        space = FreeSpace(rows.own.T, path.points[vertices].T, radius, rows.bend, path.bend[base:top])
         places = np.arange(base, top + 1, dtype=np.float64)
         return cls(space, rows.begin, np.arange(len(rows.own)), places, start)
 
@@ -80,8 +79,6 @@ class Around:
         space, radius = self.space, self.space.radius
         theirs = _parts(space.path_bend, radius)
         places, path_bend = _divided(self.places, theirs), np.repeat(space.path_bend / theirs**2, theirs)
-        gate = np.full(len(places), np.inf)
-        gate[np.append(0, np.cumsum(theirs))] = space.gate
         ours = _parts(space.own_bend, radius) if inner is not None else np.ones(len(space.own_bend), np.int64)
         at = np.append(0, np.cumsum(ours))
         own = np.empty((len(space.own), at[-1] + 1))
@@ -90,7 +87,7 @@ class Around:
         if inner is not None and len(between):
             own[:, between] = inner(_divided(rows.number, ours)[between]).T
         own_bend = np.repeat(space.own_bend / ours**2, ours)
-        finer = FreeSpace(own, path.at(places).T, radius, own_bend, path_bend, gate)
+        finer = FreeSpace(own, path.at(places).T, radius, own_bend, path_bend)
         return Around(finer, self.begin, at, places, self.start)
 
     def inward(self, place: float) -> float:
@@ -137,9 +134,7 @@ class Around:
             return None
         if stop is None:
             return self.outward(lowest(self.reached[-1]))
-        limit = min(self.space.radius, float(self.space.gate[-1]))
-        near = largest_square(self.space.own[:, -1] - self.space.path[:, -1]) <= limit * limit
-        return float(stop) if near and stop == self.top and holds(self.reached[-1], final + 1.0, final) else None
+        return float(stop) if stop == self.top and holds(self.reached[-1], final + 1.0, final) else None
 
     def farthest(self) -> float:
         """Last place that was reached."""

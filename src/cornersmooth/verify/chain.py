@@ -41,26 +41,16 @@ class Path:
     points: Floats  #: (m + 1, 3h) mm
     length: Floats  #: (m + 1,) mm: path length up to every vertex, in 3h dimensions
     bend: Floats  #: (m,) mm: how far the motion may leave each segment
-    gate: Floats  #: (m + 1,) mm: radius at each vertex
     #: Gives points (k, 3h) of the motion at places (k,); None where it is straight.
     exact: Callable[[Floats], Floats] | None = None
 
     @classmethod
-    def of(
-        cls,
-        points: Floats,
-        radius: float,
-        *,
-        gate: Floats | None = None,
-        bend: Floats | None = None,
-        exact: Callable[[Floats], Floats] | None = None,
-    ) -> Path:
+    def of(cls, points: Floats, bend: Floats | None = None, exact: Callable[[Floats], Floats] | None = None) -> Path:
         """Make it of vertices."""
         step = points[1:] - points[:-1]
         length = np.zeros(len(points))
         np.cumsum(np.sqrt(np.einsum("ij,ij->i", step, step)), out=length[1:])
-        limit = np.full(len(points), radius) if gate is None else np.minimum(gate, radius)
-        return cls(points, length, np.zeros(len(step)) if bend is None else bend, limit, exact)
+        return cls(points, length, np.zeros(len(step)) if bend is None else bend, exact)
 
     @property
     def segments(self) -> int:
@@ -252,13 +242,12 @@ def chain(own: Floats, bend: Floats, path: Path, radius: float, sections: Sectio
     rows, vertices, share = passed(own, step, path.points, place)
     beside = path.points[vertices].T - own[:, rows] - share * step[:, rows]
     beside_square = largest_square(beside)
-    limit = np.minimum(radius, path.gate[vertices] - 4.0 * bend[rows] * share * (1.0 - share))
-    bad[rows[(beside_square > limit * limit) | (limit < 0.0)] + 1] = True
+    bad[rows[beside_square > radius * radius] + 1] = True
     far = bad
     if path.bent or bend.any():
         far = away_square > radius * radius
         least = np.sqrt(beside_square) - 4.0 * bend[rows] * share * (1.0 - share)
-        far[rows[least > np.minimum(radius, path.gate[vertices])] + 1] = True
+        far[rows[least > radius] + 1] = True
         bad |= _bent(bend, path, radius, place, (rows, vertices, share), (away, -beside))
     bad[~inside] = False
     firsts = sections.first[1:]

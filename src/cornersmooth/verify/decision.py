@@ -87,7 +87,7 @@ def _only(path: Path, metric: Metric) -> Path:
     columns, exact = COLUMNS[metric], path.exact
     points = np.ascontiguousarray(path.points[:, columns])
     alone = None if exact is None else lambda place: exact(place)[:, columns]
-    return Path.of(points, np.inf, bend=path.bend, exact=alone)
+    return Path.of(points, path.bend, alone)
 
 
 def _inner(nc: Elements, motion: Motion, task: Task, columns: slice, number: Floats) -> Floats:

@@ -74,12 +74,11 @@ class FreeSpace:
     #: mm: how far the motions may leave these segments: it is taken off the radius
     own_bend: Floats
     path_bend: Floats
-    gate: Floats  #: (m + 1,) mm: radius at vertices of the path, no larger than the other
 
     def reversed(self) -> FreeSpace:
         """The same, run backwards."""
         own, path = self.own[:, ::-1], self.path[:, ::-1]
-        return FreeSpace(own, path, self.radius, self.own_bend[::-1], self.path_bend[::-1], self.gate[::-1])
+        return FreeSpace(own, path, self.radius, self.own_bend[::-1], self.path_bend[::-1])
 
     def part(self, rows: slice, segments: slice) -> FreeSpace:
         """Some of its rows, and some of its segments."""
@@ -89,7 +88,6 @@ class FreeSpace:
             self.radius,
             self.own_bend[rows.start : rows.stop - 1],
             self.path_bend[segments],
-            self.gate[segments.start : segments.stop + 1],
         )
 
     def row_radius(self, row: slice, segments: slice) -> Floats:
@@ -111,13 +109,12 @@ class FreeSpace:
             start = self.path[:, part]
             way = self.path[:, part.start + 1 : part.stop + 1] - start
             low, high = free_interval(self.own[:, row, None], start, way, self.row_radius(slice(row, row + 1), part)[0])
-            away = largest_square(self.own[:, row, None] - start) <= self.gate[part] ** 2
-            for one, other, passes in zip(low.tolist(), high.tolist(), away.tolist(), strict=True):
+            for one, other in zip(low.tolist(), high.tolist(), strict=True):
                 if k == first:
                     if not one - _HAIR <= place - k <= other + _HAIR:
                         return {}
                     found[k] = place - k, max(other, place - k)
-                elif found[k - 1][1] >= 1.0 and passes and one <= 0.0 <= other:
+                elif found[k - 1][1] >= 1.0 and one <= 0.0 <= other:
                     found[k] = 0.0, other
                 else:
                     return found
@@ -173,7 +170,7 @@ class FreeSpace:
         up = free_interval(upper, start, end - start, self.row_radius(ahead, segments))
         beside = np.append(self.path_bend[first + 1 : stop + 1], 0.0)[: stop - first]
         bend = np.maximum(self.path_bend[segments], beside)
-        radius = np.minimum(self.radius - bend - self.own_bend[row : row + rows, None], self.gate[first + 1 : stop + 1])
+        radius = self.radius - bend - self.own_bend[row : row + rows, None]
         right = free_interval(end, own, upper - own, radius)
         return list(zip(*(values.tolist() for values in (*up, *right)), strict=True))
 
@@ -188,7 +185,7 @@ class FreeSpace:
         first, stop = min(map(min, rows)), max(map(max, rows)) + 1
         part = self.part(slice(0, len(rows)), slice(first, stop)).reversed()
         # nothing is proved here, and what is free at one point only should not be lost by rounding
-        part = replace(part, radius=part.radius * _WIDER, gate=part.gate * _WIDER)
+        part = replace(part, radius=part.radius * _WIDER)
         count = stop - first
         back = [part.along(0, count - (place - first))]
         back += [reached for _, reached in part.sweep(0, back[0])]

@@ -159,10 +159,9 @@ class _Part:
             section = self._go_on(section, inner)
 
     def meets(self, row: int, place: float) -> bool:
-        """Whether a vertex is near a place of the path, or within the gate at its vertex."""
+        """Whether a vertex is near a place of the path."""
         off = largest_square(self.own[row] - points_at(self.path.points, np.array([place]))[:, 0])
-        limit = min(self.radius, float(self.path.gate[int(place)])) if place == int(place) else self.radius
-        return bool(off <= limit**2)
+        return bool(off <= self.radius**2)
 
     def _go_on(self, section: int, inner: Inner | None) -> int:
         """Go on from the first vertex of a section; return the section to go on with."""
@@ -198,10 +197,6 @@ class _Part:
             columns = np.ascontiguousarray(self.own[row:].T)
             rest = sections.behind(section, row, begin)
             found = chain(columns, self.bend[row:], self.path, self.radius, rest)
-            for k in np.flatnonzero(self.path.gate[rest.stop.astype(np.int64)] < self.radius).tolist():
-                if not (self.open and k == len(rest.last) - 1):
-                    end = int(rest.last[k])
-                    found.bad[end] |= not self.meets(row + end, float(rest.stop[k]))
             bent = np.flatnonzero(found.bad & ~found.far) + row
             if not len(bent) or inner is None or not self._divide(row, bent, inner):
                 break

@@ -72,7 +72,6 @@ class Reachable:
             self.task.radius + float(self.motion.bend[first:last].max(initial=0.0)),
             self.motion.bend[first:last],
             np.zeros(count),
-            np.full(count + 1, np.inf),
         )
         forward = [space.along(0, start - bottom)]
         forward += [reached for _, reached in space.sweep(0, forward[0])]

@@ -75,7 +75,7 @@ class Task:
         def exact(place: Floats) -> Floats:
             return side_by_side(*original.pose_at(place), axis_length, own_axis)
 
-        path = Path.of(six, np.inf, bend=trail.bend, exact=exact)
+        path = Path.of(six, trail.bend, exact)
         return cls(original, path, _exact_poses(original), tolerance, axis_length, axis_tolerance, apart)
 
     def six(self, tip: Floats, axis: Floats) -> Floats:
