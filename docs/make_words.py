@@ -26,7 +26,7 @@ def shown(text: str) -> str:
 def roles(entry: dict[str, Any], kind: str) -> str:
     """Where a word may stand, and what must hold."""
     said = []
-    if entry.get("head"):
+    if entry.get("first") == "motion":
         said.append("**must be said before the first motion**")
     if entry.get("state") and not entry.get("follows"):
         said.append("the same wherever the tool moves")
@@ -49,7 +49,7 @@ def roles(entry: dict[str, Any], kind: str) -> str:
         said.append("may change from line to line")
     if entry.get("before"):
         said.append("before an arc")
-    if entry.get("zero"):
+    if entry.get("rotary") == "zero":
         said.append("only where the rotary axes are at zero")
     if entry.get("high"):
         said.append("only behind a retract")

@@ -18,7 +18,8 @@ from cornersmooth.nc_reader.word_list import word_list
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from cornersmooth.verify import verify
-from cornersmooth.verify.word_check import GONE_ON, WordCheck
+from cornersmooth.verify.word_check import WordCheck
+from cornersmooth.verify.word_states import GONE_ON
 from nc.cases import CHOSEN, Case
 from oracle.share import how_many
 

@@ -154,8 +154,8 @@ def _switch(blocks: Sequence[str], *, ends: bool) -> Iterator[WordRule]:
             alone=True,
             follows=True,
             ends=ends,
-            turned=ends,
+            rotary="next" if ends else "",
             off=not ends,
-            first="" if ends else "first",
+            first="" if ends else "retract",
         )
         yield from (WordRule(other, "tip control", needs=word) for other in others)

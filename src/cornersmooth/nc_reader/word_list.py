@@ -16,16 +16,19 @@ The lists are data, one TOML file for each control in `word_lists`, with the man
     ``is``: the word, blanks left out. ``says``: what it means, for the documentation.
 
     ``state``: what it changes; of a ``[[block]]``, too. Where the tool moves, every state must be what it was at the
-    first motion, but for those that ``follows`` the CL file, which others compare. ``head``: one of these words must be
-    said before the first motion. ``off``: what must hold at the end of the program. ``compared``: others compare it
-    with the CL file.
+    first motion, but for those that ``follows`` the CL file, which others compare. ``off``: what must hold at the end
+    of the program. ``compared``: others compare it with the CL file.
+
+    ``first``: when it must have been said: one of these words before the first ``"motion"``; in programs of our own
+    before the first ``"retract"``, or before it is ``"used"``: before another word of its state.
 
     ``needs``: a word that must stand in the same block, of whose state it may say more. ``must``: the same, for a word
     that is nothing without. ``alone``: no other words may stand beside it. ``before``: ``"arc"``. ``after``: a word
     that must have been said since the last time. ``then``, ``behind``: the next block, the block before. ``share``:
-    what the number in brackets may be of the tolerance. ``varies``: it may change within the program. ``zero``: the
-    rotary axes must have been sent to zero before: where a parameter says so, the part program turns with the angles of
-    that moment. ``turns``: the control turns them, and nobody says where to. ``never``: the control has no such word.
+    what the number in brackets may be of the tolerance. ``varies``: it may change within the program. ``rotary``: where
+    the rotary axes must have been sent before: to ``"zero"``, as, where a parameter says so, the part program turns
+    with the angles of that moment; or, in programs of our own, where the ``"next"`` motion has them. ``turns``: the
+    control turns them, and nobody says where to. ``never``: the control has no such word.
     ``tool``: in a text with a ``cycle`` of the control, a tilted plane or cutter compensation (all ``cycle``), it may
     differ from tool to tool. ``high``:
     only behind a retract; a control with such a word wants the tool high at the end, too. ``late``: behind a retract it
@@ -33,11 +36,10 @@ The lists are data, one TOML file for each control in `word_lists`, with the man
     ``outside``: it may not be said while a word that ``ends`` holds. ``drops``: a state that the control forgets with
     it, and that must be said behind it. ``moves``: the tool moves, though the block names no axis.
 
-    In texts of our own (`own_frame`): ``first``: it must come before the first retract (``"first"``), or before
-    another word of its state (``"used"``). ``bars``: a state of which no word that is ``tidy`` or ``ends`` may hold
-    where it is said. ``tidy``: it must be switched off before another tool and at the end. ``turned``: the rotary axes
-    must stand as the next motion has them. ``preset``: the one that is meant where the head names none. ``down``: one
-    of its state must hold where the tool comes down from a retract while a word like this holds.
+    In programs of our own: ``bars``: a state of which no word that is ``tidy`` or ``ends`` may hold where it is said.
+    ``tidy``: it must be switched off before another tool and at the end. ``preset``: the one that is meant where the
+    head names none. ``down``: one of its state must hold where the tool comes down from a retract while a word like
+    this holds.
 ``[[block]]``
     A block that counts as a whole. ``retract``: it moves the tool away, which no motion may follow but an approach, in
     which work offset or tool length are said again.
@@ -47,10 +49,13 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from importlib.resources import files
 from typing import Any, Final
+
+from cornersmooth.nc_reader.words import Word
 
 #: keys of a word that are regular expressions
 _PATTERNS: Final = frozenset(("is", "needs", "must", "after", "then", "behind", "down"))
@@ -63,7 +68,6 @@ class WordRule:
     pattern: re.Pattern[str]
     says: str = ""
     state: str = ""
-    head: bool = False
     off: bool = False
     follows: bool = False
     compared: bool = False
@@ -79,7 +83,7 @@ class WordRule:
     never: bool = False
     high: bool = False
     retract: bool = False
-    zero: bool = False
+    rotary: str = ""
     tool: bool = False
     cycle: bool = False
     turns: bool = False
@@ -90,10 +94,14 @@ class WordRule:
     moves: bool = False
     first: str = ""
     tidy: bool = False
-    turned: bool = False
     preset: str = ""
     bars: str = ""
     down: re.Pattern[str] | None = None
+
+    @property
+    def changes_tool(self) -> bool:
+        """Whether another tool is taken."""
+        return self.compared and (self.high or self.after is not None)
 
 
 @dataclass(frozen=True)
@@ -111,46 +119,80 @@ class WordList:
     blocks: tuple[WordRule, ...] = field(default=())
 
     @cached_property
+    def effective(self) -> tuple[WordRule, ...]:
+        """Words without those that another rule before them is for, too."""
+        chosen: dict[tuple[str, re.Pattern[str] | None], WordRule] = {}
+        for rule in self.words:
+            chosen.setdefault((rule.pattern.pattern, rule.needs), rule)
+        return tuple(chosen.values())
+
+    @cached_property
     def heads(self) -> dict[str, list[WordRule]]:
         """Words of which one must come before the first motion, by state."""
         found: dict[str, list[WordRule]] = {}
-        for rule in self.words:
-            if rule.head and not any(self.shadows(other, rule) for other in self.words):
+        for rule in self.effective:
+            if rule.first == "motion":
                 found.setdefault(rule.state, []).append(rule)
         return found
-
-    def shadows(self, other: WordRule, rule: WordRule) -> bool:
-        """Whether a rule that stands before another is for the same words."""
-        same = other.pattern.pattern == rule.pattern.pattern and other.needs == rule.needs
-        return same and self.words.index(other) < self.words.index(rule)
 
 
 @cache
 def word_list(control: str) -> WordList:
     """Words of a control."""
     table = tomllib.loads(files(__package__).joinpath("word_lists", f"{control}.toml").read_text(encoding="utf-8"))
-    base = word_list(table["like"]) if "like" in table else WordList()
-    own: dict[str, Any] = {name: _patterns(table[name]) for name in ("begin", "end") if name in table}
-    if "switches" in table:
-        own["switches"] = table["switches"]
-    if "header" in table:
-        own["header"] = re.compile(table["header"])
-    if "points" in table:
-        own["points"] = frozenset(table["points"])
-    if "orders" in table:
-        own["orders"] = re.compile(table["orders"], re.IGNORECASE)
-    return replace(
-        base,
-        **own,
-        words=(*map(_rule, table.get("word", ())), *base.words),
-        blocks=(*map(_rule, table.get("block", ())), *base.blocks),
-    )
+    base = word_list(table.pop("like")) if "like" in table else WordList()
+    words, blocks = (tuple(map(_rule, table.pop(key, ()))) for key in ("word", "block"))
+    own = {key: _READ[key](value) for key, value in table.items()}
+    return replace(base, **own, words=(*words, *base.words), blocks=(*blocks, *base.blocks))
 
 
 def _patterns(texts: list[str]) -> tuple[re.Pattern[str], ...]:
     return tuple(map(re.compile, texts))
 
 
+#: how the values of the other keys are read
+_READ: Final[dict[str, Callable[[Any], Any]]] = {
+    "begin": _patterns,
+    "end": _patterns,
+    "header": re.compile,
+    "points": frozenset,
+    "switches": bool,
+    "orders": lambda text: re.compile(text, re.IGNORECASE),
+}
+
+
 def _rule(entry: dict[str, Any]) -> WordRule:
     values: dict[str, Any] = {key: re.compile(value) if key in _PATTERNS else value for key, value in entry.items()}
     return WordRule(values.pop("is"), **values)
+
+
+def word_text(word: Word) -> str:
+    """Text of a word as the lists have it: blanks left out, codes without leading zeros."""
+    if word.name in ("G", "M") and word.text[:1] == word.name and not _SIGN.search(word.text):
+        return f"{word.name}{word.value:g}"
+    return word.text if word.name == "block" else word.text.replace(" ", "").replace("\t", "")
+
+
+def any_of(pattern: re.Pattern[str], words: Iterable[str]) -> bool:
+    """Whether any of the words is of a pattern."""
+    return any(map(pattern.fullmatch, words))
+
+
+def shown(pattern: re.Pattern[str]) -> str:
+    """Regular expression in the user's words."""
+    text = pattern.pattern
+    for old, new in _PLAIN:
+        text = text.replace(old, new)
+    return text
+
+
+#: no code has one
+_SIGN: Final = re.compile("[-+]")
+
+_PLAIN: Final = (
+    (r"(?=\d*[1-9])", ""),
+    *((old, "…") for old in (r"\d+", r"\d{1,8}", r"\d{1,5}", r"[\d.]+", r"\w+", ".*", "(\\.\\d*)?")),
+    (r"\.", "."),
+    ("(?:", "("),
+    ("|", " or "),
+)

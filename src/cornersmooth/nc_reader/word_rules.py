@@ -1,4 +1,4 @@
-"""Which rule of the control's list a word of a block falls under, and what may not stand together in one block."""
+"""Which rule of the control's list a word of a block falls under, and what may not be together in one block."""
 
 from __future__ import annotations
 
@@ -6,11 +6,13 @@ from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from typing import Final
 
-from cornersmooth.nc_reader.block_texts import any_of, shown, text_of
 from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.nc_reader.lexer import Lexer
-from cornersmooth.nc_reader.word_list import WordList, WordRule
+from cornersmooth.nc_reader.word_list import WordList, WordRule, any_of, shown
 from cornersmooth.nc_reader.words import Line
+
+#: words of a block, or the block as a whole, with their rules; None for what is not on the list, or not beside these
+Ruled = list[tuple[str, WordRule | None]]
 
 #: code of words that are not on the list or not in their place
 NOT_LISTED: Final = "CS571"
@@ -23,7 +25,7 @@ _MOTION: Final = frozenset(("G0", "G1", "G2", "G3", "G6.2", "L", "LN", "SPL", "B
 
 
 class WordRules:
-    """Looks at blocks one by one, whatever stands before them.
+    """Looks at blocks one by one, whatever is before them.
 
     Parameters
     ----------
@@ -34,94 +36,73 @@ class WordRules:
     """
 
     def __init__(self, listed: WordList, positions: Sequence[WordRule], lexer: Lexer, tolerance: float) -> None:
-        self.words = listed.words
-        self.blocks = (*listed.blocks, *positions)
+        self._words, self._blocks = listed.words, (*listed.blocks, *positions)
         self._lexer, self._tolerance = lexer, tolerance
         # most blocks beside the motion are alike; those of cycles are not, but most of their words are
         self._find = lru_cache(_REMEMBERED)(self._look_up)
         self._fitting = lru_cache(_REMEMBERED)(self._rules_for)
 
-    def of(self, words: list[str], text: str) -> list[WordRule | None]:
-        """Rule of every word, or of the whole block; None for a word that is not on the list, or not beside these."""
-        return self._find(tuple(words), text)
+    def of(self, words: Sequence[str]) -> Ruled:
+        """Rules of the words of a block, or of the whole block where that is on the list."""
+        return self._find(tuple(words))
 
-    def _look_up(self, words: tuple[str, ...], text: str) -> list[WordRule | None]:
-        whole = next((rule for rule in self.blocks if rule.pattern.fullmatch(text)), None)
-        if whole is not None:
-            return [whole]
-        rules: list[WordRule | None] = []
+    def _look_up(self, words: tuple[str, ...]) -> Ruled:
+        text = " ".join(words)
+        for rule in self._blocks:
+            if rule.pattern.fullmatch(text):
+                return [(text, rule)]
+        ruled: Ruled = []
         for k, word in enumerate(words):
-            fitting = self._fitting(word)
-            if fitting and fitting[0].never:
-                fitting = []
-            others = _others(words, k)
-            beside = [rule for rule in fitting if rule.needs is not None and any_of(rule.needs, others)]
-            plain = [rule for rule in fitting if rule.needs is None]
-            rules.append(next(iter(beside + plain), None))
-        return rules
+            others = words[:k] + words[k + 1 :]
+            fitting = [rule for rule in self._fitting(word) if rule.needs is None or any_of(rule.needs, others)]
+            # what belongs beside another word comes first
+            ruled.append((word, min(fitting, key=lambda rule: rule.needs is None, default=None)))
+        return ruled
 
     def _rules_for(self, word: str) -> list[WordRule]:
-        return [rule for rule in self.words if rule.pattern.fullmatch(word)]
+        fitting = [rule for rule in self._words if rule.pattern.fullmatch(word)]
+        return [] if fitting and fitting[0].never else fitting
 
-    def stands(self, words: list[str]) -> bool:
-        """Whether a block moves no tool at the part: one of the list as a whole, or of a word that stands alone."""
-        if any(rule.pattern.fullmatch(text_of(words)) for rule in self.blocks):
-            return True
-        return any(rule.alone and any_of(rule.pattern, words) for rule in self.words)
-
-    def problems(self, line: Line, words: list[str], rules: list[WordRule | None]) -> Iterator[Problem]:
+    def problems(self, line: Line, words: Sequence[str], ruled: Ruled) -> Iterator[Problem]:
         """What is wrong with a block by itself: words off the list, twice, without others or beside others."""
-        number = line.number
-        if len(rules) == len(words):  # else the block is on the list as a whole
-            yield from self._unlisted(number, words, rules)
-        yield from self._spelling(line, words)
-        states = [rule.state for rule in rules if rule is not None and rule.state]
+        texts = [*self._unlisted(ruled), *self._spelling(line, words)]
+        states = [rule.state for _, rule in ruled if rule is not None and rule.state]
         if len(set(states)) < len(states):
-            yield Problem(NOT_LISTED, 0, number, "two words of one group in one block")
-        for k in range(len(rules)):
-            yield from self._company(number, k, words, rules)
+            texts.append("two words of one group in one block")
+        for k, (word, rule) in enumerate(ruled):
+            if rule is not None:
+                texts += self._company(word, rule, [*words[:k], *words[k + 1 :]], ruled)
+        return (Problem(NOT_LISTED, 0, line.number, text) for text in texts)
 
-    def _unlisted(self, number: int, words: list[str], rules: list[WordRule | None]) -> Iterator[Problem]:
-        for word, rule in zip(words, rules, strict=True):
-            if rule is None:
-                fitting = self._fitting(word)
-                if fitting and not fitting[0].never:
-                    yield Problem(NOT_LISTED, 0, number, f"{word} is beside nothing that it belongs to")
-                else:
-                    yield Problem(NOT_LISTED, 0, number, f"{word} is not on the list of words for this control")
+    def _unlisted(self, ruled: Ruled) -> Iterator[str]:
+        for word, rule in ruled:
+            if rule is None and self._fitting(word):
+                yield f"{word} is beside nothing that it belongs to"
+            elif rule is None:
+                yield f"{word} is not on the list of words for this control"
 
-    def _spelling(self, line: Line, words: list[str]) -> Iterator[Problem]:
-        number = line.number
+    def _spelling(self, line: Line, words: Sequence[str]) -> Iterator[str]:
         for spelt in filter(self._lexer.without_point, line.words):
-            text = f"{spelt.text} without a decimal point: the control may count it in its least increment"
-            yield Problem(NOT_LISTED, 0, number, text)
+            yield f"{spelt.text} without a decimal point: the control may count it in its least increment"
         names = [word.name for word in line.words if word.name not in "GM"]
         names += [word for word in words if word[0] in "GM"]
         for name in sorted({name for name in names if names.count(name) > 1}):
-            yield Problem(NOT_LISTED, 0, number, f"{name} is twice in one block")
+            yield f"{name} is twice in one block"
         if sum(word.name == "M" for word in line.words) > 1:
-            yield Problem(NOT_LISTED, 0, number, "two M words in one block")
+            yield "two M words in one block"
         if sum(word in _MOTION for word in words) > 1:
-            yield Problem(NOT_LISTED, 0, number, "two motions in one block")
+            yield "two motions in one block"
 
-    def _company(self, number: int, k: int, words: list[str], rules: list[WordRule | None]) -> Iterator[Problem]:
+    def _company(self, word: str, rule: WordRule, others: Sequence[str], ruled: Ruled) -> Iterator[str]:
         """What a word misses beside it, or may not have there; and whether it takes too much of the tolerance."""
-        rule = rules[k]
-        if rule is None:
-            return
-        word, others = words[k] if len(rules) == len(words) else text_of(words), _others(words, k)
         if rule.must is not None and not any_of(rule.must, others):
-            yield Problem(NOT_LISTED, 0, number, f"{word} without {shown(rule.must)}")
+            yield f"{word} without {shown(rule.must)}"
         if rule.alone:
-            own = [bool(theirs and theirs.needs and theirs.needs.fullmatch(word)) for theirs in rules]
-            for other, belongs in zip(words, own, strict=True):
+            own = [bool(theirs and theirs.needs and theirs.needs.fullmatch(word)) for _, theirs in ruled]
+            for (other, _), belongs in zip(ruled, own, strict=True):
                 if other != word and (not belongs or sum(own) > 1):
-                    yield Problem(NOT_LISTED, 0, number, f"{other} in the block of {word}")
+                    yield f"{other} in the block of {word}"
         if rule.share is not None:
             match = rule.pattern.fullmatch(word)
             if match and float(match[1]) > rule.share * self._tolerance * (1 + 1e-9) + 1e-5:
-                yield Problem(NOT_LISTED, 0, number, f"{word} is more than {rule.share:g} of the tolerance")
-
-
-def _others(words: Sequence[str], k: int) -> list[str]:
-    return [*words[:k], *words[k + 1 :]]
+                yield f"{word} is more than {rule.share:g} of the tolerance"

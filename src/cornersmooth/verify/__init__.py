@@ -19,7 +19,7 @@ stretch by stretch  `rapids` pairs the ends of rapids, `batches` cuts long stret
 holes               `drilling` (`hole_lines`, `hole_search`, `hole_check`); tool changes: package `statements`
 what parts          `deviation`: the lines and the distances, which `distances` measures; poses that must be exact
 feeds               `feeds`; where a vertex may be besides its place: `reachable`
-words               `word_check` against `nc_reader.word_list`; `word_places`: where they are, for `statements`
+words               `word_check`, `word_states` by `nc_reader.word_list`; `word_places`: where, for `statements`
 what is said        `findings`, `result`; all of it: `verifier`
 =================== ===================================================================================================
 

@@ -33,8 +33,9 @@ from cornersmooth.verify.half_turns import half_turns
 from cornersmooth.verify.own_rapids import OwnRapids
 from cornersmooth.verify.result import Verification
 from cornersmooth.verify.task import Task, length_of
-from cornersmooth.verify.word_check import GONE_ON, WordCheck
+from cornersmooth.verify.word_check import WordCheck
 from cornersmooth.verify.word_places import WordPlaces
+from cornersmooth.verify.word_states import GONE_ON
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine

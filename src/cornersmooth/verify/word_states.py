@@ -1,0 +1,419 @@
+"""States of the control as the words of a program set them, and what must hold where the tool moves, changes or stops.
+
+A word sets a state to a value; its rule (`nc_reader.word_list`) says when it must have been said, until when it may
+hold, and at which places of the program it may be: after a retract, on the way down, under tool tip control.
+
+Posts have many ways to begin, to change tools and to end, and most of them are right. A program whose head says how it
+was made goes the way of the control's table: what is missing there has been lost since (`WordStates._lost_since`).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from cornersmooth.nc_reader.elements import Problem
+from cornersmooth.nc_reader.machine_positions import SAME, MachinePositions
+from cornersmooth.nc_reader.rotary import tool_vectors
+from cornersmooth.nc_reader.word_list import WordList, WordRule, any_of, shown
+from cornersmooth.nc_reader.word_rules import NOT_LISTED, Ruled
+
+#: a retract with the same tool, which only GOHOME of the CL file asks for
+GONE_ON: Final = "a retract that another motion of the same tool follows"
+
+#: code of states that the program never establishes
+NOT_ESTABLISHED: Final = "CS572"
+
+#: name of the blocks around the motion, among what is left to the user
+FRAME: Final = "program frame"
+
+#: states that are spoken of by name; planes are those to which the control turns the rotary axes
+_OFFSET: Final = "work offset"
+_LENGTH: Final = "tool length"
+_PLANES: Final = ("tilted plane", "swivelled plane")
+_DYNAMIC: Final = "dynamic work offset"
+
+#: blocks that stop the program, and states that they end on most machines
+_STOPS: Final = ("M0", "M1", "STOP")
+_ENDED: Final = ("spindle", "coolant", "coolant through the spindle")
+
+_SPINDLE: Final = re.compile(r"M[345]")
+
+#: comments that say how a program was made, and the work offset and the machine in them
+_MADE: Final = re.compile(r"CORNERSMOOTH \S+: \w+=", re.IGNORECASE)
+_MADE_FOR: Final = re.compile(r"\bOFFSET=([\w.]+)", re.IGNORECASE)
+_MACHINE: Final = re.compile(r"\bMACHINE=", re.IGNORECASE)
+
+#: words of axes: linear ones; those of a place; rotary ones; those beside which Z may not come down from a retract
+LINEAR: Final = frozenset("XYZ")
+_PLACE: Final = frozenset("XY")
+ROTARY: Final = frozenset("ABC")
+_ASIDE: Final = _PLACE | ROTARY
+
+#: words of a tool vector, and of a second point on the axis, with which nothing can be said of a place high up
+_VECTOR: Final = frozenset("IJK")
+_POINT: Final = frozenset(("U", "V", "W", "XH", "YH", "ZH"))
+
+#: angles of a plane, and the cosine of the angle from Z beyond which a tool is tilted
+_DECIMAL: Final = re.compile(r"(?<![G\d])\d+\.\d*")
+_UPRIGHT: Final = 1.0 - 1e-6
+
+
+@dataclass(frozen=True)
+class _Held:
+    """What has been said last of a state."""
+
+    text: str  # the word, with those beside it that say more of it
+    rule: WordRule
+    line: int
+
+    @property
+    def off(self) -> bool:
+        """Whether it switches the state off."""
+        return self.rule.off and self.rule.pattern.fullmatch(self.text) is not None
+
+
+class WordStates:
+    """Follows the states of one program.
+
+    Parameters
+    ----------
+    left : set of str
+        States, blocks and kinds of words that are the user's own; `FRAME` where the blocks around the motion are.
+    positions : MachinePositions
+        Those of the machine's file, which may say where the program ends, and its rotary axes.
+    """
+
+    def __init__(self, listed: WordList, positions: MachinePositions, left: Set[str]) -> None:
+        self._list, self._positions, self._left = listed, positions, left
+        self.problems: list[Problem] = []
+        #: what is taken on trust, line and text, and what of it may bear on the motion
+        self.trusted: list[tuple[int, str]] = []
+        self.unsure: list[tuple[int, str]] = []
+        self._retracts = any(rule.high for rule in listed.effective)
+        self._late = {rule.state for rule in listed.words if rule.late}
+        self._approach = {rule.state for rule in listed.words if rule.off} | {_OFFSET, "cutting edge"}
+        self._said: set[str] = set()  # words so far; those that must come again before each of their kind, since then
+        self._held: dict[str, _Held] = {}
+        self._first: dict[str, str] | None = None  # states at the first motion
+        self._deferred: set[str] = set()  # of them those that are said later
+        self._forgotten: dict[str, str] = {}  # states that a word has made the control forget, and that word
+        self._halted: dict[str, str] = {}  # states that a stop has ended, and the stop
+        self._complained: set[tuple[str, int]] = set()
+        self._changed = True
+        #: where the rotary axes have been sent, as far as that is said, and whether the control has turned them since
+        self.angles: dict[str, float] = {}
+        self._swivelled = False
+        self._tip_on: tuple[WordRule, dict[str, float]] | None = None  # where they were when tip control came on
+        self._retract = 0  # line of a retract that no approach has followed
+        self._high = False  # the tool has not moved since a retract
+        self.above = False  # Z has not
+        self._over = False  # the tool has been sent over its place since, without tip control
+        self._arc: tuple[str, int] | None = None  # a word that is for an arc, and its line
+        self._started = False  # the spindle has been started since the tool last moved
+        self._stopped: tuple[str, int] | None = None  # the tool change that has stopped it since, and its line
+        self._by_tool: list[Problem] | None = []  # what is wrong unless the program has cycles; None where it has
+        # of a program of our own: whether it is one, what its head names, what was missing before the first retract
+        self._ours, self._machine, self._made_for = False, False, ""
+        self._unsaid_at_retract: list[str] | None = None
+
+    # complaints
+
+    def wrong(self, line: int, text: str, code: str = NOT_LISTED) -> None:
+        """Complain of a word or a state."""
+        self.problems.append(Problem(code, 0, line, text))
+
+    def unframed(self, line: int, text: str, code: str = NOT_LISTED) -> None:
+        """Complain of the blocks around the motion; where they are the user's own, they are taken on trust."""
+        if FRAME in self._left:
+            self.trusted.append((line, text))
+            self.unsure.append((line, text))
+        else:
+            self.wrong(line, text, code)
+
+    def _lost_since(self, line: int, texts: Iterable[str], *, retracts: bool = True) -> None:
+        """Complain of what a program of our own has; `retracts`: where the control retracts the tool."""
+        if self._ours and (self._retracts or not retracts):
+            for text in texts:
+                self.unframed(line, text)
+
+    # what holds
+
+    def _in_force(self, state: str) -> _Held | None:
+        return None if state in self._forgotten else self._held.get(state)
+
+    @property
+    def _all_in_force(self) -> list[_Held]:
+        return [held for state, held in self._held.items() if state not in self._forgotten]
+
+    @property
+    def _tip_control(self) -> str:
+        """Word of tool tip control that holds, if any."""
+        return next((held.text for held in self._all_in_force if held.rule.ends), "")
+
+    def _running(self) -> list[str]:
+        """Words that are switched off after the last motion of a tool."""
+        return [
+            held.text for held in self._all_in_force if held.rule.tidy and not {held.rule.state, held.text} & self._left
+        ]
+
+    @property
+    def attentive(self) -> bool:
+        """Whether the next motion must be looked at."""
+        return bool(self._changed or self._high or self._retract or self._arc or self.above)
+
+    # words
+
+    def comment(self, text: str) -> None:
+        """Take note of how the program was made, if a comment says so."""
+        if self._first is None and _MADE.match(text):
+            self._ours = True
+            self._machine |= _MACHINE.search(text) is not None
+            offset = _MADE_FOR.search(text)
+            self._made_for = self._made_for or (offset[1] if offset else "")
+
+    def take(self, line: int, words: Sequence[str], ruled: Ruled) -> None:
+        """Take over what a block says, and complain of what is not in its place."""
+        self._said |= set(words)
+        known = [(word, rule) for word, rule in ruled if rule is not None]
+        for word, rule in known:
+            self._place(line, word, rule)
+        for word, rule in known:
+            self._set(line, word, rule, known)
+        if any(rule.changes_tool for _, rule in known):
+            block = " ".join(words)
+            self._lost_since(line, [f"{block} under {word}" for word in self._running()], retracts=False)
+
+    def _place(self, line: int, word: str, rule: WordRule) -> None:
+        """Complain of a word that is not in its place, as things are before its block."""
+        if rule.after is not None:
+            before = {said for said in self._said if rule.after.fullmatch(said)}
+            if not before:
+                self.wrong(line, f"{word} without {shown(rule.after)} before it")
+            self._said -= before
+        if rule.cycle:
+            self._by_tool = None
+        if rule.rotary == "zero" and (not self.angles or self._positions.away(self.angles)):
+            self.unframed(line, f"{word} without the rotary axes at zero before it")
+        if rule.high and not self._high:
+            self.unframed(line, f"{word} without a retract before it")
+        if rule.turns:
+            self.angles, self._swivelled = {}, True
+        if rule.retract:
+            if self._unsaid_at_retract is None:
+                self._unsaid_at_retract = list(self._unsaid("retract", word))
+            self._retract, self._high, self.above, self._over = line, True, True, False
+        if rule.changes_tool or word.startswith("TOOL CALL "):
+            self._retract = 0
+        if rule.changes_tool:
+            if self._tip_control:
+                self.unframed(line, f"{word} under {self._tip_control}")
+            if self._started:
+                self._started, self._stopped = False, (word, line)
+        if _SPINDLE.fullmatch(word):
+            self._started, self._stopped = word != "M5", None
+        if rule.outside and self._tip_control:
+            self.wrong(line, f"{word} under {self._tip_control}")
+
+    def _set(self, line: int, word: str, rule: WordRule, known: Sequence[tuple[str, WordRule]]) -> None:
+        """Take over the state that a word sets, and complain of what a program of our own says around it."""
+        if rule.drops in self._held:
+            self._forgotten[rule.drops] = word
+        if word in _STOPS:
+            self._halted = {state: word for state in _ENDED if state in self._held and self._held[state].rule.tidy}
+        if rule.state:
+            beside = [
+                other
+                for other, theirs in known
+                if theirs.needs and theirs.needs.fullmatch(word) and not (theirs.compared or theirs.varies)
+            ]
+            self._held[rule.state] = _Held(" ".join([word, *beside]), rule, line)
+            self._changed = True
+            self._forgotten.pop(rule.state, None)
+            self._halted.pop(rule.state, None)
+            if not rule.off:
+                self._lost_since(line, self._unsaid("used", word, rule.state))
+                if rule.state in self._approach:  # GOHOME: the same tool comes back as a new one does
+                    self._retract = 0
+            if rule.before and self._first is not None and word != self._first.get(rule.state):
+                self._arc = word, line
+        held = self._in_force(rule.bars)
+        if held and (held.rule.tidy or held.rule.ends):
+            self._lost_since(line, [f"{word} under {held.text}"], retracts=False)
+        if rule.rotary == "zero" or (rule.rotary and self._high):  # elsewhere they are where the last motion left them
+            self._tip_on = rule, dict(self.angles)
+        if rule.off and rule.state == _LENGTH and self._first is not None and not self.above:
+            self._lost_since(line, [f"{word} before the retract: it may move the tool by its length"])
+        if rule.ends and self._over:
+            self._lost_since(line, [f"{word} after the motion to where the tool comes down"])
+
+    def _unsaid(self, when: str, word: str, state: str = "") -> Iterator[str]:
+        """Words that must have come before others of a state, or before the first retract."""
+        for rule in self._list.effective:
+            if rule.first == when and state in ("", rule.state) and not any_of(rule.pattern, self._said):
+                yield f"{shown(rule.pattern)} must come before {word}"
+
+    def turn(self, line: int, words: Set[str]) -> None:
+        """Look at the words of a block that may turn the rotary axes alone, where a retract has left the tool."""
+        if self.above and ROTARY & words and not LINEAR & words:
+            ends = [held.text for held in self._all_in_force if held.rule.ends]
+            self._lost_since(line, [f"the rotary axes turn under {word}" for word in ends])
+
+    # where the tool moves
+
+    def motion(
+        self, line: int, words: Mapping[str, float], code: float, *, moves: bool = False, drills: bool = False
+    ) -> None:
+        """Look at what holds where the tool moves.
+
+        Parameters
+        ----------
+        words : mapping
+            Of the block.
+        code : float
+            G word of group 01 in force.
+        moves : bool
+            Whether the tool moves along Z whatever the words are.
+        drills : bool
+            Whether they are those of a cycle of the control: no place to which the tool goes at once.
+        """
+        down, first = moves or "Z" in words, self._first is None
+        if self._stopped is not None:
+            word, number = self._stopped
+            self.wrong(number, f"{word} stops the spindle that was started before it")
+        ended = [(stop, self._held[state].text) for state, stop in self._halted.items() if state not in self._left]
+        texts = [f"{stop} ends {word}, and the tool moves on without it" for stop, word in ended]
+        self._lost_since(line, texts, retracts=False)
+        self._started, self._stopped, self._halted = False, None, {}
+        if not drills:
+            self._lost_since(line, list(self._approached(words)))
+        if first:
+            self._lost_since(line, [*(self._unsaid_at_retract or ()), *self._wrong_offset()])
+        late = set()
+        if self.above and code == 0.0 and not down:
+            late = {state for state in self._late & self._held.keys() if self._held[state].off}
+        self._changed, self._high = bool(late), False
+        for state, word in self._forgotten.items():
+            if state not in self._left:
+                self.unframed(line, f"{state}: it must come after {word}, which deselects it", NOT_ESTABLISHED)
+        self._forgotten = {}
+        if self._first is None:
+            self._begin(line)
+            self._deferred = late
+            return
+        self._first |= {state: self._held[state].text for state in self._deferred - late}
+        self._deferred &= late
+        if self._retract and not late:
+            self.wrong(self._retract, GONE_ON)
+            self._retract = 0
+        if self._arc is not None and code not in (2.0, 3.0):
+            self.wrong(self._arc[1], f"{self._arc[0]} where no arc follows")
+        self._arc = None
+        self._compare(late, self._first)
+
+    def _begin(self, line: int) -> None:
+        """Look at what holds at the first motion."""
+        self._first = {state: held.text for state, held in self._held.items()}
+        self._retract, self._arc = 0, None
+        for state, rules in self._list.heads.items():
+            if state not in self._left and not any(
+                rule.pattern.fullmatch(word) for rule in rules for word in self._said
+            ):
+                wanted = " or ".join(shown(rule.pattern) for rule in rules)
+                self.unframed(line, f"{state}: {wanted} must come before the first motion", NOT_ESTABLISHED)
+
+    def _compare(self, late: Set[str], first: Mapping[str, str]) -> None:
+        """Complain of states that are not what they were at the first motion, where nobody else compares them."""
+        for state, held in self._held.items():
+            if held.rule.follows or state in late or held.text == first.get(state):
+                continue
+            if (state, held.line) not in self._complained:
+                self._complained.add((state, held.line))
+                text = f"{state}: {held.text} where {first.get(state, 'nothing')} holds for the whole program"
+                if not held.rule.tool:
+                    self.wrong(held.line, text)
+                elif self._by_tool is not None:
+                    self._by_tool.append(Problem(NOT_LISTED, 0, held.line, text))
+
+    def _approached(self, words: Mapping[str, float]) -> Iterator[str]:
+        """What is wrong with a motion of the words of a block, the first after a retract or after other words."""
+        comes_down = self.above and "Z" in words
+        self.above &= not comes_down
+        tip_control = self._positions.keeps_tip or bool(self._tip_control)
+        self._over = self.above and (self._over or (bool(words.keys() & _PLACE) and not tip_control))
+        tip_on, self._tip_on = self._tip_on, None
+        if self._high and not words.keys() & _POINT:
+            tilted = self._tilted(words)
+            if tilted and not words.keys() >= LINEAR:
+                yield "a tilted tool does not come from a retract in one block of X Y Z"
+            if tilted is False and "Z" in words and words.keys() & _ASIDE:
+                yield "the tool comes down from a retract before it is over its place"
+        if tip_on is not None:
+            rule, angles = tip_on
+            rotary = sorted(ROTARY & words.keys())
+            off = [name for name in rotary if not abs(angles.get(name, math.nan) - words[name]) <= SAME]
+            unknown = [name for name in rotary if name not in angles]
+            if off and rule.rotary == "next":
+                yield f"tool tip control comes on before {' and '.join(off)} stands where the next motion has it"
+            if unknown and rule.rotary == "zero":
+                yield f"tool tip control comes on before {' and '.join(unknown)} stands at zero"
+        if comes_down:
+            in_force = [held for held in self._all_in_force if not held.rule.off]
+            on = {held.rule.state for held in in_force}
+            for rule in self._list.effective:
+                if rule.down and rule.state not in on and any(rule.down.fullmatch(held.text) for held in in_force):
+                    yield f"the tool comes down from a retract without {shown(rule.pattern)}"
+            unknown = sorted(self._positions.rotary - self.angles.keys() - words.keys()) if self._machine else []
+            if unknown and not (self._swivelled and not self.angles and on & {*_PLANES}):
+                yield f"the tool comes down from a retract before {' and '.join(unknown)} is sent to where it belongs"
+
+    def _tilted(self, words: Mapping[str, float]) -> bool | None:
+        """Whether X and Y lie in another plane in the part than on the machine; None where that is not known."""
+        on = {held.rule.state: held.text for held in self._all_in_force if not held.rule.off}
+        plane = [text for state, text in on.items() if state in _PLANES]
+        if plane:
+            return any(map(float, _DECIMAL.findall(plane[0])))
+        if not (self._positions.keeps_tip or self._tip_control or _DYNAMIC in on):
+            return False
+        if words.keys() >= _VECTOR:
+            axis = np.array([words[name] for name in "IJK"])
+            return bool(axis[2] < _UPRIGHT * np.linalg.norm(axis))
+        machine, angles = self._positions.machine, {**self.angles, **words}
+        if machine is None or not set(machine.names) <= angles.keys():
+            return None
+        given = [angles.get(axis.name, 0.0) for axis in machine.axes]
+        return bool(tool_vectors(machine, np.array([given]))[0, 2] < _UPRIGHT)
+
+    def _wrong_offset(self) -> Iterator[str]:
+        """What is wrong with the work offset, one for the whole program."""
+        held = self._in_force(_OFFSET)
+        if held is None or _OFFSET in self._left or self._made_for == "none":
+            return
+        match = held.rule.pattern.fullmatch(held.text)
+        said = match[1] if match and match.re.groups else held.text
+        wanted = self._made_for or held.rule.preset
+        if wanted and said.replace(" ", "_") != wanted:
+            yield f"{held.text}, where the program was made for {wanted.replace('_', ' ')}"
+
+    def end(self, line: int) -> None:
+        """Look at what holds where the program ends; `line` is that of its end."""
+        self.problems += self._by_tool or []
+        off = {rule.state for rule in self._list.words if rule.off}
+        for state in sorted(off & self._held.keys()):
+            held = self._held[state]
+            if not held.off:
+                text = f"{state}: {held.text} of line {held.line} still holds at the end"
+                self.unframed(line, text, NOT_ESTABLISHED)
+        if not self._high and self._retracts:
+            self.unframed(line, "the tool is not retracted at the end", NOT_ESTABLISHED)
+        if self._first is None:
+            return
+        self._lost_since(line, [f"{word} still holds at the end" for word in self._running()], retracts=False)
+        away = self._positions.away(self.angles)
+        if (away or (self._swivelled and not self.angles and self._machine)) and not self._positions.rules:
+            self._lost_since(line, [f"{' and '.join(away) or 'the rotary axes'} not at zero at the end"])
