@@ -25,8 +25,9 @@ from cornersmooth.verify import Verification, verify
 #: words that are the same number, and directions that are the same in six digits
 _SAME, _SAME_DIRECTION = 1e-9, 2e-6
 
-#: of the tolerance: rotary words are read as lines, which may be off by a part of it before and after
-_SHARE: Final = 1.0 - 2.0 * LINE_SHARE
+#: of the tolerance: rotary words are read as lines, which may be off by a part of it before and after; `verify` takes
+#: off that of the new program
+_SHARE: Final = (1.0 - 2.0 * LINE_SHARE) / (1.0 - LINE_SHARE)
 
 #: the last block of a run in distances
 _DISTANCES: Final = re.compile(rb"G91(?=[ \t]*\r?\n?\Z)")

@@ -17,6 +17,9 @@ ROTARY_SHARE = 0.1
 #: share of ε that the tip may leave its line where the control knows nothing of the tip
 TIP_SHARE = 0.1
 
+#: share of ε that verification takes off for the lines that stand for blocks of rotary words
+LINE_SHARE = 0.005
+
 
 @dataclass(frozen=True)
 class Form:
@@ -85,8 +88,8 @@ class Form:
 
     def tip_resolution(self, units: Units, tolerance: float) -> float:
         """What is to be taken off ε at the tip, as a step of its coordinates: half of it per axis, mm."""
-        step = self.rounding(units)
-        return step + 2.0 / math.sqrt(3.0) * TIP_SHARE * tolerance if self.orientation == "machine" else step
+        share = {"machine": TIP_SHARE + LINE_SHARE, "angles": LINE_SHARE}.get(self.orientation, 0.0)
+        return self.rounding(units) + 2.0 / math.sqrt(3.0) * share * tolerance
 
     def axis_point_resolution(self, units: Units, settings: Settings) -> float:
         """What the orientation is worth at the axis point, as a step in mm.

@@ -56,6 +56,11 @@ _POLE = 3.0
 _BEYOND = 0.1
 
 
+def sagitta(tolerance: float) -> float:
+    """How far a motion in rotary words may leave the lines that stand for it, mm, tip and axis point."""
+    return max(LINE_SHARE * tolerance, LEAST)
+
+
 @dataclass(frozen=True)
 class Rotary:
     """How rotary words move the tool."""
@@ -216,8 +221,8 @@ class Rotary:
 
     @property
     def sagitta(self) -> float:
-        """How far a motion may leave the lines that stand for it, mm, of tip and axis point."""
-        return max(LINE_SHARE * self.tolerance, LEAST)
+        """The same for its tolerance."""
+        return sagitta(self.tolerance)
 
     def _counts(self, run: Elements, position: Floats, angles: Floats) -> Ints:
         """Number of lines that each element becomes.

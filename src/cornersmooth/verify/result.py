@@ -221,7 +221,7 @@ class Verification:
         tangent = float(np.degrees(np.arccos(np.clip(-continuity.tangent.value, -1.0, 1.0))))
         return cls(
             passed=not problems,
-            tolerance=task.tolerance,
+            tolerance=task.tolerance + task.sagitta,
             axis_length=np.nan if own else task.axis_length,
             axis_tolerance=task.axis_tolerance,
             tip=_where(largest.tip),

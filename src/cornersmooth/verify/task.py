@@ -37,7 +37,7 @@ class Task:
     #: (m,): whether the end of every move must be passed exactly: all but the inner poses of chains at which nothing
     #: acts
     exact: Bools
-    #: mm: ε and H; H is the distance at which the axis tolerance shows as ε, where there is one.
+    #: mm: ε without the sagitta, and H; H is the distance at which the axis tolerance shows as ε, where there is one.
     tolerance: float
     axis_length: float
     #: degrees: That of the tool axis, where it has one of its own. The *axis point* then is H times the axis wherever
@@ -46,6 +46,8 @@ class Task:
     #: whether tips and axis points need only be within ε each on its own, and within `APART` ε together: the two
     #: curves of the paper do not run at common poses
     apart: bool = False
+    #: mm: how far the written motion may leave the lines that stand for it (rotary words)
+    sagitta: float = 0.0
 
     @property
     def own_axis(self) -> bool:
@@ -61,11 +63,13 @@ class Task:
         axis_tolerance: float | None = None,
         *,
         apart: bool = False,
+        sagitta: float = 0.0,
     ) -> Task:
-        """Make it; `axis_tolerance` in degrees takes the place of `axis_length`."""
+        """Make it of ε; `axis_tolerance` in degrees takes the place of `axis_length`."""
         own_axis = axis_tolerance is not None
         if axis_tolerance is not None:
             axis_length = length_of(tolerance, axis_tolerance)
+        tolerance -= sagitta
         original = original_motion(program, tolerance, axis_length)
         trail = original.trail
         six = side_by_side(trail.tip, trail.axis, axis_length, own_axis)
@@ -76,7 +80,7 @@ class Task:
             return side_by_side(*original.pose_at(place), axis_length, own_axis)
 
         path = Path.of(six, trail.bend, exact)
-        return cls(original, path, _exact_poses(original), tolerance, axis_length, axis_tolerance, apart)
+        return cls(original, path, _exact_poses(original), tolerance, axis_length, axis_tolerance, apart, sagitta)
 
     def six(self, tip: Floats, axis: Floats) -> Floats:
         """(..., 6) tips and axis points side by side, mm."""

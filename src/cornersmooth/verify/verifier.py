@@ -20,6 +20,7 @@ from cornersmooth.nc_reader.needed_states import CONTROL_WORDS
 from cornersmooth.nc_reader.reader import Reader
 from cornersmooth.nc_reader.reading import read_styled
 from cornersmooth.nc_reader.reading_options import DIGITS_SAMPLE, ReadingOptions
+from cornersmooth.nc_reader.rotary import sagitta
 from cornersmooth.nc_reader.source import Source, readable_twice
 from cornersmooth.nc_reader.word_list import word_list
 from cornersmooth.processes import Helper, can_fork, map_in_processes
@@ -194,13 +195,14 @@ class Verifier:
         """Read and measure the text as far as it goes."""
         return self._of_text(self._text) if isinstance(self._text, Source) else self._of_read(self._text)
 
-    def _task(self) -> Task:
+    def _task(self, *, rotary: bool) -> Task:
         options = self._options
         lengths = options.tolerance, options.axis_length, self._axis_tolerance
-        return Task.of(self._program, *lengths, apart=self._apart)
+        taken = sagitta(options.tolerance) if rotary else 0.0
+        return Task.of(self._program, *lengths, apart=self._apart, sagitta=taken)
 
     def _of_read(self, nc: NcProgram) -> Verification:
-        task = self._task()
+        task = self._task(rotary=nc.rotary)
         elements, events = OwnRapids(task).left_out(nc)
         text = _Text(iter([elements.at_most() if self._slower else elements]), events)
         measured = _measure(task, text, words=self._words, processes=self._processes)
@@ -212,8 +214,8 @@ class Verifier:
     def _of_text(self, source: Source) -> Verification:
         options = self._options
         steps = options.steps(source.head(DIGITS_SAMPLE))
-        task = self._task()  # takes memory, which who writes may need before there is text
         rotary = options.rotary(steps)
+        task = self._task(rotary=rotary is not None)  # takes memory, which who writes may need before there is text
         lever = None
         if rotary is not None:
             lever = float(rotary.levers(task.original.trail.tip).max(initial=0.0))
