@@ -65,44 +65,39 @@ class WordRules:
 
     def problems(self, line: Line, words: Sequence[str], ruled: Ruled) -> Iterator[Problem]:
         """What is wrong with a block by itself: words off the list, twice, without others or beside others."""
-        texts = [*self._unlisted(ruled), *self._spelling(line, words)]
-        states = [rule.state for _, rule in ruled if rule is not None and rule.state]
-        if len(set(states)) < len(states):
-            texts.append("two words of one group in one block")
-        for k, (word, rule) in enumerate(ruled):
-            if rule is not None:
-                texts += self._company(word, rule, [*words[:k], *words[k + 1 :]], ruled)
-        return (Problem(NOT_LISTED, 0, line.number, text) for text in texts)
 
-    def _unlisted(self, ruled: Ruled) -> Iterator[str]:
+        def wrong(text: str) -> Problem:
+            return Problem(NOT_LISTED, 0, line.number, text)
+
         for word, rule in ruled:
             if rule is None and self._fitting(word):
-                yield f"{word} is beside nothing that it belongs to"
+                yield wrong(f"{word} is beside nothing that it belongs to")
             elif rule is None:
-                yield f"{word} is not on the list of words for this control"
-
-    def _spelling(self, line: Line, words: Sequence[str]) -> Iterator[str]:
+                yield wrong(f"{word} is not on the list of words for this control")
         for spelt in filter(self._lexer.without_point, line.words):
-            yield f"{spelt.text} without a decimal point: the control may count it in its least increment"
+            yield wrong(f"{spelt.text} without a decimal point: the control may count it in its least increment")
         names = [word.name for word in line.words if word.name not in "GM"]
         names += [word for word in words if word[0] in "GM"]
         for name in sorted({name for name in names if names.count(name) > 1}):
-            yield f"{name} is twice in one block"
+            yield wrong(f"{name} is twice in one block")
         if sum(word.name == "M" for word in line.words) > 1:
-            yield "two M words in one block"
+            yield wrong("two M words in one block")
         if sum(word in _MOTION for word in words) > 1:
-            yield "two motions in one block"
-
-    def _company(self, word: str, rule: WordRule, others: Sequence[str], ruled: Ruled) -> Iterator[str]:
-        """What a word misses beside it, or may not have there; and whether it takes too much of the tolerance."""
-        if rule.must is not None and not any_of(rule.must, others):
-            yield f"{word} without {shown(rule.must)}"
-        if rule.alone:
-            own = [bool(theirs and theirs.needs and theirs.needs.fullmatch(word)) for _, theirs in ruled]
-            for (other, _), belongs in zip(ruled, own, strict=True):
-                if other != word and (not belongs or sum(own) > 1):
-                    yield f"{other} in the block of {word}"
-        if rule.share is not None:
-            match = rule.pattern.fullmatch(word)
-            if match and float(match[1]) > rule.share * self._tolerance * (1 + 1e-9) + 1e-5:
-                yield f"{word} is more than {rule.share:g} of the tolerance"
+            yield wrong("two motions in one block")
+        states = [rule.state for _, rule in ruled if rule is not None and rule.state]
+        if len(set(states)) < len(states):
+            yield wrong("two words of one group in one block")
+        for k, (word, rule) in enumerate(ruled):
+            others = [*words[:k], *words[k + 1 :]]
+            if rule is None:
+                continue
+            if rule.must is not None and not any_of(rule.must, others):
+                yield wrong(f"{word} without {shown(rule.must)}")
+            if rule.alone:
+                own = [bool(theirs and theirs.needs and theirs.needs.fullmatch(word)) for _, theirs in ruled]
+                for (other, _), belongs in zip(ruled, own, strict=True):
+                    if other != word and (not belongs or sum(own) > 1):
+                        yield wrong(f"{other} in the block of {word}")
+            share = rule.pattern.fullmatch(word) if rule.share is not None else None
+            if share and float(share[1]) > (rule.share or 0.0) * self._tolerance * (1 + 1e-9) + 1e-5:
+                yield wrong(f"{word} is more than {rule.share:g} of the tolerance")

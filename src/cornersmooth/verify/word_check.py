@@ -13,7 +13,7 @@ from cornersmooth.errors import InputError
 from cornersmooth.nc_reader.lexer import Lexer
 from cornersmooth.nc_reader.machine_positions import MachinePositions
 from cornersmooth.nc_reader.word_list import WordList, WordRule, shown, word_list, word_text
-from cornersmooth.nc_reader.word_rules import WordRules
+from cornersmooth.nc_reader.word_rules import NOT_LISTED, WordRules
 from cornersmooth.nc_reader.words import Line, Table
 from cornersmooth.verify.word_states import LINEAR, ROTARY, WordStates
 
@@ -140,21 +140,21 @@ class WordCheck:
                 off &= np.abs(column - weight) > _WEIGHT_ROOM
             for row in np.flatnonzero(off)[:_MOST_WEIGHTS].tolist():
                 text = f"a weight of {column[row]:g}, which no curve of this program has"
-                self._states.wrong(int(table.line[row]), text)
+                self._states.wrong(NOT_LISTED, int(table.line[row]), text)
 
     def _block(self, line: Line) -> Line:
         """Look at a line on its own; of one that is taken on trust only what is understood goes on to the reader."""
         for comment in line.comments:
             self._states.comment(comment)
             if self.list.orders is not None and self.list.orders.match(comment):
-                self._states.wrong(line.number, f"a comment that the control obeys: {comment[:40]}")
+                self._states.wrong(NOT_LISTED, line.number, f"a comment that the control obeys: {comment[:40]}")
             if _CONTROL_CHARACTERS.search(comment):
-                self._states.wrong(line.number, "a comment with a character that ends a block or is none")
+                self._states.wrong(NOT_LISTED, line.number, "a comment with a character that ends a block or is none")
         words = [word_text(word) for word in line.words] or ["%"] * line.tape
         text = " ".join(words)
         own = bool(words) and any(pattern.fullmatch(text) for pattern in self._own)
         if line.skipped and not own:
-            self._states.wrong(line.number, "block skip: what the control does depends on a switch")
+            self._states.wrong(NOT_LISTED, line.number, "block skip: what the control does depends on a switch")
         if not words:
             return line
         self._line = line.number
@@ -165,7 +165,7 @@ class WordCheck:
             self.problems += self._rules.problems(line, words, ruled)
             for word, rule in ruled:
                 if rule is not None and rule.behind is not None and not rule.behind.fullmatch(follows):
-                    self._states.wrong(line.number, f"{word} does not follow what it belongs to")
+                    self._states.wrong(NOT_LISTED, line.number, f"{word} does not follow what it belongs to")
                 if rule is not None and rule.then is not None:
                     self._then = rule, line.number
             self._states.take(line.number, words, ruled)
@@ -222,7 +222,7 @@ class WordCheck:
         if self._then is not None:
             rule, line = self._then
             if rule.then is not None and not rule.then.fullmatch(text):
-                self._states.wrong(line, f"{shown(rule.pattern)} without {shown(rule.then)} after it")
+                self._states.wrong(NOT_LISTED, line, f"{shown(rule.pattern)} without {shown(rule.then)} after it")
             self._then = None
         before, self._before = self._before, text
         return before
@@ -237,7 +237,7 @@ class WordCheck:
             wanted = self.list.begin[self._begun :]
             place = next((k for k, pattern in enumerate(wanted) if pattern.fullmatch(text)), None)
             if place != 0:
-                self._states.unframed(number, f"the program must begin with {shown(wanted[0])}")
+                self._states.unframed(NOT_LISTED, number, f"the program must begin with {shown(wanted[0])}")
             if place is None:
                 self._begun = len(self.list.begin)
             else:
@@ -248,7 +248,7 @@ class WordCheck:
             self._tail.append((number, text))
             return True
         for line, ending in self._tail:
-            self._states.unframed(line, f"{ending} ends the program, and more follows")
+            self._states.unframed(NOT_LISTED, line, f"{ending} ends the program, and more follows")
         self._tail = []
         return False
 
@@ -257,7 +257,7 @@ class WordCheck:
         first = self._tail[0][0] if self._tail else self._line
         ends, texts = self.list.end, [text for _, text in self._tail]
         if len(texts) != len(ends) or not all(map(re.Pattern.fullmatch, ends, texts)):
-            self._states.unframed(first, f"the program must end with {', '.join(map(shown, ends))}, once")
+            self._states.unframed(NOT_LISTED, first, f"the program must end with {', '.join(map(shown, ends))}, once")
         elif self._opening.partition(" ")[2] != texts[-1].partition(" ")[2]:
-            self._states.unframed(self._tail[-1][0], f"{texts[-1]} ends what {self._opening} began")
+            self._states.unframed(NOT_LISTED, self._tail[-1][0], f"{texts[-1]} ends what {self._opening} began")
         self._states.end(first)

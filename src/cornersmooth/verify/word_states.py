@@ -124,23 +124,23 @@ class WordStates:
 
     # complaints
 
-    def wrong(self, line: int, text: str, code: str = NOT_LISTED) -> None:
+    def wrong(self, code: str, line: int, text: str) -> None:
         """Complain of a word or a state."""
         self.problems.append(Problem(code, 0, line, text))
 
-    def unframed(self, line: int, text: str, code: str = NOT_LISTED) -> None:
+    def unframed(self, code: str, line: int, text: str) -> None:
         """Complain of the blocks around the motion; where they are the user's own, they are taken on trust."""
         if FRAME in self._left:
             self.trusted.append((line, text))
             self.unsure.append((line, text))
         else:
-            self.wrong(line, text, code)
+            self.wrong(code, line, text)
 
     def _lost_since(self, line: int, texts: Iterable[str], *, retracts: bool = True) -> None:
         """Complain of what a program of our own has; `retracts`: where the control retracts the tool."""
         if self._ours and (self._retracts or not retracts):
             for text in texts:
-                self.unframed(line, text)
+                self.unframed(NOT_LISTED, line, text)
 
     # what holds
 
@@ -194,14 +194,14 @@ class WordStates:
         if rule.after is not None:
             before = {said for said in self._said if rule.after.fullmatch(said)}
             if not before:
-                self.wrong(line, f"{word} without {shown(rule.after)} before it")
+                self.wrong(NOT_LISTED, line, f"{word} without {shown(rule.after)} before it")
             self._said -= before
         if rule.cycle:
             self._by_tool = None
         if rule.rotary == "zero" and (not self.angles or self._positions.away(self.angles)):
-            self.unframed(line, f"{word} without the rotary axes at zero before it")
+            self.unframed(NOT_LISTED, line, f"{word} without the rotary axes at zero before it")
         if rule.high and not self._high:
-            self.unframed(line, f"{word} without a retract before it")
+            self.unframed(NOT_LISTED, line, f"{word} without a retract before it")
         if rule.turns:
             self.angles, self._swivelled = {}, True
         if rule.retract:
@@ -212,13 +212,13 @@ class WordStates:
             self._retract = 0
         if rule.changes_tool:
             if self._tip_control:
-                self.unframed(line, f"{word} under {self._tip_control}")
+                self.unframed(NOT_LISTED, line, f"{word} under {self._tip_control}")
             if self._started:
                 self._started, self._stopped = False, (word, line)
         if _SPINDLE.fullmatch(word):
             self._started, self._stopped = word != "M5", None
         if rule.outside and self._tip_control:
-            self.wrong(line, f"{word} under {self._tip_control}")
+            self.wrong(NOT_LISTED, line, f"{word} under {self._tip_control}")
 
     def _set(self, line: int, word: str, rule: WordRule, known: Sequence[tuple[str, WordRule]]) -> None:
         """Take over the state that a word sets, and complain of what a program of our own says around it."""
@@ -285,7 +285,7 @@ class WordStates:
         down, first = moves or "Z" in words, self._first is None
         if self._stopped is not None:
             word, number = self._stopped
-            self.wrong(number, f"{word} stops the spindle that was started before it")
+            self.wrong(NOT_LISTED, number, f"{word} stops the spindle that was started before it")
         ended = [(stop, self._held[state].text) for state, stop in self._halted.items() if state not in self._left]
         texts = [f"{stop} ends {word}, and the tool moves on without it" for stop, word in ended]
         self._lost_since(line, texts, retracts=False)
@@ -300,7 +300,7 @@ class WordStates:
         self._changed, self._high = bool(late), False
         for state, word in self._forgotten.items():
             if state not in self._left:
-                self.unframed(line, f"{state}: it must come after {word}, which deselects it", NOT_ESTABLISHED)
+                self.unframed(NOT_ESTABLISHED, line, f"{state}: it must come after {word}, which deselects it")
         self._forgotten = {}
         if self._first is None:
             self._begin(line)
@@ -309,10 +309,10 @@ class WordStates:
         self._first |= {state: self._held[state].text for state in self._deferred - late}
         self._deferred &= late
         if self._retract and not late:
-            self.wrong(self._retract, GONE_ON)
+            self.wrong(NOT_LISTED, self._retract, GONE_ON)
             self._retract = 0
         if self._arc is not None and code not in (2.0, 3.0):
-            self.wrong(self._arc[1], f"{self._arc[0]} where no arc follows")
+            self.wrong(NOT_LISTED, self._arc[1], f"{self._arc[0]} where no arc follows")
         self._arc = None
         self._compare(late, self._first)
 
@@ -325,7 +325,7 @@ class WordStates:
                 rule.pattern.fullmatch(word) for rule in rules for word in self._said
             ):
                 wanted = " or ".join(shown(rule.pattern) for rule in rules)
-                self.unframed(line, f"{state}: {wanted} must come before the first motion", NOT_ESTABLISHED)
+                self.unframed(NOT_ESTABLISHED, line, f"{state}: {wanted} must come before the first motion")
 
     def _compare(self, late: Set[str], first: Mapping[str, str]) -> None:
         """Complain of states that are not what they were at the first motion, where nobody else compares them."""
@@ -336,7 +336,7 @@ class WordStates:
                 self._complained.add((state, held.line))
                 text = f"{state}: {held.text} where {first.get(state, 'nothing')} holds for the whole program"
                 if not held.rule.tool:
-                    self.wrong(held.line, text)
+                    self.wrong(NOT_LISTED, held.line, text)
                 elif self._by_tool is not None:
                     self._by_tool.append(Problem(NOT_LISTED, 0, held.line, text))
 
@@ -408,9 +408,9 @@ class WordStates:
             held = self._held[state]
             if not held.off:
                 text = f"{state}: {held.text} of line {held.line} still holds at the end"
-                self.unframed(line, text, NOT_ESTABLISHED)
+                self.unframed(NOT_ESTABLISHED, line, text)
         if not self._high and self._retracts:
-            self.unframed(line, "the tool is not retracted at the end", NOT_ESTABLISHED)
+            self.unframed(NOT_ESTABLISHED, line, "the tool is not retracted at the end")
         if self._first is None:
             return
         self._lost_since(line, [f"{word} still holds at the end" for word in self._running()], retracts=False)
