@@ -16,7 +16,6 @@ from cornersmooth.kinematics import load_machine
 from cornersmooth.model import Program
 from cornersmooth.nc import Form, choose_form
 from cornersmooth.nc_reader import read_nc
-from cornersmooth.nc_reader.elements import FeedIs
 from cornersmooth.pipeline import postprocess, reading_back
 from cornersmooth.provenance import read_provenance
 from cornersmooth.settings import Settings
@@ -74,7 +73,7 @@ def test_blocks_have_the_mean_speed_of_the_plan(control: str, form: str, machine
     line, feed, _ = block_feeds(plan_text(plain, LIMITS, machine=axes))
     element = np.searchsorted(plain.line, line)
     said = text.feed[element]
-    room = np.where(plain.feed_is[element] == FeedIs.LEAST, 10.0, plain.feed_room[element])
+    room = np.where(plain.least_feed[element], 10.0, plain.feed_room[element])
     assert (said <= plain.feed[element] * (1 + 1e-9) + room).all()
     known = ~np.isnan(feed)
     assert known.sum() > 10

@@ -13,7 +13,6 @@ import pytest
 from cornersmooth.cl import read
 from cornersmooth.model import Program
 from cornersmooth.nc_reader import read_nc
-from cornersmooth.nc_reader.elements import FeedIs
 from cornersmooth.settings import Settings
 from cornersmooth.verify import Verification, verify
 from nc.cases import Case
@@ -633,13 +632,14 @@ def test_blocks_as_fast_as_f_can_say_are_right_in_a_plan_too(name: str) -> None:
 
 
 def test_a_plan_may_let_the_tip_creep_within_its_digits() -> None:
+    """Its least feed is the lower one of both that the block may have been timed by, less their room."""
     text = read_nc(CREEPING.text.encode(), control="fanuc", machine=CREEPING.case.choose().machine, tcp=False)
-    kinds = np.array([FeedIs.KNOWN, FeedIs.OF_AXIS_POINT, FeedIs.LEAST], np.uint8)
-    part = replace(text.part(0, 3), feed=np.full(3, 100.0), feed_room=np.array([1.0, 1.0, 0.0]), feed_is=kinds)
+    others = np.array([np.nan, 0.5, 40.0])
+    part = replace(text.part(0, 3), feed=np.full(3, 100.0), other_feed=others, feed_room=np.array([1.0, 1.0, 0.0]))
     known = part.at_most()
-    assert known.feed.tolist() == [99.0, 99.0, 100.0]
-    assert known.feed_is.tolist() == [FeedIs.LEAST, FeedIs.OF_AXIS_POINT, FeedIs.LEAST]
-    assert known.feed_room.tolist() == [0.0, np.inf, 0.0]
+    assert known.least_feed.all()
+    np.testing.assert_allclose(known.feed, [99.0, 0.0, 40.0], atol=1e-300)
+    assert (known.feed > 0.0).all()
 
 
 def test_tip_that_turns_round_before_the_axis_point_is_not_going_back() -> None:
@@ -683,6 +683,34 @@ def test_time_of_a_standing_tip_is_still_compared(factor: float) -> None:
         wrong = [*lines[:k], f"{words} F{factor * float(rate):.4f}", *lines[k + 1 :]]
         found = STANDING.verified("\n".join(wrong)).problems
         assert [(problem.code, problem.nc_line) for problem in found] == [("CS541", k + 1)]
+
+
+#: the tip moves by less than a coarse tolerance, and by more than the one that the program is written with
+HARDLY_MOVING = Alarm(
+    Case("linuxcnc", "g1", "xyzac-trt"),
+    0.0005,
+    10.0,
+    """GOTO/0.0,0.0,0.0,0.0,0.0,1.0
+FEDRAT/MMPM,1000.0
+GOTO/0.03,0.02,0.0,0.1045285,0.0,0.9945219
+GOTO/0.06,0.04,0.0,0.0174524,0.0,0.9998477
+GOTO/0.09,0.0,0.0,0.1045285,0.0,0.9945219
+GOTO/0.12,0.02,0.0,0.2079117,0.0,0.9781476
+""",
+)
+
+
+@pytest.mark.parametrize("tolerance", [0.0005, 0.002, 0.005, 0.01, 0.02, 0.04, 0.1])
+def test_timed_blocks_may_be_of_any_tolerance_up_to_the_one_of_the_check(tolerance: float) -> None:
+    alarm = replace(HARDLY_MOVING, tolerance=tolerance)
+    lines = HARDLY_MOVING.text.splitlines()
+    assert alarm.verified("\n".join(lines)).problems == ()
+    timed = lines.index("G93") + 1
+    words, rate = lines[timed].split(" F")
+    for factor in (0.3, 3.0):
+        wrong = [*lines[:timed], f"{words} F{factor * float(rate):.3f}", *lines[timed + 1 :]]
+        found = alarm.verified("\n".join(wrong)).problems
+        assert [(problem.code, problem.nc_line) for problem in found] == [("CS541", timed + 1)]
 
 
 def test_time_of_a_dwell_in_revolutions_is_compared() -> None:

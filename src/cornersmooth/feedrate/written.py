@@ -18,7 +18,7 @@ from cornersmooth.feedrate.timelaw import TimeLaw
 from cornersmooth.kinematics import Machine, endless
 from cornersmooth.model import Arcs, Bools, FeedMode, Floats, Ints, Move, Program, Source, Statement
 from cornersmooth.nc_reader.curves import groups
-from cornersmooth.nc_reader.elements import Element, Event, FeedIs, NcProgram
+from cornersmooth.nc_reader.elements import Element, Event, NcProgram
 from cornersmooth.settings import Settings
 from cornersmooth.vectors import norm, unit
 
@@ -156,7 +156,7 @@ def _said(nc: NcProgram) -> Floats:
 
     What is read for them is only a feed that they are not below.
     """
-    unsaid = (nc.feed_is == FeedIs.LEAST) & (nc.feed < _SAYS_NOTHING)
+    unsaid = nc.least_feed & (nc.feed < _SAYS_NOTHING)
     known = np.flatnonzero(~unsaid & (nc.feed > 0.0))
     if not unsaid.any() or not len(known):
         return nc.feed

@@ -27,16 +27,6 @@ class Element(IntEnum):
     CURVE = 3
 
 
-class FeedIs(IntEnum):
-    """What the feed of an element says of that of its move (`NcProgram.feed_is`)."""
-
-    KNOWN = 0
-    #: the feed of the axis point, where the tip stands; or the tip creeps, at most a few times the room
-    OF_AXIS_POINT = 1
-    #: the feed of the move may be higher: F is the largest that the control takes, or that of a plan
-    LEAST = 2
-
-
 @dataclass(frozen=True)
 class Curves:
     """Control points and knots of the curves, c of them, one after another."""
@@ -191,7 +181,10 @@ class Elements:
     line: Ints  #: (m,): NC line of each element (curves: of their first block)
     feed: Floats  #: (m,): mm/min or mm/rev; NaN for rapids and where none was given.
     per_revolution: NDArray[np.bool_]  #: (m,)
-    feed_is: NDArray[np.uint8]  #: (m,): `FeedIs`
+    #: (m,): the same of a block that inverse time counts, if the other of tip and axis point has timed it; else NaN
+    other_feed: Floats
+    #: (m,): whether the feed of the move may be higher: F is the largest that the control takes, or that of a plan
+    least_feed: NDArray[np.bool_]
     #: (m,): mm/min or mm/rev by which the feed is not known: digits of F, and of times and ways where it is timed
     feed_room: Floats
     #: (m,): by how much, as `second`, directions that must be exact may be off beside the printed digits
@@ -237,14 +230,13 @@ class Elements:
     def at_most(self) -> Self:
         """Return the same elements with feeds that those of the moves are not below.
 
-        Where the tip may creep its feed may be any lower one. No plan lowers a feed per revolution: threads.
+        No plan lowers a feed per revolution: threads.
         """
-        least = np.maximum(self.feed - self.feed_room, np.finfo(np.float64).tiny)
+        least = np.maximum(np.fmin(self.feed, self.other_feed) - self.feed_room, np.finfo(np.float64).tiny)
         feed = np.where((self.feed > 0.0) & ~self.per_revolution, least, self.feed)
-        creeps = self.feed_is == FeedIs.OF_AXIS_POINT
-        room = np.where(self.per_revolution, self.feed_room, np.where(creeps, np.inf, 0.0))
-        kind = np.where(self.per_revolution | creeps, self.feed_is, np.uint8(FeedIs.LEAST))
-        return replace(self, feed=feed, feed_room=room, feed_is=kind)
+        room = np.where(self.per_revolution, self.feed_room, 0.0)
+        other = np.where(self.per_revolution, self.other_feed, np.nan)
+        return replace(self, feed=feed, other_feed=other, feed_room=room, least_feed=~self.per_revolution)
 
     @classmethod
     def joined(cls, parts: Sequence[Elements]) -> Elements:
@@ -261,7 +253,7 @@ class Elements:
 #: fields of `Elements` with a row for each
 _COLUMNS: Final = (
     *("kind", "tip", "second", "line", "feed", "per_revolution"),
-    *("feed_is", "feed_room", "second_room", "tip_room"),
+    *("other_feed", "least_feed", "feed_room", "second_room", "tip_room"),
 )
 
 

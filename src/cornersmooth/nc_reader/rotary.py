@@ -15,7 +15,7 @@ import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.curves import basis, groups
-from cornersmooth.nc_reader.elements import Curves, Element, Elements, FeedIs
+from cornersmooth.nc_reader.elements import Curves, Element, Elements
 from cornersmooth.nc_reader.execution import Modal
 from cornersmooth.nc_reader.needed_states import MOST_TURN
 
@@ -41,7 +41,7 @@ _LEAST_FEED = 1e-9
 _FASTEST = (9999.999, 999_999.999)
 
 #: ways of the tip shorter than so many steps of what is printed say little
-SHORT_STEPS = 3.0
+_SHORT_STEPS = 3.0
 
 #: an axis that turns faster (deg/min) may make a block slower than its feed where the text times it (G93)
 FAST_TURN = 30_000.0
@@ -280,35 +280,30 @@ class Rotary:
     def _timed(self, run: Elements, position: Floats, tip: Floats, vector: Floats, angles: Floats) -> Elements:
         """Blocks whose F is moves per minute, with their feeds (mm/min), and how far these are uncertain.
 
-        Where the tip stands still the axis point runs with the feed; where the tip stays within ε and the axis point
-        does not, either may. Without tip control the printed digits do not tell whether the tip stands or creeps:
-        either may have timed the block then, see `FeedIs`.
+        Where the tip stands still the axis point runs with the feed. Where the tip stays within ε either may: who wrote
+        the program may have had any tolerance up to ε, and at that the tip stood still or not.
         """
         rate, levers = run.feed, self.levers(position)
         step, turn_step = self.steps(float(levers.max(initial=0.0, where=~np.isnan(levers))))
         length = np.linalg.norm(np.diff(tip, axis=0), axis=1)
         swing = np.linalg.norm(np.diff(tip + self.axis_length * vector, axis=0), axis=1)
         turn = np.abs(np.diff(angles, axis=0)).max(axis=1)
-        short = length < SHORT_STEPS * step
+        short = length < _SHORT_STEPS * step
         still = length < 0.5 * self.tip_step if self.tip_control else short
-        way = np.where(still, swing, length)
-        pole = self.pole_room(vector)
-        off = 2 * step + np.where(still, self.axis_length * (turn_step + pole[1:] + pole[:-1]), 0.0)
-        room = np.maximum(rate * off, _F_STEP * way)
         printed = 2 * step + self.axis_length * turn_step  # who timed the block knew its length before it was rounded
-        either = ~still & (length < self.tolerance + printed) & (swing > self.tolerance - printed)
-        room[either] += (rate * np.abs(swing - length))[either]
-        way = np.where(~still & (length < self.tolerance) & (swing > self.tolerance), swing, way)
-        kind = np.where(still & (not self.tip_control), np.uint8(FeedIs.OF_AXIS_POINT), np.uint8(FeedIs.KNOWN))
+        either = (length < self.tolerance + printed) & (swing > length) & ~(still & self.tip_control)
+        swings = still | ((length < self.tolerance) & (swing > self.tolerance))
+        way, other = np.where(swings, (swing, length), (length, swing))
+        pole = self.pole_room(vector)
+        off = np.where(still | either, printed, 2 * step)
+        off += np.where(still, self.axis_length * (pole[1:] + pole[:-1]), 0.0)
+        room = np.maximum(rate * off, _F_STEP * np.where(either, np.maximum(way, other), way))
         room[(rate * turn > FAST_TURN) | (~still & short)] = np.inf
-        feed = rate * way
+        feed, other_feed = rate * way, np.where(either, rate * other, np.nan)
         slowed = np.isin(rate, _FASTEST) & np.isfinite(room)
-        feed[slowed] -= room[slowed]
-        creeping = slowed & still & (not self.tip_control)  # the tip may have timed it, by what the digits do not show
-        feed[creeping] = np.minimum(feed, rate * np.maximum(length - 2 * step, 0.0))[creeping]
-        feed[slowed] = np.maximum(feed[slowed], _LEAST_FEED)
-        room[slowed], kind[slowed] = 0.0, FeedIs.LEAST
-        return replace(run, feed=feed, feed_room=room, feed_is=kind)
+        feed[slowed] = np.maximum(np.fmin(feed, other_feed) - room, _LEAST_FEED)[slowed]
+        room[slowed], other_feed[slowed] = 0.0, np.nan
+        return replace(run, feed=feed, other_feed=other_feed, feed_room=room, least_feed=slowed)
 
     def _curves(self, curves: Curves) -> Curves:
         """Curves in tip and tool vector."""

@@ -9,16 +9,12 @@ from functools import partial
 import numpy as np
 
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program
-from cornersmooth.nc_reader.elements import Element, Elements, FeedIs, Problem
-from cornersmooth.nc_reader.rotary import SHORT_STEPS
+from cornersmooth.nc_reader.elements import Element, Elements, Problem
 from cornersmooth.verify.cl_motion import Original
 from cornersmooth.verify.findings import Findings, Runs
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.nearest import COLUMNS, on_segments
 from cornersmooth.verify.task import ARITHMETIC
-
-#: a tip that creeps goes at most so many times the room of the feed: `SHORT_STEPS` and two of which the room is two
-_CREEPING = (SHORT_STEPS + 2) / 2
 
 #: segments on either side of a vertex that are looked at first (speed only)
 _FEW = 64
@@ -45,9 +41,7 @@ def check_feeds(match: Match, found: Findings) -> None:
         return _Said(nc, int(element[k])).same(original, moves)
 
     # a planned feed of what does not move the tool, as a table that turns about it, tells nothing but a time
-    still = (nc.feed_is[element] == FeedIs.LEAST) & (
-        np.linalg.norm(match.six[end] - match.six[start], axis=1) <= ARITHMETIC
-    )
+    still = nc.least_feed[element] & (np.linalg.norm(match.six[end] - match.six[start], axis=1) <= ARITHMETIC)
     good = said.same(original, low) | rapid | still
     other = np.flatnonzero(~good)
     if len(other):
@@ -94,11 +88,10 @@ class _Said:
     def near(self, asked: Floats) -> Bools:
         """Whether they may be feeds that are asked for; the unit is not looked at."""
         nc, own = self.nc, self.element
-        feed, room, kind = nc.feed[own], nc.feed_room[own], nc.feed_is[own]
-        slack = ARITHMETIC * np.maximum(np.abs(asked), 1.0)
-        near: Bools = np.abs(feed - asked) <= room + slack
-        near |= (kind == FeedIs.OF_AXIS_POINT) & (asked <= _CREEPING * room)
-        near |= (kind == FeedIs.LEAST) & (feed > 0.0) & (feed <= asked + slack)
+        feed, slack = nc.feed[own], ARITHMETIC * np.maximum(np.abs(asked), 1.0)
+        room = nc.feed_room[own] + slack
+        near: Bools = (np.abs(feed - asked) <= room) | (np.abs(nc.other_feed[own] - asked) <= room)
+        near |= nc.least_feed[own] & (feed > 0.0) & (feed <= asked + slack)
         return near
 
     def same(self, original: Original, move: Ints) -> Bools:

@@ -9,7 +9,7 @@ import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints, Move
 from cornersmooth.nc_reader.ahead import Ahead
-from cornersmooth.nc_reader.elements import Element, FeedIs
+from cornersmooth.nc_reader.elements import Element
 from cornersmooth.nc_reader.tool import directions
 from cornersmooth.statements.cycles import Drilling
 from cornersmooth.statements.tool_changes import ToolChanges
@@ -218,7 +218,7 @@ class HoleLines:
     def wrong_feed(self, element: int, cycle: Drilling) -> bool:
         """Whether the feed of an element is not that of a cycle."""
         nc, own = self.ahead.nc, element - self.ahead.base
-        least = nc.feed_is[own] == FeedIs.LEAST  # of a plan, which may lower it
+        least = nc.least_feed[own]  # of a plan, which may lower it
         off = nc.feed[own] - cycle.feed
         return bool(
             not np.isnan(cycle.feed)
