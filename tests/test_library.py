@@ -155,8 +155,8 @@ def test_one_call_does_what_the_command_does(tmp_path, capsys):
 
 def test_a_failed_program_is_an_error_and_the_old_file_stays(tmp_path, monkeypatch):
     nothing = lambda smoothed: np.zeros(0, np.int64)  # noqa: E731
-    monkeypatch.setattr("cornersmooth.smoothing.zhang2016._straying_transitions", nothing)
-    monkeypatch.setattr("cornersmooth.smoothing.zhang2016._straying_remainders", nothing)
+    monkeypatch.setattr("cornersmooth.smoothing.zhang2016.straying_transitions", nothing)
+    monkeypatch.setattr("cornersmooth.smoothing.zhang2016.straying_remainders", nothing)
     out = tmp_path / "o.nc"
     out.write_text("old")
     settings = Settings(tolerance=0.01, method="zhang2016")

@@ -38,8 +38,8 @@ END-OF-PATH
 def careless(monkeypatch: pytest.MonkeyPatch) -> None:
     """The paper's method without a look at what it makes."""
     nothing = lambda smoothed: np.zeros(0, np.int64)  # noqa: E731
-    monkeypatch.setattr("cornersmooth.smoothing.zhang2016._straying_transitions", nothing)
-    monkeypatch.setattr("cornersmooth.smoothing.zhang2016._straying_remainders", nothing)
+    monkeypatch.setattr("cornersmooth.smoothing.zhang2016.straying_transitions", nothing)
+    monkeypatch.setattr("cornersmooth.smoothing.zhang2016.straying_remainders", nothing)
 
 
 @pytest.fixture

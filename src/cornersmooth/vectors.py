@@ -9,8 +9,7 @@ from cornersmooth.model import Floats
 
 def dot(one: Floats, other: Floats) -> Floats:
     """Scalar products."""
-    product: Floats = np.einsum("...i,...i->...", one, other)
-    return product
+    return np.einsum("...i,...i->...", one, other)
 
 
 def square(vectors: Floats) -> Floats:
@@ -26,11 +25,9 @@ def norm(vectors: Floats) -> Floats:
 def unit(vectors: Floats) -> Floats:
     """Vectors of length one with the same directions; a vector of no length stays as it is."""
     length = norm(vectors)[..., None]
-    units: Floats = vectors / np.where(length > 0.0, length, 1.0)
-    return units
+    return vectors / np.where(length > 0.0, length, 1.0)
 
 
 def angle_between(one: Floats, other: Floats) -> Floats:
     """Angles between vectors, rad; accurate for small angles too."""
-    angle: Floats = np.arctan2(norm(np.cross(one, other)), dot(one, other))
-    return angle
+    return np.arctan2(norm(np.cross(one, other)), dot(one, other))

@@ -41,7 +41,7 @@ TABLE_1 = (
 )
 def test_table_2_of_the_paper(monkeypatch, tolerance, tips, axes):
     """Of the construction alone: in lines it leaves 0.078 mm by 0.1 %, and the corner would get a smaller one."""
-    monkeypatch.setattr("cornersmooth.smoothing.zhang2016._straying_transitions", lambda smoothed: [])
+    monkeypatch.setattr("cornersmooth.smoothing.zhang2016.straying_transitions", lambda smoothed: [])
     tip, top = TABLE_1
     corners = smooth(Program.from_poses(tip, top - tip), Settings(tolerance=tolerance, method="zhang2016")).corners
     assert corners.tip_error == pytest.approx(tips, abs=1e-4)

@@ -7,8 +7,8 @@ import numpy as np
 from cornersmooth import Program, Settings, smooth
 from cornersmooth.model import Status
 from cornersmooth.smoothing.construction import Construction
-from cornersmooth.smoothing.self_check import distances, passing
-from cornersmooth.smoothing.zhang2016 import CONSTRUCTION, _straying_remainders
+from cornersmooth.smoothing.self_check import distances, passing, straying_remainders
+from cornersmooth.smoothing.zhang2016 import CONSTRUCTION
 
 
 def bend(turn: float) -> Program:
@@ -37,10 +37,10 @@ def test_what_is_left_of_a_segment_strays() -> None:
     settings = Settings(tolerance=0.031, axis_tolerance=2.959, method="zhang2016")
     smoothed = Construction.smooth(CONSTRUCTION, program, settings)
     assert smoothed.corners.smoothed.all()
-    assert _straying_remainders(smoothed).tolist() == [0]
+    assert straying_remainders(smoothed).tolist() == [0]
     straight = Construction.smooth(CONSTRUCTION, bend(0.0), settings)
     assert straight.corners.smoothed.all()
-    assert not len(_straying_remainders(straight))
+    assert not len(straying_remainders(straight))
 
 
 def test_going_back_is_told_from_the_farthest_sample() -> None:

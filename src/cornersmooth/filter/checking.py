@@ -204,8 +204,7 @@ def _left_otherwise(run: Run, state: State) -> str:
 
 
 def _unit(vector: Floats) -> Floats:
-    unit: Floats = vector / np.linalg.norm(vector)
-    return unit
+    return vector / np.linalg.norm(vector)
 
 
 def _told(axes: Sequence[str], place: Sequence[float]) -> str:

@@ -26,8 +26,7 @@ _LARGEST_STEP = math.pi / 2.0
 def arc_radii(program: Program) -> Floats:
     """(k,) mean of the distances of start and end from the axis, mm."""
     start, end = _radius_vectors(program)
-    radii: Floats = (norm(start) + norm(end)) / 2.0
-    return radii
+    return (norm(start) + norm(end)) / 2.0
 
 
 def arc_lines(program: Program, settings: Settings) -> Ints:
@@ -73,8 +72,7 @@ def arc_points(program: Program, rows: Ints, share: Floats) -> tuple[Floats, Flo
     side = np.cross(normal, radius)
 
     def swung(angle: Floats) -> Floats:
-        offset: Floats = (np.cos(angle) - 1.0)[:, None] * radius + np.sin(angle)[:, None] * side
-        return offset
+        return (np.cos(angle) - 1.0)[:, None] * radius + np.sin(angle)[:, None] * side
 
     sweep = arcs.sweep[rows]
     closing = (end - start) - swung(sweep)

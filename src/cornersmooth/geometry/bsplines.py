@@ -60,51 +60,43 @@ class Splines:
     @cached_property
     def width(self) -> Floats:
         """(spans,) steps."""
-        widths: Floats = self.knot[self.span_knot + 1] - self.knot[self.span_knot]
-        return widths
+        return self.knot[self.span_knot + 1] - self.knot[self.span_knot]
 
     @cached_property
     def _extended(self) -> Floats:
         """Knots with the ends repeated: control point j of run r has the knots j to j + 4 from 4 r places on."""
         run, place = spread(self.count + 6)
         inner = np.clip(place - 3, 0, self.count[run] - 1)
-        extended: Floats = self.knot[self.first[run] + inner]
-        return extended
+        return self.knot[self.first[run] + inner]
 
     def around(self, span: Ints) -> Floats:
         """(m, 6) the three knots up to the start of each span and the three from its end on."""
         begin = self.span_control[span] + 4 * self.span_run[span]
-        knots: Floats = self._extended[begin[:, None] + np.arange(1, 7)]
-        return knots
+        return self._extended[begin[:, None] + np.arange(1, 7)]
 
     @cached_property
     def inner_knots(self) -> Floats:
         """(controls, 3) the knots whose blossom each control point is."""
         begin = np.arange(len(self.control_run)) + 4 * self.control_run
-        knots: Floats = self._extended[begin[:, None] + np.arange(1, 4)]
-        return knots
+        return self._extended[begin[:, None] + np.arange(1, 4)]
 
     @cached_property
     def greville(self) -> Floats:
         """(controls,) mean of the three inner knots of each control point; the control points of a line lie there."""
-        means: Floats = self.inner_knots.sum(axis=1) / 3.0
-        return means
+        return self.inner_knots.sum(axis=1) / 3.0
 
     def span_at(self, run: Ints, s: Floats) -> Ints:
         """Span (m,) of the splines `run` (m,) that each parameter s (m,) lies in."""
         knot = search(self.knot, self.count, run, s, side="right") - 1
-        spans: Ints = np.clip(knot, self.first[run], self.first[run + 1] - 2) - run
-        return spans
+        return np.clip(knot, self.first[run], self.first[run + 1] - 2) - run
 
     def taps(self, span: Ints) -> Ints:
         """(m, 4) the control points of spans."""
-        control: Ints = self.span_control[span][:, None] + np.arange(4)
-        return control
+        return self.span_control[span][:, None] + np.arange(4)
 
     def points(self, control: Floats, span: Ints, s: Floats) -> Floats:
         """Points (m, d) in spans at the parameters s (m,), from control points (controls, d)."""
-        found: Floats = np.einsum("mk,mkd->md", self.basis(span, s), control[self.taps(span)])
-        return found
+        return np.einsum("mk,mkd->md", self.basis(span, s), control[self.taps(span)])
 
     def basis(self, span: Ints, s: Floats) -> Floats:
         """(m, 4) basis functions of the spans at the parameters s."""
@@ -150,8 +142,7 @@ class Splines:
 
     def bezier(self, control: Floats, span: Ints, low: Floats, high: Floats) -> Floats:
         """(m, 4, d) Bézier points of the parts low..high of spans, from control points (controls, d)."""
-        points: Floats = self.bernstein(span, low, high) @ control[self.taps(span)]
-        return points
+        return self.bernstein(span, low, high) @ control[self.taps(span)]
 
     def on_knots(self, finer: Splines, control: Floats) -> Floats:
         """Control points (c, d) of the same curves on knots that contain these: knot insertion by blossoms."""
@@ -167,5 +158,4 @@ class Splines:
             begin, end = k[:, level:3], k[:, 3 : 6 - level]
             share = ((arguments[:, level, None] - begin) / (end - begin))[:, :, None]
             values = (1.0 - share) * values[:, :-1] + share * values[:, 1:]
-        blossoms: Floats = values[:, 0]
-        return blossoms
+        return values[:, 0]

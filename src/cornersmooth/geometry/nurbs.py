@@ -30,8 +30,7 @@ _BINARY_DIGIT = 2.0**-20
 
 def deviation_factor(weights: Floats, ratio: Floats | float) -> Floats:
     """(...,) the factor c of weights (..., 2) and ratios (...,)."""
-    factor: Floats = ratio * weights[..., 0] / (2.0 * (weights[..., 0] + weights[..., 1]))
-    return factor
+    return ratio * weights[..., 0] / (2.0 * (weights[..., 0] + weights[..., 1]))
 
 
 def basis(u: Floats) -> Floats:
@@ -133,8 +132,7 @@ def evaluate(points: Floats, weights: Floats, u: Floats) -> Floats:
 
     Weights (2,) are those of all curves.
     """
-    values: Floats = rational_basis(u, weights) @ points
-    return values
+    return rational_basis(u, weights) @ points
 
 
 def derivatives(points: Floats, weights: Floats, u: Floats) -> tuple[Floats, Floats, Floats]:
@@ -192,18 +190,15 @@ class Refinement:
         if len(weights) and (weights == weights[0]).all():
             weights = weights[:1]
         weighted = self.basis(u) * weights[:, None, :]
-        shares: Floats = weighted / weighted.sum(axis=2, keepdims=True)
-        return shares
+        return weighted / weighted.sum(axis=2, keepdims=True)
 
     def homogeneous(self, weights: Floats) -> Floats:
         """Weights of the refined curves: (g, 5) -> (g, p)."""
-        refined: Floats = weights @ self.from_five.T
-        return refined
+        return weights @ self.from_five.T
 
     def control_points(self, points: Floats, weights: Floats) -> Floats:
         """Control points of the refined curves: (g, 5, d) with the weights (g, 5) -> (g, p, d)."""
-        refined: Floats = (self.from_five @ (points * weights[:, :, None])) / self.homogeneous(weights)[:, :, None]
-        return refined
+        return (self.from_five @ (points * weights[:, :, None])) / self.homogeneous(weights)[:, :, None]
 
 
 @cache

@@ -23,8 +23,7 @@ def spread(counts: Ints) -> tuple[Ints, Ints]:
 def ranges(begin: Ints, counts: Ints) -> Ints:
     """Concatenation of ``begin[i] .. begin[i] + counts[i] - 1``."""
     row, place = spread(counts)
-    whole: Ints = begin[row] + place
-    return whole
+    return begin[row] + place
 
 
 def batches(counts: Ints, size: int) -> Ints:

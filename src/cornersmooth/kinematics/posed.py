@@ -70,20 +70,17 @@ class Posed:
     @cached_property
     def axis(self) -> Floats:
         """(3,) unit vector from the tip to the spindle, in part coordinates."""
-        found: Floats = tool_axis(self.machine, self.angles[None])[0]
-        return found
+        return tool_axis(self.machine, self.angles[None])[0]
 
     @cached_property
     def position(self) -> Floats:
         """(3,) words of the linear axes, mm, from the zero of the part, the tool length taken off."""
-        found: Floats = machine_position(self.machine, self.tip[None], self.angles[None])[0]
-        return found
+        return machine_position(self.machine, self.tip[None], self.angles[None])[0]
 
     @cached_property
     def nose(self) -> Floats:
         """(3,) place of the spindle nose, mm, with the heads at zero: as travel and points are given."""
-        found: Floats = nose_position(self.machine, self.tip[None], self.angles[None])[0]
-        return found
+        return nose_position(self.machine, self.tip[None], self.angles[None])[0]
 
     @cached_property
     def _found(self) -> Solutions:

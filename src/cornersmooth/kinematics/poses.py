@@ -41,8 +41,7 @@ class Solutions:
     @property
     def singular(self) -> Bools:
         """(n,) bool: the axis is at the pole, to rounding."""
-        singular: Bools = self.pole_distance <= np.degrees(POLE_MATCH)
-        return singular
+        return self.pole_distance <= np.degrees(POLE_MATCH)
 
 
 def tool_axis(machine: Machine, angles: Floats) -> Floats:
@@ -185,16 +184,14 @@ def passes_pole(machine: Machine, start: Floats, end: Floats, cone: float) -> Bo
 def angle_between(one: Floats, other: Floats) -> Floats:
     """Angle between unit vectors, degrees, exact for small angles too: (n, 3), (n, 3) -> (n,)."""
     apart = np.linalg.norm(one - other, axis=-1)
-    angle: Floats = np.degrees(2 * np.arcsin(np.minimum(apart / 2, 1.0)))
-    return angle
+    return np.degrees(2 * np.arcsin(np.minimum(apart / 2, 1.0)))
 
 
 def pole_angle(machine: Machine, axis: Floats) -> Floats:
     """Second angle that the machine has at the pole nearest to each axis: (n, 3) -> (n,) degrees in (-180, 180]."""
     poles = np.array(_Frame.of(machine).poles(machine))
     angles = closest_second(machine, poles, np.zeros(len(poles)))
-    nearest: Floats = angles[np.argmax(axis @ poles.T, axis=1)]
-    return nearest
+    return angles[np.argmax(axis @ poles.T, axis=1)]
 
 
 def wrap(angles: Floats) -> Floats:
@@ -205,8 +202,7 @@ def wrap(angles: Floats) -> Floats:
 
 def radians(angles: Floats) -> Floats:
     """Radians of angles in degrees, whole turns taken off first so that they cost no digits."""
-    turned: Floats = np.radians(np.fmod(angles, 360.0))
-    return turned
+    return np.radians(np.fmod(angles, 360.0))
 
 
 def rotate(direction: Floats, angle: Floats, vectors: Floats) -> Floats:
@@ -215,8 +211,7 @@ def rotate(direction: Floats, angle: Floats, vectors: Floats) -> Floats:
     x, y, z = direction
     across = np.array(((0.0, z, -y), (-z, 0.0, x), (y, -x, 0.0)))  # v @ across = direction × v, faster than np.cross
     along = (vectors @ direction)[:, None] * direction
-    turned: Floats = along + (vectors - along) * cosine + (vectors @ across) * sine
-    return turned
+    return along + (vectors - along) * cosine + (vectors @ across) * sine
 
 
 @dataclass(frozen=True)
@@ -260,23 +255,20 @@ class _Frame:
             distance = np.minimum(distance, rho1)
         if self.pole_behind:
             distance = np.minimum(distance, np.pi - rho1)
-        degrees: Floats = np.degrees(distance)
-        return degrees
+        return np.degrees(distance)
 
     def beyond(self, rho1: Floats) -> Floats:
         """Degrees outside of the reach of the machine."""
         nearest = abs(self.sigma - self.rho)
         farthest = np.pi - abs(np.pi - self.sigma - self.rho)
-        degrees: Floats = np.degrees(np.maximum(np.maximum(nearest - rho1, rho1 - farthest), 0.0))
-        return degrees
+        return np.degrees(np.maximum(np.maximum(nearest - rho1, rho1 - farthest), 0.0))
 
 
 def _columns(about: Floats, towards: Floats) -> Floats:
     """Right-handed frame as columns: the part of `towards` across `about`, the third direction, `about`."""
     third = np.cross(about, towards)
     third /= np.linalg.norm(third)
-    frame: Floats = np.stack((np.cross(third, about), third, about), axis=1)
-    return frame
+    return np.stack((np.cross(third, about), third, about), axis=1)
 
 
 def _angle(one: Floats, other: Floats) -> float:

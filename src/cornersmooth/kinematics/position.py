@@ -19,8 +19,7 @@ def machine_position(machine: Machine, tip: Floats, angles: Floats) -> Floats:
     for index, axis in enumerate(machine.axes):
         if axis.carrier == "table":
             turned = _about(axis.unit, axis.point, -axis.sign * radians(angles[:, index]), turned)
-    position: Floats = turned - machine.part_zero - _swing(machine, angles)
-    return position
+    return turned - machine.part_zero - _swing(machine, angles)
 
 
 def tip_position(machine: Machine, position: Floats, angles: Floats) -> Floats:
@@ -30,8 +29,7 @@ def tip_position(machine: Machine, position: Floats, angles: Floats) -> Floats:
         axis = machine.axes[index]
         if axis.carrier == "table":
             turned = _about(axis.unit, axis.point, axis.sign * radians(angles[:, index]), turned)
-    tip: Floats = turned - machine.part_zero
-    return tip
+    return turned - machine.part_zero
 
 
 def inverse_time(length: Floats, feed: Floats, turn: Floats, rotary_feed: float) -> Floats:

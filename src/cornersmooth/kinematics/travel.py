@@ -20,8 +20,7 @@ def nose_position(machine: Machine, tip: Floats, angles: Floats) -> Floats:
     Tips are (n, 3) mm in part coordinates, angles (n, 2) degrees. A control under tool tip control moves its axes there
     although the words are the tip.
     """
-    position: Floats = machine_position(machine, tip, angles) + machine.part_zero + machine.tool_length * machine.tool
-    return position
+    return machine_position(machine, tip, angles) + machine.part_zero + machine.tool_length * machine.tool
 
 
 def check_travel(machine: Machine, tip: Floats, angles: Floats, line: Ints, file: str | None = None) -> None:

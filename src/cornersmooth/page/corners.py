@@ -140,8 +140,7 @@ def _turns(points: Floats, pose: Ints) -> Floats:
     """Change of direction of a path at its points, degrees; 0 beside a step of no length."""
     before, after = points[pose] - points[pose - 1], points[pose + 1] - points[pose]
     moving = before.any(axis=1) & after.any(axis=1)
-    turns: Floats = np.degrees(np.where(moving, angle_between(before, after), 0.0))
-    return turns
+    return np.degrees(np.where(moving, angle_between(before, after), 0.0))
 
 
 def _ranked(

@@ -183,5 +183,4 @@ def _coordinates(law: TimeLaw, nc: NcProgram, written: WrittenPath, axis_length:
     length = end - begin
     share = np.divide(gone - begin, length, out=written.share.copy(), where=length > 0.0)
     before = np.concatenate(([0.0], reached))[element]
-    found: Floats = np.maximum.accumulate(before + share * (reached[element] - before))
-    return found
+    return np.maximum.accumulate(before + share * (reached[element] - before))

@@ -202,8 +202,7 @@ def _continued(place: Floats, tip: Floats, original: OriginalPath) -> Floats:
     way[:first] = np.maximum(place[first] - (length[first] - length[:first]), 0.0)
     way[last + 1 :] = np.minimum(place[last] + (length[last + 1 :] - length[last]), end)
     way[known] = place[known]
-    found: Floats = np.maximum.accumulate(way)
-    return found
+    return np.maximum.accumulate(way)
 
 
 def _curvature(tip: Floats, end: Bools, rapid: Bools) -> Floats:

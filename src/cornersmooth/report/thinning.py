@@ -49,5 +49,4 @@ def _largest(values: Floats, first: Ints, group: Ints) -> Ints:
     top = np.maximum.reduceat(values, first)
     rows = np.flatnonzero(values == top[group])
     _, one = np.unique(group[rows], return_index=True)
-    found: Ints = rows[one]
-    return found
+    return rows[one]

@@ -140,8 +140,7 @@ def _carried(blends: Floats, enough: Floats) -> Floats:
     bound = blends < _NEARLY * enough
     last = np.maximum.accumulate(np.where(bound, np.arange(len(blends)), 0))
     before = blends[last]
-    carried: Floats = np.where(~bound & bound[last] & (before >= _NEARLY * enough), np.minimum(before, blends), blends)
-    return carried
+    return np.where(~bound & bound[last] & (before >= _NEARLY * enough), np.minimum(before, blends), blends)
 
 
 def _deviation(rows: Vertices, limits: LineLimits, corners: _Corners, blend: Floats) -> Floats:
@@ -157,8 +156,7 @@ def _deviation(rows: Vertices, limits: LineLimits, corners: _Corners, blend: Flo
 
         def at(place: Floats, per_mm: tuple[Floats, Floats], left: Floats = left, gone: Floats = gone) -> Floats:
             shape = (-1,) + (1,) * (place.ndim - 1)
-            moved: Floats = place + left.reshape(shape) * per_mm[0] + gone.reshape(shape) * per_mm[1]
-            return moved
+            return place + left.reshape(shape) * per_mm[0] + gone.reshape(shape) * per_mm[1]
 
         tip = at(corners.tip, corners.way)
         axis_point = tip + limits.axis_length * limits.axis_of(at(corners.words, corners.turn))
@@ -176,7 +174,6 @@ def _original(rows: Vertices, parameter: Floats) -> tuple[Floats, Floats]:
     share = np.clip((parameter - s[row]) / np.where(step > 0.0, step, 1.0), 0.0, 1.0)[:, None]
 
     def between(values: Floats) -> Floats:
-        place: Floats = values[row] + share * (values[row + 1] - values[row])
-        return place
+        return values[row] + share * (values[row + 1] - values[row])
 
     return between(rows.original_tip), between(rows.original_axis_point)

@@ -1,20 +1,106 @@
-"""What a method of smoothing has to be able to do; `cornersmooth.methods` lists the methods."""
+"""Where the path is rounded (docs/method.md), and what a method of smoothing has to be able to do.
+
+Corners are worked on in batches of whole arrays; `cornersmooth.methods` lists the methods.
+"""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, fields
 from importlib import import_module
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from cornersmooth.methods import AUTO, DEFAULT_METHOD, METHODS
-from cornersmooth.model import Corners, Floats, Ints, Program, SmoothProgram
+from cornersmooth.model import Corners, FeedMode, Floats, Ints, Move, Program, SmoothProgram, Status
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing.corner_table import Legs, Placed, Remainders
-from cornersmooth.smoothing.transition import place_corners
+from cornersmooth.smoothing.neighbours import find_neighbours
+from cornersmooth.vectors import dot, norm
+
+#: corners worked on at once: their intermediate arrays fit the processor's cache
+BATCH = 16384
+
+#: batches worked on side by side
+THREADS = 2
 
 #: what `Corners.extra` may have: largest curvature of the curve of a run beside each of its corners, 1/mm
 RUN_CURVATURE = "run_curvature"
+
+
+class Legs(NamedTuple):
+    """The two segments at g corners, (g, 3) each."""
+
+    tip_in: Floats  # D⁻ of the tip, mm
+    tip_out: Floats  # D⁺ of the tip, mm
+    turn_in: Floats  # H times the change of the axis vector, mm: ``tip + turn`` is the axis-point segment
+    turn_out: Floats
+    axis: Floats  # unit axis at the corner
+
+
+def legs_at(program: Program, axis_length: float, pose: Ints, before: Ints, after: Ints) -> Legs:
+    """Segments at the corners `pose` with their neighbours `before` and `after`, (g,) each."""
+    tip, axis = program.tip, program.axis
+    corner, direction = tip[pose], axis[pose]
+    return Legs(
+        corner - tip[before],
+        tip[after] - corner,
+        axis_length * (direction - axis[before]),
+        axis_length * (axis[after] - direction),
+        direction,
+    )
+
+
+def half_cosine(legs: Legs, axis_length: float) -> Floats:
+    """(g,) cosine of half the larger of both axis changes, from their chords ``|turn| = 2 H sin(θ/2)``."""
+    sine = np.maximum(norm(legs.turn_in), norm(legs.turn_out)) / (2.0 * axis_length)
+    return np.sqrt(np.maximum(0.0, 1.0 - sine * sine))
+
+
+def refuse_turns(status: NDArray[np.uint8], legs: Legs, half_cosines: Floats, settings: Settings) -> None:
+    """Mark the corners at which the path turns back, by its six-dimensional turn, or the axis turns too far."""
+    axis_in, axis_out = legs.tip_in + legs.turn_in, legs.tip_out + legs.turn_out
+    along = dot(legs.tip_in, legs.tip_out) + dot(axis_in, axis_out)
+    sizes = np.hypot(norm(legs.tip_in), norm(axis_in)) * np.hypot(norm(legs.tip_out), norm(axis_out))
+    status[along < np.cos(np.radians(settings.reversal_angle)) * sizes] = Status.REVERSAL
+    status[half_cosines < np.cos(np.radians(settings.max_axis_step / 2.0)) - 1e-12] = Status.AXIS_STEP
+
+
+def divide(numerator: Floats | float, denominator: Floats) -> Floats:
+    """Quotient; infinity where the denominator is zero."""
+    return np.divide(numerator, denominator, out=np.full_like(denominator, np.inf), where=denominator > 0.0)
+
+
+class Remainders(NamedTuple):
+    """What transitions leave of g segments."""
+
+    start: Ints  # poses at the ends of the segments, (g,)
+    end: Ints
+    tip: Floats  # fractions of the tip segment at which the remainder starts and ends, (g, 2)
+    axis: Floats  # the same of the axis-point segment
+
+
+@dataclass
+class Placed:
+    """Transitions of g corners; the names are those of `Corners`."""
+
+    status: NDArray[np.uint8]
+    limited_by: NDArray[np.uint8]
+    trim_in: Floats
+    trim_out: Floats
+    axis_trim_in: Floats
+    axis_trim_out: Floats
+    tip_error: Floats
+    axis_error: Floats
+    orientation_error: Floats
+    extra: dict[str, Floats] = field(default_factory=dict)
+
+
+#: what a method measures of every transition
+_MEASURES = tuple(name for name in Placed.__dataclass_fields__ if name not in ("status", "limited_by", "extra"))
 
 
 class Construction(ABC):
@@ -81,3 +167,79 @@ def construction_of(method: str) -> Construction:
     name = DEFAULT_METHOD if method == AUTO else method
     construction: Construction = import_module(METHODS[name].module).CONSTRUCTION
     return construction
+
+
+def place_corners(
+    program: Program,
+    settings: Settings,
+    construction: Construction,
+    progress: Callable[[int, int], None] | None = None,
+) -> Corners:
+    """Round every corner of the program that can be rounded; `progress` takes (corners done, corners in all)."""
+    around = find_neighbours(program, settings.axis_length, settings.duplicate_distance)
+    pose = np.flatnonzero(around.inner)
+    before, after = around.previous[pose], around.following[pose]
+    status = _surroundings(program, settings, pose, after)
+    status[around.duplicate[pose]] = Status.DUPLICATE
+
+    k = len(pose)
+    whole = Placed(
+        status=status,
+        limited_by=np.zeros(k, np.uint8),
+        **{name: np.zeros(k) for name in _MEASURES},
+        extra={name: np.full(k, np.nan) for name in construction.extra},
+    )
+    if METHODS[settings.method].one_parameter:  # the same fractions on both curves: one array
+        whole.axis_trim_in, whole.axis_trim_out = whole.trim_in, whole.trim_out
+
+    def settle(start: int) -> int:
+        rows = start + np.flatnonzero(status[start : start + BATCH] == Status.SMOOTHED)
+        if len(rows):
+            legs = legs_at(program, settings.axis_length, pose[rows], before[rows], after[rows])
+            part = construction.place(legs, settings)
+            for name in ("status", "limited_by", *_MEASURES):
+                getattr(whole, name)[rows] = getattr(part, name)
+            for name, values in part.extra.items():
+                whole.extra[name][rows] = values
+        return min(start + BATCH, k)
+
+    with ThreadPoolExecutor(THREADS) as pool:  # numpy leaves the interpreter free; batches share no rows
+        for done in (pool.map if k > BATCH else map)(settle, range(0, k, BATCH)):
+            if progress is not None:
+                progress(done, k)
+    weights = np.broadcast_to(np.array(settings.weights), (k, 2))
+    ratio = np.broadcast_to(np.float64(settings.ratio), (k,))
+    return Corners(pose=pose, before=before, after=after, weights=weights, ratio=ratio, **vars(whole))
+
+
+def _surroundings(program: Program, settings: Settings, pose: Ints, after: Ints) -> NDArray[np.uint8]:
+    """Status of every corner as far as its surroundings decide it, geometry apart."""
+    status = np.full(len(pose), Status.SMOOTHED, np.uint8)
+    after = np.maximum(after, 0)
+    feed_in, feed_out = program.feed[pose], program.feed[after]
+    same = (feed_in == feed_out) | (np.isnan(feed_in) & np.isnan(feed_out))
+    same_mode = program.feed_mode[pose] == program.feed_mode[after]
+    status[~same_mode | (~same & (not settings.round_feed_changes))] = Status.FEED_CHANGE
+    if not settings.round_feed_changes:
+        status[program.feed_mode[pose] == FeedMode.PER_REVOLUTION] = Status.FEED_PER_REVOLUTION
+    acts = np.cumsum(program.acted)
+    status[acts[after] > acts[pose]] = Status.STATEMENT
+    status[program.keep[pose] != 0] = Status.KEPT
+    status[program.kind[pose - 1] == Move.HOLE] = Status.KEPT  # the tool comes from above the hole, not out of its pose
+    status[after == 0] = Status.TOO_SHORT
+    return status
+
+
+def with_rows(corners: Corners, others: Corners, rows: Ints) -> Corners:
+    """Corners with some rows of others; extra columns that those lack are NaN there."""
+
+    def taken(values: NDArray[Any], other: NDArray[Any]) -> NDArray[Any]:
+        values = values.copy()
+        values[rows] = other[rows]
+        return values
+
+    missing = np.full(len(corners), np.nan)
+    extra = {name: taken(values, others.extra.get(name, missing)) for name, values in corners.extra.items()}
+    names = (item.name for item in fields(Corners) if item.name != "extra")
+    columns: dict[str, Any] = {name: taken(getattr(corners, name), getattr(others, name)) for name in names}
+    return Corners(**columns, extra=extra)

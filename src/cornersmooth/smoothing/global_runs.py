@@ -15,14 +15,12 @@ from cornersmooth.model import Bools, Corners, Floats, Ints, LimitedBy, Program,
 from cornersmooth.processes import map_in_processes
 from cornersmooth.settings import Settings
 from cornersmooth.slices import some_runs
-from cornersmooth.smoothing.construction import RUN_CURVATURE
-from cornersmooth.smoothing.corner_table import with_rows
+from cornersmooth.smoothing.construction import RUN_CURVATURE, place_corners, with_rows
 from cornersmooth.smoothing.neighbours import find_neighbours
 from cornersmooth.smoothing.proportional import Proportional
 from cornersmooth.smoothing.runs.polylines import Polylines
 from cornersmooth.smoothing.runs.rows import TURNING
 from cornersmooth.smoothing.runs.solving import STEP, RunCurves, measured, solve_runs
-from cornersmooth.smoothing.transition import place_corners
 from cornersmooth.vectors import angle_between
 
 #: poses of runs that are solved together, about
@@ -154,15 +152,13 @@ def _backwards(point: Floats, count: Ints) -> Bools:
     first, last = starts(count)[:-1], starts(count)[1:] - 1
     way, inner = point[last] - point[first], point[last - 1] - point[first + 1]
     way = np.where(way.any(axis=1, keepdims=True), way, inner)
-    back: Bools = way[np.arange(len(way)), np.abs(way).argmax(axis=1)] < 0.0
-    return back
+    return way[np.arange(len(way)), np.abs(way).argmax(axis=1)] < 0.0
 
 
 def _turned(count: Ints, back: Bools) -> Ints:
     """Rows of runs with those of some of them in reverse: its own inverse."""
     run, place = spread(count)
-    order: Ints = starts(count)[run] + np.where(back[run], count[run] - 1 - place, place)
-    return order
+    return starts(count)[run] + np.where(back[run], count[run] - 1 - place, place)
 
 
 def _turned_curves(curves: RunCurves, back: Bools) -> RunCurves:
@@ -172,8 +168,7 @@ def _turned_curves(curves: RunCurves, back: Bools) -> RunCurves:
 
     def turned(s: Floats, count: Ints) -> Floats:
         run, order = spread(count)[0], _turned(count, back)
-        places: Floats = np.where(back[run], whole[run] - s[order], s[order])
-        return places
+        return np.where(back[run], whole[run] - s[order], s[order])
 
     poses = _turned(lines.count, back)
     return replace(

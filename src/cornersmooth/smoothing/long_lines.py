@@ -133,8 +133,7 @@ def _fixed(smoothed: SmoothProgram, move: Ints, at_pose: Bools) -> Bools:
     changed |= program.feed_mode[move] != program.feed_mode[after]
     fixed |= changed | (at_pose & (exact[move] | (said[after + 1] > said[move + 1])))
     fixed[:1] = fixed[-1:] = True
-    ends: Bools = fixed
-    return ends
+    return fixed
 
 
 def fewest_lines(rows: Vertices, limits: LineLimits) -> Ints:
@@ -208,8 +207,7 @@ def _reaches(rows: Vertices, limits: LineLimits, start: Ints, end: Ints) -> Bool
     for part in np.split(asked, np.searchsorted(between, np.arange(_TOGETHER, between[-1:].sum(), _TOGETHER))):
         if len(part):
             good[part] = _keeps(rows, limits, start[part], end[part])
-    reached: Bools = good
-    return reached
+    return good
 
 
 def _keeps(rows: Vertices, limits: LineLimits, start: Ints, end: Ints) -> Bools:
@@ -241,8 +239,7 @@ def _in_order(rows: Vertices, limits: LineLimits, start: Ints, end: Ints) -> Boo
     way = np.diff(np.hstack((tip, tip + limits.axis_length * limits.axis_of(words))), axis=0)
     original = np.diff(np.hstack((rows.original_tip[row], rows.original_axis_point[row])), axis=0)
     back = (line[1:] == line[:-1]) & ((way * original).sum(axis=1) < 0.0)
-    kept: Bools = np.bincount(line[1:][back], minlength=len(start)) == 0
-    return kept
+    return np.bincount(line[1:][back], minlength=len(start)) == 0
 
 
 def _off(rows: Vertices, limits: LineLimits, start: Ints, end: Ints, count: Ints, *, halves: bool) -> Floats:
@@ -253,8 +250,7 @@ def _off(rows: Vertices, limits: LineLimits, start: Ints, end: Ints, count: Ints
     length = s[end] - low
 
     def at(values: Floats) -> Floats:
-        middle: Floats = (values[row] + values[row + 1]) / 2.0 if halves else values[row]
-        return middle
+        return (values[row] + values[row + 1]) / 2.0 if halves else values[row]
 
     share = ((at(s) - low[line]) / np.where(length > 0.0, length, 1.0)[line])[:, None]
     begin, finish = start[line], end[line]
@@ -268,5 +264,4 @@ def _off(rows: Vertices, limits: LineLimits, start: Ints, end: Ints, count: Ints
     lever = at(rows.original_axis_point) - original_tip
     lever *= (limits.axis_length / np.maximum(norm(lever), np.finfo(np.float64).tiny))[:, None]
     off = np.maximum(norm(tip - original_tip) / limits.tip, norm(axis_point - original_tip - lever) / limits.axis_point)
-    largest: Floats = np.maximum.reduceat(off, starts(count)[:-1])
-    return largest
+    return np.maximum.reduceat(off, starts(count)[:-1])

@@ -64,5 +64,4 @@ def find_neighbours(program: Program, axis_length: float, distance: float) -> Ne
 def _closer(program: Program, one: Ints, other: Ints, axis_length: float, distance: float) -> Bools:
     step = program.tip[one] - program.tip[other]
     turn = axis_length * (program.axis[one] - program.axis[other])
-    near: Bools = (norm(step) <= distance) & (norm(step + turn) <= distance)
-    return near
+    return (norm(step) <= distance) & (norm(step + turn) <= distance)

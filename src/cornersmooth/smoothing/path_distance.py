@@ -134,5 +134,4 @@ def _nearest_on_lines(transitions: _Transitions, tip: Floats, lever: Floats, *, 
         turned = lever[:, :-1] + share * np.diff(lever, axis=1)
         turned *= (transitions.height / norm(turned))[..., None]
         nearest = tip[:, :-1] + share * np.diff(tip, axis=1) + turned - transitions.lever[:, None, :]
-    least: Floats = norm(nearest).min(axis=1)
-    return least
+    return norm(nearest).min(axis=1)

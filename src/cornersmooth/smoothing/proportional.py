@@ -11,8 +11,15 @@ from numpy.typing import NDArray
 from cornersmooth.geometry import nurbs
 from cornersmooth.model import Floats, Ints, LimitedBy, Program, SmoothProgram, Status
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing.construction import Construction
-from cornersmooth.smoothing.corner_table import Legs, Placed, Remainders, divide, half_angle_cosine
+from cornersmooth.smoothing.construction import (
+    Construction,
+    Legs,
+    Placed,
+    Remainders,
+    divide,
+    half_cosine,
+    refuse_turns,
+)
 from cornersmooth.vectors import dot, norm, square, unit
 
 #: parameters u at which the deviation at constant H is evaluated; it is largest near u = ½
@@ -49,9 +56,7 @@ class Wanted:
     """
 
     legs: Legs
-    weights: Floats  # (2,)
-    ratio: float
-    axis_length: float
+    settings: Settings
     status: NDArray[np.uint8]  # as far as the geometry of the corner decides it
     length_in: Floats  # m(D⁻), mm
     length_out: Floats
@@ -61,6 +66,11 @@ class Wanted:
     factor: float
     half_cosine: Floats
     per_length: tuple[Floats, Floats, Floats]  # deviation over length: tip, axis point, axis point less tip
+
+    @property
+    def axis_length(self) -> float:
+        """H, mm."""
+        return self.settings.axis_length
 
     def middle(self, length: Floats, rows: Ints | slice = slice(None)) -> Floats:
         """|b′−b| at u = ½, where b is the axis point of the corner itself, mm."""
@@ -81,9 +91,9 @@ class Wanted:
     def probe(self, length: Floats, rows: Ints | slice = slice(None)) -> Floats:
         """Largest |b′−b| at common parameters over both halves, mm."""
         reach = length[:, None]
-        sway = nurbs.rational_basis(_PROBES, self.weights)  # (probes, 5)
-        beta = self.ratio * sway[..., 3]
-        sigma = sway[..., 0] + self.ratio * (sway[..., 1] - sway[..., 3])
+        shares = nurbs.leg_coefficients(_PROBES, np.array(self.settings.weights), self.settings.ratio)
+        beta = shares[:, 2]
+        sigma = -shares[:, 1] - beta
         lever = self.axis_length * self.legs.axis[rows][:, None, :]
         shift = (beta * reach)[..., None]
         tip_shift = shift * self.bend_tip[rows][:, None, :]
@@ -103,52 +113,42 @@ class Wanted:
 
 def wanted(legs: Legs, settings: Settings) -> Wanted:
     """Measure g corners."""
-    axis_length, weights, ratio = settings.axis_length, np.array(settings.weights), settings.ratio
     axis_in, axis_out = legs.tip_in + legs.turn_in, legs.tip_out + legs.turn_out
     length_in = np.sqrt((square(legs.tip_in) + square(axis_in)) / 2.0)
     length_out = np.sqrt((square(legs.tip_out) + square(axis_out)) / 2.0)
     per_in, per_out = 1.0 / length_in[:, None], 1.0 / length_out[:, None]
-    bend_tip = legs.tip_out * per_out - legs.tip_in * per_in  # (U⁺ − U⁻)_A
-    bend_turn = legs.turn_out * per_out - legs.turn_in * per_in  # (U⁺ − U⁻)_B − (U⁺ − U⁻)_A
-    bend_axis = bend_tip + bend_turn  # (U⁺ − U⁻)_B
-    factor = float(nurbs.deviation_factor(weights, ratio))
-    per_length_tip, per_length_axis, per_length_turn = (factor * norm(v) for v in (bend_tip, bend_axis, bend_turn))
-    by_tolerance = np.minimum(
-        divide(settings.tip_tolerance, per_length_tip), divide(settings.axis_point_tolerance, per_length_axis)
-    )
-    half_cosine = np.minimum(
-        half_angle_cosine(legs.turn_in, axis_length), half_angle_cosine(legs.turn_out, axis_length)
-    )
+    bend_tip = legs.tip_out * per_out - legs.tip_in * per_in
+    bend_turn = legs.turn_out * per_out - legs.turn_in * per_in
+    factor = float(nurbs.deviation_factor(np.array(settings.weights), settings.ratio))
+    per_tip, per_axis, per_turn = (factor * norm(v) for v in (bend_tip, bend_tip + bend_turn, bend_turn))
+    by_tolerance = np.minimum(divide(settings.tip_tolerance, per_tip), divide(settings.axis_point_tolerance, per_axis))
+    cosines = half_cosine(legs, settings.axis_length)
 
     status = np.full(len(length_in), Status.SMOOTHED, np.uint8)
     halves = np.minimum(length_in, length_out) / 2.0
-    flat_tip = per_length_tip * halves <= settings.tip_resolution / 2.0
-    flat_axis = per_length_axis * halves <= max(settings.tip_resolution, settings.axis_point_resolution) / 2.0
+    flat_tip = per_tip * halves <= settings.tip_resolution / 2.0
+    flat_axis = per_axis * halves <= max(settings.tip_resolution, settings.axis_point_resolution) / 2.0
     status[flat_tip & flat_axis] = Status.STRAIGHT
-    cosine = (dot(legs.tip_in, legs.tip_out) + dot(axis_in, axis_out)) / (2.0 * length_in * length_out)
-    status[cosine < np.cos(np.radians(settings.reversal_angle))] = Status.REVERSAL
-    status[half_cosine < np.cos(np.radians(settings.max_axis_step / 2.0)) - 1e-12] = Status.AXIS_STEP
-    per_length = per_length_tip, per_length_axis, per_length_turn
+    refuse_turns(status, legs, cosines, settings)
     lengths = length_in, length_out, by_tolerance
-    shape = legs, weights, ratio, axis_length
-    return Wanted(*shape, status, *lengths, bend_tip, bend_turn, factor, half_cosine, per_length)
+    return Wanted(legs, settings, status, *lengths, bend_tip, bend_turn, factor, cosines, (per_tip, per_axis, per_turn))
 
 
 def place_proportional(asked: Wanted, settings: Settings) -> Placed:
     """Give g corners the transition lengths they ask for, up to half of the shorter segment."""
     room = np.minimum(asked.length_in, asked.length_out) / 2.0
     status = asked.status
-    per_length_tip, _, per_length_turn = asked.per_length
+    per_tip, _, per_turn = asked.per_length
     limited_by = np.where(asked.by_tolerance <= room, LimitedBy.TOLERANCE, LimitedBy.SEGMENT).astype(np.uint8)
     length = np.minimum(room, asked.by_tolerance)
 
     # The construction runs on chords of the sphere, the tolerance is about b = tip + H·axis at constant H. The bound
     # |b′−b| ≤ |A′−A| + H|O′−O| proves most corners; the others are evaluated and shortened until they keep it.
     axis_length = settings.axis_length
-    shortest_lever = axis_length * asked.half_cosine - length * per_length_turn  # below |B−A| of both motions
-    bound = length * (per_length_tip + divide(axis_length * per_length_turn, np.maximum(shortest_lever, 0.0)))
+    shortest_lever = axis_length * asked.half_cosine - length * per_turn  # below |B−A| of both motions
+    bound = length * (per_tip + divide(axis_length * per_turn, np.maximum(shortest_lever, 0.0)))
     doubtful = (status == Status.SMOOTHED) & (bound > settings.axis_point_tolerance * (1.0 + EXACT))
-    peaks = _largest_in_the_middle(asked, length, length * per_length_turn)
+    peaks = _largest_in_the_middle(asked, length, length * per_turn)
     probed = np.flatnonzero(doubtful & ~peaks)
     for rows, measure, share in (
         (np.flatnonzero(doubtful & peaks), asked.middle, 1.0),
@@ -157,27 +157,14 @@ def place_proportional(asked: Wanted, settings: Settings) -> Placed:
         shortened = keep(length, rows, measure, share * settings.axis_point_tolerance)
         limited_by[rows[shortened < length[rows]]] = LimitedBy.TOLERANCE
         length[rows] = shortened
-    shortest = 4.0 * settings.tip_resolution
-    status[(status == Status.SMOOTHED) & (length <= shortest)] = Status.TOO_SHORT
+    status[(status == Status.SMOOTHED) & (length <= 4.0 * settings.tip_resolution)] = Status.TOO_SHORT
 
-    smoothed = status == Status.SMOOTHED
-    length = np.where(smoothed, length, 0.0)
-    limited_by[~smoothed] = LimitedBy.NOTHING
+    sharp = status != Status.SMOOTHED
+    length[sharp], limited_by[sharp] = 0.0, LimitedBy.NOTHING
     axis_error = asked.middle(length)
-    if len(probed):
-        axis_error[probed] = np.maximum(axis_error[probed], asked.probe(length[probed], probed))
-    trim_in, trim_out = length / asked.length_in, length / asked.length_out
-    return Placed(
-        status=status,
-        limited_by=limited_by,
-        trim_in=trim_in,
-        trim_out=trim_out,
-        axis_trim_in=trim_in,
-        axis_trim_out=trim_out,
-        tip_error=per_length_tip * length,
-        axis_error=axis_error,
-        orientation_error=asked.middle_turn(length),
-    )
+    axis_error[probed] = np.maximum(axis_error[probed], asked.probe(length[probed], probed))
+    trims = length / asked.length_in, length / asked.length_out
+    return Placed(status, limited_by, *trims, *trims, per_tip * length, axis_error, asked.middle_turn(length))
 
 
 def _largest_in_the_middle(asked: Wanted, length: Floats, turned: Floats) -> NDArray[np.bool_]:
@@ -191,10 +178,9 @@ def _largest_in_the_middle(asked: Wanted, length: Floats, turned: Floats) -> NDA
     legs = asked.legs
     turn = np.maximum(norm(legs.turn_in) * (1.0 / asked.length_in), norm(legs.turn_out) * (1.0 / asked.length_out))
     turn *= length / asked.axis_length
-    paper = (asked.weights == 1.0).all() and abs(asked.ratio - 2.0 / 3.0) < EXACT
+    paper = asked.settings.weights == (1.0, 1.0) and abs(asked.settings.ratio - 2.0 / 3.0) < EXACT
     tilt = 2.0 * turn * turned
-    largest: NDArray[np.bool_] = (tilt <= (_TILT_PAPER if paper else _TILT_ANY) * asked.middle(length)) & (turn < 0.5)
-    return largest
+    return (tilt <= (_TILT_PAPER if paper else _TILT_ANY) * asked.middle(length)) & (turn < 0.5)
 
 
 class Proportional(Construction):

@@ -17,7 +17,6 @@ from cornersmooth.geometry.arcs import arc_lines, arc_points, divided
 from cornersmooth.geometry.ragged import ranges, starts
 from cornersmooth.model import Bools, Floats, Ints, SmoothProgram
 from cornersmooth.smoothing.construction import construction_of
-from cornersmooth.smoothing.corner_table import Remainders
 from cornersmooth.smoothing.runs.rows import SectionRows, run_lines, section_rows, some_at_once
 from cornersmooth.smoothing.segments import Segments, lines_per_half, segments_of
 from cornersmooth.vectors import unit
@@ -267,13 +266,7 @@ def _fill_divided(smoothed: SmoothProgram, segments: Segments, batch: _Batch) ->
             continue
         pose, first = batch.poses[lines == number], batch.first[lines == number]
         start = segments.start[pose]
-        remainders = Remainders(
-            start,
-            pose,
-            np.stack((segments.entry[pose], segments.exit[pose]), axis=1),
-            np.stack((segments.axis_entry[pose], segments.axis_exit[pose]), axis=1),
-        )
-        fraction, axis = construction.divide(program, settings, remainders, int(number))
+        fraction, axis = construction.divide(program, settings, segments.remainders(pose), int(number))
         rows = first[:, None] + np.arange(number - 1)
         step = program.tip[pose] - program.tip[start]
         batch.tip[rows] = program.tip[start][:, None] + fraction[..., None] * step[:, None]

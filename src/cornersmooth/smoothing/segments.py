@@ -16,7 +16,7 @@ from cornersmooth.geometry import nurbs
 from cornersmooth.methods import METHODS
 from cornersmooth.model import Bools, Floats, Ints, Move, SmoothProgram, Status
 from cornersmooth.settings import FLIP_ANGLE, STANDING, Settings
-from cornersmooth.smoothing.corner_table import legs_at
+from cornersmooth.smoothing.construction import Remainders, legs_at
 from cornersmooth.vectors import norm, square
 
 #: exponent of the graded nodes s = (j/n)^(2/3)
@@ -59,6 +59,11 @@ class Segments:
     axis_exit: Floats
     has_line: Bools  # the straight remainder has a length
     lines: Ints  # lines it is written in
+
+    def remainders(self, pose: Ints) -> Remainders:
+        """What transitions leave of the segments into some poses."""
+        ends = ((self.entry, self.exit), (self.axis_entry, self.axis_exit))
+        return Remainders(self.start[pose], pose, *(np.stack((a[pose], b[pose]), axis=1) for a, b in ends))
 
 
 def segments_of(smoothed: SmoothProgram, *, dense: bool) -> Segments:
@@ -211,8 +216,7 @@ def lines_of(smoothed: SmoothProgram, rows: Ints) -> Ints:
     graded = np.maximum(number, np.ceil(by_turn**1.5 - 1e-9))
     even = np.maximum(np.ceil(1.5 * by_chord), np.ceil(by_turn - 1e-9))
     chosen = np.where(even < graded, -np.maximum(even, 1.0), np.maximum(graded, 1.0))
-    number_of_lines: Ints = np.clip(chosen, -_MOST_LINES, _MOST_LINES).astype(np.int64)
-    return number_of_lines
+    return np.clip(chosen, -_MOST_LINES, _MOST_LINES).astype(np.int64)
 
 
 @cache

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from cornersmooth.geometry.arcs import arc_tangents
 from cornersmooth.model import Floats, Ints, Move, Program, SmoothProgram, Status, Trait
-from cornersmooth.smoothing.corner_table import BATCH, legs_at
+from cornersmooth.smoothing.construction import BATCH, legs_at
 from cornersmooth.smoothing.proportional import wanted
 from cornersmooth.vectors import angle_between
 

@@ -19,8 +19,8 @@ from cornersmooth.vectors import angle_between, norm
 #: parameters of the tip curve at which residual and jumps are reported
 REPORT_PARAMETERS = np.linspace(0.0, 1.0, 9)
 
-#: what is missing of ``|Q(v) − P(u)| = H`` at parameters v
-Excess = Callable[[Floats], Floats]
+#: what is missing of ``|Q(v) − P(u)| = H`` at parameters v of some rows
+Excess = Callable[[Floats, Ints | slice], Floats]
 
 _GRID = np.linspace(0.0, 1.0, 33)
 _HALVINGS = 36
@@ -44,65 +44,52 @@ def matching_parameters(
     axis_length : float, mm
         H.
     """
-    g, m = len(tip_curve), len(u)
     tips = nurbs.evaluate(tip_curve, weights, u)
     grid = nurbs.evaluate(axis_curve, weights, _GRID)
-    v = np.zeros((g, m))
-    residual = np.zeros((g, m))
-    low_limit = np.zeros(g)
-    target = np.full(g, u[0])
-    for j in range(m):
+    v = np.zeros((len(tip_curve), len(u)))
+    low_limit, target = np.zeros(len(v)), np.full(len(v), u[0])
+    for j, step in enumerate(np.diff(u, append=u[-1])):
         tip = tips[:, j]
 
-        def excess_of(rows: Ints | slice, tip: Floats = tip) -> Excess:
-            curve, own, start = axis_curve[rows], weights[rows], tip[rows]
+        def excess(parameter: Floats, rows: Ints | slice, tip: Floats = tip) -> Floats:
+            points = nurbs.evaluate(axis_curve[rows], weights[rows], parameter[:, None])[:, 0]
+            return norm(points - tip[rows]) - axis_length
 
-            def excess(parameter: Floats) -> Floats:
-                return norm(nurbs.evaluate(curve, own, parameter[:, None])[:, 0] - start) - axis_length
-
-            return excess
-
-        found = _follow(norm(grid - tip[:, None]) - axis_length, low_limit, target, excess_of)
-        v[:, j] = found
-        residual[:, j] = np.abs(excess_of(slice(None))(found))
-        low_limit = found
-        if j + 1 < m:
-            target = np.clip(found + (u[j + 1] - u[j]), 0.0, 1.0)
-    return v, residual
+        v[:, j] = low_limit = _follow(norm(grid - tip[:, None]) - axis_length, low_limit, target, excess)
+        target = np.clip(low_limit + step, 0.0, 1.0)
+    return v, np.abs(norm(nurbs.evaluate(axis_curve, weights, v) - tips) - axis_length)
 
 
-def _follow(values: Floats, low_limit: Floats, target: Floats, excess_of: Callable[[Ints | slice], Excess]) -> Floats:
+def _follow(values: Floats, low_limit: Floats, target: Floats, excess: Excess) -> Floats:
     """One step of the branch: the root at or above `low_limit` nearest to `target`, else the smallest excess.
 
-    `values` (g, grid) are the excess on the grid; `excess_of` gives it at parameters of some rows.
+    `values` (g, grid) are the excess on the grid.
     """
     # the cell that holds the limit counts from the limit on
-    at_limit = excess_of(slice(None))(low_limit)
-    below = _GRID[None, :] < low_limit[:, None]
-    values = np.where(below, at_limit[:, None], values)
-    parameters = np.maximum(_GRID[None, :], low_limit[:, None])
+    at_limit = excess(low_limit, slice(None))
+    values = np.where(low_limit[:, None] > _GRID, at_limit[:, None], values)
+    parameters = np.maximum(_GRID, low_limit[:, None])
     crossing = (values[:, :-1] <= 0.0) != (values[:, 1:] <= 0.0)
     has_root = crossing.any(axis=1)
     found = np.empty(len(values))
     rows = np.flatnonzero(has_root)
     if len(rows):
-        at = parameters[rows]
-        distance = np.maximum(at[:, :-1] - target[rows, None], target[rows, None] - at[:, 1:])
+        at, wanted, limit = parameters[rows], target[rows], low_limit[rows]
+        distance = np.maximum(at[:, :-1] - wanted[:, None], wanted[:, None] - at[:, 1:])
         cell = np.argmin(np.where(crossing[rows], np.maximum(distance, 0.0), np.inf), axis=1)
         each = np.arange(len(rows))
         ends = (values[rows, cell], values[rows, cell + 1])
-        root = _roots(at[each, cell], at[each, cell + 1], ends, excess_of(rows))
+        root = _roots(at[each, cell], at[each, cell + 1], ends, lambda parameter: excess(parameter, rows))
         # an exact root at the limit, as at the two ends of a well synchronised corner, is kept exactly
-        limit, wanted = low_limit[rows], target[rows]
         exact = (np.abs(at_limit[rows]) <= 1e-12) & (np.abs(wanted - limit) <= np.abs(wanted - root))
         found[rows] = np.where(exact, limit, root)
-    rows = np.flatnonzero(~has_root)
-    if len(rows):
-        found[rows] = _closest(values[rows], parameters[rows], excess_of(rows))
+    rest = np.flatnonzero(~has_root)
+    if len(rest):
+        found[rest] = _closest(values[rest], parameters[rest], lambda parameter: excess(parameter, rest))
     return found
 
 
-def _roots(low: Floats, high: Floats, ends: tuple[Floats, Floats], excess: Excess) -> Floats:
+def _roots(low: Floats, high: Floats, ends: tuple[Floats, Floats], excess: Callable[[Floats], Floats]) -> Floats:
     """Roots between pairs of parameters whose excess is known: by secants (Illinois), then by bisection."""
     (one, other), negative_low = ends, ends[0] <= 0.0
     root, best = np.where(np.abs(one) < np.abs(other), low, high), np.minimum(np.abs(one), np.abs(other))
@@ -117,14 +104,13 @@ def _roots(low: Floats, high: Floats, ends: tuple[Floats, Floats], excess: Exces
         one = np.where(same, value, np.where(kept < 0, one / 2.0, one))
         other = np.where(same, np.where(kept > 0, other / 2.0, other), value)
         kept = np.where(same, np.int8(1), np.int8(-1))
-        nearer = np.abs(value) < best
-        root, best = np.where(nearer, middle, root), np.where(nearer, np.abs(value), best)
+        root, best = np.where(np.abs(value) < best, middle, root), np.minimum(np.abs(value), best)
         if ((best <= _NO_EXCESS) | (high - low <= _NO_STEP)).all():
             break
     return root
 
 
-def _closest(values: Floats, parameters: Floats, excess: Excess) -> Floats:
+def _closest(values: Floats, parameters: Floats, excess: Callable[[Floats], Floats]) -> Floats:
     """Parameter with the smallest ``|excess|``: grid minimum refined by ternary search in its two cells."""
     rows = np.arange(len(values))
     best = np.argmin(np.abs(values), axis=1)
@@ -138,8 +124,7 @@ def _closest(values: Floats, parameters: Floats, excess: Excess) -> Floats:
     middle = 0.5 * (low + high)
     candidates = np.stack((middle, low, high, parameters[rows, best]))
     misses = np.abs(np.stack([excess(candidate) for candidate in candidates]))
-    closest: Floats = candidates[np.argmin(misses, axis=0), rows]
-    return closest
+    return candidates[np.argmin(misses, axis=0), rows]
 
 
 def synchronisation_report(
@@ -160,18 +145,11 @@ def synchronisation_report(
     Largest ``||Q−P|−H|`` over `REPORT_PARAMETERS` (mm); angles (rad) between the axis of the transition and that of the
     straight motion before it and after it, and between the axis at u = ½ and that at the corner.
     """
-    origin = np.zeros_like(lever)
-    tip_curve = nurbs.five_points(origin, *tip_legs, ratio)
+    tip_curve = nurbs.five_points(np.zeros_like(lever), *tip_legs, ratio)
     axis_curve = nurbs.five_points(lever, *axis_legs, ratio)
     v, residual = matching_parameters(tip_curve, axis_curve, weights, REPORT_PARAMETERS, axis_length)
-    ends = []
-    for at, index in ((0, 0), (4, -1)):
-        line = axis_curve[:, at] - tip_curve[:, at]
-        curve = nurbs.evaluate(axis_curve, weights, v[:, [index]])[:, 0] - tip_curve[:, at]
-        ends.append(angle_between(line, curve))
     half = len(REPORT_PARAMETERS) // 2
-    middle = (
-        nurbs.evaluate(axis_curve, weights, v[:, [half]])[:, 0]
-        - nurbs.evaluate(tip_curve, weights, REPORT_PARAMETERS[[half]])[:, 0]
-    )
-    return residual.max(axis=1), ends[0], ends[1], angle_between(middle, lever)
+    tops = nurbs.evaluate(axis_curve, weights, v[:, [0, half, -1]])
+    tips = nurbs.evaluate(tip_curve, weights, REPORT_PARAMETERS[[half]])[:, 0]
+    jumps = (angle_between(axis_curve[:, at] - tip_curve[:, at], tops[:, at // 2] - tip_curve[:, at]) for at in (0, 4))
+    return residual.max(axis=1), *jumps, angle_between(tops[:, 1] - tips, lever)

@@ -38,8 +38,7 @@ class Cutter:
 
     def distance(self, out: Floats, up: Floats) -> Floats:
         """Signed distance as of the tool, mm; above the edge at least the way down to it."""
-        found: Floats = np.maximum(self.tool.distance(out, up), up - self.edge)
-        return found
+        return np.maximum(self.tool.distance(out, up), up - self.edge)
 
 
 def distance_to_motion(points: Floats, motion: RuledMotion, tool: Tool, edge: float, *, reach: float) -> Floats:

@@ -48,8 +48,7 @@ class SurfaceMap:
     @property
     def known(self) -> Bools:
         """(k,) bool: rows with a distance."""
-        found: Bools = np.isfinite(self.off)
-        return found
+        return np.isfinite(self.off)
 
     @property
     def kept(self) -> bool:

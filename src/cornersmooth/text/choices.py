@@ -59,8 +59,7 @@ class Choices:
 
     def outside(self, start: int, stop: int) -> Ints:
         """Sizes of the texts of rows `start` to `stop` that are not laid out, 0 for the others."""
-        sizes: Ints = self._outside.take(self._ids[start:stop])
-        return sizes
+        return self._outside.take(self._ids[start:stop])
 
     @property
     def all_laid_out(self) -> bool:

@@ -169,8 +169,7 @@ def _by_column(extreme: np.ufunc, ticks: Ints) -> list[int]:
     if m >= FOLD:
         folded = extreme.reduce(ticks[: m - m % FOLD].reshape(m // FOLD, FOLD * columns), axis=0)
         rest = np.concatenate((folded.reshape(FOLD, columns), rest))
-    found: list[int] = extreme.reduce(rest, axis=0).tolist()
-    return found
+    return extreme.reduce(rest, axis=0).tolist()
 
 
 def _write_blocks(
@@ -206,8 +205,7 @@ def _count_by_row(used: NDArray[np.uint64]) -> Ints:
         sums += used[:, column]
     low = np.uint64(0x00FF00FF00FF00FF)
     pairs = (sums & low) + (sums >> np.uint64(8) & low)
-    counts: Ints = (pairs * np.uint64(0x0001000100010001) >> np.uint64(48)).astype(np.int64)
-    return counts
+    return (pairs * np.uint64(0x0001000100010001) >> np.uint64(48)).astype(np.int64)
 
 
 def interleave(which: Ints, texts: Sequence[tuple[bytes, Ints]]) -> bytes:

@@ -91,8 +91,7 @@ def _round_exactly(values: Floats, scale: Floats) -> Floats:
     half = (product - below) - 0.5  # both differences are exact, and the sign of the sum below is the true one
     rest = half + error
     up = (rest > 0) | ((rest == 0) & (below % 2 == 1))
-    rounded: Floats = below + up
-    return rounded
+    return below + up
 
 
 def _product_error(a: Floats, b: Floats, product: Floats) -> Floats:
@@ -100,8 +99,7 @@ def _product_error(a: Floats, b: Floats, product: Floats) -> Floats:
     a_high = _SPLITTER * a - (_SPLITTER * a - a)
     b_high = _SPLITTER * b - (_SPLITTER * b - b)
     a_low, b_low = a - a_high, b - b_high
-    error: Floats = a_low * b_low - (((product - a_high * b_high) - a_low * b_high) - a_high * b_low)
-    return error
+    return a_low * b_low - (((product - a_high * b_high) - a_low * b_high) - a_high * b_low)
 
 
 def _unprintable(values: Floats, scale: Floats) -> OutputError:

@@ -85,8 +85,7 @@ class Problem:
         first = splines.span_first[splines.span_run], splines.span_first[splines.span_run + 1]
         span = np.arange(len(splines.span_run))
         low, high = np.maximum(span - SURROUNDINGS, first[0]), np.minimum(span + SURROUNDINGS + 1, first[1])
-        share: Floats = (count[high] - count[low]) / (high - low)
-        return share
+        return (count[high] - count[low]) / (high - low)
 
     @cached_property
     def lever(self) -> Floats:
@@ -100,8 +99,7 @@ class Problem:
         Where it has a larger tolerance than the tip it may be off by what it turns in the segment, or as the tip.
         """
         turned = np.sqrt(_squares(np.diff(self.lever, axis=0, append=self.lever[-1:])))
-        room: Floats = np.minimum(np.maximum(turned, self.tolerances[0]) / self.tolerances[1], 1.0)
-        return room
+        return np.minimum(np.maximum(turned, self.tolerances[0]) / self.tolerances[1], 1.0)
 
     @cached_property
     def first_lever(self) -> Floats:
@@ -114,8 +112,7 @@ class Problem:
         run = spread(self.lines.count)[0]
         size = np.abs(self.lines.point).max(axis=1)
         off = np.abs(self.lever - self.first_lever[run]).max(axis=1) > STILL * np.maximum(size, self.axis_length)
-        still: Bools = np.bincount(run, off, minlength=len(self.lines.count)) == 0
-        return still
+        return np.bincount(run, off, minlength=len(self.lines.count)) == 0
 
     @cached_property
     def normal(self) -> Floats:
@@ -208,8 +205,7 @@ class _Places:
     def deviation(self, moved: Floats, part: int) -> Floats:
         """(m, 3) of tip or axis point from control points (c, 6)."""
         own = slice(3 * part, 3 * part + 3)
-        off: Floats = (self.near.apply(moved[:, own]) - self.target[:, own]) / self.problem.tolerances[part]
-        return off
+        return (self.near.apply(moved[:, own]) - self.target[:, own]) / self.problem.tolerances[part]
 
     def tip_task(self, weight: Floats) -> Task:
         """The tip; |across|² + (1 + k)·along² ≤ r² leaves the axis point its part.
@@ -260,8 +256,7 @@ def followed(splines: Splines, windows: Windows, control: Floats) -> Floats:
     own, others = (np.sqrt(_third_squares(splines, windows, part)) for part in (tip, lever))
     stands = turn > _LARGEST_RATIO * way  # and the tool turns: the tip follows nothing
     own *= (OWN_WAY**2 * (1.0 + np.where(stands, 0.0, turn / np.maximum(way, 1e-300)))) ** 1.5
-    share: Floats = np.where(stands, 0.0, others / np.maximum(own + others, 1e-300))
-    return share
+    return np.where(stands, 0.0, others / np.maximum(own + others, 1e-300))
 
 
 def even_weights(splines: Splines, windows: Windows, control: Floats) -> Floats:
@@ -275,8 +270,7 @@ def even_weights(splines: Splines, windows: Windows, control: Floats) -> Floats:
     largest = np.zeros(len(windows.count))
     np.maximum.at(largest, window, mean)
     relative = mean / np.where(largest > 0.0, largest, 1.0)[window]
-    weights: Floats = np.maximum(relative, LEAST_MEAN) ** (-POWER)
-    return weights
+    return np.maximum(relative, LEAST_MEAN) ** (-POWER)
 
 
 def _third_squares(splines: Splines, windows: Windows, curve: Floats) -> Floats:
@@ -292,17 +286,14 @@ def _third_squares(splines: Splines, windows: Windows, curve: Floats) -> Floats:
         for sums, values in ((total, own), (length, width)):
             sums[shift:] += same * values[:-shift]
             sums[:-shift] += same * values[shift:]
-    means: Floats = total / length
-    return means
+    return total / length
 
 
 def _squares(vectors: Floats) -> Floats:
     """(m,) squared lengths of vectors (m, d)."""
-    squares: Floats = np.square(vectors).sum(axis=1)
-    return squares
+    return np.square(vectors).sum(axis=1)
 
 
 def _size(axis: Floats, stretch: Floats, off: Floats) -> Floats:
     """(m,) lengths of deviations in the metric I + k·O·Oᵀ."""
-    lengths: Floats = np.sqrt(np.maximum(dot(off, off) + stretch * dot(axis, off) ** 2, 0.0))
-    return lengths
+    return np.sqrt(np.maximum(dot(off, off) + stretch * dot(axis, off) ** 2, 0.0))

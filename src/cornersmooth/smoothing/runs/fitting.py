@@ -101,8 +101,7 @@ def over(off: Floats, tolerances: tuple[float, float]) -> Floats:
     square = off * off
     tip = square[:, 0] + square[:, 1] + square[:, 2]
     axis = square[:, 3] + square[:, 4] + square[:, 5]
-    worst: Floats = np.sqrt(np.maximum(tip / tolerances[0] ** 2, axis / tolerances[1] ** 2))
-    return worst
+    return np.sqrt(np.maximum(tip / tolerances[0] ** 2, axis / tolerances[1] ** 2))
 
 
 def _least_squares(splines: Splines, windows: Windows, samples: Samples, control: Floats) -> Floats:

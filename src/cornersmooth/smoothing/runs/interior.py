@@ -70,8 +70,7 @@ class Task:
 
     def pull(self, off: Floats) -> Floats:
         """M·x of deviations (3, m)."""
-        pulled: Floats = off + self.stretch * product(self.columns, off) * self.columns
-        return pulled
+        return off + self.stretch * product(self.columns, off) * self.columns
 
     def total(self, values: Floats) -> Floats:
         """(windows,) sums of values at the samples (m,)."""
@@ -186,11 +185,9 @@ def _bend(task: Task, force: Floats, penalty: Floats, bent: Floats, pull: Floats
 
 def product(one: Floats, other: Floats) -> Floats:
     """(m,) products of columns (3, m)."""
-    products: Floats = one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
-    return products
+    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
 
 
 def dot(one: Floats, other: Floats) -> Floats:
     """(m,) products of rows."""
-    products: Floats = np.einsum("ij,ij->i", one, other)
-    return products
+    return np.einsum("ij,ij->i", one, other)

@@ -57,8 +57,7 @@ class Polylines:
     def segment_at(self, run: Ints, s: Floats) -> Ints:
         """Index of the pose before each place; the last segment at the end of a run."""
         before, first = search(self.s, self.count, run, s, side="right") - 1, self.first
-        inside: Ints = np.clip(before, first[run], first[run + 1] - 2)
-        return inside
+        return np.clip(before, first[run], first[run + 1] - 2)
 
     def poses_around(self, run: Ints, low: Floats, high: Floats) -> tuple[Ints, Ints]:
         """Pose at or before the start of each stretch, and pose at or after its end."""
@@ -69,15 +68,13 @@ class Polylines:
         """Points (m, 6) at lengths (m,) of the runs (m,)."""
         before = self.segment_at(run, s)
         share = (s - self.s[before]) / (self.s[before + 1] - self.s[before])
-        points: Floats = self.point[before] + share[:, None] * (self.point[before + 1] - self.point[before])
-        return points
+        return self.point[before] + share[:, None] * (self.point[before + 1] - self.point[before])
 
 
 def _floors(along: Floats, first: Ints, count: Ints) -> Floats:
     """What lifts every run above those before it, so that a running maximum begins anew in each."""
     ends = np.round(along[first + count - 1]) + _LEAST * count
-    lifts: Floats = np.concatenate(([0.0], np.cumsum(ends[:-1] + 1.0)))
-    return lifts
+    return np.concatenate(([0.0], np.cumsum(ends[:-1] + 1.0)))
 
 
 @dataclass(frozen=True)

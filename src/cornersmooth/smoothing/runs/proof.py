@@ -84,11 +84,9 @@ def _axis_bound(off: Floats, levers: Floats, axis_length: float) -> Floats:
     turned = np.minimum(half_way / size, 1.0)  # sine of the angle to the middle, at most
     steepest = axis_length / shortest
     rest = (steepest * turned + (steepest - axis_length / (size + half_way + largest))) * largest
-    bound: Floats = first + rest + steepest * largest**2 / (2.0 * shortest)
-    return bound
+    return first + rest + steepest * largest**2 / (2.0 * shortest)
 
 
 def _longest(vectors: Floats) -> Floats:
     """(g,) length of the longest of the vectors (g, k, 3)."""
-    longest: Floats = np.sqrt((vectors**2).sum(axis=2).max(axis=1))
-    return longest
+    return np.sqrt((vectors**2).sum(axis=2).max(axis=1))

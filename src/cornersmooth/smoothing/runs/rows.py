@@ -153,8 +153,7 @@ def _effort(
     turn = np.concatenate((angle_between(levers[:-1], levers[1:]), [0.0]))[pieces.segment]
     turned = angle_between(hull[:, 0, 3:] - hull[:, 0, :3], hull[:, 3, 3:] - hull[:, 3, :3])
     by_turn = turned / turn_limit(settings, turn / 2.0, TURNING * settings.tolerance)
-    effort: Floats = np.maximum(by_chord, by_turn)
-    return effort
+    return np.maximum(by_chord, by_turn)
 
 
 @dataclass(frozen=True)
@@ -233,5 +232,4 @@ def _cuts(runs: Runs, splines: Splines, program: Program) -> tuple[Ints, Floats,
 
 def _moves(runs: Runs, run: Ints, s: Floats) -> Ints:
     """Pose in whose segment each place lies; a pose is in the segment that leads to it."""
-    poses: Ints = runs.pose[search(runs.s, runs.count, run, s)]
-    return poses
+    return runs.pose[search(runs.s, runs.count, run, s)]

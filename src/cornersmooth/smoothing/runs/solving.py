@@ -137,8 +137,7 @@ def _own(splines: Splines, windows: Windows) -> Bools:
     w = windows.window
     low = np.where(at_start, 0, BESIDE + 1)[w]
     high = (windows.count + 3 - np.where(at_end, 0, BESIDE + 2))[w]
-    own: Bools = (place >= low) & (place < high) & windows.free
-    return own
+    return (place >= low) & (place < high) & windows.free
 
 
 def _around(splines: Splines, spans: Ints) -> Windows:
