@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from cornersmooth.cli.group import COMMANDS
 from oracle.command import DONE, SCRIPT, run
 
 #: asks the function that bash calls, and prints what it answers
@@ -67,20 +66,3 @@ def test_every_shell_has_a_script(shell: str) -> None:
     result = run("completion", shell)
     assert result.returncode == DONE
     assert f"_CORNERSMOOTH_COMPLETE={shell}_complete" in result.stdout.decode()
-
-
-def test_the_manual_page_has_every_command_and_option() -> None:
-    page = run("man").stdout.decode()
-    for name in COMMANDS:
-        assert f'.SH "{name.upper()}"' in page
-        said = run(name, "--help").stdout.decode()
-        for word in said.split():
-            if word.startswith("--"):
-                assert word.rstrip(",.;:").replace("-", "\\-") in page, word
-
-
-@pytest.mark.skipif(shutil.which("groff") is None, reason="there is no groff")
-def test_the_manual_page_is_rendered_without_a_warning() -> None:
-    done = subprocess.run(["groff", "-man", "-ww", "-Tascii"], input=run("man").stdout, capture_output=True, check=True)
-    assert done.stderr == b""
-    assert b"Round the corners of the CL files IN and write NC programs." in done.stdout

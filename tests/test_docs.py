@@ -135,7 +135,6 @@ def execute(line: str, folder: Path) -> None:
     line = line.removesuffix(" | source")  # what fish does with it
     if set("|>;*$~") & set(line):
         around = {"PATH": f"{SCRIPT.parent}{os.pathsep}{os.environ['PATH']}", "HOME": str(folder)}
-        (folder / ".local" / "share" / "man" / "man1").mkdir(parents=True, exist_ok=True)
         subprocess.run(["bash", "-c", line], cwd=folder, env=os.environ | around, check=True, capture_output=True)
         return
     _, command, *words = shlex.split(line)

@@ -61,7 +61,7 @@ def run_on_cluster(jobs: list[Job], scheduler: str) -> Iterator[tuple[int, Outco
         for task in ending:
             place = places.pop(task.key)
             outcome = _outcome(jobs[place], task)
-            for path in (jobs[place].target, *jobs[place].reports):
+            for path in jobs[place].outputs:
                 remove_leftovers(path)  # of a worker that was lost
             yield place, outcome
             task.release()
@@ -85,7 +85,7 @@ def do(job: Job, folder: str, proof: str, version: str) -> Outcome:
         return _failed(job, f"{host} has cornersmooth {__version__}, not {version}; install the same everywhere")
     if not os.path.exists(os.path.join(folder, proof)):
         return _failed(job, f"{host} does not see {os.path.dirname(proof)}; let it stand in a folder that all share")
-    named = {path: os.path.join(folder, path) for path in (job.source, job.target, *job.reports) if path != STANDARD}
+    named = {path: os.path.join(folder, path) for path in (job.source, *job.outputs) if path != STANDARD}
     there = replace(
         job,
         source=named[job.source],

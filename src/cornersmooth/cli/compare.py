@@ -11,11 +11,18 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from cornersmooth.cli.files import check_inputs, check_path, read_input, target_of, told_of
-from cornersmooth.cli.options import motion, nc_text, outputs, reading, smoothing
-from cornersmooth.cli.options.parameters import PATH
-from cornersmooth.cli.shop import ShopCommand
+from cornersmooth.cli.command import new_command
+from cornersmooth.cli.files import check_inputs, check_path, target_of, told_of
+from cornersmooth.cli.headings import EXIT_CODES_OF_READERS
+from cornersmooth.cli.options import CURVES, READING, Options
 from cornersmooth.cli.show import progress_bar, say_json, say_line
+from cornersmooth.cli.values import (
+    control_of,
+    machine_of,
+    read_source,
+    reading_of,
+    settings_of,
+)
 from cornersmooth.output import open_output
 
 if TYPE_CHECKING:
@@ -25,31 +32,14 @@ if TYPE_CHECKING:
 _OWN = frozenset(("as_json", "csv", "verbose", "quiet", "force", "machine", "limits", "source", "look_ahead"))
 
 
-@click.command(
+@new_command(
     "compare",
-    cls=ShopCommand,
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
-    epilog="Exit codes: 0 done; 2 wrong usage or configuration; 3 input cannot be read or is not valid; "
-    "4 output cannot be written.",
+    "IN",
+    f"tolerance axis_length axis_tolerance control machine limits look_ahead {CURVES} feed {READING} tip_control "
+    "as_json csv force quiet verbose",
+    epilog=EXIT_CODES_OF_READERS,
 )
-@click.argument("source", type=PATH, metavar="IN")
-@smoothing.tolerance
-@smoothing.axis_length
-@smoothing.axis_tolerance
-@nc_text.control
-@nc_text.machine
-@motion.limits
-@motion.look_ahead
-@smoothing.curve_options
-@reading.feed
-@reading.reading_options
-@reading.tip_control
-@outputs.as_json
-@motion.rows_csv
-@outputs.force
-@outputs.quiet
-@outputs.verbose
-def command(source: str, **given: Any) -> int:
+def command(given: Options) -> int:
     """Write the CL file IN in every form, method and line density that the control can run, and compare the times.
 
     Every program is verified and planned as it is written, under the limits of the axes of --limits, or of --machine.
@@ -69,42 +59,39 @@ def command(source: str, **given: Any) -> int:
     from cornersmooth.comparing import candidates, compare_programs
     from cornersmooth.feedrate import BlockLimits
     from cornersmooth.filter.compared import compare_filtered
-    from cornersmooth.nc_reader.recognition import first_block
-    from cornersmooth.provenance import HEAD
     from cornersmooth.saving import with_feed
 
+    source = given.source
     check_inputs(source)
-    if given["csv"]:
-        check_path(given["csv"], [source], force=given["force"])
-    machine, limits = nc_text.machine_of(given), nc_text.machine_of(given, "limits")
+    if given.csv:
+        check_path(given.csv, [source], force=given.force)
+    machine, limits = machine_of(given.machine), machine_of(given.limits)
     axes = axes_of(given)
-    control, settings = nc_text.control_of(given), smoothing.settings_of(given)
-    data, name = read_input(source, size_limit=not given["no_size_limit"])
-    is_program = bool(first_block(data[:HEAD]))
-    reading.check_kind(given, program=is_program)
-    with told_of(name), progress_bar(given["quiet"]) as progress:
+    control, settings = control_of(given), settings_of(given)
+    data, name, is_program = read_source(given)
+    with told_of(name), progress_bar(given.quiet) as progress:
         step = None if progress is None else lambda done, total: progress("programs", done, total)
         if is_program:  # it has one kind of words
             tried = [one for one in candidates(control, settings, machine) if one.form.rotary == (machine is not None)]
             table = compare_filtered(data, tried, axes, **how_read(given), progress=step)
         else:
-            program = with_feed(read(data, name=name, **reading.reading_of(given)), given["feed"])
+            program = with_feed(read(data, name=name, **reading_of(given)), given.feed)
             tried = candidates(control, settings, limits if machine is None else machine)
-            blocks = BlockLimits(look_ahead=given["look_ahead"])
+            blocks = BlockLimits(look_ahead=given.look_ahead)
             table = compare_programs(program, tried, axes, blocks, progress=step)
-    machine_named = given["limits"] if machine is None else given["machine"]
+    machine_named = given.limits if machine is None else given.machine
     made_by = ("filter", os.path.splitext(source)[1]) if is_program else ("smooth", control.layout.suffix)
-    commands = [_command(source, given, row, machine_named, *made_by) for row in table.rows]
-    if given["csv"]:
-        with open_output(target_of(given["csv"])) as output:
+    commands = [_command(given, row, machine_named, *made_by) for row in table.rows]
+    if given.csv:
+        with open_output(target_of(given.csv)) as output:
             output.stream.write(_csv(table, commands).encode("utf-8"))
-    if given["as_json"]:
+    if given.as_json:
         contents = table.as_dict()
         for row, text in zip(contents["rows"], commands, strict=True):
             row["command"] = text
         say_json(contents)
-    elif not given["quiet"]:
-        for line in _lines(table, commands, bool(given["verbose"])):
+    elif not given.quiet:
+        for line in _lines(table, commands, bool(given.verbose)):
             say_line(line)
     return 0
 
@@ -154,7 +141,7 @@ def _cells(row: Row) -> tuple[str, ...]:
     )
 
 
-def _command(source: str, given: dict[str, Any], row: Row, machine: Any, command: str, suffix: str) -> str:
+def _command(given: Options, row: Row, machine: Any, command: str, suffix: str) -> str:
     """Options that were typed, and those of the row; a machine is called as the user has called it."""
     context, typed = click.get_current_context(), []
     for option in context.command.params:
@@ -163,7 +150,7 @@ def _command(source: str, given: dict[str, Any], row: Row, machine: Any, command
         if not isinstance(option, click.Option) or name in _OWN or not from_user:
             continue
         spelled = option.opts[-1]
-        value = given[name]
+        value = getattr(given, name)
         for one in value if option.multiple else (value,):
             if option.is_flag:
                 typed.append(spelled)
@@ -174,8 +161,8 @@ def _command(source: str, given: dict[str, Any], row: Row, machine: Any, command
     options = list(row.options)
     if "--machine" in options:
         options[options.index("--machine") + 1] = called
-    target = os.path.splitext(os.path.basename(source))[0] + (".smooth" if command == "filter" else "") + suffix
-    return shlex.join(["cornersmooth", command, source, *typed, *options, "-o", target])
+    target = os.path.splitext(os.path.basename(given.source))[0] + (".smooth" if command == "filter" else "") + suffix
+    return shlex.join(["cornersmooth", command, given.source, *typed, *options, "-o", target])
 
 
 def _csv(table: Table, commands: list[str]) -> str:

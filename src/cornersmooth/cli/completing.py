@@ -16,17 +16,17 @@ from click.shell_completion import CompletionItem
 _FOLDERS = {"controls": ("nc", "controls"), "machines": ("kinematics", "machines")}
 
 
-def controls(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+def controls(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
     """Names of controls, and files."""
     return _offer("controls", ctx, incomplete)
 
 
-def machines(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+def machines(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
     """Names of machines, and files."""
     return _offer("machines", ctx, incomplete)
 
 
-def forms(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+def forms(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
     """Names of the forms of the control that is chosen, or of all of them."""
     tables = {**_built_in("controls"), **_own("controls", ctx)}
     chosen = ctx.params.get("control")

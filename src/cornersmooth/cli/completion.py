@@ -4,18 +4,12 @@ from __future__ import annotations
 
 import click
 
-from cornersmooth.cli.headings import EXIT_CODES
-
-_LINES = {
-    "bash": 'eval "$(cornersmooth completion bash)"    # in ~/.bashrc',
-    "zsh": 'eval "$(cornersmooth completion zsh)"     # in ~/.zshrc, behind compinit',
-    "fish": "cornersmooth completion fish | source     # in ~/.config/fish/config.fish",
-}
+from cornersmooth.cli.command import new_command
+from cornersmooth.cli.options import Options
 
 
-@click.command("completion", epilog=EXIT_CODES)
-@click.argument("shell", type=click.Choice(list(_LINES)))
-def command(shell: str) -> int:
+@new_command("completion", "SHELL", "", cls=click.Command)
+def command(given: Options) -> int:
     """Print what makes SHELL complete commands, options, names of controls, machines and forms, and files.
 
     \b
@@ -29,6 +23,6 @@ def command(shell: str) -> int:
     from cornersmooth.cli.group import cli
 
     kinds = {"bash": BashComplete, "zsh": ZshComplete, "fish": FishComplete}
-    source = kinds[shell](cli, {}, "cornersmooth", "_CORNERSMOOTH_COMPLETE").source()
+    source = kinds[str(given.name)](cli, {}, "cornersmooth", "_CORNERSMOOTH_COMPLETE").source()
     click.echo(source.rstrip())
     return 0

@@ -9,9 +9,8 @@ from typing import Final
 import click
 
 from cornersmooth.cli import shop
-from cornersmooth.cli.headings import EXIT_CODES
-from cornersmooth.cli.options import outputs
-from cornersmooth.cli.options.parameters import PATH
+from cornersmooth.cli.command import new_command
+from cornersmooth.cli.options import Options
 from cornersmooth.cli.show import say_json, say_line
 from cornersmooth.errors import InputError
 
@@ -19,10 +18,8 @@ from cornersmooth.errors import InputError
 _DEFAULT: Final = re.compile(r"\[default: ([^]]+)\]")
 
 
-@click.command("config", epilog=EXIT_CODES)
-@click.argument("source", type=PATH, metavar="[IN]", default=".")
-@outputs.as_json
-def command(source: str, as_json: bool) -> int:
+@new_command("config", "[IN]", "as_json", cls=click.Command)
+def command(given: Options) -> int:
     """Say which values 'cornersmooth smooth' would use for the file or folder IN, and where each comes from.
 
     Options come first, then the environment (CORNERSMOOTH_TOLERANCE), the file cornersmooth.toml in the folder of the
@@ -35,6 +32,7 @@ def command(source: str, as_json: bool) -> int:
     """
     from cornersmooth.cli.smooth import command as smooth
 
+    source = given.source
     if not os.path.exists(source):
         raise InputError("CS100", "cannot read it: no such file or directory", "check the path", file=source)
     with smooth.make_context("smooth", [source]) as context:
@@ -45,7 +43,7 @@ def command(source: str, as_json: bool) -> int:
             rows.append((shop.keys(option)[0], value, shop.origin(context, str(option.name))))
             instead = _DEFAULT.search(option.help or "")
             told.append(instead[1] if instead and value in (None, "", ()) else _told(value))
-    if as_json:
+    if given.as_json:
         values = [dict(zip(("key", "value", "from"), row, strict=True)) for row in rows]
         say_json({"schema": "cornersmooth-config/1", "values": values})
         return 0

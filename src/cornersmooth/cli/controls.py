@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from cornersmooth.cli import completing
-from cornersmooth.cli.headings import EXIT_CODES
-from cornersmooth.cli.options import outputs
+from cornersmooth.cli.command import new_command
+from cornersmooth.cli.options import Options
 from cornersmooth.cli.show import say_json, say_line
 
 if TYPE_CHECKING:
@@ -24,11 +23,8 @@ _MODES = {
 }
 
 
-@click.command("controls", epilog=EXIT_CODES)
-@click.argument("name", required=False, metavar="[NAME|FILE]", shell_complete=completing.controls)
-@outputs.table
-@outputs.as_json
-def command(name: str | None, table: bool, as_json: bool) -> int:
+@new_command("controls", "[CONTROL]", "table as_json", cls=click.Command)
+def command(given: Options) -> int:
     """List the controls with their forms, or check and describe one.
 
     A TOML file of your own is like one of them and says only what is different; see docs/controls.md.
@@ -42,15 +38,16 @@ def command(name: str | None, table: bool, as_json: bool) -> int:
     """
     from cornersmooth.nc import control_names, control_table, load_control
 
-    if table:
+    name = given.name
+    if given.table:
         if name is None:
             raise click.UsageError("--table needs the name of a control")
-        if as_json:
+        if given.as_json:
             raise click.UsageError("--table and --json exclude each other")
         click.echo(control_table(name), nl=False)
         return 0
     controls = [_values(load_control(one)) for one in ([name] if name else control_names())]
-    if as_json:
+    if given.as_json:
         say_json({"schema": "cornersmooth-controls/1", "controls": controls})
         return 0
     for control in controls:

@@ -11,8 +11,8 @@ from typing import Any, Final
 
 import click
 
-from cornersmooth.cli.headings import EXIT_CODES
-from cornersmooth.cli.options import outputs
+from cornersmooth.cli.command import new_command
+from cornersmooth.cli.options import Options
 from cornersmooth.cli.show import say_json, say_line
 
 #: what the hundreds of the codes are about
@@ -34,10 +34,8 @@ KINDS: Final = {
 _WIDTH: Final = 80
 
 
-@click.command("explain", epilog=EXIT_CODES)
-@click.argument("code", required=False, metavar="[CODE]")
-@outputs.as_json
-def command(code: str | None, as_json: bool) -> int:
+@new_command("explain", "[CODE]", "as_json", cls=click.Command)
+def command(given: Options) -> int:
     """Explain the code of a message: its cause, what to do, and how it is printed. Without a code, list them all.
 
     \b
@@ -46,13 +44,13 @@ def command(code: str | None, as_json: bool) -> int:
       cornersmooth explain CS337
       cornersmooth explain 337 --json
     """
-    known = codes()
+    known, code = codes(), given.name
     if code is not None:
         number = re.fullmatch(r"(?:CS)?(\d{3})", code.strip("[]"), re.IGNORECASE)
         code = f"CS{number[1]}" if number else code
         if code not in known:
             raise click.UsageError(f"no code {code!r}; 'cornersmooth explain' lists them")
-    if as_json:
+    if given.as_json:
         found = {name: one for name, one in known.items() if code in (None, name)}
         say_json({"schema": "cornersmooth-codes/1", "codes": found})
         return 0

@@ -97,6 +97,19 @@ def _reading(path: str) -> Iterator[None]:
         raise InputError("CS100", what, hint, file=path) from failure
 
 
+def read_head(nc: bytes | str | os.PathLike[str]) -> bytes:
+    """Beginning of an NC program; empty where it cannot be read twice."""
+    from cornersmooth.provenance import HEAD
+
+    if isinstance(nc, bytes):
+        return nc[:HEAD]
+    with contextlib.suppress(OSError):  # who reads it all says why
+        if os.path.isfile(nc):
+            with open(nc, "rb") as file:
+                return file.read(HEAD)
+    return b""
+
+
 def read_lines(path: str) -> tuple[str, ...]:
     """Lines of a text of the user's own; a mark that some editors put before it is none of it."""
     return tuple(read_input(path)[0].decode("utf-8-sig", "replace").splitlines())

@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from cornersmooth.cli.command import new_command
 from cornersmooth.cli.files import STANDARD, check_path, read_input, suffix_of, target_of, told_of, write_report
-from cornersmooth.cli.inputs import Input, check_together, find_inputs, named_input
-from cornersmooth.cli.options import motion, nc_text, outputs, reading, smoothing
-from cornersmooth.cli.options.parameters import PATH
-from cornersmooth.cli.programs import form_of, how_read, show_wrong
-from cornersmooth.cli.shop import ShopCommand, command_line, loosened
+from cornersmooth.cli.headings import EXIT_CODES_OF_WRITERS
+from cornersmooth.cli.inputs import Input, check_together, find_inputs
+from cornersmooth.cli.options import LINES, Options
+from cornersmooth.cli.programs import filter_form_of, how_read, show_wrong
+from cornersmooth.cli.shop import command_line, loosened
 from cornersmooth.cli.show import (
     INDENT,
     print_heading,
@@ -25,6 +26,10 @@ from cornersmooth.cli.show import (
     say_json,
     say_line,
     warn,
+)
+from cornersmooth.cli.values import (
+    machine_of,
+    settings_of,
 )
 from cornersmooth.errors import CornersmoothError
 from cornersmooth.output import FAILED, make_folder, open_output
@@ -48,37 +53,16 @@ PATTERNS = ("*.nc", "*.ngc", "*.mpf", "*.spf", "*.h", "*.tap", "*.cnc", "*.eia",
 _SHOWN = 10
 
 
-@click.command(
+@new_command(
     "filter",
-    cls=ShopCommand,
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
-    epilog="Exit codes: 0 done; 1 the program FAILED, or is not PASSED under --strict; 2 wrong usage or configuration; "
-    "3 input cannot be read or is not valid; 4 output cannot be written. With several inputs: that of the worst.",
+    "IN...",
+    "tolerance output control machine no_tcp tip_control units form axis_length axis_tolerance directory glob reports "
+    f"as_json method {LINES} limits no_verify strict force quiet verbose",
+    epilog=f"{EXIT_CODES_OF_WRITERS} With several inputs: that of the worst.",
+    reports="Write what was done: .json, or .html for a page to look at. May be repeated; {stem} is the input's name.",
+    units="Units of a program that does not say them.",
 )
-@click.argument("inputs", type=PATH, nargs=-1, required=True, metavar="IN...")
-@smoothing.tolerance
-@outputs.output
-@nc_text.control
-@nc_text.machine
-@nc_text.no_tcp
-@reading.tip_control
-@reading.units_of_program
-@nc_text.form
-@smoothing.axis_length
-@smoothing.axis_tolerance
-@outputs.directory
-@outputs.glob
-@outputs.json_reports
-@outputs.as_json
-@smoothing.method
-@smoothing.line_options
-@motion.limits
-@nc_text.no_verify
-@nc_text.strict
-@outputs.force
-@outputs.quiet
-@outputs.verbose
-def command(inputs: tuple[str, ...], **given: Any) -> int:
+def command(given: Options) -> int:
     """Smooth the cutting runs of the finished NC programs IN; every other byte stays.
 
     Runs of plain cuts are replaced where the state of the control is surely known. What the program does there today
@@ -93,19 +77,19 @@ def command(inputs: tuple[str, ...], **given: Any) -> int:
       cornersmooth filter *.mpf --control siemens -d smooth/
       cat part.nc | cornersmooth filter - > smooth.nc
     """
-    folder, output = given["directory"], given["output"]
-    check_together(inputs, given)
-    form, settings = form_of(given), smoothing.settings_of(given)
-    files = find_inputs(inputs, given["glob"] or PATTERNS) if folder else [named_input(inputs[0])]
+    folder, output = given.directory, given.output
+    check_together(given)
+    form, settings = filter_form_of(given), settings_of(given)
+    files = find_inputs(given, PATTERNS)
     targets = [_target(one, folder) if folder else output or STANDARD for one in files]
     if len(set(targets)) < len(targets):
         raise click.UsageError("two inputs would be written to one name; give each a -d of its own")
-    reports = [[path.replace("{stem}", one.stem) for path in given["reports"]] for one in files]
-    _check_reports(reports, given["reports"])
-    if given["as_json"] and (STANDARD in targets or len(files) != 1):
+    reports = [[path.replace("{stem}", one.stem) for path in given.reports] for one in files]
+    _check_reports(reports, given.reports)
+    if given.as_json and (STANDARD in targets or len(files) != 1):
         raise click.UsageError("--json needs one input and -o FILE; --report '{stem}.json' tells of several")
     for path in (*targets, *chain.from_iterable(reports)):
-        check_path(path, [one.path for one in files], force=given["force"])
+        check_path(path, [one.path for one in files], force=given.force)
     if folder:
         make_folder(folder)
     worst = 0
@@ -186,9 +170,7 @@ def _target(one: Input, folder: str) -> str:
     return path
 
 
-def _filter(
-    source: str, target: str, reports: Sequence[str], form: Form, settings: Settings, given: dict[str, Any]
-) -> int:
+def _filter(source: str, target: str, reports: Sequence[str], form: Form, settings: Settings, given: Options) -> int:
     """Filter one program; return the exit code."""
     from cornersmooth.filter import filter_program
     from cornersmooth.report import NcFile
@@ -197,20 +179,20 @@ def _filter(
     from cornersmooth.verify import useful_processes
 
     data, name = read_input(source)
-    axes = nc_text.machine_of(given, "limits")
+    axes = machine_of(given.limits)
     with told_of(name):
         found = filter_program(
             data,
             form,
             settings,
             **how_read(given),
-            verify=not given["no_verify"],
+            verify=not given.no_verify,
             axes=axes,
             paths=_pages(reports),
             processes=useful_processes(),
         )
-    bad = found.verdict is Verdict.FAILED or (given["strict"] and found.verdict is not Verdict.PASSED)
-    with open_output(target_of(target), hold=bad, replace=given["force"]) as output:
+    bad = found.verdict is Verdict.FAILED or (given.strict and found.verdict is not Verdict.PASSED)
+    with open_output(target_of(target), hold=bad, replace=given.force) as output:
         output.failed = bad
         output.stream.write(found.data)
     judgement = judgement_of(found, settings.tolerance)
@@ -230,16 +212,16 @@ def _filter(
     page = _page(found, judgement, (name, data), os.path.basename(target), form, settings, axes)
     _write_reports(reports, contents, page)
     line = contents["verdict_text"]
-    if given["as_json"]:
+    if given.as_json:
         say_json(contents)
-    elif not given["quiet"]:
-        _show(name, contents, found, given["verbose"], given["units"])
+    elif not given.quiet:
+        _show(name, contents, found, given.verbose, given.units)
     elif loosened(settings.tolerance):
         print_line(f"{name}: {line}")
     return int(bad)
 
 
-def verify_with_program(source: str, old: bytes, path: str, given: dict[str, Any]) -> int:
+def verify_with_program(source: str, old: bytes, path: str, given: Options) -> int:
     """Compare an NC program with what was made of it; return the exit code of ``verify``."""
     from cornersmooth.filter import verify_programs
     from cornersmooth.report import NcFile
@@ -248,20 +230,20 @@ def verify_with_program(source: str, old: bytes, path: str, given: dict[str, Any
     from cornersmooth.verify import useful_processes
 
     new, name = read_input(path)
-    settings, form = smoothing.settings_of(given), form_of(given)
+    settings, form = settings_of(given), filter_form_of(given)
     found = verify_programs(
-        old, new, form, settings, **how_read(given), paths=_pages(given["reports"]), processes=useful_processes()
+        old, new, form, settings, **how_read(given), paths=_pages(given.reports), processes=useful_processes()
     )
     checked = found.checked
     assert checked is not None
     judgement = Judgement(found.verdict, 0, 0, "", _problems(checked.wrong) or _measured(checked, settings.tolerance))
     written = replace(NcFile.of(None if path == STANDARD else path, sha256_of(new), form), form=None)
     contents = _report("verify", judgement, checked, (source, old), written, settings)
-    _write_reports(given["reports"], contents, _page(found, judgement, (source, old), name, form, settings))
+    _write_reports(given.reports, contents, _page(found, judgement, (source, old), name, form, settings))
     show_wrong(name, checked.wrong)
-    if given["as_json"]:
+    if given.as_json:
         say_json(contents)
-    elif loosened(settings.tolerance) or not given["quiet"]:
+    elif loosened(settings.tolerance) or not given.quiet:
         say_line(contents["verdict_text"])
     return int(found.verdict is not Verdict.PASSED)
 

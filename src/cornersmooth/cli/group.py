@@ -31,7 +31,6 @@ COMMANDS = {
     "config": "Say which values hold here, and where each comes from.",
     "completion": "Print what makes a shell complete commands, names and files.",
     "explain": "Explain the code of a message: cause, and what to do.",
-    "man": "Print the manual page.",
 }
 
 #: how the list shows them
@@ -40,7 +39,7 @@ GROUPS = {
     "Check programs": "verify surface",
     "Save time": "compare time setup",
     "Look up": "info controls machines config explain",
-    "Shell": "completion man",
+    "Shell": "completion",
 }
 
 EXIT_INTERRUPTED = 130

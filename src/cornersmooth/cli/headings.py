@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable
 from typing import Any, Final
 
 import click
@@ -23,9 +22,12 @@ HEADINGS: Final = (
     "Verification",
     "Batches",
 )
-#: epilogs of commands that read no input, and of those that do and write no program
+#: epilogs of commands that read no input, of those that do, and of those that write programs, too
 EXIT_CODES: Final = "Exit codes: 0 done; 2 wrong usage or configuration; 4 output cannot be written."
 EXIT_CODES_OF_READERS: Final = EXIT_CODES.replace("; 4", "; 3 input cannot be read or is not valid; 4")
+EXIT_CODES_OF_WRITERS: Final = EXIT_CODES_OF_READERS.replace(
+    "0 done;", "0 done; 1 the program FAILED, or is not PASSED under --strict;"
+)
 #: room for the names of options
 _NAMES: Final = 26
 
@@ -36,26 +38,6 @@ class HeadedOption(click.Option):
     def __init__(self, *args: Any, heading: str, **given: Any) -> None:
         super().__init__(*args, **given)
         self.heading = heading
-
-
-Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
-
-
-def option(heading: str, *names: str, **given: Any) -> Decorator:
-    """Give an option, as `click.option` does, its place in the help: one of `HEADINGS`."""
-    if "default" in given:
-        given.setdefault("show_default", "[default" not in given["help"])  # some helps say it in words
-    return click.option(*names, cls=HeadedOption, heading=heading, **given)
-
-
-def flag(heading: str, *names: str, help: str) -> Decorator:
-    """Give an option without a value."""
-    return option(heading, *names, is_flag=True, help=help)
-
-
-def number(heading: str, *names: str, unit: str, help: str, default: float | None = None) -> Decorator:
-    """Give an option that is a number; `unit` is what the help shows in its place."""
-    return option(heading, *names, type=float, metavar=unit, default=default, help=help)
 
 
 class HeadedCommand(click.Command):

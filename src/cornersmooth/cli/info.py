@@ -5,23 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-import click
-
-from cornersmooth.cli.files import read_input
+from cornersmooth.cli.command import new_command
 from cornersmooth.cli.headings import EXIT_CODES_OF_READERS
-from cornersmooth.cli.options import outputs, reading, smoothing
-from cornersmooth.cli.options.parameters import PATH
-from cornersmooth.cli.shop import ShopCommand
+from cornersmooth.cli.options import READING, Options
 from cornersmooth.cli.show import say_json, say_line, told_finding
+from cornersmooth.cli.values import (
+    read_source,
+    reading_of,
+)
 
 
-@click.command("info", cls=ShopCommand, epilog=EXIT_CODES_OF_READERS)
-@click.argument("source", type=PATH, metavar="IN")
-@smoothing.tolerance
-@smoothing.axis_length
-@reading.reading_options
-@outputs.as_json
-def command(source: str, tolerance: float, axis_length: float, as_json: bool, **given: Any) -> int:
+@new_command("info", "IN", f"tolerance axis_length {READING} as_json", epilog=EXIT_CODES_OF_READERS)
+def command(given: Options) -> int:
     """Say what the CL file IN holds: dialect, moves, lengths, turns, axis changes, arcs, statements, findings.
 
     IN is an APT/CL file or a table of points; - is standard input. -e and -H do not write anything: they tell how many
@@ -35,15 +30,12 @@ def command(source: str, tolerance: float, axis_length: float, as_json: bool, **
     """
     from cornersmooth.cl import read
     from cornersmooth.cli.programs import describe_program
-    from cornersmooth.nc_reader.recognition import first_block
-    from cornersmooth.provenance import HEAD
     from cornersmooth.report.info import describe
 
-    data, name = read_input(source, size_limit=not given["no_size_limit"])
-    if first_block(data[:HEAD]):
-        reading.check_kind(given, program=True)
+    data, name, is_program = read_source(given)
+    if is_program:
         told = describe_program(data, name)
-        if as_json:
+        if given.as_json:
             say_json(told)
             return 0
         looks = f", looks like {told['looks_like']}" if told["looks_like"] else ""
@@ -51,8 +43,8 @@ def command(source: str, tolerance: float, axis_length: float, as_json: bool, **
         say_line(f"cuts   {told['cuts']}")
         say_line("       'cornersmooth filter' smooths them; name the control and the machine there")
         return 0
-    info = describe(read(data, name=name, **reading.reading_of(given)), tolerance, axis_length)
-    if as_json:
+    info = describe(read(data, name=name, **reading_of(given)), given.tolerance, given.axis_length)
+    if given.as_json:
         say_json(info)
         return 0
     rows = [row for part in (_file(info), _motion(info), _axis(info), _corners(info)) for row in part]

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatch
-from typing import Any
 
 import click
 
 from cornersmooth.cli.files import STANDARD
+from cornersmooth.cli.options import Options
 from cornersmooth.cli.show import print_line
 from cornersmooth.errors import SettingsError
 
@@ -27,16 +26,16 @@ class Input:
     stem: str  #: its place below the folder that was named, without the ending: where its outputs go below theirs
 
 
-def check_together(inputs: tuple[str, ...], given: Mapping[str, Any]) -> None:
+def check_together(given: Options) -> None:
     """Refuse options that do not go together, or not with so many inputs."""
-    folder = given["directory"]
-    if given["quiet"] and given["verbose"]:
+    folder, inputs = given.directory, given.inputs
+    if given.quiet and given.verbose:
         raise click.UsageError("-q and -v exclude each other")
-    if given["no_verify"] and given["strict"]:
+    if given.no_verify and given.strict:
         raise click.UsageError("--no-verify and --strict exclude each other")
-    if folder and given["output"]:
+    if folder and given.output:
         raise click.UsageError("-o and -d exclude each other; -d is for several inputs")
-    if given["glob"] and not folder:
+    if given.glob and not folder:
         raise click.UsageError("--glob is for folders, which need -d FOLDER")
     if len(inputs) > 1 and not folder:
         raise click.UsageError("several inputs need -d FOLDER; -o goes with a single input")
@@ -44,35 +43,32 @@ def check_together(inputs: tuple[str, ...], given: Mapping[str, Any]) -> None:
         raise click.UsageError("standard input goes with no other input")
 
 
-def find_inputs(named: tuple[str, ...], patterns: tuple[str, ...]) -> list[Input]:
-    """Files that were named, and those of the folders that were, with all folders in them, in alphabetical order.
+def find_inputs(given: Options, patterns: tuple[str, ...] = PATTERNS) -> list[Input]:
+    """Files that were named, and in batches those of the folders that were, with all below, in alphabetical order.
 
     Parameters
     ----------
     patterns : tuple of str
-        What the names of files in folders are like; those of CL files where it is empty.
+        What the names of files in folders are like where ``--glob`` does not say.
 
     Raises
     ------
     SettingsError
         CS224: a folder without any such file.
     """
+    patterns = given.glob or patterns
     found = []
-    for name in named:
-        if name != STANDARD and os.path.isdir(name):
-            inside = _inside(name, patterns or PATTERNS)
-            if not inside:
-                wanted = ", ".join(patterns or PATTERNS)
-                raise SettingsError("CS224", f"no file in {name} is like {wanted}", "name others with --glob")
+    for name in given.inputs:
+        if name == STANDARD:
+            found.append(Input(name, "stdin"))
+        elif not (given.directory and os.path.isdir(name)):
+            found.append(Input(name, _stem(os.path.basename(name))))
+        elif inside := _inside(name, patterns):
             found += inside
         else:
-            found.append(named_input(name))
+            what = f"no file in {name} is like {', '.join(patterns)}"
+            raise SettingsError("CS224", what, "name others with --glob")
     return found
-
-
-def named_input(name: str) -> Input:
-    """Make an input of a file that was named by itself, or of standard input."""
-    return Input(name, "stdin" if name == STANDARD else _stem(os.path.basename(name)))
 
 
 def _inside(folder: str, patterns: tuple[str, ...]) -> list[Input]:

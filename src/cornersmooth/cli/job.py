@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Any, BinaryIO, cast
 
 from cornersmooth.cli.files import STANDARD, Beginning, check_path, read_input, suffix_of, target_of, write_report
 from cornersmooth.cli.fingerprint import fingerprint
+from cornersmooth.cli.options import Options
 from cornersmooth.cli.show import more
+from cornersmooth.cli.values import reading_of
 from cornersmooth.errors import CornersmoothError, SettingsError, VerdictError, message, printable
 from cornersmooth.memory import return_large_arrays
 from cornersmooth.output import ClosedPipe, make_folder, read_mark
@@ -24,7 +26,6 @@ if TYPE_CHECKING:
     from cornersmooth.pipeline import Progress, Result
     from cornersmooth.report.verdict import Saving
     from cornersmooth.settings import Settings
-    from cornersmooth.surface.tool import Tool
 
 #: how the reports of earlier runs begin; such files are replaced without being asked
 _OURS = {
@@ -51,22 +52,11 @@ class Job:
     source: str
     target: str
     reports: tuple[str, ...]
-    reading: dict[str, Any]  #: keyword arguments of `cornersmooth.read`
+    given: Options
     settings: Settings
     form: Form
     frame: Frame
-    feed: float | None  #: mm/min: for moves without one
-    force: bool
-    verify: bool = True  #: whether the text is read back
-    strict: bool = False  #: whether a program with any verdict but PASSED is an error
     alone: bool = False  #: whether no other job runs at the same time: verification may use all processors
-    #: whether it is one of a batch: folders are made, and what an earlier run has made of the same input with the
-    #: same settings is left as it is
-    batch: bool = False
-    skip_existing: bool = False  #: whether an output that exists is left as it is, whatever it was made of
-    tool: Tool | None = None  #: for pages, instead of that of the file
-    plan: int = 0  #: poses up to which the time that is saved is planned
-    timed: bool = False  #: whether it is planned without a page, too
     axes: Machine | None = None  #: whose limits, in place of those of the machine of the form
     #: Within which the feeds of the blocks are planned; None for the programmed ones.
     plan_feeds: Limits | None = None
@@ -75,6 +65,16 @@ class Job:
     run: str = ""
     loosened: str = ""  #: what settings made looser than the default; the line of the verdict says it
     command: str = ""  #: command line, for reports
+
+    @property
+    def batch(self) -> bool:
+        """Whether it is one of a batch: folders are made, and an output of the same input and settings stays."""
+        return bool(self.given.directory)
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Files that it writes."""
+        return tuple(path for path in (self.target, *self.reports) if path != STANDARD)
 
 
 @dataclass
@@ -109,34 +109,26 @@ class Outcome:
         return "not done" if self.unfinished else "skipped" if self.skipped else self.verdict or "error"
 
 
-def check(job: Job, *, replace_target: bool | None = False) -> dict[str, bool | None]:
-    """Refuse what would fail later or destroy something; nothing is read or written.
+def _check(job: Job, *, replace_target: bool | None = False) -> dict[str, bool | None]:
+    """Refuse what would fail later or destroy something; say of each output whether it may replace what is there.
 
     Parameters
     ----------
     replace_target : bool or None
-        Whether the NC file may be replaced, besides `Job.force`: as `force` of `cornersmooth.output.check_output`.
-
-    Returns
-    -------
-    dict
-        For each output, whether what stands at its place may be replaced.
+        Whether the NC file may be replaced, besides `--force`: as `force` of `cornersmooth.output.check_output`.
     """
-    outputs = [job.target, *job.reports]
-    replace_target = job.force or replace_target
-    may_replace: dict[str, bool | None] = {}
-    may_replace[job.target] = check_path(job.target, [job.source], force=replace_target)
-    if replace_target is None:
+    force = job.given.force
+    may_replace: dict[str, bool | None] = {
+        job.target: check_path(job.target, [job.source], force=force or replace_target)
+    }
+    if not force and replace_target is None:
         may_replace[job.target] = None
     for path in job.reports:
         suffix = suffix_of(path)
         if suffix not in _OURS:
             what = f"cannot tell the form of the report {path}"
             raise SettingsError("CS221", what, "let it end in .json, .csv or .html")
-        may_replace[path] = check_path(path, [job.source], force=job.force, ours=_OURS[suffix])
-    real = [os.path.realpath(path) for path in outputs if path != STANDARD]
-    if len(set(real)) < len(real):
-        raise SettingsError("CS222", "two outputs have the same name", "give each its own")
+        may_replace[path] = check_path(path, [job.source], force=force, ours=_OURS[suffix])
     return may_replace
 
 
@@ -148,7 +140,7 @@ def run_job(job: Job, progress: Progress | None = None) -> Outcome:
     return_large_arrays()
     outcome = Outcome(job)
     try:
-        if not (job.skip_existing and _exists(job, outcome)):
+        if not (job.given.skip_existing and _exists(job, outcome)):
             outcome.contents = _smooth_file(job, outcome, progress)
     except CornersmoothError as failure:
         outcome.exit_code = failure.exit_code
@@ -180,15 +172,15 @@ def _exists(job: Job, outcome: Outcome) -> bool:
 
 def _made_of(job: Job, source: bytes) -> str:
     """Name for everything that the text of a job depends on."""
-    text = hashlib.sha256(source).hexdigest()
-    wanted = (job.verify, job.strict, job.feed, job.plan_feeds)
-    return fingerprint(text, job.reading, job.settings, job.form, job.frame, *wanted)
+    text, given = hashlib.sha256(source).hexdigest(), job.given
+    wanted = (given.no_verify, given.strict, given.feed, job.plan_feeds)
+    return fingerprint(text, reading_of(given), job.settings, job.form, job.frame, *wanted)
 
 
 def _may_replace(job: Job, made_of: str, outcome: Outcome) -> bool | None:
     """Whether the output of an earlier run may be replaced; where nothing has to be done the outcome says so."""
-    if job.force or not os.path.exists(job.target):
-        return job.force
+    if job.given.force or not os.path.exists(job.target):
+        return job.given.force
     before = read_mark(job.target)
     if before is None:  # nothing can be known of it: it may stay if it is the same
         return None
@@ -205,18 +197,20 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> dict[
     """Make text and reports; a verdict that is not good enough goes to the outcome, and why there was nothing to do."""
     from cornersmooth.pipeline import postprocess
     from cornersmooth.report import corners_csv, report_json
+    from cornersmooth.settings import TIMED_POSES
 
-    may_replace = {} if job.batch else check(job)
-    source, name = read_input(job.source, size_limit=job.reading["size_limit"])
+    given = job.given
+    may_replace = {} if job.batch else _check(job)
+    source, name = read_input(job.source, size_limit=not given.no_size_limit)
     made_of = ""
     if job.batch:
         made_of = _made_of(job, source)
         replace_target = _may_replace(job, made_of, outcome)
         if outcome.skipped:
             return {}
-        for path in (job.target, *job.reports):
+        for path in job.outputs:
             make_folder(os.path.dirname(path) or ".")
-        may_replace = check(job, replace_target=replace_target)
+        may_replace = _check(job, replace_target=replace_target)
     target = target_of(job.target)
     beginning = Beginning(cast(BinaryIO, target)) if job.beginning else None
     try:
@@ -226,11 +220,11 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> dict[
             job.settings,
             form=job.form,
             frame=job.frame,
-            reading={"name": name, **job.reading},
-            feed=job.feed,
+            reading={"name": name, **reading_of(given)},
+            feed=given.feed,
             plan_feeds=job.plan_feeds,
-            verify=job.verify,
-            strict=job.strict,
+            verify=not given.no_verify,
+            strict=given.strict,
             force=may_replace[job.target],
             mark={"made_of": made_of, "run": job.run} if made_of else None,
             processes=None if job.alone else 1,
@@ -244,11 +238,18 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> dict[
         outcome.held_back = beginning.held_back
     outcome.seconds = result.seconds
     outcome.verdict_text = "; ".join(filter(None, (result.judgement.text, job.loosened)))
+    timed = given.time or len(result.program) <= TIMED_POSES
     pages = [path for path in job.reports if suffix_of(path) == ".html"]
     for path in pages:
-        outcome.saving = _write_page(path, job, bool(may_replace[path]), source, result) or outcome.saving
+        from cornersmooth.page.pages import page_and_saving
+
+        page, saving = page_and_saving(
+            result, source=source, frame=result.frame, axes=job.axes, timed=timed, tool=given.tool
+        )
+        write_report(path, [page], replace=bool(may_replace[path]))
+        outcome.saving = saving or outcome.saving
     good = result.verdict in (Verdict.PASSED, Verdict.INCOMPLETE)
-    if good and job.timed and not outcome.saving and len(result.program) <= job.plan:
+    if good and timed and not outcome.saving and (given.time or not (given.quiet or job.batch)):
         from cornersmooth.saving import planned_saving
 
         outcome.saving = planned_saving(
@@ -261,16 +262,6 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> dict[
             texts = corners_csv(result.smoothed, dense=not result.form.curve) if table else [report_json(contents)]
             write_report(path, texts, replace=bool(may_replace[path]))
     return contents
-
-
-def _write_page(path: str, job: Job, may_replace: bool, source: bytes, result: Result) -> Saving | None:
-    """Write a page; return the times that were planned for it."""
-    from cornersmooth.page.pages import page_and_saving
-
-    timed = len(result.program) <= job.plan
-    page, saving = page_and_saving(result, source=source, frame=result.frame, axes=job.axes, timed=timed, tool=job.tool)
-    write_report(path, [page], replace=may_replace)
-    return saving
 
 
 def _say_failed(name: str, result: Result, failure: VerdictError) -> str:

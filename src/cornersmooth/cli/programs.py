@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from cornersmooth.cli.files import read_input, told_of
-from cornersmooth.cli.options import nc_text, smoothing
+from cornersmooth.cli.options import Options
 from cornersmooth.cli.show import more, print_line, print_message, say_json, say_line
+from cornersmooth.cli.values import control_of, form_of, machine_of, settings_of
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics import Machine
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 _WRONG_SHOWN = 20
 
 
-def form_of(given: dict[str, Any]) -> Form:
+def filter_form_of(given: Options) -> Form:
     """Form of the control that blocks are read and written in.
 
     Raises
@@ -31,54 +32,53 @@ def form_of(given: dict[str, Any]) -> Form:
     """
     from cornersmooth.errors import SettingsError
     from cornersmooth.filter.vocabulary import VOCABULARIES
-    from cornersmooth.nc import choose_form
 
-    control = nc_text.control_of(given)
+    control = control_of(given)
     if control.dialect not in VOCABULARIES:
         known = ", ".join(sorted(VOCABULARIES))
         raise SettingsError("CS240", f"programs for {control.name} are not read as a filter", f"use one of {known}")
-    return choose_form(control, given.get("form"), machine=nc_text.machine_of(given), tcp=not given.get("no_tcp"))
+    return form_of(given)
 
 
-def how_read(given: dict[str, Any]) -> dict[str, Any]:
+def how_read(given: Options) -> dict[str, Any]:
     """What is to be known of a program that it does not say."""
-    return {"tip_from_start": given["tip_control"], "inch": given["units"] == "inch"}
+    return {"tip_from_start": given.tip_control, "inch": given.units == "inch"}
 
 
-def axes_of(given: dict[str, Any]) -> Machine:
+def axes_of(given: Options) -> Machine:
     """Machine under whose limits a program is planned."""
     from cornersmooth.comparing import limits_machine
 
-    axes = limits_machine(nc_text.machine_of(given, "limits"), nc_text.machine_of(given))
+    axes = limits_machine(machine_of(given.limits), machine_of(given.machine))
     if axes is None:
         raise click.UsageError("programs are planned within limits of axes: name a machine with [dynamics]: --limits")
     return axes
 
 
-def time_of_program(data: bytes, name: str, given: dict[str, Any]) -> int:
+def time_of_program(data: bytes, name: str, given: Options) -> int:
     """Say the time of a program as it is and smoothed, or beside another one; return the exit code of ``time``."""
     from cornersmooth.filter import filter_program, verify_programs
     from cornersmooth.filter.program import read_program
     from cornersmooth.filter.times import time_as_it_is
     from cornersmooth.verify import useful_processes
 
-    form, settings, axes = form_of(given), smoothing.settings_of(given), axes_of(given)
+    form, settings, axes = filter_form_of(given), settings_of(given), axes_of(given)
     how = {**how_read(given), "axes": axes, "processes": useful_processes()}
     with told_of(name):
-        if given["text"]:
-            found = verify_programs(data, read_input(given["text"])[0], form, settings, **how)
+        if given.text:
+            found = verify_programs(data, read_input(given.text)[0], form, settings, **how)
         else:
             found = filter_program(data, form, settings, verify=False, **how)
         if found.seconds is None and not (found.checked and found.checked.wrong):  # nothing differs
             alone = time_as_it_is(*read_program(data, form, settings, **how_read(given)), axes)
             found = replace(found, seconds=(alone, alone))
     if found.checked is not None and found.checked.wrong:
-        show_wrong(given["text"], found.checked.wrong)
+        show_wrong(given.text, found.checked.wrong)
         return 1
     assert found.seconds is not None
     before, after = found.seconds
     whole = bool(form.table.lines.planner)
-    if given["as_json"]:
+    if given.as_json:
         contents = {
             "schema": "cornersmooth-time/1",
             "seconds": {"unsmoothed": before, "as_written": after},
@@ -88,10 +88,10 @@ def time_of_program(data: bytes, name: str, given: dict[str, Any]) -> int:
             "smoothed": found.smoothed,
         }
         say_json(contents)
-    elif not given["quiet"]:
+    elif not given.quiet:
         say_line(f"{before:>12.3f} s  {name} as it is")
         share = f" ({100.0 * (after / before - 1.0):+.1f} %)" if before else ""
-        say_line(f"{after:>12.3f} s  {given['text'] or 'smoothed'}{share}")
+        say_line(f"{after:>12.3f} s  {given.text or 'smoothed'}{share}")
         what = "the whole program" if whole else "the runs that differ, without rapids"
         say_line(f"of {what}; {found.smoothed:,} of {found.cuts:,} cuts differ")
     return 0

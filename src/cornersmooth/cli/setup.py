@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import click
-
-from cornersmooth.cli import completing
+from cornersmooth.cli.command import new_command
 from cornersmooth.cli.files import read_input
-from cornersmooth.cli.headings import flag, option
-from cornersmooth.cli.options import motion, nc_text, outputs, reading, smoothing
-from cornersmooth.cli.options.parameters import PATH
-from cornersmooth.cli.shop import ShopCommand
+from cornersmooth.cli.headings import EXIT_CODES_OF_READERS
+from cornersmooth.cli.options import FEED_OF_ALL, LIMITS, LINES, READING, Options
 from cornersmooth.cli.show import progress_bar, say_json, say_line
+from cornersmooth.cli.values import (
+    control_of,
+    limits_of,
+    machine_of,
+    reading_of,
+    settings_of,
+)
 
 if TYPE_CHECKING:
     from cornersmooth.model import Floats
@@ -22,51 +25,22 @@ if TYPE_CHECKING:
 #: savings of less are none, %
 _WORTH = 0.1
 
-limits = option(
-    "Everyday",
-    "--limits",
-    required=True,
-    metavar="NAME|FILE",
-    shell_complete=completing.machines,
-    help="Machine that the program runs on: a name that 'cornersmooth machines' lists (its numbers are examples), or a "
-    "TOML file with [dynamics.X] and so on.",
-)
-tilt = option(
-    "Limits",
-    "--tilt",
-    type=click.FloatRange(0.0, 90.0),
-    default=45.0,
-    metavar="DEG",
-    help="Largest tilt about X and about Y, either way; 0 for none.",
-)
-no_turn = flag(
-    "Limits", "--no-turn", help="Do not turn the part about Z. A table that turns without end does that itself."
-)
-plans = option("Limits", "--plans", type=click.IntRange(min=1), default=6, help="Setups that are planned as written.")
 
-
-@click.command(
+@new_command(
     "setup",
-    cls=ShopCommand,
-    epilog="Exit codes: 0 done; 2 wrong usage or configuration; 3 input cannot be read or is not valid.",
+    "IN",
+    "limits tolerance axis_length axis_tolerance control form tilt no_turn plans "
+    f"{LIMITS} method {LINES} {READING} as_json quiet",
+    epilog=EXIT_CODES_OF_READERS,
+    feed=FEED_OF_ALL,
+    limits={
+        "heading": "Everyday",
+        "required": True,
+        "help": "Machine that the program runs on: a name that 'cornersmooth machines' lists (its numbers are "
+        "examples), or a TOML file with [dynamics.X] and so on.",
+    },
 )
-@click.argument("source", type=PATH, metavar="IN")
-@limits
-@smoothing.tolerance
-@smoothing.axis_length
-@smoothing.axis_tolerance
-@nc_text.control
-@nc_text.form
-@tilt
-@no_turn
-@plans
-@motion.limit_options
-@smoothing.method
-@smoothing.line_options
-@reading.reading_options
-@outputs.as_json
-@outputs.quiet
-def command(source: str, **given: Any) -> int:
+def command(given: Options) -> int:
     """Find how to clamp the part of the CL file IN so that its program takes the least time.
 
     The part is turned about Z and tilted about X and Y of the machine. Many setups are estimated; the best are
@@ -84,24 +58,24 @@ def command(source: str, **given: Any) -> int:
     from cornersmooth.processes import useful_processes
     from cornersmooth.setup import find_setups
 
-    machine = nc_text.machine_of(given, "limits")
-    form = choose_form(nc_text.control_of(given), given["form"], machine=machine)
-    data, name = read_input(source, size_limit=not given["no_size_limit"])
-    with progress_bar(given["quiet"]) as progress:
+    machine = machine_of(given.limits)
+    form = choose_form(control_of(given), given.form, machine=machine)
+    data, name = read_input(given.source, size_limit=not given.no_size_limit)
+    with progress_bar(given.quiet) as progress:
         found = find_setups(
-            read(data, name=name, **reading.reading_of(given)),
+            read(data, name=name, **reading_of(given)),
             form,
-            smoothing.settings_of(given),
-            motion.limits_of(given),
-            tilt=given["tilt"],
-            turns=not given["no_turn"],
-            plans=given["plans"],
+            settings_of(given),
+            limits_of(given),
+            tilt=given.tilt,
+            turns=not given.no_turn,
+            plans=given.plans,
             processes=useful_processes(),
             progress=progress,
         )
-    if given["as_json"]:
+    if given.as_json:
         say_json(found.as_dict())
-    elif not given["quiet"]:
+    elif not given.quiet:
         for line in _lines(found, "the machine" if machine is None else machine.name):
             say_line(line)
     return 0

@@ -1,4 +1,4 @@
-"""``cornersmooth smooth``: CL files in, NC text and reports out."""
+"""``cornersmooth smooth``: CL files in, NC programs and reports out."""
 
 from __future__ import annotations
 
@@ -6,17 +6,18 @@ import os
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 import click
 
 from cornersmooth.cli.batch import Batch
+from cornersmooth.cli.command import new_command
 from cornersmooth.cli.files import STANDARD, check_inputs, check_path, read_lines
-from cornersmooth.cli.inputs import Input, check_together, find_inputs, named_input
+from cornersmooth.cli.headings import EXIT_CODES_OF_WRITERS
+from cornersmooth.cli.inputs import Input, check_together, find_inputs
 from cornersmooth.cli.job import Job, Outcome, run_job
-from cornersmooth.cli.options import motion, nc_text, outputs, reading, smoothing, surface
-from cornersmooth.cli.options.parameters import PATH
-from cornersmooth.cli.shop import ShopCommand, command_line, loosened
+from cornersmooth.cli.options import CURVES, LINES, PLANNED, READING, WRITING, Options
+from cornersmooth.cli.shop import command_line, loosened
 from cornersmooth.cli.show import (
     more,
     print_line,
@@ -28,57 +29,29 @@ from cornersmooth.cli.show import (
     show_verdict,
     warn,
 )
-from cornersmooth.cli.shutdown import Shutdown
 from cornersmooth.cli.summary import batch_report, check_summary, end_lines, interrupted_line, line_of, write_summary
+from cornersmooth.cli.values import form_of, machine_of, planned_limits_of, settings_of
 from cornersmooth.errors import printable
 from cornersmooth.output import make_folder
 from cornersmooth.verdict import Verdict
 
 if TYPE_CHECKING:
-    from cornersmooth.nc import Form, Frame
+    from cornersmooth.cli.shutdown import Shutdown
+    from cornersmooth.nc import Frame
 
 #: files named in a warning
 _NAMED = 3
 
 
-@click.command(
+@new_command(
     "smooth",
-    cls=ShopCommand,
-    epilog="Exit codes: 0 done; 1 the program FAILED, or is not PASSED under --strict; 2 wrong usage or configuration; "
-    "3 input cannot be read or is not valid; 4 output cannot be written. With several inputs: that of the worst.",
+    "IN...",
+    "tolerance output form axis_length axis_tolerance directory glob skip_existing summary jobs scheduler reports "
+    f"as_json tool {WRITING} method {CURVES} {LINES} feed feed_from_plan {PLANNED} limits time "
+    f"{READING} tool_number spindle no_verify strict force quiet verbose",
+    epilog=f"{EXIT_CODES_OF_WRITERS} With several inputs: that of the worst.",
 )
-@click.argument("inputs", type=PATH, nargs=-1, required=True, metavar="IN...")
-@smoothing.tolerance
-@outputs.output
-@nc_text.form
-@smoothing.axis_length
-@smoothing.axis_tolerance
-@outputs.directory
-@outputs.glob
-@outputs.skip_existing
-@outputs.summary
-@outputs.jobs
-@outputs.scheduler
-@outputs.reports
-@outputs.as_json
-@surface.tool
-@nc_text.writing_options
-@smoothing.method
-@smoothing.curve_options
-@smoothing.line_options
-@reading.feed
-@motion.planned_feed_options
-@motion.limits
-@motion.planned_time
-@reading.reading_options
-@reading.tool_options
-@nc_text.no_verify
-@nc_text.strict
-@outputs.force
-@outputs.quiet
-@outputs.verbose
-@click.pass_obj
-def command(ending: Shutdown, /, inputs: tuple[str, ...], **given: Any) -> int:
+def command(given: Options) -> int:
     """Round the corners of the CL files IN and write NC programs.
 
     IN is an APT/CL file (NX, CATIA, Creo, ...) or a table of points (x y z i j k, or two points); - is standard input.
@@ -97,46 +70,33 @@ def command(ending: Shutdown, /, inputs: tuple[str, ...], **given: Any) -> int:
       cornersmooth smooth cl/ -e 0.04 -d nc/ -j --summary made.csv
       cat part.cls | cornersmooth smooth - -e 0.04 > part.nc
     """
-    jobs = _make_jobs(inputs, given)
-    quiet, verbose = given["quiet"], given["verbose"]
-    if len(jobs) == 1 and not given["directory"]:
-        check_inputs(jobs[0].source)
-        with progress_bar(quiet or (jobs[0].target == STANDARD and _to_terminal())) as progress:  # a bar eats lines
-            outcome = run_job(jobs[0], progress)
-        if outcome.held_back and not quiet:
-            print_line(f"... {more(outcome.held_back, 'line')}; -o FILE writes them, -o - shows them all")
-        told = outcome.contents and not quiet and not given["as_json"]
-        if told:
-            show_verdict(outcome.contents, outcome.saving)
-        _tell(outcome, quiet, verbose, alone=True)
-        if outcome.contents and given["as_json"]:
-            say_json(outcome.contents)
-        if told:
-            show_summary(outcome.contents, outcome.seconds, verbose)
-        return outcome.exit_code
+    jobs = _make_jobs(given)
+    if len(jobs) == 1 and not given.directory:
+        return _alone(jobs[0])
+    ending: Shutdown = click.get_current_context().obj
     worst = 0
-    with progress_bar(quiet, rate=True) as progress:
-        batch = Batch(jobs, given["jobs"], progress, scheduler=given["scheduler"] or "")
+    with progress_bar(given.quiet, rate=True) as progress:
+        batch = Batch(jobs, given.jobs, progress, scheduler=given.scheduler or "")
 
         def keep() -> None:
-            if given["summary"]:
-                write_summary(given["summary"], batch.rows())
+            if given.summary:
+                write_summary(given.summary, batch.rows())
 
         def lines() -> Iterator[str]:
-            if not quiet:
+            if not given.quiet:
                 yield from map(printable, end_lines(batch.rows()))
 
         ending.keep = keep
         ending.say = lambda: "\n".join((*lines(), interrupted_line(batch.rows())))
         for outcome in batch.run(ending):
-            told = outcome.status != "error" and not quiet and (progress is None or verbose > 0)
+            told = outcome.status != "error" and not given.quiet and (progress is None or given.verbose > 0)
             if told:
                 print_line(line_of(outcome))
-            _tell(outcome, quiet, verbose, told)
+            _tell(outcome, told)
             worst = max(worst, outcome.exit_code)
     ending.keep = None
     keep()
-    if given["as_json"]:
+    if given.as_json:
         say_json(batch_report(batch.rows()))
     else:
         for line in lines():
@@ -144,142 +104,135 @@ def command(ending: Shutdown, /, inputs: tuple[str, ...], **given: Any) -> int:
     return worst
 
 
-def _tell(outcome: Outcome, quiet: bool, verbose: int, told: bool = False, *, alone: bool = False) -> None:
+def _alone(job: Job) -> int:
+    """Do the only job; return the exit code."""
+    given = job.given
+    check_inputs(job.source)
+    with progress_bar(given.quiet or (job.target == STANDARD and _to_terminal())) as progress:  # a bar eats lines
+        outcome = run_job(job, progress)
+    if outcome.held_back and not given.quiet:
+        print_line(f"... {more(outcome.held_back, 'line')}; -o FILE writes them, -o - shows them all")
+    told = outcome.contents and not given.quiet and not given.as_json
+    if told:
+        show_verdict(outcome.contents, outcome.saving)
+    _tell(outcome)
+    if outcome.contents and given.as_json:
+        say_json(outcome.contents)
+    if told:
+        show_summary(outcome.contents, outcome.seconds, given.verbose)
+    return outcome.exit_code
+
+
+def _tell(outcome: Outcome, told: bool = False) -> None:
     """Print what went wrong and what was noticed; where no line has told the verdict, any but a plain PASSED."""
+    job, given = outcome.job, outcome.job.given
     if outcome.message:
         print_message(outcome.message)
     elif (
         not told
-        and (quiet or outcome.job.batch)
-        and (outcome.verdict not in ("", Verdict.PASSED) or (outcome.contents and outcome.job.loosened))
+        and (given.quiet or job.batch)
+        and (outcome.verdict not in ("", Verdict.PASSED) or (outcome.contents and job.loosened))
     ):
-        print_line(f"{outcome.job.source}: {outcome.verdict_text}")
-    if outcome.contents and not quiet:
+        print_line(f"{job.source}: {outcome.verdict_text}")
+    if outcome.contents and not given.quiet:
         findings = outcome.contents["findings"]
-        if alone:  # the verdict has told what is to be checked
+        if not job.batch:  # the verdict has told what is to be checked
             findings = [finding for finding in findings if not finding["to_check"]]
-        show_findings(outcome.job.source, findings, verbose)
+        show_findings(job.source, findings, given.verbose)
 
 
-def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
+def _make_jobs(given: Options) -> list[Job]:
     """One job for every input, all of them checked for names that clash."""
     from cornersmooth.nc import fit_settings
-    from cornersmooth.settings import TIMED_POSES
 
-    folder, output = given["directory"], given["output"]
-    _check_usage(inputs, given)
-    files = find_inputs(inputs, given["glob"]) if folder else [named_input(path) for path in inputs]
+    folder = given.directory
+    _check_usage(given)
+    files = find_inputs(given)
     _check_side_outputs(files, given)
-    settings, form, frame = smoothing.settings_of(given), _form(given), _frame(given)
+    settings, form, frame = settings_of(given), form_of(given), _frame(given)
     fit_settings(settings, form, "mm")  # refuses wrong ones before any file is touched
-    jobs = []
-    for found in files:
-        target = os.path.join(folder, found.stem + form.table.layout.suffix) if folder else output or STANDARD
-        jobs.append(
-            Job(
-                source=found.path,
-                target=target,
-                reports=tuple(path.replace("{stem}", found.stem) for path in given["reports"]),
-                reading=reading.reading_of(given),
-                settings=settings,
-                form=form,
-                frame=replace(frame, stem="" if found.path == STANDARD else os.path.basename(found.stem)),
-                feed=given["feed"],
-                plan_feeds=motion.planned_limits_of(given),
-                force=given["force"],
-                verify=not given["no_verify"],
-                strict=given["strict"],
-                alone=len(files) == 1,
-                batch=bool(folder),
-                skip_existing=given["skip_existing"],
-                tool=given["tool"],
-                beginning=not folder and not output and _to_terminal(),
-                plan=sys.maxsize if given["time"] else TIMED_POSES,
-                timed=given["time"] or not (given["quiet"] or folder),
-                axes=nc_text.machine_of(given, "limits"),
-                loosened=loosened(settings.tolerance),
-                command=command_line(),
-            )
+    jobs = [
+        Job(
+            source=found.path,
+            target=os.path.join(folder, found.stem + form.table.layout.suffix) if folder else given.output or STANDARD,
+            reports=tuple(path.replace("{stem}", found.stem) for path in given.reports),
+            given=given,
+            settings=settings,
+            form=form,
+            frame=replace(frame, stem="" if found.path == STANDARD else os.path.basename(found.stem)),
+            plan_feeds=planned_limits_of(given),
+            alone=len(files) == 1,
+            beginning=not folder and not given.output and _to_terminal(),
+            axes=machine_of(given.limits),
+            loosened=loosened(settings.tolerance),
+            command=command_line(),
         )
+        for found in files
+    ]
     _check_targets(jobs)
-    _check_against_inputs(jobs)
-    if not given["quiet"]:
+    if not given.quiet:
         _tell_same_programs(jobs)
     if folder:
         make_folder(folder)
     return jobs
 
 
-def _check_usage(inputs: tuple[str, ...], given: dict[str, Any]) -> None:
+def _check_usage(given: Options) -> None:
     """Refuse options that do not go together, or not with so many inputs."""
-    folder = given["directory"]
-    check_together(inputs, given)
-    if given["as_json"] and not folder and given["output"] in (None, STANDARD):
+    folder = given.directory
+    check_together(given)
+    if given.as_json and not folder and given.output in (None, STANDARD):
         raise click.UsageError("--json needs -o FILE or -d FOLDER: standard output is for the JSON object")
-    if given["summary"] and not folder:
+    if given.summary and not folder:
         raise click.UsageError("--summary is for batches, which need -d FOLDER; --report tells of a single file")
-    if given["scheduler"] and (not folder or given["jobs"] != 1):
+    if given.scheduler and (not folder or given.jobs != 1):
         raise click.UsageError("--scheduler is for batches, which need -d FOLDER and take no -j")
-    if given["feed"] is not None and not 0.0 < given["feed"] < 1e6:
+    if given.feed is not None and not 0.0 < given.feed < 1e6:
         raise click.UsageError("--feed must be a positive number of mm/min")
 
 
-def _check_side_outputs(files: list[Input], given: dict[str, Any]) -> None:
+def _check_side_outputs(files: list[Input], given: Options) -> None:
     """Refuse a summary or reports that cannot be written for these files."""
-    if given["summary"]:
-        check_summary(given["summary"])
-        check_path(given["summary"], [found.path for found in files], force=True)
-    if len(files) > 1 and any("{stem}" not in path for path in given["reports"]):
+    if given.summary:
+        check_summary(given.summary)
+        check_path(given.summary, [found.path for found in files], force=True)
+    if len(files) > 1 and any("{stem}" not in path for path in given.reports):
         raise click.UsageError("with several inputs a report needs {stem} in its name, as in 'out/{stem}.json'")
 
 
-def _form(given: dict[str, Any]) -> Form:
-    """Form of the control."""
-    from cornersmooth.nc import choose_form
-
-    machine = nc_text.machine_of(given)
-    return choose_form(
-        nc_text.control_of(given),
-        given["form"],
-        machine=machine,
-        tcp=not given["no_tcp"],
-        extras=given["extras"],
-        digits=given["digits"],
-        rewind=given["rewind"] or 0.0,
-        planes=given["planes"] == "tilted",
-    )
-
-
-def _frame(given: dict[str, Any]) -> Frame:
+def _frame(given: Options) -> Frame:
     """What stands around the motion, with the texts of header and footer."""
     from cornersmooth.nc import Frame
 
     return Frame(
-        given["program_name"],
-        given["block_numbers"],
-        header=read_lines(given["header"]) if given["header"] else (),
-        footer=read_lines(given["footer"]) if given["footer"] else (),
-        comments=not given["no_comments"],
-        skip_cycles=given["skip_cycles"],
-        cycles=given["cycles"],
-        modal=given["modal"],
-        line_ends=given["line_ends"],
-        approach=given["approach"] or 0.0,
-        retract=given["retract"] or 0.0,
-        work_offset="" if given["work_offset"] == "none" else given["work_offset"],
+        given.program_name,
+        given.block_numbers,
+        header=read_lines(given.header) if given.header else (),
+        footer=read_lines(given.footer) if given.footer else (),
+        comments=not given.no_comments,
+        skip_cycles=given.skip_cycles,
+        cycles=given.cycles,
+        modal=given.modal,
+        line_ends=given.line_ends,
+        approach=given.approach or 0.0,
+        retract=given.retract or 0.0,
+        work_offset="" if given.work_offset == "none" else given.work_offset,
     )
 
 
 def _check_targets(jobs: list[Job]) -> None:
-    """Refuse two outputs of one name."""
+    """Refuse two outputs of one name, and outputs of one job that are the input of another."""
+    sources = [job.source for job in jobs]
+    names = {name for source in sources for name in _names(source)}
     by_target: dict[str, Job] = {}
     for job in jobs:
-        for path in (job.target, *job.reports):
-            if path == STANDARD:
-                continue
-            if path in by_target:
-                _refuse_clash(by_target[path], job, path)
-            by_target[path] = job
+        real = [os.path.realpath(path) for path in job.outputs]
+        for path, place in zip(job.outputs, real, strict=True):
+            other = by_target.setdefault(place, job)
+            if other is not job or real.count(place) > 1:
+                _refuse_clash(other, job, path)
+            if not names.isdisjoint(_names(path)):
+                check_path(path, sources, force=True)
 
 
 def _tell_same_programs(jobs: list[Job]) -> None:
@@ -305,15 +258,6 @@ def _refuse_clash(one: Job, other: Job, path: str) -> NoReturn:
     raise click.UsageError(
         f"{one.source} and {other.source} would both be written to {path}; rename one, or give each a -d of its own"
     )
-
-
-def _check_against_inputs(jobs: list[Job]) -> None:
-    """No output of one job may be the input of another."""
-    sources = {name for job in jobs for name in _names(job.source)}
-    for job in jobs:
-        for path in (job.target, *job.reports):
-            if path != STANDARD and not sources.isdisjoint(_names(path)):
-                check_path(path, [other.source for other in jobs], force=True)
 
 
 def _names(path: str) -> list[object]:

@@ -7,11 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from cornersmooth.cli.command import new_command
 from cornersmooth.cli.files import STANDARD, check_inputs, check_reports, read_input, suffix_of, write_report
-from cornersmooth.cli.options import nc_text, outputs, reading, smoothing, surface
-from cornersmooth.cli.options.parameters import PATH
-from cornersmooth.cli.shop import ShopCommand
+from cornersmooth.cli.options import READING, Options
 from cornersmooth.cli.show import say_json, say_line
+from cornersmooth.cli.values import (
+    control_of,
+    reading_back_of,
+    reading_of,
+)
 from cornersmooth.errors import SettingsError
 from cornersmooth.verdict import Verdict
 
@@ -20,28 +24,16 @@ if TYPE_CHECKING:
     from cornersmooth.surface import SurfaceMap, Tool
 
 
-@click.command(
+@new_command(
     "surface",
-    cls=ShopCommand,
+    "IN NC",
+    f"tolerance axis_length tool stations levels control machine no_tcp {READING} reports as_json force quiet",
     epilog="Exit codes: 0 the surface is within the tolerance; 1 it is not; 2 wrong usage or configuration; 3 an input "
     "cannot be read or is not valid; 4 output cannot be written.",
+    reports="Write what was found: .json, .csv for a row per point, .html, or a map: .png, .svg, .pdf. May be "
+    "repeated.",
 )
-@click.argument("source", type=PATH, metavar="IN")
-@click.argument("text", type=PATH, metavar="NC")
-@smoothing.tolerance
-@smoothing.axis_length
-@surface.tool
-@surface.stations
-@surface.levels
-@nc_text.control
-@nc_text.machine
-@nc_text.no_tcp
-@reading.reading_options
-@outputs.surface_reports
-@outputs.as_json
-@outputs.force
-@outputs.quiet
-def command(source: str, text: str, **given: Any) -> int:
+def command(given: Options) -> int:
     """Measure the surface that the NC program NC leaves against that of the CL file IN.
 
     Points are taken on the envelope of the original motion of the tool, up to the length of its cutting edge (-H). At
@@ -59,30 +51,31 @@ def command(source: str, text: str, **given: Any) -> int:
     from cornersmooth.report.surface import surface_lines
     from cornersmooth.surface import measure_surface
 
+    source, text = given.source, given.text
     if source == text == STANDARD:
         raise click.UsageError("only one of the inputs can be standard input")
     check_inputs(source, text)
-    check_reports(given["reports"], ".json, .csv, .html, .png, .svg, .pdf", [source, text], force=given["force"])
-    how = nc_text.reading_back_of(given)
-    data, name = read_input(source, size_limit=not given["no_size_limit"])
-    program = read(data, name=name, **reading.reading_of(given))
-    tool = _tool(program, given["tool"])
+    check_reports(given.reports, ".json, .csv, .html, .png, .svg, .pdf", [source, text], force=given.force)
+    how = reading_back_of(given)
+    data, name = read_input(source, size_limit=not given.no_size_limit)
+    program = read(data, name=name, **reading_of(given))
+    tool = _tool(program, given.tool)
     written = read_input(text)[0] if text == STANDARD else text
-    nc = read_nc(written, tolerance=given["tolerance"], axis_length=given["axis_length"], **how)
+    nc = read_nc(written, tolerance=given.tolerance, axis_length=given.axis_length, **how)
     found = measure_surface(
         program,
         nc,
         tool,
-        tolerance=given["tolerance"],
-        edge=given["axis_length"],
-        levels=given["levels"],
-        stations=given["stations"],
+        tolerance=given.tolerance,
+        edge=given.axis_length,
+        levels=given.levels,
+        stations=given.stations,
     )
-    for path in given["reports"]:
+    for path in given.reports:
         write_report(path, _report(suffix_of(path), program, data, written, nc, found, given))
-    if given["as_json"]:
+    if given.as_json:
         say_json(found.as_dict())
-    elif not given["quiet"]:
+    elif not given.quiet:
         say_line(
             f"{Verdict.of(problems=not found.kept)}: the surface is {'' if found.kept else 'not '}within the tolerance"
         )
@@ -110,7 +103,7 @@ def _tool(program: Program, asked: Tool | None) -> Tool:
 
 
 def _report(
-    form: str, program: Program, source: bytes, written: bytes | str, nc: Any, found: SurfaceMap, given: dict[str, Any]
+    form: str, program: Program, source: bytes, written: bytes | str, nc: Any, found: SurfaceMap, given: Options
 ) -> Iterator[str | bytes]:
     from cornersmooth.report import report_json
     from cornersmooth.report.surface import draw_surface, surface_csv
@@ -123,9 +116,9 @@ def _report(
         from cornersmooth.page import verified_page
         from cornersmooth.verify import verify
 
-        how = {"tolerance": given["tolerance"], "axis_length": given["axis_length"], **nc_text.reading_back_of(given)}
+        how = {"tolerance": given.tolerance, "axis_length": given.axis_length, **reading_back_of(given)}
         checked = verify(program, written, **how)
-        name, control = written if isinstance(written, str) else "", nc_text.control_of(given).name
+        name, control = written if isinstance(written, str) else "", control_of(given).name
         yield verified_page(program, nc, checked, name=name, control=control, source=source, surface=found)
     else:
         yield draw_surface(found, form[1:])

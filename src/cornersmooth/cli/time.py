@@ -2,26 +2,34 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import click
 
-from cornersmooth.cli.files import check_inputs, check_path, read_input, target_of
-from cornersmooth.cli.options import motion, nc_text, outputs, reading, smoothing, surface
-from cornersmooth.cli.options.parameters import PATH
-from cornersmooth.cli.shop import ShopCommand
+from cornersmooth.cli.command import new_command
+from cornersmooth.cli.files import check_inputs, check_path, read_head, target_of
+from cornersmooth.cli.headings import EXIT_CODES_OF_READERS
+from cornersmooth.cli.options import CURVES, FEED_OF_ALL, LIMITS, READING, Options
 from cornersmooth.cli.show import print_message, progress_bar, say_json, say_line
+from cornersmooth.cli.values import (
+    control_of,
+    form_of,
+    limits_of,
+    machine_of,
+    read_source,
+    reading_back_of,
+    reading_of,
+    settings_of,
+)
 from cornersmooth.errors import message
 from cornersmooth.methods import METHODS
 from cornersmooth.output import open_output
 
 if TYPE_CHECKING:
     from cornersmooth.feedrate import Comparison
-    from cornersmooth.model import Program, Units
-    from cornersmooth.nc import Form
-    from cornersmooth.settings import Settings
+    from cornersmooth.model import Program
 
 _TITLES = {
     "direct_exact_stop": "direct, exact stop",
@@ -32,39 +40,19 @@ _TITLES = {
 LAWS = tuple(_TITLES)
 
 
-@click.command(
+@new_command(
     "time",
-    cls=ShopCommand,
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
-    epilog="Exit codes: 0 done; 2 wrong usage or configuration; 3 input cannot be read or is not valid; "
-    "4 output cannot be written.",
+    "IN",
+    f"tolerance axis_length axis_tolerance {LIMITS} control form machine method limits text text_machine block_time "
+    f"look_ahead {CURVES} {READING} tip_control as_json law csv reports tool force quiet verbose",
+    epilog=EXIT_CODES_OF_READERS,
+    feed=FEED_OF_ALL,
+    block_time="Shortest time that the control takes for one block, of lines to write and in the plan. [default: that "
+    "of the control's table for lines, none in the plan]",
+    csv="Write the motion, a row every period.",
+    reports="Write a page to look at: .html. May be repeated.",
 )
-@click.argument("source", type=PATH, metavar="IN")
-@smoothing.tolerance
-@smoothing.axis_length
-@smoothing.axis_tolerance
-@motion.limit_options
-@nc_text.control
-@nc_text.form
-@nc_text.machine
-@smoothing.method
-@motion.limits
-@motion.text
-@motion.text_machine
-@motion.block_time
-@motion.look_ahead
-@smoothing.curve_options
-@reading.reading_options
-@reading.tip_control
-@outputs.as_json
-@motion.law
-@motion.motion_csv
-@outputs.page_reports
-@surface.tool
-@outputs.force
-@outputs.quiet
-@outputs.verbose
-def command(source: str, **given: Any) -> int:
+def command(given: Options) -> int:
     """Plan the CL file IN as it is and the program that the options write, under the same limits.
 
     The path of the CL file is planned twice: with a stop at the end of every move, and without. At corners, the
@@ -84,137 +72,118 @@ def command(source: str, **given: Any) -> int:
       cornersmooth time part.ngc --control linuxcnc --machine xyzac-trt
     """
     from cornersmooth.cli.programs import time_of_program
-    from cornersmooth.nc_reader.recognition import first_block
-    from cornersmooth.provenance import HEAD
 
-    for path in given["reports"]:
+    for path in given.reports:
         if not path.lower().endswith(".html"):
             raise click.UsageError(f"--report {path}: let the name end in .html")
-    inputs = [source, given["text"]] if given["text"] else [source]
+    inputs = [given.source, given.text] if given.text else [given.source]
     check_inputs(*inputs)
-    for path in (given["csv"], *given["reports"]):
-        if path:
-            check_path(path, inputs, force=given["force"])
-    data, name = read_input(source, size_limit=not given["no_size_limit"])
-    is_program = bool(first_block(data[:HEAD]))
-    reading.check_kind(given, program=is_program)
+    for path in filter(None, (given.csv, *given.reports)):
+        check_path(path, inputs, force=given.force)
+    data, name, is_program = read_source(given)
     if is_program:
-        if given["csv"] or given["reports"]:
+        if given.csv or given.reports:
             raise click.UsageError("--csv and --report: of an NC program only the times are told")
         return time_of_program(data, name, given)
-    control = nc_text.control_of(given)
+    control = control_of(given)
     if control.lines.planner:
-        if given["csv"] or given["reports"]:
+        if given.csv or given.reports:
             raise click.UsageError(
                 f"--csv and --report: {control.name} plans by a law of its own, which gives times only"
             )
         return _by_own_law(data, name, given)
     compared = _compare(data, name, given)
-    if given["reports"]:
+    if given.reports:
         from cornersmooth.page import times_page
 
-        page = times_page(compared, source=data, tool=given["tool"]).encode("utf-8")
-        for path in given["reports"]:
+        page = times_page(compared, source=data, tool=given.tool).encode("utf-8")
+        for path in given.reports:
             with open_output(target_of(path)) as output:
                 output.stream.write(page)
-    if given["csv"]:
+    if given.csv:
         from cornersmooth.report.timelaw import timelaw_csv
 
-        with open_output(target_of(given["csv"])) as output:
-            for text in timelaw_csv(compared.laws[given["law"]]):
+        with open_output(target_of(given.csv)) as output:
+            for text in timelaw_csv(compared.laws[given.law]):
                 output.stream.write(text.encode("utf-8"))
-    if given["as_json"]:
+    if given.as_json:
         say_json(compared.as_dict())
-    elif not given["quiet"]:
-        for line in _tables(compared, bool(given["verbose"])):
+    elif not given.quiet:
+        for line in _tables(compared, bool(given.verbose)):
             say_line(line)
     return 0
 
 
-def _compare(data: bytes, name: str, given: dict[str, Any]) -> Comparison:
+def _compare(data: bytes, name: str, given: Options) -> Comparison:
+    from cornersmooth.cl import read
     from cornersmooth.feedrate import BlockLimits, compare, plan_text
-    from cornersmooth.methods import METHODS
+    from cornersmooth.nc import fit_settings
     from cornersmooth.nc_reader import read_nc
     from cornersmooth.pipeline import read_back
     from cornersmooth.saving import with_feed, without_holes, written_text
 
-    machine, axes = nc_text.machine_of(given), nc_text.machine_of(given, "limits")
+    machine, axes = machine_of(given.machine), machine_of(given.limits)
     axes = machine if axes is None else axes
-    limits, settings = motion.limits_of(given), smoothing.settings_of(given)
-    program = _read(data, name, given)
-    if given["text"]:  # before anything that takes long
-        how = nc_text.reading_back_of(given | _how_text_was_made(given))
-        nc = read_nc(given["text"], **how, tolerance=settings.tolerance, axis_length=settings.axis_scale)
+    limits, settings = limits_of(given), settings_of(given)
+    program = read(data, name=name, **reading_of(given))
+    if given.text:  # before anything that takes long
+        how = reading_back_of(_as_text_was_made(given))
+        nc = read_nc(given.text, **how, tolerance=settings.tolerance, axis_length=settings.axis_scale)
     else:
-        form, fitted = _form(given, program.units)
-        nc = read_back(written_text(without_holes(with_feed(program, given["feed"])), fitted, form), form, fitted)
-    if not given["quiet"]:
-        _tell_feeds(program, given["feed"])
-    everything = given["verbose"] or given["reports"]
-    methods = tuple(METHODS) if everything else tuple(name for name in METHODS if name == given["law"])
-    with progress_bar(given["quiet"]) as progress:
+        form = form_of(given)
+        fitted = fit_settings(settings, form, program.units)
+        nc = read_back(written_text(without_holes(with_feed(program, given.feed)), fitted, form), form, fitted)
+    if not given.quiet:
+        _tell_feeds(program, given.feed)
+    everything = given.verbose or given.reports
+    methods = tuple(METHODS) if everything else tuple(name for name in METHODS if name == given.law)
+    with progress_bar(given.quiet) as progress:
         compared = compare(program, settings, limits, methods=methods, machine=axes, progress=progress)
-        blocks = BlockLimits(given["block_time"] or 0.0, given["look_ahead"])
-        law = plan_text(nc, limits, name=given["text"] or name, blocks=blocks, settings=settings, machine=axes)
+        blocks = BlockLimits(given.block_time or 0.0, given.look_ahead)
+        law = plan_text(nc, limits, name=given.text or name, blocks=blocks, settings=settings, machine=axes)
         return compared.with_text(law)
 
 
-def _read(data: bytes, name: str, given: dict[str, Any]) -> Program:
-    from cornersmooth.cl import read
-
-    return read(data, name=name, **reading.reading_of(given))
-
-
-def _form(given: dict[str, Any], units: Units) -> tuple[Form, Settings]:
-    """Form that the options ask for, and the settings that fit it."""
-    from cornersmooth.nc import choose_form, fit_settings
-
-    form = choose_form(nc_text.control_of(given), given["form"], machine=nc_text.machine_of(given))
-    return form, fit_settings(smoothing.settings_of(given), form, units)
-
-
-def _by_own_law(data: bytes, name: str, given: dict[str, Any]) -> int:
+def _by_own_law(data: bytes, name: str, given: Options) -> int:
     """Times of a control that plans lines by a law of its own."""
+    from cornersmooth.cl import read
     from cornersmooth.comparing import law_of_lines
+    from cornersmooth.nc import fit_settings
     from cornersmooth.saving import Timing, with_feed, without_holes, written_text
 
-    program = without_holes(with_feed(_read(data, name, given), given["feed"]))
-    form, settings = _form(given, program.units)
-    timing = Timing.of(form, settings, axes=nc_text.machine_of(given, "limits"))
+    program = without_holes(with_feed(read(data, name=name, **reading_of(given)), given.feed))
+    form = form_of(given)
+    settings = fit_settings(settings_of(given), form, program.units)
+    timing = Timing.of(form, settings, axes=machine_of(given.limits))
     if timing is None:
         raise click.UsageError("name the machine with --machine; its table has to have [dynamics]")
-    if given["text"]:
-        with open(given["text"], "rb") as file:
+    if given.text:
+        with open(given.text, "rb") as file:
             text = file.read()
     else:
         text = written_text(program, settings, form)
     before, against = timing.unsmoothed(program)
     seconds = timing.written(text, program)[0]
-    if given["as_json"]:
+    if given.as_json:
         contents = {"seconds": {"unsmoothed": before, "as_written": seconds}, "unsmoothed": against}
         say_json({"schema": "cornersmooth-time/1", **contents, "law": law_of_lines(timing)})
-    elif not given["quiet"]:
+    elif not given.quiet:
         say_line(f"{before:>12.3f} s  {against}")
         say_line(f"{seconds:>12.3f} s  as written")
         say_line(law_of_lines(timing))
     return 0
 
 
-def _how_text_was_made(given: dict[str, Any]) -> dict[str, Any]:
-    """Machine and mode to read the text for: its own option, what its head says, the machine that is planned for."""
+def _as_text_was_made(given: Options) -> Options:
+    """Options to read the text by: the machine of its own option, else of its head, else the one planned for."""
     from cornersmooth.kinematics import machine_names
-    from cornersmooth.provenance import HEAD, read_provenance
+    from cornersmooth.provenance import read_provenance
 
-    made = None
-    if os.path.isfile(given["text"]):  # a pipe can be read once
-        with open(given["text"], "rb") as file:
-            made = read_provenance(file.read(HEAD))
-    no_tcp = made is not None and not made.tcp
-    if given["text_machine"] or made is None:
-        machine = given["text_machine"] or given["machine"]
-    else:  # a name that is not known is that of a file of the user's own
-        machine = made.machine if made.machine in ("", *machine_names()) else given["machine"]
-    return {"machine": machine or None, "no_tcp": no_tcp}
+    made = read_provenance(read_head(given.text))
+    machine = given.text_machine or given.machine
+    if made is not None and not given.text_machine and made.machine in ("", *machine_names()):
+        machine = made.machine or None  # another name is that of a file of the user's own
+    return replace(given, machine=machine, no_tcp=made is not None and not made.tcp)
 
 
 def _tell_feeds(program: Program, feed: float | None) -> None:

@@ -2,37 +2,41 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import os
-import stat
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from cornersmooth.cli.command import new_command, typed
 from cornersmooth.cli.files import (
     STANDARD,
     check_inputs,
     check_reports,
+    read_head,
     read_input,
     read_lines,
     suffix_of,
     write_report,
 )
-from cornersmooth.cli.options import nc_text, outputs, reading, smoothing, surface
-from cornersmooth.cli.options.parameters import PATH
-from cornersmooth.cli.shop import ShopCommand, command_line, loosened
+from cornersmooth.cli.options import READING, Options
+from cornersmooth.cli.shop import command_line, loosened
 from cornersmooth.cli.show import more, print_line, print_message, say_json, say_line, show_findings, warn
+from cornersmooth.cli.values import (
+    check_one_of_axis,
+    control_of,
+    read_source,
+    reading_back_of,
+    reading_of,
+)
 from cornersmooth.errors import SettingsError
 from cornersmooth.memory import return_large_arrays
 from cornersmooth.verdict import Verdict
 
 if TYPE_CHECKING:
     from cornersmooth.nc_reader import NcProgram, Problem
-    from cornersmooth.report import NcFile
-    from cornersmooth.report.deviation_profile import Distribution
     from cornersmooth.verify import Verification, Where
 
 #: problems shown without -v
@@ -45,34 +49,19 @@ _REWINDS_SHOWN = 5
 _ALIKE = 1e-9
 
 
-@click.command(
+@new_command(
     "verify",
-    cls=ShopCommand,
+    "IN NC",
+    "tolerance axis_length axis_tolerance control machine no_tcp trusted slower skip_cycles strict "
+    f"{READING} tool_number spindle tip_control reports as_json tool force quiet verbose",
     epilog="Exit codes: 0 PASSED or INCOMPLETE; 1 FAILED or NOT VERIFIED, and INCOMPLETE under --strict; "
     "2 wrong usage or configuration; 3 an input cannot be read or is not valid; 4 output cannot be written.",
+    strict="Take no verdict but PASSED: else 1 is returned.",
+    reports="Write what was found: .json for the results, .csv for a row per pose, .html for a page to look at. May be "
+    "repeated.",
+    verbose="More: every problem, and how large deviations are and where along the path.",
 )
-@click.argument("source", type=PATH, metavar="IN")
-@click.argument("text", type=PATH, metavar="NC")
-@smoothing.tolerance
-@smoothing.axis_length
-@smoothing.axis_tolerance
-@nc_text.control
-@nc_text.machine
-@nc_text.no_tcp
-@nc_text.trusted
-@nc_text.slower
-@nc_text.skip_cycles
-@nc_text.strict_verdict
-@reading.reading_options
-@reading.tool_options
-@reading.tip_control
-@outputs.found_reports
-@outputs.as_json
-@surface.tool
-@outputs.force
-@outputs.quiet
-@outputs.verbose_found
-def command(source: str, text: str, **given: Any) -> int:
+def command(given: Options) -> int:
     """Measure the NC program NC against the CL file IN, whoever wrote it.
 
     Tip and axis point must stay within the tolerance of their paths, in order; rapids, statements, feeds and exact
@@ -92,37 +81,37 @@ def command(source: str, text: str, **given: Any) -> int:
     from cornersmooth.cl import read
     from cornersmooth.cli.filter import verify_with_program
     from cornersmooth.nc import own_words
-    from cornersmooth.nc_reader.recognition import first_block
+    from cornersmooth.nc_reader import read_nc
     from cornersmooth.nc_reader.source import readable_twice
-    from cornersmooth.provenance import HEAD
-    from cornersmooth.report import findings_table, report_json
+    from cornersmooth.report import NcFile, findings_table, report_json
     from cornersmooth.report.deviation_profile import deviation_along
     from cornersmooth.report.record import cl_file, record, sha256_of
     from cornersmooth.report.verdict import judge, trusted_blocks
-    from cornersmooth.report.verification import verification_csv
+    from cornersmooth.report.verification import along_lines, histogram_lines, verification_csv
     from cornersmooth.settings import UNITS
     from cornersmooth.verify import useful_processes, verify
+    from cornersmooth.verify.task import length_of
 
+    source, text = given.source, given.text
     if source == text == STANDARD:
         raise click.UsageError("only one of the inputs can be standard input")
     return_large_arrays()
     check_inputs(source, text)
-    check_reports(given["reports"], ".json, .csv or .html", [source, text], force=given["force"])
-    data, name = read_input(source, size_limit=not given["no_size_limit"])
-    is_program = first_block(data[:HEAD])
-    reading.check_kind(given, program=bool(is_program))
+    check_reports(given.reports, ".json, .csv or .html", [source, text], force=given.force)
+    data, name, is_program = read_source(given)
     if is_program:
         return verify_with_program(name, data, text, given)
     nc: bytes | str | os.PathLike[str] = read_input(text)[0] if text == STANDARD else text
     head = _take_over(given, nc, data)
-    own = own_words(nc_text.control_of(given))
-    smoothing.check_one_of_axis(given)
-    reader = nc_text.reading_back_of(given)
-    measures = {name: given[name] for name in ("tolerance", "axis_length", "axis_tolerance")}
-    program = read(data, name=name, **reading.reading_of(given))
-    if given["verbose"] or given["reports"] or given["as_json"]:  # it is looked at more than once
+    given = head.given
+    check_one_of_axis(given)
+    control, reader = control_of(given), reading_back_of(given)
+    machine = reader["machine"]
+    measures = {name: getattr(given, name) for name in ("tolerance", "axis_length", "axis_tolerance")}
+    program = read(data, name=name, **reading_of(given))
+    if given.verbose or given.reports or given.as_json:  # it is looked at more than once
         nc = readable_twice(nc)
-    trusted = [line for path in given["trusted"] for line in read_lines(path)]
+    trusted = [line for path in given.trusted for line in read_lines(path)]
     if head.remark:  # first: what follows may be hard to understand without it
         warn(head.remark, text)
     found = verify(
@@ -130,23 +119,30 @@ def command(source: str, text: str, **given: Any) -> int:
         nc,
         **measures,
         **reader,
-        trusted=(*own, *trusted),
-        accepted=nc_text.control_of(given).trusted,
+        trusted=(*own_words(control), *trusted),
+        accepted=control.trusted,
         weights=head.weights,
-        slower=given["slower"],
-        skip_cycles=given["skip_cycles"],
+        slower=given.slower,
+        skip_cycles=given.skip_cycles,
         processes=useful_processes(),
     )
     found = replace(found, taken_from_head=head.taken).not_verified(*head.loose)
     if head.problem is not None:
         found = found.with_problem(head.problem)
     findings = (*program.findings, *trusted_blocks(found))
-    loose = loosened(given["tolerance"])
+    loose = loosened(given.tolerance)
     contents = record(
         "verify",
         judge(found, findings),
         source=cl_file(program, sha256_of(data)),
-        program=_nc_file(text, nc, head.form, given),
+        program=NcFile(
+            name=None if text == STANDARD else text,
+            sha256=sha256_of(nc) if isinstance(nc, bytes) or os.path.isfile(nc) else None,
+            control=control.name,
+            form=head.form,
+            machine=None if machine is None else machine.name,
+            tcp=not given.no_tcp,
+        ),
         settings={f"{name}_{UNITS[name]}": value for name, value in measures.items()},
         findings=findings,
         command=command_line(),
@@ -154,44 +150,49 @@ def command(source: str, text: str, **given: Any) -> int:
     )
     contents["verification"] = found.to_dict()
 
+    def read_again() -> NcProgram:
+        own = given.axis_tolerance
+        length = given.axis_length if own is None else length_of(given.tolerance, own)
+        return read_nc(nc, **reader, tolerance=given.tolerance, axis_length=length)
+
     def page() -> str:
         from cornersmooth.page import verified_page
 
-        control = nc_text.control_of(given)
         return verified_page(
             program,
-            _read_again(nc, given, reader),
+            read_again(),
             found,
             name=text if text != STANDARD else "",
             control=control.name,
             form=head.form or "",
             source=data,
-            machine=reader["machine"],
+            machine=machine,
             planner=control.lines.planner,
-            tool=given["tool"],
+            tool=given.tool,
         )
 
-    for path in given["reports"]:
+    for path in given.reports:
         form = suffix_of(path)
         table = verification_csv(program, found) if form == ".csv" else None
         write_report(path, table or [page() if form == ".html" else report_json(contents)])
-    for line in _problems(found, name, "<stdin>" if text == STANDARD else text, given["verbose"]):
+    for line in _problems(found, name, "<stdin>" if text == STANDARD else text, given.verbose):
         print_message(line)
     verdict = contents["verdict_text"]
-    if given["as_json"]:
+    if given.as_json:
         say_json(contents)
-    elif given["quiet"]:
+    elif given.quiet:
         if loose or found.verdict not in (Verdict.PASSED, Verdict.FAILED):
             print_line(f"{text}: {verdict}")
     else:
-        show_findings(name, findings_table(findings), given["verbose"])
+        show_findings(name, findings_table(findings), given.verbose)
         say_line(verdict)
         for line in _summary(found):
             say_line(line, indent=18)
-        if given["verbose"]:
-            for line in _along(found, deviation_along(program, _read_again(nc, given, reader), **measures)):
+        if given.verbose:
+            along = deviation_along(program, read_again(), **measures)
+            for line in ("", *histogram_lines(found), "", *along_lines(along, found.tolerance)):
                 say_line(line)
-    taken = (Verdict.PASSED,) if given["strict"] else (Verdict.PASSED, Verdict.INCOMPLETE)
+    taken = (Verdict.PASSED,) if given.strict else (Verdict.PASSED, Verdict.INCOMPLETE)
     return 0 if found.verdict in taken else 1
 
 
@@ -199,7 +200,8 @@ def command(source: str, text: str, **given: Any) -> int:
 class _Head:
     """What was taken from the head of a program."""
 
-    taken: tuple[str, ...] = ()  #: words that took the place of options that were not given
+    given: Options  #: with what took the place of options that were not typed
+    taken: tuple[str, ...] = ()  #: the words of it
     loose: tuple[str, ...] = ()  #: what is not verified because the program itself loosens the check
     weights: tuple[float, ...] | None = None  #: Weights of its curves; None for any.
     form: str | None = None  #: In which it was written; None where it does not say.
@@ -207,31 +209,29 @@ class _Head:
     problem: Problem | None = None
 
 
-def _take_over(given: dict[str, Any], nc: bytes | str | os.PathLike[str], source: bytes) -> _Head:
+def _take_over(given: Options, nc: bytes | str | os.PathLike[str], source: bytes) -> _Head:
     """Take what the head of a program says of how it was made for options that were not typed."""
     from cornersmooth.kinematics import machine_names
     from cornersmooth.nc import control_names
     from cornersmooth.nc_reader import Problem
     from cornersmooth.provenance import read_provenance
 
-    head = _beginning(nc)
+    head = read_head(nc)
     made = read_provenance(head)
-    context = click.get_current_context()
     if made is None:
-        return _Head(remark=_recognise(given, head, context))
+        return _recognised(given, head)
     words: dict[str, tuple[str, Any]] = {"tolerance": ("E", made.tolerance), "axis_length": ("H", made.axis_length)}
-    if not _typed(context, "axis_length"):
+    if not typed("axis_length"):
         words["axis_tolerance"] = ("AXIS", made.axis_tolerance)
     words |= {"control": ("CONTROL", made.control)} if made.control in control_names() else {}
     words |= {"machine": ("MACHINE", made.machine or None)} if made.machine in ("", *machine_names()) else {}
     words |= {"operation": ("OPERATION", str(made.operation))} if made.operation else {}
     words |= {"no_tcp": ("TCP", not made.tcp), "slower": ("FEEDS", made.planned_feeds)}
-    words = {name: word for name, word in words.items() if not _typed(context, name)}
-    if "axis_length" in words and (_typed(context, "axis_tolerance") or made.axis_tolerance is not None):
+    words = {name: word for name, word in words.items() if not typed(name)}
+    if "axis_length" in words and (typed("axis_tolerance") or made.axis_tolerance is not None):
         del words["axis_length"]  # H is no measure where the axis has a tolerance of its own
-    before = dict(given)
-    given |= {name: value for name, (_, value) in words.items()}
-    if made.machine and not given["machine"]:
+    now = replace(given, **{name: value for name, (_, value) in words.items()})
+    if made.machine and not now.machine:
         raise SettingsError("CS225", f"the program is for the machine {made.machine}", "name its file with --machine")
     spelled = {"machine": made.machine, "no_tcp": "no", "slower": "plan"}
     taken = [
@@ -244,90 +244,42 @@ def _take_over(given: dict[str, Any], nc: bytes | str | os.PathLike[str], source
     if made.sha256 and made.sha256 != hashlib.sha256(source).hexdigest():
         text = "the program was made from another CL file, or that has changed since: its SHA-256 is another"
         problem = Problem("CS567", 0, 1, text)
-    loose = tuple(_loose(before, given, set(words)))
-    return _Head(tuple(taken), loose, made.weights, made.form, problem=problem)
+    return _Head(now, tuple(taken), tuple(_loose(given, now, set(words))), made.weights, made.form, problem=problem)
 
 
-def _typed(context: click.Context, name: str) -> bool:
-    """Whether an option was given on the command line."""
-    return context.get_parameter_source(name) == click.core.ParameterSource.COMMANDLINE
-
-
-def _loose(before: dict[str, Any], given: dict[str, Any], taken: set[str]) -> Iterator[str]:
+def _loose(before: Options, given: Options, taken: set[str]) -> Iterator[str]:
     """Say where words of the head make the check looser than the options and settings do without them."""
     from cornersmooth.verify.task import length_of
 
-    def lever(options: dict[str, Any]) -> float:
+    def lever(options: Options) -> float:
         """Distance from the tip at which the axis is off by the tolerance where it is off by what it may."""
-        own = options["axis_tolerance"]
-        return float(options["axis_length"] if own is None else length_of(options["tolerance"], own))
+        own = options.axis_tolerance
+        return float(options.axis_length if own is None else length_of(options.tolerance, own))
 
-    was, now = before["tolerance"], given["tolerance"]
+    was, now = before.tolerance, given.tolerance
     if "tolerance" in taken and now > was * (1.0 + _ALIKE):
         yield f"the tolerance {now:g} mm is the program's own word, looser than {was:g} mm: name it with -e"
     looser = lever(given) < lever(before) * (1.0 - _ALIKE) and now / lever(given) > was / lever(before) * (1.0 + _ALIKE)
     if looser and taken & {"axis_length", "axis_tolerance"}:
-        name = "-H" if given["axis_tolerance"] is None else "--axis-tolerance"
+        name = "-H" if given.axis_tolerance is None else "--axis-tolerance"
         yield f"the tolerance of the tool axis is the program's own word, looser than without: name it with {name}"
     if "operation" in taken:
-        yield f"that operation {given['operation']} is enough is the program's own word: name it with --operation"
-    if "slower" in taken and given["slower"]:
+        yield f"that operation {given.operation} is enough is the program's own word: name it with --operation"
+    if "slower" in taken and given.slower:
         yield "feeds: that they may be lower is the program's own word: name it with --planned-feeds"
 
 
-def _beginning(nc: bytes | str | os.PathLike[str]) -> bytes:
-    """Beginning of the text; empty where it cannot be read twice."""
-    from cornersmooth.provenance import HEAD
-
-    if isinstance(nc, bytes):
-        return nc[:HEAD]
-    with contextlib.suppress(OSError):  # who reads it all says why
-        if stat.S_ISREG(os.stat(nc).st_mode):
-            with open(nc, "rb") as file:
-                return file.read(HEAD)
-    return b""
-
-
-def _recognise(given: dict[str, Any], head: bytes, context: click.Context) -> str:
-    """Take the control that a text looks like, where none was named; return what is to be said of it."""
+def _recognised(given: Options, head: bytes) -> _Head:
+    """Take the control that a program looks like, where none was named, and say so."""
     from cornersmooth.nc_reader.recognition import recognise_control
 
     looks = recognise_control(head)
-    named = context.get_parameter_source("control") != click.core.ParameterSource.DEFAULT
-    if looks in ("", nc_text.control_of(given).dialect) or (named and looks == "fanuc"):  # others say its words, too
-        return ""
+    source = click.get_current_context().get_parameter_source("control")
+    named = source != click.core.ParameterSource.DEFAULT
+    if looks in ("", control_of(given).dialect) or (named and looks == "fanuc"):  # others say its words, too
+        return _Head(given)
     advice = f"it looks like {looks.capitalize()}: --control {looks}"
-    if named:
-        return advice
-    given["control"] = looks
-    return f"{advice} is taken"
-
-
-def _nc_file(text: str, nc: bytes | str | os.PathLike[str], form: str | None, given: dict[str, Any]) -> NcFile:
-    """What is told of the program; its hash only where it can be read again."""
-    from cornersmooth.report import NcFile
-    from cornersmooth.report.record import sha256_of
-
-    machine = nc_text.machine_of(given)
-    return NcFile(
-        name=None if text == STANDARD else text,
-        sha256=sha256_of(nc) if isinstance(nc, bytes) or os.path.isfile(nc) else None,
-        control=nc_text.control_of(given).name,
-        form=form,
-        machine=None if machine is None else machine.name,
-        tcp=not given["no_tcp"],
-    )
-
-
-def _read_again(nc: bytes | str | os.PathLike[str], given: dict[str, Any], reader: dict[str, Any]) -> NcProgram:
-    """Read the text as verification did."""
-    from cornersmooth.nc_reader import read_nc
-    from cornersmooth.verify.task import length_of
-
-    axis_length = given["axis_length"]
-    if given["axis_tolerance"] is not None:
-        axis_length = length_of(given["tolerance"], given["axis_tolerance"])
-    return read_nc(nc, **reader, tolerance=given["tolerance"], axis_length=axis_length)
+    return _Head(given, remark=advice) if named else _Head(replace(given, control=looks), remark=f"{advice} is taken")
 
 
 def _problems(found: Verification, name: str, text: str, verbose: int) -> Iterator[str]:
@@ -372,16 +324,6 @@ def _summary(found: Verification) -> Iterator[str]:
         yield f"{'':<18}{more(len(found.rewinds) - _REWINDS_SHOWN, 'rewind')}"
     least = f", shortest move {_place(found.shortest, 'mm')}" if found.shortest.nc_line else ""
     yield f"{'blocks':<18}{found.blocks}{least}"
-
-
-def _along(found: Verification, along: Distribution) -> Iterator[str]:
-    """How the deviation is distributed, over poses and along the path."""
-    from cornersmooth.report.verification import along_lines, histogram_lines
-
-    yield ""
-    yield from histogram_lines(found)
-    yield ""
-    yield from along_lines(along, found.tolerance)
 
 
 def _place(where: Where, unit: str, limit: float | None = None) -> str:

@@ -17,7 +17,6 @@ import threading
 from collections.abc import Iterator
 from typing import BinaryIO, NoReturn
 
-from cornersmooth.cli.files import STANDARD
 from cornersmooth.cli.job import Job, Outcome, run_job
 from cornersmooth.cli.shutdown import SIGNALS
 from cornersmooth.errors import message
@@ -68,9 +67,8 @@ class Worker:
         process.kill()
         with contextlib.suppress(subprocess.TimeoutExpired):
             process.wait(1.0)  # unlike without a limit, safe in a signal handler
-        for path in (job.target, *job.reports) if job is not None else ():
-            if path != STANDARD:
-                remove_leftovers(path, process.pid)
+        for path in job.outputs if job is not None else ():
+            remove_leftovers(path, process.pid)
 
 
 def _start() -> subprocess.Popen[bytes]:

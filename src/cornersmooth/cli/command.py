@@ -1,0 +1,111 @@
+"""Commands made of their names: arguments, and options of `Options`, which is what the command gets."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+from functools import cache
+from types import NoneType
+from typing import Annotated, Any, Final, Literal, get_args, get_origin, get_type_hints
+
+import click
+
+from cornersmooth.cli.headings import EXIT_CODES, HeadedOption
+from cornersmooth.cli.options import Options
+from cornersmooth.cli.parameters import ControlName, MachineName, Path
+from cornersmooth.cli.shop import ShopCommand
+
+#: arguments as the usage line has them, and their fields
+_ARGUMENTS: Final[dict[str, tuple[str, dict[str, Any]]]] = {
+    "IN": ("source", {"type": get_args(Path)[1]}),
+    "[IN]": ("source", {"type": get_args(Path)[1], "default": "."}),
+    "IN...": ("inputs", {"type": get_args(Path)[1], "nargs": -1, "required": True}),
+    "NC": ("text", {"type": get_args(Path)[1]}),
+    "[CONTROL]": ("name", {"type": get_args(ControlName)[1], "required": False, "metavar": "[NAME|FILE]"}),
+    "[MACHINE]": ("name", {"type": get_args(MachineName)[1], "required": False, "metavar": "[NAME|FILE]"}),
+    "[CODE]": ("name", {"required": False}),
+    "SHELL": ("name", {"type": click.Choice(["bash", "zsh", "fish"]), "metavar": None}),
+}
+
+Decorator = Callable[[Callable[[Options], int]], click.Command]
+
+
+def new_command(
+    name: str,
+    arguments: str,
+    options: str,
+    *,
+    epilog: str = EXIT_CODES,
+    cls: type[click.Command] = ShopCommand,
+    **changes: str | Mapping[str, Any],
+) -> Decorator:
+    """Make a command of a function that takes `Options`.
+
+    Parameters
+    ----------
+    name, arguments, options : str
+        Arguments as the usage line has them, and fields of `Options` in the order of the help.
+    **changes
+        Helps of some options in this command, or all that is different of them there.
+    """
+
+    def decorate(function: Callable[[Options], int]) -> click.Command:
+        params: list[click.Parameter] = []
+        for metavar in arguments.split():
+            field, more = _ARGUMENTS[metavar]
+            params.append(click.Argument([field], **{"metavar": metavar, **more}))
+        for field in options.split():
+            change = changes.get(field, {})
+            params.append(_option(field, {"help": change} if isinstance(change, str) else change))
+        return cls(
+            name,
+            params=params,
+            callback=lambda **given: function(
+                Options(**{key: value for key, value in given.items() if value is not None})
+            ),
+            help=function.__doc__,
+            epilog=epilog,
+        )
+
+    return decorate
+
+
+def typed(name: str) -> bool:
+    """Whether an option of the command that runs was given on the command line."""
+    context = click.get_current_context(silent=True)
+    return context is not None and context.get_parameter_source(name) == click.core.ParameterSource.COMMANDLINE
+
+
+@cache
+def _types() -> dict[str, Any]:
+    return get_type_hints(Options, include_extras=True)
+
+
+def _option(name: str, changes: Mapping[str, Any]) -> click.Option:
+    """Option of a field: its type says what it may be."""
+    item = next(item for item in fields(Options) if item.name == name)
+    given = dict(item.metadata) | dict(changes)
+    words = given.pop("spelled").split()
+    flags = [word for word in words if word.startswith("-")]
+    if not any(flag.startswith("--") for flag in flags):
+        flags.append(f"--{name.replace('_', '-')}")
+    if metavar := next((word for word in words if not word.startswith("-")), None):
+        given["metavar"] = metavar
+    hint: Any = _types()[name]
+    if NoneType in get_args(hint):
+        hint = get_args(hint)[0]
+    if get_origin(hint) is tuple:
+        given["multiple"], hint = True, get_args(hint)[0]
+    if hint is bool:
+        given["is_flag"] = True
+    elif not given.get("count"):
+        given["type"] = _click_type(hint)
+    if item.default not in (None, False, (), "") and not given.get("count"):
+        given |= {"default": item.default, "show_default": "[default" not in given["help"]}
+    return HeadedOption([*flags, name], **given)
+
+
+def _click_type(hint: Any) -> Any:
+    if get_origin(hint) is Annotated:
+        return get_args(hint)[1]
+    return click.Choice(get_args(hint)) if get_origin(hint) is Literal else hint
