@@ -20,8 +20,7 @@ Where is what:
   `word_rules` (what may stand together in a block)
 - bytes to tables: `lexer`, `words`, `block_tables`, `line_patterns`
 - tables to elements: `reader` holds the modal state, `execution` executes: `arcs`, `splines`, `long_curves`, `rotary`;
-  `needed_states` says which words want another state; `way_back` leads back from retracts,
-  `left_cuts` back into cuts
+  `needed_states` says which words want another state; `retracts` leads back from retracts, and back into cuts
 - what comes out: `elements`; `ahead` reads on as far as need be, `curves` evaluates, `reading` puts a
   whole text together
 """

@@ -50,10 +50,10 @@ class MachinePositions:
     def __init__(
         self, machine: Machine | None, mm_per_unit: float, *, switches: bool = False, tcp: bool = True
     ) -> None:
-        home = {} if machine is None else dict(machine.home)
-        change = {} if machine is None else dict(machine.tool_change)
+        home, change = ((), ()) if machine is None else (machine.home, machine.tool_change)
+        units = dict.fromkeys("XYZ", mm_per_unit)
         self._home, self._change = (
-            {axis: self._said(axis, value, mm_per_unit) for axis, value in known.items()} for known in (home, change)
+            {axis: value / units.get(axis, 1.0) for axis, value in known} for known in (home, change)
         )
         self._at: dict[str, float] = {}
         #: names of the machine's rotary axes
@@ -75,23 +75,12 @@ class MachinePositions:
                 for retract, pattern in ((True, f"(?=.* Z[-+.\\d]){block}"), (False, block))
             )
 
-    @property
-    def endless(self) -> frozenset[str]:
-        """Names of rotary axes that turn without end: there a full turn is zero."""
-        axes = () if self.machine is None else self.machine.axes
-        return frozenset(axis.name for axis in axes if axis.limits is None)
-
     def away(self, angles: Mapping[str, float]) -> list[str]:
-        """Names of axes that do not stand at zero, or at a full turn of an endless axis."""
-        return [
-            name
-            for name, angle in sorted(angles.items())
-            if abs(math.remainder(angle, 360.0) if name in self.endless else angle) > SAME
-        ]
-
-    @staticmethod
-    def _said(axis: str, value: float, mm_per_unit: float) -> float:
-        return value / mm_per_unit if axis in "XYZ" else value
+        """Names of axes that are not at zero, or at a full turn of an axis that turns without end."""
+        axes = () if self.machine is None else self.machine.axes
+        endless = {axis.name for axis in axes if axis.limits is None}
+        turns = {name: math.remainder(angle, 360.0) if name in endless else angle for name, angle in angles.items()}
+        return sorted(name for name, angle in turns.items() if abs(angle) > SAME)
 
     def take(self, line: Line, text: str, *, retract: bool) -> list[Problem]:
         """Return what is wrong with a block that moves no tool at the part.
@@ -102,23 +91,29 @@ class MachinePositions:
             Whether it is a retract on the control's own list, which holds where the file says nothing of home.
         """
         if any(rule.pattern.fullmatch(text) for rule in self.rules):
-            return self._goes(line, free="Z" if retract and "Z" not in self._home else "")
-        names = {word.name for word in line.words}
+            return list(self._goes(line, free="Z" if retract and "Z" not in self._home else ""))
         if any((word.name, word.value) == ("M", 6.0) for word in line.words) or re.match(r"TOOL CALL \d", text):
-            return self._is_there(line.number, self._change, "the tool is changed")
-        if re.fullmatch(r"M2|M30", text):
-            return self._is_there(line.number, self._home, "the program ends")
-        self.leave(names)
-        return []
+            wanted, what = self._change, "the tool is changed"
+        elif re.fullmatch(r"M2|M30", text):
+            wanted, what = self._home, "the program ends"
+        else:
+            self.leave({word.name for word in line.words})
+            return []
+        off = [
+            f"{axis}{value:g}"
+            for axis, value in wanted.items()
+            if not abs(self._at.get(axis, math.nan) - value) <= _ROOM
+        ]
+        told = f"{what} away from {' '.join(off)} of the machine, which its file asks for"
+        return [Problem(POSITIONS, 0, line.number, told)] if off else []
 
     def leave(self, names: Set[str]) -> None:
         """Take note of axes that move otherwise: words of the tip may move all of them."""
         gone = names & set("ABC") | (set(self._at) if names & set("XYZ") else set())
         self._at = {axis: value for axis, value in self._at.items() if axis not in gone}
 
-    def _goes(self, line: Line, free: str) -> list[Problem]:
+    def _goes(self, line: Line, free: str) -> Iterator[Problem]:
         """Take note of a position; an axis that is free may be anywhere."""
-        problems = []
         for word in line.words:
             if word.name not in "XYZABC":
                 continue
@@ -126,20 +121,8 @@ class MachinePositions:
             if known and word.name != free and min(abs(word.value - value) for value in known) > _ROOM:
                 wanted = " or ".join(f"{word.name}{value:g}" for value in known)
                 text = f"{word.name} goes to {word.value:g} of the machine, whose file says {wanted}"
-                problems.append(Problem(POSITIONS, 0, line.number, text))
+                yield Problem(POSITIONS, 0, line.number, text)
             self._at[word.name] = word.value
-        return problems
-
-    def _is_there(self, number: int, wanted: dict[str, float], what: str) -> list[Problem]:
-        """Return which axes are elsewhere."""
-        off = [f"{axis}{value:g}" for axis, value in wanted.items() if self._off(axis, value)]
-        if not off:
-            return []
-        text = f"{what} away from {' '.join(off)} of the machine, which its file asks for"
-        return [Problem(POSITIONS, 0, number, text)]
-
-    def _off(self, axis: str, value: float) -> bool:
-        return axis not in self._at or abs(self._at[axis] - value) > _ROOM
 
 
 def _switch(blocks: Sequence[str], *, ends: bool) -> Iterator[WordRule]:

@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Iterator, Mapping, Sequence, Set
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from cornersmooth.nc_reader.dialects.base import BY_WORD, CLAMPED, HIGH_SPEED, KINEMATICS, SPLINE_AXES, Dialect
+from cornersmooth.model import Bools, Ints
+from cornersmooth.nc_reader.dialects.base import (
+    BY_WORD,
+    CLAMPED,
+    HIGH_SPEED,
+    KINEMATICS,
+    SPLINE_AXES,
+    Dialect,
+    State,
+)
 from cornersmooth.nc_reader.elements import Element, Elements, Problem
 from cornersmooth.nc_reader.words import BSPLINE, NURBS, Table
 
 if TYPE_CHECKING:
-    from cornersmooth.kinematics.machine import Machine
+    from cornersmooth.kinematics.machine import Machine, RotaryAxis
 
 #: code of words that want another state of the control
 CONTROL_WORDS: Final = "CS506"
-
-#: code of moves in which the tool axis turns too far
-TURNS: Final = "CS526"
 
 #: degrees that a rotary axis turns at most in one feed move: a mistake beyond
 MOST_TURN: Final = 360.0
@@ -35,79 +41,85 @@ _KINDS = {
 }
 
 
-def curve_problem(table: Table, dialect: Dialect, memory: Mapping[str, Any]) -> Problem | None:
-    """Return what is wrong with the first curve of a run: some controls want look ahead of a certain kind with it."""
-    needed = dialect.curves_need
-    if not needed or memory.get(HIGH_SPEED) or not (curves := np.flatnonzero(table.column("G") == NURBS)).size:
-        return None
-    return Problem(CONTROL_WORDS, 0, int(table.line[curves[0]]), f"a curve where {needed} must be in force")
+def _first(code: str, wrong: Bools, line: Ints, text: str) -> Iterator[Problem]:
+    """The first of some rows where something is wrong, if there is one; `line` are the NC lines of the rows."""
+    if wrong.any():
+        yield Problem(code, 0, int(line[np.argmax(wrong)]), text)
 
 
-def spline_problem(table: Table, dialect: Dialect, memory: Mapping[str, Any], letters: Set[str]) -> Problem | None:
-    """Return what is wrong with the first spline of a run: its rotary axes must have been said to be of splines."""
-    missing = letters - memory.get(SPLINE_AXES, set())
-    if not (dialect.names_spline_axes and missing):
-        return None
-    if not (splines := np.flatnonzero(table.column("G") == BSPLINE)).size:
-        return None
-    text = f"a spline of {' and '.join(sorted(missing))}, which no SPLINEPATH(1,X,Y,Z,...) names"
-    return Problem(CONTROL_WORDS, 0, int(table.line[splines[0]]), text)
-
-
-def modulo_problems(table: Table, machine: Machine, words: str, memory: Mapping[str, Any]) -> list[Problem]:
-    """Return what is wrong with words of modulo axes in a run: from 0 to 360 degrees, and told to go the shorter way.
+def control_problems(
+    table: Table, dialect: Dialect, state: State, code: float, approach: Set[int]
+) -> Iterator[Problem]:
+    """What of a run of motion blocks the control would not take for what it is.
 
     Parameters
     ----------
-    words : str
-        `Dialect.shorter_way`.
-    memory : mapping
-        `State.memory`.
+    code : float
+        G word of group 01 before the run.
+    approach : set of int
+        Lines on the way down from a retract: there rotary axes turn before the control is told of the tip.
     """
-    problems = []
-    for axis in machine.axes:
-        values = table.column(axis.name)
-        given = ~np.isnan(values)
-        beyond = given & ((values < 0.0) | (values >= 360.0)) if axis.modulo else np.zeros_like(given)
-        found = [(beyond, f"a word of {axis.name} that is not from 0 to 360 degrees")]
-        if words == BY_WORD:
-            told = ~np.isnan(table.column(f"{BY_WORD} {axis.name}"))
-            if axis.modulo:
-                found.append((given & ~told, f"{axis.name} without {BY_WORD}(), which sends it the shorter way"))
-            else:
-                found.append((told, f"{axis.name} with {BY_WORD}(), which is for modulo axes"))
-        elif words and axis.modulo and not memory.get(words):
-            found.append((given, f"{axis.name} without {words} in force, which sends it the shorter way"))
-        problems += [
-            Problem(CONTROL_WORDS, 0, int(table.line[np.argmax(wrong)]), text) for wrong, text in found if wrong.any()
-        ]
-    return problems
+    if state.rotary is not None:
+        kind, letters = ("angles" if state.rotary.tip_control else "machine"), set(state.rotary.names)
+    else:
+        kind, letters = ("point", set("UVW")) if state.modal.points else ("vector", set("IJ"))
+    motion = table.column("G")
+    if dialect.curves_need and not state.memory.get(HIGH_SPEED):
+        text = f"a curve where {dialect.curves_need} must be in force"
+        yield from _first(CONTROL_WORDS, motion == NURBS, table.line, text)
+    unnamed = letters - state.memory.get(SPLINE_AXES, set())
+    if dialect.names_spline_axes and kind == "angles" and unnamed:
+        text = f"a spline of {' and '.join(sorted(unnamed))}, which no SPLINEPATH(1,X,Y,Z,...) names"
+        yield from _first(CONTROL_WORDS, motion == BSPLINE, table.line, text)
+    wanted, used = dialect.controls.get(kind), table.columns.keys() & letters
+    if wanted is not None and used and state.tip_control not in wanted:
+        rows = np.zeros(len(table), np.bool_)
+        rows[table.rows_with(used, code)] = True
+        need = " or ".join(word or "no tool tip control" for word in wanted)
+        text = f"{_KINDS[kind]} under {state.tip_control or 'no tool tip control'}, where {need} must be in force"
+        yield from _first(CONTROL_WORDS, rows & ~np.isin(table.line, list(approach)), table.line, text)
 
 
-def limit_problems(table: Table, run: Elements, machine: Machine, step: float) -> list[Problem]:
-    """Return which rotary words of a run lie beyond the limits of their axes.
+def axis_problems(
+    table: Table, run: Elements, machine: Machine, way: str, memory: Mapping[str, Any], step: float
+) -> Iterator[Problem]:
+    """What is wrong with the rotary words of a run: beyond the limits of their axes, or words of modulo axes.
+
+    Those are from 0 to 360 degrees, and are told to go the shorter way.
 
     Parameters
     ----------
     run : Elements
-        What becomes of it; of curves, whose control points may lie farther out, the ends.
+        What becomes of it; of curves, whose control points may lie farther out, the ends count for limits.
+    way : str
+        `Dialect.shorter_way`.
     step : float, degrees
         Last printed digit.
     """
-    problems = []
     for column, axis in enumerate(machine.axes):
-        if axis.limits is None:
-            continue
-        values, line = (run.second[:, column], run.line) if len(run.curves) else (table.column(axis.name), table.line)
-        beyond = np.flatnonzero((values < axis.low - step / 2) | (values > axis.high + step / 2))
-        if len(beyond):
-            text = f"{axis.name} goes to {values[beyond[0]]:g} deg, its limits are {axis.low:g} and {axis.high:g}"
-            problems.append(Problem("CS581", 0, int(line[beyond[0]]), text))
-    return problems
+        name, values = axis.name, table.column(axis.name)
+        given, told = ~np.isnan(values), ~np.isnan(table.column(f"{BY_WORD} {axis.name}"))
+        if axis.modulo:
+            text = f"a word of {name} that is not from 0 to 360 degrees"
+            yield from _first(CONTROL_WORDS, (values < 0.0) | (values >= 360.0), table.line, text)
+        if way == BY_WORD and axis.modulo:
+            text = f"{name} without {BY_WORD}(), which sends it the shorter way"
+            yield from _first(CONTROL_WORDS, given & ~told, table.line, text)
+        elif way == BY_WORD:
+            yield from _first(CONTROL_WORDS, told, table.line, f"{name} with {BY_WORD}(), which is for modulo axes")
+        elif way and axis.modulo and not memory.get(way):
+            text = f"{name} without {way} in force, which sends it the shorter way"
+            yield from _first(CONTROL_WORDS, given, table.line, text)
+        if axis.limits is not None:
+            angles, line = (run.second[:, column], run.line) if len(run.curves) else (values, table.line)
+            beyond = (angles < axis.low - step / 2) | (angles > axis.high + step / 2)
+            for angle in angles[beyond][:1].tolist():
+                text = f"{name} goes to {angle:g} deg, its limits are {axis.low:g} and {axis.high:g}"
+                yield from _first("CS581", beyond, line, text)
 
 
-def turn_problems(run: Elements, before: Sequence[float], machine: Machine) -> list[Problem]:
-    """Return which rotary axes turn more than once round in one feed move, which nobody asks for.
+def turn_problems(run: Elements, before: Sequence[float], machine: Machine) -> Iterator[Problem]:
+    """Which rotary axes turn more than once round in one feed move, which nobody asks for.
 
     Parameters
     ----------
@@ -116,7 +128,6 @@ def turn_problems(run: Elements, before: Sequence[float], machine: Machine) -> l
     before : sequence of float
         Those before it, NaN where they are not known.
     """
-    problems = []
     curves = run.curves
     of_points = np.repeat(run.line[run.kind == Element.CURVE], curves.points)
     next_curve = np.cumsum(curves.points)[:-1] - 1
@@ -126,11 +137,9 @@ def turn_problems(run: Elements, before: Sequence[float], machine: Machine) -> l
         between = np.abs(np.diff(curves.point[:, 3 + column]))
         between[next_curve] = 0.0
         for amount, line in ((turn, run.line), (between, of_points[1:])):
-            found = np.flatnonzero(amount > MOST_TURN)
-            if len(found):
-                text = f"{axis.name} turns by {amount[found[0]]:.0f} deg in one feed move"
-                problems.append(Problem(TURNS, 0, int(line[found[0]]), text))
-    return problems
+            for degrees in amount[amount > MOST_TURN][:1].tolist():
+                text = f"{axis.name} turns by {degrees:.0f} deg in one feed move"
+                yield from _first("CS526", amount > MOST_TURN, line, text)
 
 
 def take_clamp(word: float, machine: Machine, memory: dict[str, Any]) -> bool:
@@ -143,89 +152,46 @@ def take_clamp(word: float, machine: Machine, memory: dict[str, Any]) -> bool:
     return False
 
 
+def is_clamped(axis: RotaryAxis, memory: Mapping[str, Any]) -> bool:
+    """Whether an axis is held, or may be, as no word has said that it is not."""
+    return axis.clamp is not None and bool(memory.get(CLAMPED, {}).get(axis.name, True))
+
+
 def clamp_problems(
     run: Elements, before: Sequence[float], machine: Machine, memory: Mapping[str, Any]
-) -> list[Problem]:
-    """Return which rotary axes turn in a run although they are clamped, or nobody has said that they are not."""
-    problems = []
+) -> Iterator[Problem]:
+    """Which rotary axes turn in a run although they are clamped, or nobody has said that they are not."""
     for column, axis in enumerate(machine.axes):
-        if axis.clamp is None or not memory.get(CLAMPED, {}).get(axis.name, True):
-            continue
-        angles = np.append(before[column], run.second[:, column])
-        turned = np.flatnonzero((angles[1:] != angles[:-1]) & ~np.isnan(angles[1:]))
-        if len(turned):
-            text = f"{axis.name} turns without {axis.clamp[1]} before it"
-            problems.append(Problem("CS538", 0, int(run.line[turned[0]]), text))
-    return problems
+        if axis.clamp is not None and is_clamped(axis, memory):
+            angles = np.append(before[column], run.second[:, column])
+            turned = (angles[1:] != angles[:-1]) & ~np.isnan(angles[1:])
+            yield from _first("CS538", turned, run.line, f"{axis.name} turns without {axis.clamp[1]} before it")
 
 
-def unclamped_problems(machine: Machine, memory: Mapping[str, Any]) -> list[Problem]:
-    """Return which rotary axes are not clamped at the end of a text."""
-    free = [axis for axis in machine.axes if axis.clamp and not memory.get(CLAMPED, {}).get(axis.name, True)]
-    return [Problem("CS538", 0, 0, f"{axis.name} is not clamped at the end") for axis in free]
+def unclamped_problems(machine: Machine, memory: Mapping[str, Any]) -> Iterator[Problem]:
+    """Which rotary axes are not clamped at the end of a program."""
+    for axis in machine.axes:
+        if axis.clamp is not None and not is_clamped(axis, memory):
+            yield Problem("CS538", 0, 0, f"{axis.name} is not clamped at the end")
 
 
-def kinematics_problem(
+def kinematics_problems(
     run: Elements, machine: Machine, memory: Mapping[str, Any], *, tip_control: bool
-) -> Problem | None:
-    """Return what is wrong with a run where the machine's file says what switches tip control of its kinematics.
+) -> Iterator[Problem]:
+    """What is wrong with a run where the machine's file says what switches tip control of its kinematics.
 
     Parameters
     ----------
     run : Elements
         With its rotary words.
-    memory : mapping
-        `State.memory`.
     tip_control : bool
         Whether the words are those of the tip; without it, of the machine's axes. With both rotary axes at zero that is
         the same.
     """
     on = memory.get(KINEMATICS)
-    turned = np.abs(run.second[:, : len(machine.names)]) > _ZERO
-    if not machine.tip_control or on is tip_control or not turned.any():
-        return None
-    row = int(np.argmax(turned.any(axis=1)))
-    here, other = machine.tip_control if tip_control else machine.tip_control[::-1]
-    what = _KINDS["angles" if tip_control else "machine"]
-    before = "before any word of tip control" if on is None else f"under {other}"
-    return Problem(CONTROL_WORDS, 0, int(run.line[row]), f"{what} {before}, where {here} must be in force")
-
-
-class AxisWords:
-    """Complains once for each state of words of the axis that it does not take for what they are."""
-
-    def __init__(self, dialect: Dialect) -> None:
-        self._wanted = dialect.controls
-        self._complained: set[tuple[str, str]] = set()
-
-    def problem(
-        self, table: Table, kind: str, letters: Set[str], tip_control: str, code: float, approach: Set[int]
-    ) -> Problem | None:
-        """Return what is wrong with a run of motion blocks.
-
-        Parameters
-        ----------
-        kind : str
-            What its words of the axis are; a key of `Dialect.controls`.
-        letters : set of str
-            Addresses of such words.
-        tip_control : str
-            Tool tip control in force; empty for none.
-        code : float
-            G word of group 01 before the run.
-        approach : set of int
-            Lines on the way down from a retract: there rotary axes turn before the control is told of the tip.
-        """
-        wanted = self._wanted.get(kind)
-        used = table.columns.keys() & letters
-        if wanted is None or not used or tip_control in wanted or (kind, tip_control) in self._complained:
-            return None
-        rows = table.rows_with(used, code)
-        if approach:
-            rows = rows[[int(number) not in approach for number in table.line[rows]]]
-        if not len(rows):
-            return None
-        self._complained.add((kind, tip_control))
-        need = " or ".join(word or "no tool tip control" for word in wanted)
-        text = f"{_KINDS[kind]} under {tip_control or 'no tool tip control'}, where {need} must be in force"
-        return Problem(CONTROL_WORDS, 0, int(table.line[rows[0]]), text)
+    if machine.tip_control and on is not tip_control:
+        here, other = machine.tip_control if tip_control else machine.tip_control[::-1]
+        before = "before any word of tip control" if on is None else f"under {other}"
+        text = f"{_KINDS['angles' if tip_control else 'machine']} {before}, where {here} must be in force"
+        turned = np.any(np.abs(run.second[:, : len(machine.names)]) > _ZERO, axis=1)
+        yield from _first(CONTROL_WORDS, turned, run.line, text)

@@ -9,12 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
 from cornersmooth.model import Floats
-from cornersmooth.nc_reader.dialects.base import CLAMPED
 from cornersmooth.nc_reader.elements import Elements, Problem
 from cornersmooth.nc_reader.execution import Modal
 from cornersmooth.nc_reader.rotary import Rotary
@@ -125,9 +124,3 @@ def turned_frame(rotary: Rotary, angles: Sequence[float]) -> Floats | None:
 def room_of(numbers: Sequence[str]) -> float:
     """Radians that a step of the last printed digit of angles is."""
     return math.radians(10.0 ** -min(len(number.partition(".")[2]) for number in numbers))
-
-
-def unclamped(memory: dict[str, Any], names: Sequence[str], clamps: Sequence[bool]) -> list[str]:
-    """Rotary axes that a plane would turn although they are held."""
-    free = memory.get(CLAMPED, {})
-    return [name for name, clamp in zip(names, clamps, strict=True) if clamp and free.get(name, True)]

@@ -16,23 +16,20 @@ from cornersmooth.nc_reader.block_tables import Readable, read_lines
 from cornersmooth.nc_reader.dialects.base import INCREMENTAL
 from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem, Second, settle
 from cornersmooth.nc_reader.execution import Modal, execute
-from cornersmooth.nc_reader.left_cuts import LeftCuts
 from cornersmooth.nc_reader.needed_states import (
-    AxisWords,
+    axis_problems,
     clamp_problems,
-    curve_problem,
-    kinematics_problem,
-    limit_problems,
-    modulo_problems,
-    spline_problem,
+    control_problems,
+    is_clamped,
+    kinematics_problems,
     take_clamp,
     turn_problems,
     unclamped_problems,
 )
-from cornersmooth.nc_reader.planes import ASIDE, NOT_ABOVE, TiltedPlane, unclamped
+from cornersmooth.nc_reader.planes import ASIDE, NOT_ABOVE, TiltedPlane
 from cornersmooth.nc_reader.reading_options import ReadingOptions, Steps
+from cornersmooth.nc_reader.retracts import Retracts
 from cornersmooth.nc_reader.rotary import MOST_LINES
-from cornersmooth.nc_reader.way_back import WayBack
 from cornersmooth.nc_reader.words import MOTION_CODES, Line, Table, joined_tables
 
 #: name in `State.memory` of the tool that has been chosen
@@ -72,7 +69,7 @@ class Reader:
         self.late: list[tuple[Line, str, float, str]] = []
         self.comments: list[tuple[int, str]] | None = None
         self.problems: list[Problem] = []
-        self._axis_words = AxisWords(self.dialect)
+        self._told: set[str] = set()  # texts of problems that are told once for each tilted plane
         self.lever, self._given_lever = 0.0, lever
         self.elements = self.given_out = self.curves = 0
         #: whether the tool has been fed from a position that was known
@@ -82,11 +79,9 @@ class Reader:
         self.coarse = 0
         #: what was not looked at, and the NC line
         self.unlooked: list[tuple[int, str]] = []
-        self.way_back = WayBack(name)
-        self.left_cuts = LeftCuts(self.problems)
-        #: the tilted plane that is on, and what has been said of it
+        self.retracts = Retracts(name, self.problems)
+        #: the tilted plane that is on
         self.plane: TiltedPlane | None = None
-        self._said_of_planes: set[str] = set()
         #: whether a plane that is off again has left the rotary axes where no word says
         self._left_turned = False
         #: the last element that was given out, if any
@@ -120,7 +115,7 @@ class Reader:
             else:
                 self.line(item)
             waiting = self.elements - self.given_out
-            if self.placed and waiting >= GIVEN_OUT and not (self.left_cuts.open or self._may_go_up(waiting)):
+            if self.placed and waiting >= GIVEN_OUT and not (self.retracts.cut_is_left or self._may_go_up(waiting)):
                 yield self._collected()
         self.flush()
         if self.rotary is not None:
@@ -132,7 +127,7 @@ class Reader:
     def rows(self, table: Table) -> None:
         """Take a run of motion blocks."""
         # the first block that moves Z behind a retract is looked at with what it leads to
-        leads = self.way_back.open and bool(self.waiting) and not isinstance(self.waiting[-1], Table)
+        leads = self.retracts.open and bool(self.waiting) and not isinstance(self.waiting[-1], Table)
         if not leads and len(table) + len(self.waiting) > FEW_ROWS and (table.closed or self._code in MOTION_CODES[:4]):
             self.flush()
         self.waiting.append(table)
@@ -158,7 +153,7 @@ class Reader:
         if not self.waiting:
             return
         factor = MM_PER_UNIT[self.units]
-        for table in joined_tables(self.waiting, sys.maxsize if self.way_back.open else FEW_ROWS):
+        for table in joined_tables(self.waiting, sys.maxsize if self.retracts.open else FEW_ROWS):
             before = self.modal
             if self.memory.get(INCREMENTAL):
                 hint = "write G90 after a position of the machine"
@@ -169,9 +164,9 @@ class Reader:
             if self.rotary is not None:
                 self.problems += clamp_problems(run, before.second, self.rotary.machine, self.memory)
             approach: frozenset[int] = frozenset()
-            if self.way_back.open:
+            if self.retracts.open:
                 aside = table.line[~np.isnan([table.column("X"), table.column("Y")]).all(axis=0)]
-                whole, run = run, self.way_back.arrive(run, aside, self.problems)
+                whole, run = run, self.retracts.arrive(run, aside)
                 approach = frozenset(whole.line.tolist()).difference(run.line.tolist())
                 if not len(run.kind):
                     continue
@@ -180,19 +175,20 @@ class Reader:
             if self.plane is not None:
                 self._in_plane(table, run, self.plane, factor, before)
                 continue
-            self._check_control(table, before.code, approach)
+            self._tell_once(control_problems(table, self.dialect, self, before.code, approach))
             if self.modal.points and not before.points:
                 self._know_points(run)
             run = self._in_mm(run, factor, before)
             if self.rotary is not None:
                 start = before.but(tip=tuple(factor * value for value in before.tip))
                 rotary = replace(self.rotary, tip_step=factor * self.rotary.tip_step)
-                self.problems += modulo_problems(table, rotary.machine, self.dialect.shorter_way, self.memory)
-                self.problems += limit_problems(table, run, rotary.machine, rotary.angle_step)
+                machine, way = rotary.machine, self.dialect.shorter_way
+                self.problems += axis_problems(table, run, machine, way, self.memory, rotary.angle_step)
                 if self.dialect.switches:
-                    self._check_kinematics(run)
+                    tip_control = rotary.tip_control
+                    self._tell_once(kinematics_problems(run, machine, self.memory, tip_control=tip_control))
                 run = replace(run, second=rotary.unwrapped(run.second, before.second))
-                self.problems += turn_problems(run, before.second, rotary.machine)
+                self.problems += turn_problems(run, before.second, machine)
                 self._check_turned(run)
                 if self.dialect.retracts:
                     self._check_swings(rotary.swung(run, start), run)
@@ -225,9 +221,7 @@ class Reader:
     def _in_plane(self, table: Table, run: Elements, plane: TiltedPlane, factor: float, before: Modal) -> None:
         """Take over a run in a tilted plane."""
         axis_words = self.rotary.names if self.rotary is not None else "IJKUVW"
-        found = plane.problems(table, run, self.tip_control, axis_words)
-        self.problems += [problem for problem in found if problem.text not in self._said_of_planes]
-        self._said_of_planes |= {problem.text for problem in found}
+        self._tell_once(plane.problems(table, run, self.tip_control, axis_words))
         self._add(plane.in_part(self._in_mm(run, factor, before), factor), plane)
 
     def tilt(self, line: Line, plane: TiltedPlane) -> None:
@@ -237,8 +231,8 @@ class Reader:
         if self.tip_control:
             self.wrong("CS506", line, f"a tilted plane under {self.tip_control}")
         self._above(line, "a tilted plane where the tool is not retracted")
-        self.plane, self._said_of_planes, self._left_turned = plane, set(), False
-        self.way_back.open = True
+        self.plane, self._told, self._left_turned = plane, set(), False
+        self.retracts.open = True
         self.modal = self.modal.but(tip=(math.nan,) * 3)
         if plane.turned:
             self._turn(line)
@@ -274,15 +268,15 @@ class Reader:
 
     def _above(self, line: Line, text: str) -> None:
         """Complain where the tool is not above a retract."""
-        if not self.way_back.open:
+        if not self.retracts.open:
             self.wrong(NOT_ABOVE, line, text)
 
     def _turn(self, line: Line) -> None:
         """Complain of rotary axes that are held where a plane turns them."""
         if self.rotary is not None:
-            axes = self.rotary.machine.axes
-            for name in unclamped(self.memory, self.rotary.names, [axis.clamp is not None for axis in axes]):
-                self.wrong("CS538", line, f"{name} turns to a tilted plane while it is clamped")
+            for axis in self.rotary.machine.axes:
+                if is_clamped(axis, self.memory):
+                    self.wrong("CS538", line, f"{axis.name} turns to a tilted plane while it is clamped")
 
     @property
     def _code(self) -> float:
@@ -338,8 +332,7 @@ class Reader:
             room = min(plane.room, self._widest("vector")[1] / 2.0)
             elements.second_room[:], elements.tip_room[:] = room, ASIDE * elements.tip_step
         self.ready.append(elements)
-        self.way_back.look_along(self.ready[-1])
-        self.left_cuts.come_back(self.ready[-1], self.elements)
+        self.retracts.take(self.ready[-1], self.elements)
         self.elements += len(run.kind)
         self.curves += len(run.curves)
         if not self.placed and (run.kind != Element.RAPID).any():
@@ -418,7 +411,7 @@ class Reader:
         self.flush()
         if letter == "T":
             self.memory[TOOL] = value
-            self.left_cuts.forget()
+            self.retracts.forget()
         elif (letter, value) == ("M", 6.0) and self.rotary is not None:
             self._take_tool()
         if letter == "M" and self.rotary is not None and take_clamp(value, self.rotary.machine, self.memory):
@@ -452,22 +445,15 @@ class Reader:
 
     def leave(self, axes: str) -> None:
         """Say that axes go to positions of the machine."""
-        if not self.way_back.has_come(self.ready):
-            self.left_cuts.leave([*self.given, *self.ready[-2:]], self.elements)
-        if self.way_back.look_back(self.given, self.ready):  # words behind it belong where it comes from
+        if self.retracts.leave(self.given, self.ready, self.elements):  # words after it belong where it comes from
             self.withdrawn = self.elements
             place = len(self.events)
             while place and self.events[place - 1].element == self.elements:
                 place -= 1
             self.events[place:] = [replace(event, element=event.element - 1) for event in self.events[place:]]
-        self.modal = self.way_back.leave(self.modal, "XYZ" if self.plane is not None else axes)
-
-    def _check_kinematics(self, run: Elements) -> None:
-        """Complain once for each state of tip control of the kinematics that the words of a run do not go with."""
-        assert self.rotary is not None
-        found = kinematics_problem(run, self.rotary.machine, self.memory, tip_control=self.rotary.tip_control)
-        if found is not None and all(found.text != problem.text for problem in self.problems):
-            self.problems.append(found)
+        gone = "XYZ" if self.plane is not None else axes
+        tip = tuple(math.nan if axis in gone else at for axis, at in zip("XYZ", self.modal.tip, strict=True))
+        self.modal = self.modal.but(tip=tip)
 
     def _check_swings(self, elements: Ints, run: Elements) -> None:
         """Complain of rapids in which rotary axes lead the tool far round."""
@@ -482,15 +468,9 @@ class Reader:
         """Give up: words that make it impossible to tell where the tool is."""
         raise InputError("CS503", what, hint, file=self.name, line=line.number)
 
-    def _check_control(self, table: Table, code: float, approach: frozenset[int]) -> None:
-        """Complain of words that the control would not take for what they are."""
-        if self.rotary is not None:
-            kind, letters = ("angles" if self.rotary.tip_control else "machine"), set(self.rotary.names)
-        else:
-            kind, letters = ("point", set("UVW")) if self.modal.points else ("vector", set("IJ"))
-        found = (
-            curve_problem(table, self.dialect, self.memory),
-            spline_problem(table, self.dialect, self.memory, letters if kind == "angles" else set()),
-            self._axis_words.problem(table, kind, letters, self.tip_control, code, approach),
-        )
-        self.problems += [problem for problem in found if problem is not None]
+    def _tell_once(self, problems: Iterable[Problem]) -> None:
+        """Note problems whose texts have not been told."""
+        for problem in problems:
+            if problem.text not in self._told:
+                self._told.add(problem.text)
+                self.problems.append(problem)

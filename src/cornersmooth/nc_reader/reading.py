@@ -71,7 +71,7 @@ def read_styled(data: bytes | str | os.PathLike[str], options: ReadingOptions, n
         source.finish()
         reader = Reader(label, options, options.steps(source.head(DIGITS_SAMPLE)))
         reader.comments = []
-        reader.way_back.added = reader.note_along_tool
+        reader.retracts.added = reader.note_along_tool
         parts = list(reader.chunks(reader.lines(source)))
         return _program(reader, parts)
     finally:
@@ -96,5 +96,5 @@ def _program(reader: Reader, parts: list[Elements]) -> NcProgram:
         blocks=reader.blocks,
         unsaid=reader.dialect.unsaid,
         along_tool=tuple(reader.along_tool),
-        left_cuts=tuple(reader.left_cuts.found),
+        left_cuts=tuple(reader.retracts.left_cuts),
     )

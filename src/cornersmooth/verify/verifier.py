@@ -231,7 +231,7 @@ class Verifier:
         )
         check = WordCheck(options.control, options.dialect.lexer, room, *self._own, positions)
         own_rapids = OwnRapids(task)
-        reader.way_back.added, reader.left_cuts.asked = own_rapids.added, own_rapids.goes_to
+        reader.retracts.added, reader.retracts.asked = own_rapids.added, own_rapids.goes_to
         chunks = reader.chunks(check.watch(lines) if self._words else lines)
         text = _Text((part.at_most() for part in chunks) if self._slower else chunks, reader.events)
         measured = _measure(task, text, words=self._words, processes=self._processes)
@@ -243,7 +243,7 @@ class Verifier:
         found = measured.verification(
             problems, reader.units, reader.dialect.unsaid, blocks=reader.blocks, curves=reader.curves
         )
-        rewinds = tuple((out, back) for *_, out, back in reader.left_cuts.found)
+        rewinds = tuple((out, back) for *_, out, back in reader.retracts.left_cuts)
         trusted = [(0, _own_table(own - _OF_MOTION))] if own - _OF_MOTION else []
         found = found.not_verified(self._unverified(check, own))
         return replace(found, trusted=(*trusted, *check.trusted), rewinds=rewinds)
