@@ -1,13 +1,17 @@
-"""Compares what the CL file asks for with what a text says: the same tokens, in order, between the right poses."""
+"""Compares what the CL file asks for with what a program says: the same tokens, in order, between the right poses.
+
+Tokens of both are paired in their order, so that as few as possible are left over, are others or are elsewhere. Left
+over without harm are those that change nothing, and those of the program that posts write on their own (`_habits`).
+"""
 
 from __future__ import annotations
 
-import difflib
 import math
 from bisect import bisect_left
-from collections.abc import Callable, Iterator
+from collections import deque
+from collections.abc import Callable, Iterator, Set
 from dataclasses import dataclass
-from itertools import takewhile
+from itertools import pairwise, takewhile, zip_longest
 
 from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.statements.tokens import Token
@@ -47,9 +51,14 @@ _STOPPED = ("spindle", "coolant")
 #: kinds of which only changes count
 _STATES = ("tool", "offset", "spindle", "speed", "coolant", "compensation")
 
+#: more ways to pair tokens are not looked at: the rest is compared one by one
+_MOST_WAYS = 100_000
 
-#: longer lists that differ are compared one by one
-_LONGEST_SEARCH = 2000
+#: how many tokens of both are paired, and what holds then
+_Way = tuple[int, int, float | None]
+
+#: tokens of the CL file and of the program that should be the same; None where one is missing
+_Pair = tuple[Token | None, Token | None]
 
 
 def way_between(here: float, there: float) -> float:
@@ -65,19 +74,12 @@ class _Nearness:
     apart: Callable[[float, float], float]
 
     def away(self, place: float, ours: Token) -> bool:
-        """Whether a token of the text is elsewhere than asked for."""
+        """Whether a token of the program is elsewhere than asked for."""
         nearest = min(max(place, ours.place), ours.place + ours.reach)
         if any(abs(place - here) <= self.room + ours.room for here in (nearest, *ours.others)):
             return False
         # a pose is a rounding off, and its place as far from it as the room
         return self.apart(place, nearest) > 2 * self.room + ours.room
-
-    def beyond(self, place: float, there: float, spare: float) -> bool:
-        """Whether any token at least as far along as one place is away from the other: `apart` grows on its way.
-
-        `spare` is what no token is uncertain by more, its reach included.
-        """
-        return abs(place - there) > self.room + spare and self.apart(place, there) > 2 * self.room + spare
 
 
 def compare(
@@ -106,183 +108,104 @@ def compare(
     unsaid = unsaid - {token.kind for token in found if token.kind == "compensation" and token.value != 40.0}
     asked_for = [token for token in asked_for if not {token.kind, (token.kind, token.value)} & (unsaid | own)]
     found = [token for token in found if token.kind not in unsaid | (own & _LOOSE)]
-    near = _Nearness(room, apart)
-    found = _without_idle_stops(asked_for, found, near)
-    found = _without_tidying(asked_for, found, end, near)
     asked_for, found = _without_idle_offsets(asked_for, found)
+    near = _Nearness(room, apart)
+    changes = [token.line for token in found if token.kind == "tool"]
     problems: list[Problem] = []
-    for kind in _NAMES:
-        theirs, ours = _effective(asked_for, kind), _effective(found, kind)
-        if kind in _STOPPED and _values(theirs) != _values(ours):
-            ours = _without_habits(ours, theirs, _tool_lines(found), near)
-        if kind in _STOPPED and _values(theirs) != _values(ours):
-            theirs, ours = (_effective(_last_of_moments(tokens, kind), kind) for tokens in (asked_for, found))
-        problems += _differences(theirs, ours, found, near)
+    for kind, (code, name) in _NAMES.items():
+        theirs, ours = ([token for token in tokens if token.kind == kind] for tokens in (asked_for, found))
+        for wanted, token in _unlike(theirs, ours, _superseded(theirs), _habits(ours, changes, end, near), near):
+            if wanted is None:
+                assert token is not None
+                text = f"{name.format(token.value)} is nothing that the CL file asks for"
+                problems.append(Problem(code, 0, token.line, text))
+                continue
+            label = name.format(wanted.value)
+            if token is None:
+                text = f"{label} is missing"
+            elif wanted.value != token.value:
+                text = f"{name.format(token.value)} where the CL file asks for {label}"
+            else:
+                text = f"{label} is {token.place - wanted.place:+.3f} mm of path away from its place"
+            # what is missing has no line: named is that of the last word before it
+            before = (other.line for other in reversed(found) if other.place <= wanted.place + room)
+            problems.append(Problem(code, wanted.line, next(before, 0) if token is None else token.line, text))
     return problems
 
 
-def _differences(theirs: list[Token], ours: list[Token], found: list[Token], near: _Nearness) -> list[Problem]:
-    """What of one kind is wrong, in another place, missing or too much; `found` are all tokens of the text."""
-    problems = []
+def _unlike(
+    theirs: list[Token], ours: list[Token], superseded: Set[int], habits: Set[int], near: _Nearness
+) -> Iterator[_Pair]:
+    """Tokens of one kind that are wrong, in another place, missing or too much: as few as can be.
 
-    def add(cl_line: int, nc_line: int, kind: str, text: str) -> None:
-        problems.append(Problem(_NAMES[kind][0], cl_line, nc_line, text))
-
-    head = _alike(theirs, ours, near)
-    tail = _alike(theirs[head:][::-1], ours[head:][::-1], near)
-    between = (_values(tokens[head : len(tokens) - tail]) for tokens in (theirs, ours))
-    for tag, *where in _opcodes(*between):
-        i0, i1, j0, j1 = (head + k for k in where)
-        for wanted, token in zip(theirs[i0:i1], ours[j0:j1], strict=False):
-            if tag != "equal":
-                text = f"{_label(token)} where the CL file asks for {_label(wanted)}"
-                add(wanted.line, token.line, wanted.kind, text)
-            elif near.away(wanted.place, token):
-                text = f"{_label(wanted)} is {token.place - wanted.place:+.3f} mm of path away from its place"
-                add(wanted.line, token.line, wanted.kind, text)
-        both = min(i1 - i0, j1 - j0)
-        for wanted in theirs[i0 + both : i1]:
-            line = ours[min(j1, len(ours) - 1)].line if ours else _last_line(found, wanted.place + near.room)
-            add(wanted.line, line, wanted.kind, f"{_label(wanted)} is missing")
-        for token in ours[j0 + both : j1]:
-            add(0, token.line, token.kind, f"{_label(token)} is nothing that the CL file asks for")
-    return problems
-
-
-def _alike(theirs: list[Token], ours: list[Token], near: _Nearness) -> int:
-    """How many tokens of both are the same, and where they should be, from the first on."""
-    pairs = enumerate(zip(theirs, ours, strict=False))
-    unlike = (k for k, (one, other) in pairs if one.value != other.value or near.away(one.place, other))
-    return next(unlike, min(len(theirs), len(ours)))
-
-
-def _opcodes(theirs: list[float], ours: list[float]) -> Iterator[tuple[str, int, int, int, int]]:
-    """How values differ from others, as `difflib` says it; one by one where that would take long."""
-    if max(len(theirs), len(ours)) <= _LONGEST_SEARCH:
-        yield from difflib.SequenceMatcher(None, theirs, ours, autojunk=False).get_opcodes()
-        return
-    both = min(len(theirs), len(ours))
-    for k in range(both):
-        yield "equal" if theirs[k] == ours[k] else "replace", k, k + 1, k, k + 1
-    yield "replace", both, len(theirs), both, len(ours)
-
-
-def _label(token: Token) -> str:
-    return _NAMES[token.kind][1].format(token.value)
-
-
-def _without_idle_stops(asked_for: list[Token], found: list[Token], near: _Nearness) -> list[Token]:
-    """Tokens of the text without the optional stops that posts write on their own, but for those that are asked for."""
-    habits = [token for token in found if token.habit]
-    others = [token for token in found if (token.kind, token.value) == ("stop", 1.0) and not token.habit]
-    kept: list[Token] = []
-    for stop in asked_for:
-        if (stop.kind, stop.value) != ("stop", 1.0):
-            continue
-        other = next((k for k, one in enumerate(others) if not near.away(stop.place, one)), None)
-        if other is not None:
-            del others[other]  # each is one of those that are asked for
-        else:
-            kept += [one for one in habits if one not in kept and not near.away(stop.place, one)][:1]
-    return [token for token in found if not token.habit or token in kept]
-
-
-def _without_tidying(asked_for: list[Token], found: list[Token], end: float, near: _Nearness) -> list[Token]:
-    """Tokens of the text without those that only end what ends with the program anyway, unless that is asked for."""
-    lines = _tool_lines(found)
-
-    def tidying(tokens: list[Token], kind: str) -> list[Token]:
-        """Tokens that end a state for good, where everything ends."""
-        mine = [token for token in tokens if token.kind == kind]
-        last = list(takewhile(lambda token: token.value == _ENDED[kind], reversed(mine)))
-        return [token for token in last if token.place >= end or not near.away(end, token)]
-
-    for kind, off in _ENDED.items():
-        theirs, ours = _effective(asked_for, kind), _effective(found, kind)
-        if kind in _STOPPED:  # what a tool change stops says nothing of the end
-            ours = _without_habits(ours, theirs, lines, near)
-        more = sum(token.value == off for token in ours) > sum(token.value == off for token in theirs)
-        more |= _values(ours)[-1:] == [off] and _values(theirs)[-1:] not in ([], [off])
-        if more and not tidying(theirs, kind):
-            last = tidying(found, kind)
-            found = [token for token in found if not any(token is one for one in last)]
-    return found
-
-
-def _tool_lines(found: list[Token]) -> list[int]:
-    return [token.line for token in found if token.kind == "tool"]
-
-
-def _values(tokens: list[Token]) -> list[float]:
-    return [token.value for token in tokens]
-
-
-def _last_line(tokens: list[Token], place: float) -> int:
-    """Line of the last token as far as a place; 0 where there is none."""
-    return next((token.line for token in reversed(tokens) if token.place <= place), 0)
-
-
-def _without_habits(ours: list[Token], theirs: list[Token], changes: list[int], near: _Nearness) -> list[Token]:
-    """Tokens without those that end a state which begins again before any motion, if the CL file does not ask for them.
-
-    Posts stop spindle and coolant for a tool change on their own, also where the program waits behind it; `changes` are
-    the lines of those. What the CL file asks for is rather one whose place is certain, or, if that does not make both
-    the same, one behind which the state does not begin again.
+    Parameters
+    ----------
+    superseded, habits : set of int
+        Tokens of the CL file, and of the program, that may be left over.
     """
-    if not ours:
-        return []
-    ways = [
-        _effective(_without_unasked(ours, theirs, changes, near, certain_first), ours[0].kind)
-        for certain_first in (True, False)
-    ]
-    return next((kept for kept in ways if _values(kept) == _values(theirs)), ways[0])
+
+    def alike(wanted: Token | None, token: Token | None) -> bool:
+        return bool(wanted and token and wanted.value == token.value and not near.away(wanted.place, token))
+
+    kind = next((token.kind for token in (*theirs, *ours)), "")
+    came: dict[_Way, tuple[_Way | None, _Pair | None]] = {}
+    waiting: deque[tuple[_Way, _Way | None, _Pair | None]] = deque([((0, 0, _AT_START.get(kind)), None, None)])
+    while waiting:
+        way, before, wrong = waiting.popleft()
+        if way in came:
+            continue
+        came[way] = before, wrong
+        i, j, held = way
+        wanted, token = (tokens[k] if k < len(tokens) else None for tokens, k in ((theirs, i), (ours, j)))
+        if len(came) > _MOST_WAYS or (wanted is None and token is None):
+            break
+        if token is not None and (j in habits or token.value == held):
+            waiting.appendleft(((i, j + 1, held), way, None))
+        if wanted is not None:
+            if i in superseded or wanted.value == held:
+                waiting.appendleft(((i + 1, j, held), way, None))
+            after = wanted.value if kind in _STATES else None
+            both = (i + 1, j + 1, after)
+            if alike(wanted, token):
+                waiting.appendleft((both, way, None))
+            elif token is not None:
+                waiting.append((both, way, (wanted, token)))
+            waiting.append(((i + 1, j, after), way, (wanted, None)))
+        if token is not None:
+            waiting.append(((i, j + 1, held), way, (None, token)))
+    found: list[_Pair] = []
+    rest = [pair for pair in zip_longest(theirs[way[0] :], ours[way[1] :]) if not alike(*pair)]
+    at: _Way | None = way
+    while at is not None:
+        at, wrong = came[at]
+        found += [] if wrong is None else [wrong]
+    yield from reversed(found)
+    yield from rest
 
 
-def _without_unasked(
-    ours: list[Token], theirs: list[Token], changes: list[int], near: _Nearness, certain_first: bool
-) -> list[Token]:
-    """Tokens without the habits, where those asked for are looked for in one of two orders."""
-    unasked = {k for k, token in enumerate(ours) if token.value == _ENDED[token.kind]}
-    begins_again = {k for k in unasked if k + 1 < len(ours) and _goes_on(ours[k], ours[k + 1], changes)}
-    around = _Around.of(ours, sorted(unasked), near)
-    for other in theirs:
-        alike = [k for k in around.tokens(other.place) if k in unasked and other.value == ours[k].value]
-        alike = sorted(k for k in alike if not near.away(other.place, ours[k]))
-        ranks = []
-        for k in alike:
-            doubts = (ours[k].reach > near.room, k in begins_again)
-            ranks.append((doubts if certain_first else doubts[::-1], abs(ours[k].place - other.place)))
-        if alike:
-            unasked.remove(alike[ranks.index(min(ranks))])
-    return [token for k, token in enumerate(ours) if k not in begins_again or k not in unasked]
+def _superseded(tokens: list[Token]) -> set[int]:
+    """Tokens that no motion, stop or dwell meets, as another of their kind follows: of what a tool change stops."""
+    return {k for k, (one, after) in enumerate(pairwise(tokens)) if one.kind in _STOPPED and one.moment == after.moment}
 
 
-@dataclass(frozen=True)
-class _Around:
-    """Tokens by their places: those that may be near a place are found without looking at all."""
+def _habits(ours: list[Token], changes: list[int], end: float, near: _Nearness) -> set[int]:
+    """Tokens of the program that posts write on their own.
 
-    tokens_anywhere: list[int]  #: those with other places, or of which it is not known how far along they are
-    ordered: list[int]  #: all others, by place
-    places: list[float]  #: mm: of these, ascending
-    spare: float  #: mm: what none of these is uncertain by more
-    near: _Nearness
-
-    @classmethod
-    def of(cls, ours: list[Token], chosen: list[int], near: _Nearness) -> _Around:
-        anywhere = [k for k in chosen if ours[k].others or ours[k].reach > near.room]
-        ordered = sorted(set(chosen).difference(anywhere), key=lambda k: ours[k].place)
-        spare = max((ours[k].room + ours[k].reach for k in ordered), default=0.0)
-        return cls(anywhere, ordered, [ours[k].place for k in ordered], spare, near)
-
-    def tokens(self, place: float) -> Iterator[int]:
-        """Tokens that may be near a place, and a few more."""
-        yield from self.tokens_anywhere
-        at = bisect_left(self.places, place)
-        for way in (range(at, len(self.places)), range(at - 1, -1, -1)):
-            for k in way:
-                if self.near.beyond(place, self.places[k], self.spare):
-                    break
-                yield self.ordered[k]
+    Those are optional stops before another tool; what only ends what ends with the program anyway; and what ends a
+    state which begins again before any motion, also where the program waits after a tool change: `changes` are the
+    lines of those.
+    """
+    found = {k for k, token in enumerate(ours) if token.habit} | _superseded(ours)
+    off = [token.value == _ENDED.get(token.kind) for token in ours]
+    last = len(ours) - len(list(takewhile(bool, reversed(off))))
+    found |= {k for k in range(last, len(ours)) if ours[k].place >= end or not near.away(end, ours[k])}
+    on: Token | None = None
+    for k in range(len(ours) - 1, -1, -1):
+        if not off[k]:
+            on = ours[k]
+        elif on is not None and on.kind in _STOPPED and _goes_on(ours[k], on, changes):
+            found.add(k)
+    return found
 
 
 def _goes_on(off: Token, on: Token, changes: list[int]) -> bool:
@@ -296,7 +219,7 @@ def _goes_on(off: Token, on: Token, changes: list[int]) -> bool:
 def _without_idle_offsets(asked_for: list[Token], found: list[Token]) -> tuple[list[Token], list[Token]]:
     """Both without the offsets of tools with which nothing moves: those may be said or not."""
     theirs, ours = _effective(asked_for, "tool"), _effective(found, "tool")
-    if _values(theirs) != _values(ours):
+    if [tool.value for tool in theirs] != [tool.value for tool in ours]:
         return asked_for, found
     idle = {k for k, tool in enumerate(ours) if tool.idle}
     if not idle:
@@ -313,12 +236,6 @@ def _outside(tokens: list[Token], tools: list[Token], idle: set[int]) -> list[To
         if token.kind != "offset" or at not in idle:
             kept.append(token)
     return kept
-
-
-def _last_of_moments(tokens: list[Token], kind: str) -> list[Token]:
-    """Tokens of one kind that the next motion, stop or dwell meets."""
-    mine = [token for token in tokens if token.kind == kind]
-    return [token for k, token in enumerate(mine) if k + 1 == len(mine) or mine[k + 1].moment != token.moment]
 
 
 def _effective(tokens: list[Token], kind: str) -> list[Token]:
