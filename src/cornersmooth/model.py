@@ -435,14 +435,12 @@ class Corners:
     @property
     def smoothed(self) -> Bools:
         """(k,) bool: rows with a transition of their own."""
-        smoothed: Bools = self.status == Status.SMOOTHED
-        return smoothed
+        return self.status == Status.SMOOTHED
 
     @property
     def rounded(self) -> Bools:
         """(k,) bool: smoothed rows, and those that the curve of a run rounds."""
-        rounded: Bools = np.isin(self.status, Status.having(Trait.ROUNDED))
-        return rounded
+        return np.isin(self.status, Status.having(Trait.ROUNDED))
 
 
 @dataclass(frozen=True)

@@ -225,8 +225,7 @@ class Settings:
         speed = feed / 60.0
         jump = np.maximum(speed * kinks[0] / SMALL_JUMPS[0], np.degrees(speed * kinks[1]) / SMALL_JUMPS[1])
         most = np.minimum(length / (speed * self.block_time), jump)
-        found: Floats = np.maximum(by_chord, np.minimum(finest, np.nan_to_num(most, nan=0.0, posinf=0.0)))
-        return found
+        return np.maximum(by_chord, np.minimum(finest, np.nan_to_num(most, nan=0.0, posinf=0.0)))
 
     @property
     def interpolation_tolerance(self) -> float:

@@ -62,8 +62,7 @@ class Setup:
     @property
     def matrix(self) -> Floats:
         """(3, 3) rotation from today's coordinates of the part to those of the machine."""
-        matrix: Floats = self._rotation.as_matrix()
-        return matrix
+        return self._rotation.as_matrix()
 
     @property
     def _rotation(self) -> Rotation:
@@ -129,8 +128,7 @@ class Setups:
 
     def zero(self, setup: Setup) -> Floats:
         """(3,) where the zero of the part goes to, counted from where it is, mm."""
-        shift: Floats = self.pivot - setup.matrix @ self.pivot
-        return shift
+        return self.pivot - setup.matrix @ self.pivot
 
     def as_dict(self) -> dict[str, Any]:
         """Everything, plain; keys carry their unit."""

@@ -126,7 +126,7 @@ def test_plain_lines_take_the_fast_path() -> None:
     assert len(chunk.tip) == 21
     assert chunk.runs.tolist() == [[0, 20], [21, 23]]
     assert chunk.line.tolist() == [*range(1, 21), 22]
-    assert np.array_equal(chunk.own_axis, [True, False] * 10 + [True])
+    assert np.array_equal(~np.isnan(chunk.axis[:, 0]), [True, False] * 10 + [True])
 
 
 @pytest.mark.parametrize(

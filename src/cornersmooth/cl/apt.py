@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from cornersmooth.cl import arcs as arc_geometry
 from cornersmooth.cl.arcs import ArcRule
-from cornersmooth.cl.builder import AXIS_NOISE, Builder
 from cornersmooth.cl.bulk import chunks
 from cornersmooth.cl.cards import without_card_columns
 from cornersmooth.cl.dialects import by_name, recognise
 from cornersmooth.cl.grammar import Decode, Record, read_records
 from cornersmooth.cl.interpret import end, obey, plain
 from cornersmooth.cl.messages import error, finding
+from cornersmooth.cl.poses import AXIS_NOISE
 from cornersmooth.cl.reader_state import ReaderState
 from cornersmooth.errors import Finding
 from cornersmooth.model import MM_PER_UNIT, Arcs, Floats, Ints, Keep, Move, Program, Source, Units
@@ -73,15 +73,19 @@ def read_apt(
     data, cut = without_card_columns(data, name)
     known = by_name(dialect) if dialect else recognise(data)
     decode = _decoder(data)
-    builder = Builder(
-        name, short_axis_up=known.short_axis == "up", off_known=known.multax_off is not None, lenient=lenient
+    state = ReaderState(
+        file=name,
+        dialect=known,
+        short_axis_up=known.short_axis == "up",
+        off_known=known.multax_off is not None,
+        arc_rule=arc_rule,
+        lenient=lenient,
     )
-    state = ReaderState(name, known, builder, arc_rule, lenient)
     if cut:
         state.note(cut, 0)
     _run(data, state, decode, fast)
     end(state)
-    if not builder.n:
+    if not state.n:
         raise error("CS101", name, 1)
     return _program(state, units)
 
@@ -105,7 +109,7 @@ def _run(data: bytes, state: ReaderState, decode: Decode, fast: bool) -> None:
             remembered[key] = records
 
     for chunk in chunks(data, fast=fast):
-        state.builder.enter(chunk)
+        state.enter(chunk)
         done += chunk.size
         follows = "GOTO" if done < len(data) else "the end of the file"
         begin = 0
@@ -134,16 +138,15 @@ def _decoder(data: bytes) -> Decode:
 
 
 def _program(state: ReaderState, asked: Units | None) -> Program:
-    builder = state.builder
     units, said = _units(state, asked)
     scale = MM_PER_UNIT[units]
-    tip = builder.tips()
-    axis, axis_findings = builder.axes()
-    kind = builder.kinds()
-    line = builder.lines()
+    tip = state.tips()
+    axis, axis_findings = state.axes()
+    kind = state.kinds()
+    line = state.lines()
     resolved = arc_geometry.resolve(state.arcs, tip, kind, state.file, state.arc_rule)
     kind[resolved.lines] = Move.LINEAR
-    keep = builder.keep.spread(builder.n).astype(np.uint8)
+    keep = state.exact.spread(state.n).astype(np.uint8)
     keep[resolved.kept] = Keep.CONTRADICTION
     keep[resolved.kept - 1] = Keep.CONTRADICTION
     turned = np.abs(axis[resolved.arcs.pose] - axis[resolved.arcs.pose - 1]).max(axis=1, initial=0) > AXIS_NOISE
@@ -151,21 +154,21 @@ def _program(state: ReaderState, asked: Units | None) -> Program:
     fed = _fed_from_elsewhere(tip, kind)
     jumps = [finding("CS185", int(line[fed[0]]), len(fed))] if len(fed) else []
     for index in state.unitless_feeds:
-        builder.feed.value[index] *= scale
+        state.feed.value[index] *= scale
     arcs = Arcs(resolved.arcs.pose, resolved.arcs.centre * scale, resolved.arcs.normal, resolved.arcs.sweep)
     return Program(
         tip=tip * scale,
         axis=axis,
         kind=kind,
-        feed=builder.feed.spread(builder.n),
+        feed=state.feed.spread(state.n),
         line=line,
-        feed_mode=builder.feed_mode.spread(builder.n).astype(np.uint8),
+        feed_mode=state.feed_mode.spread(state.n).astype(np.uint8),
         keep=keep,
         arcs=arcs,
         statements=tuple(state.statements),
         units=units,
         source=Source(state.file, "apt", state.dialect.name),
-        findings=(*said, *state.findings, *axis_findings, *resolved.findings, *along, *jumps),
+        findings=(*said, *state.findings.values(), *axis_findings, *resolved.findings, *along, *jumps),
     )
 
 

@@ -15,9 +15,9 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.cl.builder import check_range
 from cornersmooth.cl.grammar import Record
 from cornersmooth.cl.messages import error, finding
+from cornersmooth.cl.poses import check_range
 from cornersmooth.errors import Finding
 from cornersmooth.model import Arcs, Bools, Floats, Ints, Move
 from cornersmooth.vectors import dot, norm

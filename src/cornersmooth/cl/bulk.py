@@ -46,8 +46,7 @@ class Chunk:
     runs: Ints  #: (k, 2): ranges [start, stop) of lines that are plain GOTO statements, ascending
     rows: Ints  #: (k+1,): first pose of every run; the last is the number of poses
     tip: Floats  #: (m, 3): as written
-    own_axis: Bools  #: (m,): which poses have an axis of their own
-    axis: Floats  #: (a, 3): these axes, as written
+    axis: Floats  #: (m, 3): as written; NaN where a pose has none of its own
     line: Ints  #: (m,): line of every pose
 
 
@@ -91,7 +90,6 @@ def _all_careful(text: bytes, first: int) -> Chunk:
         none.reshape(0, 2),
         np.zeros(1, np.int64),
         np.zeros((0, 3)),
-        none.astype(np.bool_),
         np.zeros((0, 3)),
         none,
     )
@@ -135,11 +133,13 @@ def _find_plain(text: bytes, first: int) -> Chunk | None:
         table = values.reshape(-1, 6)
         tip, axis = table[:, :3], table[:, 3:]
     elif not own_axis.any():
-        tip, axis = values.reshape(-1, 3), np.zeros((0, 3))
+        tip = values.reshape(-1, 3)
+        axis = np.full(tip.shape, np.nan)
     else:
         begin = np.cumsum(count) - count
         tip = values[begin[:, None] + np.arange(3)]
-        axis = values[begin[own_axis, None] + np.arange(3, 6)]
+        axis = np.full(tip.shape, np.nan)
+        axis[own_axis] = values[begin[own_axis, None] + np.arange(3, 6)]
     if not (np.abs(tip) <= FARTHEST).all():
         return None
     poses = np.concatenate(([0], np.cumsum(taken > 0)))
@@ -151,7 +151,6 @@ def _find_plain(text: bytes, first: int) -> Chunk | None:
         edges,
         np.concatenate((poses[edges[:, 0]], [len(tip)])),
         tip,
-        own_axis,
         axis,
         np.flatnonzero(taken) + first,
     )

@@ -78,7 +78,7 @@ class Record:
     def moved(self, lines: int) -> Record:
         """Return the same statement so many lines further down."""
         points = tuple((line + lines, args) for line, args in self.points)
-        return replace(self, line=self.line + lines, points=points)
+        return Record(self.line + lines, self.word, self.args, self.text, self.rest, points, self.cut_short)
 
 
 @dataclass
@@ -227,6 +227,11 @@ def arguments(body: str) -> tuple[Argument, ...]:
     if len(parts) == 1 and not parts[0].strip():
         return ()
     return tuple(_argument(part.strip()) for part in parts)
+
+
+def joined(args: tuple[Argument, ...]) -> str:
+    """Arguments as text, for messages."""
+    return ",".join(f"{value:g}" if isinstance(value, float) else value for value in args)
 
 
 def number(token: str) -> float | None:

@@ -7,7 +7,8 @@ import re
 from typing import Final
 
 from cornersmooth.cl import motion_statements, state_statements
-from cornersmooth.cl.grammar import Record, number
+from cornersmooth.cl.grammar import Record, joined, number
+from cornersmooth.cl.messages import error
 from cornersmooth.cl.reader_state import ReaderState
 from cornersmooth.cl.words import (
     GOTO_WORDS,
@@ -44,17 +45,17 @@ _STRANGE_PREFIXES: Final = ("TLON,", "TLLFT,", "TLRGT,", "TLOFF,")
 
 
 def plain(state: ReaderState, count: int, line: int) -> None:
-    """Carry out some plain GOTO statements, whose poses the builder already has."""
+    """Carry out some plain GOTO statements, whose poses are in the chunk."""
     if state.finished:
-        raise state.fail("CS118", line, word="GOTO")
+        raise error("CS118", state.file, line, word="GOTO")
     if state.curve is not None:
         motion_statements.finish_curve(state)
     if state.rapid or state.arc is not None:
-        state.builder.take(1)
+        state.take(1)
         state.arrived()
         count -= 1
     if count:
-        state.builder.take(count)
+        state.take(count)
 
 
 def obey(state: ReaderState, record: Record) -> None:
@@ -72,23 +73,24 @@ def obey(state: ReaderState, record: Record) -> None:
         _after_end(state, record, word)
         return
     if state.arc is not None and word not in _WITHIN_ARC:
-        raise state.fail("CS121", state.arc.line, word=state.arc.word)
+        raise state.fail("CS121", state.arc)
     if record.points and word not in GOTO_WORDS:
-        raise state.fail("CS105", record.points[0][0], text=state_statements.joined(record.points[0][1]))
+        line, args = record.points[0]
+        raise state.fail("CS105", record, line, text=joined(args))
     handler = HANDLERS.get(word)
     refused = _refused(record, word) if handler is None or word in _CHOOSING else None
     if refused is not None:
         whole = word in _CHOOSING or word == "INSERT" or refused == "CS198"
-        raise state.fail(refused, record.line, word=record.text if whole else word)
+        raise state.fail(refused, record, word=record.text if whole else word)
     if handler is not None:
         if record.rest:
-            raise state.fail("CS107", record.line, word=word, text=record.rest)
+            raise state.fail("CS107", record, word=word, text=record.rest)
         handler(state, record)
         if word in state_statements.KEPT:
             state.keep(record)
         return
     if any(isinstance(value, float) and not math.isfinite(value) for value in record.args):
-        raise state.fail("CS196", record.line, word=word)
+        raise state.fail("CS196", record, word=word)
     if word not in KNOWN_WORDS and word != "$$" and not word.startswith(PLAIN_PREFIXES):
         _unknown(state, record, word)
     state.keep(record)
@@ -99,12 +101,12 @@ def end(state: ReaderState) -> None:
     if state.curve is not None:
         motion_statements.finish_curve(state)
     if state.arc is not None:
-        raise state.fail("CS121", state.arc.line, word=state.arc.word)
+        raise state.fail("CS121", state.arc)
 
 
 def _after_end(state: ReaderState, record: Record, word: str) -> None:
     if (word in MOTION_WORDS or _refused(record, word)) and not state.lenient:
-        raise state.fail("CS118", record.line, word=word)
+        raise state.fail("CS118", record, word=word)
     if word != "$$":
         state.note("CS144", record.line, what="statements after FINI")
 
@@ -141,9 +143,9 @@ def _numbers_in_a_row(record: Record) -> int:
 def _unknown(state: ReaderState, record: Record, word: str) -> None:
     near = near_motion_word(word)
     if near is not None and not state.lenient:
-        raise state.fail("CS109", record.line, word=word, near=near)
+        raise state.fail("CS109", record, word=word, near=near)
     if _numbers_in_a_row(record) >= _POSITION and not state.lenient:
-        raise state.fail("CS187", record.line, word=word or record.text)
+        raise state.fail("CS187", record, word=word or record.text)
     if word:
         state.note("CS130", record.line, word=word)
     else:

@@ -8,11 +8,12 @@ from dataclasses import replace
 from typing import Final
 
 from cornersmooth.cl.arcs import LEAST_DECIMALS, Arc, read_arc
-from cornersmooth.cl.builder import check_range
-from cornersmooth.cl.grammar import NUMBER, Argument, Record, number
+from cornersmooth.cl.grammar import NUMBER, Argument, Record, joined, number
+from cornersmooth.cl.messages import error
 from cornersmooth.cl.nurbs import CURVE_DIGITS, Curve, lines_of
+from cornersmooth.cl.poses import check_range
 from cornersmooth.cl.reader_state import ReaderState
-from cornersmooth.cl.state_statements import Handler, joined
+from cornersmooth.cl.state_statements import Handler
 from cornersmooth.cl.surfaces import read_drive_arc, read_helix
 from cornersmooth.cl.systems import Vector
 from cornersmooth.cl.words import GOTO_WORDS
@@ -47,19 +48,18 @@ def _goto(state: ReaderState, record: Record) -> None:
         state.note("CS195", record.points[0][0])
     poses = [(line, *_pose(state, record, args, line)) for line, args in ((record.line, record.args), *record.points)]
     if state.arc is not None:  # more points of one GOTO lie on the arc; the last one ends it
-        state.arcs.pass_through([state.builder.system.point(tip) for _, tip, _ in poses[:-1]])
+        state.arcs.pass_through([state.system.point(tip) for _, tip, _ in poses[:-1]])
         poses = poses[-1:]
     for line, tip, axis in poses:
         if record.cut_short:
             state.note("CS129", line)
-            axis = state.builder.last_axis()
+            axis = state.last_axis
         state.add(tip, axis, line)
 
 
 def _from(state: ReaderState, record: Record) -> None:
     tip, axis = _pose(state, record, record.args, record.line)
-    state.builder.special[state.builder.n] = Move.FROM
-    state.builder.add(tip, axis, record.line)
+    state.add_special(tip, axis, record.line, Move.FROM)
 
 
 def _gohome(state: ReaderState, record: Record) -> None:
@@ -69,8 +69,7 @@ def _gohome(state: ReaderState, record: Record) -> None:
         return
     tip, axis = _pose(state, record, record.args, record.line)
     state.rapid = False
-    state.builder.special[state.builder.n] = Move.RAPID
-    state.builder.add(tip, axis, record.line)
+    state.add_special(tip, axis, record.line, Move.RAPID)
 
 
 def _retract(state: ReaderState, record: Record) -> None:
@@ -78,12 +77,12 @@ def _retract(state: ReaderState, record: Record) -> None:
     if record.args:
         raise _no_retract(state, record, f"its option {joined(record.args)} is not understood", "write RETRCT alone")
     if state.hole:
-        raise state.fail("CS181", record.line, word=record.word)
-    if not state.builder.n:
+        raise state.fail("CS181", record)
+    if not state.n:
         raise _no_retract(state, record, "it is before the first position", "put a GOTO before it")
     if state.clearance is None:
         raise _no_retract(state, record, "no clearance plane is known", "put CLEARP/XYPLAN,z before it")
-    tip, axis = state.builder.last_tip(), state.builder.last_axis()
+    tip, axis = state.last_tip(), state.last_axis
     normal, point = state.clearance
     normal = normal or axis
     slope = sum(a * b for a, b in zip(normal, axis, strict=True))
@@ -95,36 +94,36 @@ def _retract(state: ReaderState, record: Record) -> None:
         state.rapid = False
         return
     x, y, z = (t + way * a for t, a in zip(tip, axis, strict=True))
-    state.add((x, y, z), state.builder.held_axis(), record.line)
+    state.add((x, y, z), state.held_axis(), record.line)
 
 
 def _no_retract(state: ReaderState, record: Record, why: str, want: str) -> InputError:
-    return state.fail("CS193", record.line, why=why, want=want)
+    return state.fail("CS193", record, why=why, want=want)
 
 
 def _godlta(state: ReaderState, record: Record) -> None:
     values = state.numbers(record)
     if len(values) not in (1, 2, 3, 6):
-        raise state.count(record, len(values), "dx,dy,dz or the distance along the tool axis", record.line)
-    if not state.builder.n:
-        raise state.fail("CS114", record.line, word="GODLTA")
+        raise state.count(record, len(values), "dx,dy,dz or the distance along the tool axis")
+    if not state.n:
+        raise state.fail("CS114", record)
     if len(values) == 1:
-        axis = state.builder.last_axis()
+        axis = state.last_axis
         length = math.hypot(*axis) or 1.0  # a zero axis is refused when all axes are looked at
         step = [values[0] * part / length for part in axis]
     else:
         step = [*values, 0.0][:3]
-    x, y, z = (a + b for a, b in zip(state.builder.last_tip(), step, strict=True))
-    own = (values[3], values[4], values[5]) if len(values) == 6 else state.builder.held_axis()
+    x, y, z = (a + b for a, b in zip(state.last_tip(), step, strict=True))
+    own = (values[3], values[4], values[5]) if len(values) == 6 else state.held_axis()
     state.add((x, y, z), own, record.line)
 
 
 def _check_curve(state: ReaderState, record: Record) -> None:
     """Refuse a curve from nowhere, and one among holes."""
-    if not state.builder.n:
-        raise state.fail("CS122", record.line, word=record.word)
+    if not state.n:
+        raise state.fail("CS122", record)
     if state.hole:
-        raise state.fail("CS181", record.line, word=record.word)
+        raise state.fail("CS181", record)
 
 
 def _circle(state: ReaderState, record: Record) -> None:
@@ -136,7 +135,7 @@ def _circle(state: ReaderState, record: Record) -> None:
 
 def _placed(state: ReaderState, arc: Arc) -> Arc:
     """Return the same arc in the first coordinate system."""
-    system = state.builder.system
+    system = state.system
     return replace(arc, centre=system.point(arc.centre), normal=system.vector(arc.normal))
 
 
@@ -149,10 +148,10 @@ def _direction(state: ReaderState, record: Record) -> None:
 def _drive(state: ReaderState, record: Record) -> None:
     _check_curve(state, record)
     read = read_helix if record.word == "HELICAL" else read_drive_arc
-    arc, end = read(record, state.builder.last_tip(), state.direction, state.file)
+    arc, end = read(record, state.last_tip(), state.direction, state.file)
     state.arc, state.direction = _placed(state, arc), None
     _at_feed(state, record)
-    state.add(end, state.builder.held_axis(), record.line)
+    state.add(end, state.held_axis(), record.line)
 
 
 def _nothing(state: ReaderState, record: Record) -> None:
@@ -162,25 +161,23 @@ def _nothing(state: ReaderState, record: Record) -> None:
 def _nurbs(state: ReaderState, record: Record) -> None:
     _check_curve(state, record)
     if record.args:
-        raise state.fail("CS128", record.line, why="numbers behind NURBS are not understood")
+        raise state.fail("CS128", record, why="numbers behind NURBS are not understood")
     _at_feed(state, record)
     state.curve = Curve(record.line)
 
 
 def _knot(state: ReaderState, record: Record) -> None:
     if state.curve is None or state.curve.points:
-        raise state.fail("CS128", record.line, why="KNOT without NURBS before it")
+        raise state.fail("CS128", record, why="KNOT without NURBS before it")
     state.curve.knots += state.numbers(record)
 
 
 def _control(state: ReaderState, record: Record) -> None:
     if state.curve is None:
-        raise state.fail("CS128", record.line, why="CNTRL without NURBS before it")
-    values = state.numbers(record)
-    if len(values) != 3:
-        raise state.count(record, len(values), "x,y,z", record.line)
-    check_range(values, state.file, record.line)
-    state.curve.points.append((values[0], values[1], values[2]))
+        raise state.fail("CS128", record, why="CNTRL without NURBS before it")
+    point = state.vector(record, "x,y,z")
+    check_range(point, state.file, record.line)
+    state.curve.points.append(point)
     state.curve.lines.append(record.line)
     digits = (len(token.partition(".")[2].strip()) for token in record.text.partition("/")[2].split(","))
     state.curve.decimals = max(state.curve.decimals, *digits)
@@ -194,12 +191,12 @@ def finish_curve(state: ReaderState) -> None:
     points = None
     if why is None:
         tolerance = CURVE_DIGITS * 10.0 ** -max(curve.decimals, LEAST_DECIMALS)
-        points = lines_of(curve, state.builder.last_tip(), tolerance)
+        points = lines_of(curve, state.last_tip(), tolerance)
         why = "it would need too many lines" if points is None else None
     if points is None:
-        raise state.fail("CS128", curve.line, why=why)
+        raise error("CS128", state.file, curve.line, why=why)
     state.note("CS145", curve.line, tolerance=tolerance)
-    axis = state.builder.held_axis()
+    axis = state.held_axis()
     for (x, y, z), line in zip(points[0].tolist(), points[1].tolist(), strict=True):
         state.add((x, y, z), axis, line)
 

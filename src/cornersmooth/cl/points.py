@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from cornersmooth.cl import points_header
 from cornersmooth.cl import points_table as table
-from cornersmooth.cl.builder import UNIT_TOLERANCE
 from cornersmooth.cl.bulk import FARTHEST
 from cornersmooth.cl.messages import error, finding
 from cornersmooth.cl.points_header import Columns
+from cornersmooth.cl.poses import UNIT_TOLERANCE
 from cornersmooth.errors import Finding
 from cornersmooth.model import MM_PER_UNIT, Bools, Floats, Ints, Move, Program, Source, Units
 

@@ -6,32 +6,29 @@ until OFF; an arc is completed by the GOTO after it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from cornersmooth.cl.arcs import Arc, ArcRule, ArcTable
-from cornersmooth.cl.builder import Builder
 from cornersmooth.cl.dialects import Dialect
-from cornersmooth.cl.grammar import Argument, Record, number
+from cornersmooth.cl.grammar import Argument, Record, joined, number
 from cornersmooth.cl.messages import error, finding
 from cornersmooth.cl.nurbs import Curve
+from cornersmooth.cl.poses import Poses
 from cornersmooth.cl.systems import System, Vector
 from cornersmooth.errors import Finding, InputError
 from cornersmooth.model import Move, Statement, Units
 
 
-@dataclass
-class ReaderState:
+@dataclass(kw_only=True)
+class ReaderState(Poses):
     """State of the reading of one file."""
 
-    file: str  #: for messages
     dialect: Dialect
-    builder: Builder  #: takes the poses
     arc_rule: ArcRule | None = None  #: overrides the dialect's sense of rotation
-    lenient: bool = False  #: go on where that is safe
     arcs: ArcTable = field(default_factory=ArcTable)
     statements: list[Statement] = field(default_factory=list)
     stated_units: list[tuple[int, Units, int]] = field(default_factory=list)  #: line, units, pose
-    unitless_feeds: set[int] = field(default_factory=set)  #: rows of `Builder.feed` in units of the file
+    unitless_feeds: set[int] = field(default_factory=set)  #: rows of `Poses.feed` in units of the file
     feed_units: list[Units] = field(default_factory=list)
     rapid: bool = False  #: the next motion is rapid
     rapid_on: bool = False  #: all motions are
@@ -45,34 +42,29 @@ class ReaderState:
     clearance: tuple[Vector | None, Vector] | None = None  #: normal of the plane of RETRCT (None: the tool axis), point
     renamed: dict[str, str] = field(default_factory=dict)  #: SYN
     finished: bool = False  #: FINI was met
-    _findings: dict[str, Finding] = field(default_factory=dict)
+    findings: dict[str, Finding] = field(default_factory=dict)  #: by text, in the order in which they were first met
 
     @property
     def stopped(self) -> bool:
         """Whether the rest of the file is of no interest."""
         return self.finished and self.lenient
 
-    @property
-    def findings(self) -> tuple[Finding, ...]:
-        """What was noticed, equal texts once, in the order in which they were first met."""
-        return tuple(self._findings.values())
-
     def note(self, code: str, line: int, **values: object) -> None:
-        """Count a finding."""
+        """Count a finding; equal texts are one."""
         new = finding(code, line, 1, **values)
-        old = self._findings.get(new.text)
-        if old is not None:
-            new = Finding(old.code, old.severity, old.line, old.text, old.count + 1)
-        self._findings[new.text] = new
+        old = self.findings.get(new.text)
+        self.findings[new.text] = new if old is None else replace(old, count=old.count + 1)
 
-    def fail(self, code: str, line: int, **values: object) -> InputError:
-        """Return the error, to be raised."""
-        return error(code, self.file, line, **values)
+    def fail(self, code: str, record: Record | Arc, line: int = 0, **values: object) -> InputError:
+        """Return the error of a statement, to be raised; `line` where it is not the first one of the statement."""
+        values = {"word": record.word} | values
+        if isinstance(record, Record):
+            values = {"text": joined(record.args)} | values
+        return error(code, self.file, line or record.line, **values)
 
     def keep(self, record: Record) -> None:
         """Keep a statement in its place."""
-        word = record.word or "?"
-        self.statements.append(Statement(self.builder.n, record.line, word, record.args, record.text))
+        self.statements.append(Statement(self.n, record.line, record.word or "?", record.args, record.text))
 
     def numbers(self, record: Record, args: tuple[Argument, ...] | None = None, line: int = 0) -> list[float]:
         """Return arguments (of the statement, or of a line after it) that must all be numbers (InputError CS106).
@@ -87,37 +79,41 @@ class ReaderState:
                 return [value for value in values if value is not None]
         for value in given:
             if isinstance(value, str):
-                raise self.fail("CS106", line or record.line, word=record.word, token=value)
+                raise self.fail("CS106", record, line, token=value)
         return [float(value) for value in given]
 
-    def vector(self, record: Record) -> Vector:
+    def vector(self, record: Record, want: str = "i,j,k") -> Vector:
         """Return the three numbers of a statement that has a vector (InputError CS106, CS110)."""
         values = self.numbers(record)
         if len(values) != 3:
-            raise self.count(record, len(values), "i,j,k", record.line)
+            raise self.count(record, len(values), want)
         return values[0], values[1], values[2]
 
-    def count(self, record: Record, count: int, want: str, line: int) -> InputError:
+    def count(self, record: Record, count: int, want: str, line: int = 0) -> InputError:
         """Return the error for a wrong number of numbers, to be raised."""
-        return self.fail("CS110", line, word=record.word, count=count, s="s"[: count != 1], want=want)
+        return self.fail("CS110", record, line, count=count, s="s"[: count != 1], want=want)
 
     def add(self, tip: Vector, axis: Vector | None, line: int) -> None:
         """Append a pose that a feed motion or the pending RAPID reaches."""
-        self.builder.add(tip, axis, line)
+        self.append(tip, axis, line)
         self.arrived()
+
+    def add_special(self, tip: Vector, axis: Vector | None, line: int, move: Move) -> None:
+        """Append a pose that is reached in a way of its own."""
+        self.special[self.n] = move
+        self.append(tip, axis, line)
 
     def arrived(self) -> None:
         """Settle how the last pose was reached."""
-        pose = self.builder.n - 1
+        pose = self.n - 1
         if self.arc is not None:
             self.arcs.add(pose, self.arc)
-            self.builder.special[pose] = Move.ARC
+            self.special[pose] = Move.ARC
             self.arc = None
         elif self.rapid and not self.hole:
-            self.builder.special[pose] = Move.RAPID
+            self.special[pose] = Move.RAPID
         self.rapid = False
 
     def set_kind(self) -> None:
         """Let the modal kind of motion hold from here on."""
-        kind = Move.HOLE if self.hole else Move.RAPID if self.rapid_on else Move.LINEAR
-        self.builder.kind.set(self.builder.n, float(kind))
+        self.kind.set(self.n, Move.HOLE if self.hole else Move.RAPID if self.rapid_on else Move.LINEAR)

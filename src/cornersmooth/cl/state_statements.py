@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable
 from typing import Final
 
-from cornersmooth.cl.builder import UNIT_TOLERANCE, UP
 from cornersmooth.cl.bulk import FARTHEST
-from cornersmooth.cl.grammar import Argument, Record, number
+from cornersmooth.cl.grammar import Record, joined, number
+from cornersmooth.cl.poses import UNIT_TOLERANCE, UP
 from cornersmooth.cl.reader_state import ReaderState
 from cornersmooth.cl.systems import IDENTITY, System, Vector, from_numbers
 from cornersmooth.cl.words import MOTION_WORDS, REFUSED_WORDS, TURNS
@@ -48,8 +48,7 @@ _NO_TURN: Final = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0]
 def _rapid(state: ReaderState, record: Record) -> None:
     option = record.option
     if isinstance(option, float):
-        text = joined(record.args)
-        raise state.fail("CS115", record.line, word="RAPID", text=text, want="write RAPID, and GOTO with the position")
+        raise state.fail("CS115", record, want="write RAPID, and GOTO with the position")
     if option in ("ON", "OFF"):
         state.rapid_on = option == "ON"
         state.rapid = False
@@ -72,37 +71,34 @@ def _feed(state: ReaderState, record: Record) -> None:
         return
     if not (math.isfinite(values[0]) and values[0] > 0):
         if not state.lenient:
-            raise state.fail("CS119", record.line, word="FEDRAT", value=values[0])
+            raise state.fail("CS119", record, value=values[0])
         state.note("CS144", record.line, what=f"feed of {values[0]:g}")
         return
     if state.rapid:
         state.note("CS135", record.line)
     if not units:
         state.note("CS148", record.line)
-    builder = state.builder
-    scale, mode = FEED_UNITS[units[0]] if units else (None, FeedMode(int(builder.feed_mode.now)))
+    scale, mode = FEED_UNITS[units[0]] if units else (None, FeedMode(int(state.feed_mode.now)))
     if scale is None:
-        state.unitless_feeds.add(len(builder.feed.at))
+        state.unitless_feeds.add(len(state.feed.at))
     else:
         state.feed_units.append("mm" if units[0].startswith("MM") else "inch")
-    builder.feed_mode.set(builder.n, float(mode))
-    builder.feed.append(builder.n, values[0] * (scale or 1.0))
+    state.feed_mode.set(state.n, mode)
+    state.feed.append(state.n, values[0] * (scale or 1.0))
 
 
 def _units(state: ReaderState, record: Record) -> None:
     name = record.args[0] if len(record.args) == 1 else None
     units = UNIT_NAMES.get(name) if isinstance(name, str) else None
     if units is None:
-        want = "use UNITS/MM or UNITS/INCHES"
-        raise state.fail("CS115", record.line, word=record.word, text=joined(record.args), want=want)
-    state.stated_units.append((record.line, units, state.builder.n))
+        raise state.fail("CS115", record, want="use UNITS/MM or UNITS/INCHES")
+    state.stated_units.append((record.line, units, state.n))
 
 
 def _multax(state: ReaderState, record: Record) -> None:
     if record.args not in ((), ("ON",), ("OFF",), ("NOMORE",)):
-        text = joined(record.args)
-        raise state.fail("CS115", record.line, word="MULTAX", text=text, want="use MULTAX/ON or MULTAX/OFF")
-    state.builder.lock_axis(record.args[:1] in (("OFF",), ("NOMORE",)))
+        raise state.fail("CS115", record, want="use MULTAX/ON or MULTAX/OFF")
+    state.lock_axis(record.args[:1] in (("OFF",), ("NOMORE",)))
 
 
 def _tlaxis(state: ReaderState, record: Record) -> None:
@@ -112,16 +108,16 @@ def _tlaxis(state: ReaderState, record: Record) -> None:
 def _set_axis(state: ReaderState, record: Record, axis: Vector) -> None:
     length = math.hypot(*axis)
     if length == 0:
-        raise state.fail("CS111", record.line)
+        raise state.fail("CS111", record)
     if not abs(length - 1) <= UNIT_TOLERANCE:
         if not (state.lenient and math.isfinite(length)):
-            raise state.fail("CS112", record.line, length=length)
+            raise state.fail("CS112", record, length=length)
         state.note("CS139", record.line, length=length)
-    state.builder.set_axis((axis[0] / length, axis[1] / length, axis[2] / length))
+    state.set_axis((axis[0] / length, axis[1] / length, axis[2] / length))
 
 
 def _tool_path(state: ReaderState, record: Record) -> None:
-    state.builder.set_axis(UP)  # NX repeats i,j,k on the first point of a path that is tilted
+    state.set_axis(UP)  # NX repeats i,j,k on the first point of a path that is tilted
 
 
 def _csys(state: ReaderState, record: Record) -> None:
@@ -133,7 +129,7 @@ def _csys(state: ReaderState, record: Record) -> None:
 def _msys(state: ReaderState, record: Record) -> None:
     """MSYS/origin,x,y of NX, also misspelt SYS: positions are in this system; those of all go into the first one."""
     args, system = record.args, _system(record)
-    if state.builder.n and state.first_system is None:  # positions before it are in no system that is known
+    if state.n and state.first_system is None:  # positions before it are in no system that is known
         state.first_system = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0), None
     if state.first_system is None:
         state.first_system = args, system
@@ -152,14 +148,13 @@ def _system(record: Record) -> System | None:
 
 
 def _enter(state: ReaderState, system: System) -> None:
-    builder = state.builder
-    if system is builder.system:
+    if system is state.system:
         return
     if state.clearance is not None:  # the plane stays where it is
-        change = builder.system.seen_from(system)
+        change = state.system.seen_from(system)
         normal, point = state.clearance
         state.clearance = normal and change.vector(normal), change.point(point)
-    builder.enter_system(system)
+    state.enter_system(system)
 
 
 def _clearance(state: ReaderState, record: Record) -> None:
@@ -183,7 +178,7 @@ def _clearance(state: ReaderState, record: Record) -> None:
 
 def _offset(state: ReaderState, record: Record) -> None:
     """FIXTURE/n, FIXTUR/n, WCS/n: another work offset of the machine, which the text does not select."""
-    if state.builder.n and record.args != state.offsets.get(record.word):
+    if state.n and record.args != state.offsets.get(record.word):
         _frame(state, record)
     state.offsets[record.word] = record.args
 
@@ -193,7 +188,7 @@ def _mcs(state: ReaderState, record: Record) -> None:
     values = record.values
     axes = values[:6] if record.word == "MCS" else values[4:10]
     turned = len(axes) == 6 and max(abs(a - b) for a, b in zip(axes, (1, 0, 0, 0, 1, 0), strict=True)) > _TURNED
-    moved = state.builder.n and (state.first_system is None or state.first_system[0] != record.args)
+    moved = state.n and (state.first_system is None or state.first_system[0] != record.args)
     if turned or moved:
         _frame(state, record)
     else:
@@ -218,20 +213,18 @@ def _same_system(state: ReaderState, record: Record, word: str, given: list[str]
     matrix = tuple(value for value in map(number, given) if value is not None)
     before = state.offsets.get(word, matrix)
     state.offsets[word] = matrix
-    if state.builder.n and matrix != before:
-        if not state.lenient:
-            raise state.fail("CS117", record.line, word=word)
-        state.note("CS143", record.line, word=word)
+    if state.n and matrix != before:
+        _other_system(state, record, word)
 
 
 def _cutcom(state: ReaderState, record: Record) -> None:
     option = record.option
     if option in ("LEFT", "RIGHT", "ON") and "LENGTH" not in record.args:
-        if not state.builder.keep.now:
+        if not state.exact.now:
             state.note("CS138", record.line)
-        state.builder.keep.set(state.builder.n, float(Keep.CUTTER_COMPENSATION))
+        state.exact.set(state.n, Keep.CUTTER_COMPENSATION)
     elif option in _ENDS:
-        state.builder.keep.set(state.builder.n, float(Keep.NO))
+        state.exact.set(state.n, Keep.NO)
 
 
 def _cycle(state: ReaderState, record: Record) -> None:
@@ -240,22 +233,23 @@ def _cycle(state: ReaderState, record: Record) -> None:
 
 
 def _frame(state: ReaderState, record: Record) -> None:
-    if record.word == "TRNTYP" or not _changes_nothing(record):
-        if not state.lenient:
-            raise state.fail("CS117", record.line, word=record.word)
-        state.note("CS143", record.line, word=record.word)
-
-
-def _changes_nothing(record: Record) -> bool:
-    """Whether a coordinate change is switched off, or by nothing: its numbers are zero, or the matrix of no turn."""
     values = record.values
-    return record.option in _ENDS or (bool(values) and not any(values)) or values == _NO_TURN
+    # off, or by nothing: its numbers are zero, or the matrix of no turn
+    nothing = record.option in _ENDS or (bool(values) and not any(values)) or values == _NO_TURN
+    if record.word == "TRNTYP" or not nothing:
+        _other_system(state, record, record.word)
+
+
+def _other_system(state: ReaderState, record: Record, word: str) -> None:
+    """Refuse a change of the coordinates of what follows."""
+    if not state.lenient:
+        raise state.fail("CS117", record, word=word)
+    state.note("CS143", record.line, word=word)
 
 
 def _set(state: ReaderState, record: Record) -> None:
     if "INCR" in record.args or "INCREM" in record.args:
-        text = joined(record.args)
-        raise state.fail("CS115", record.line, word="SET", text=text, want="write absolute positions")
+        raise state.fail("CS115", record, want="write absolute positions")
 
 
 def _trntyp(state: ReaderState, record: Record) -> None:
@@ -266,19 +260,13 @@ def _trntyp(state: ReaderState, record: Record) -> None:
 def _syn(state: ReaderState, record: Record) -> None:
     words = [value.strip("'").upper() for value in record.words]
     if words[:1] and words[0] in MOTION_WORDS:
-        text, want = joined(record.args), "motion statements keep their names"
-        raise state.fail("CS115", record.line, word="SYN", text=text, want=want)
+        raise state.fail("CS115", record, want="motion statements keep their names")
     if len(words) == 2:  # ICAM: the first word now means the second, also a comment
         state.renamed[words[0]] = "$$" if words[1].startswith("$$") else words[1]
 
 
 def _fini(state: ReaderState, record: Record) -> None:
     state.finished = True
-
-
-def joined(args: tuple[Argument, ...]) -> str:
-    """Arguments as text, for messages."""
-    return ",".join(f"{value:g}" if isinstance(value, float) else value for value in args)
 
 
 Handler = Callable[[ReaderState, Record], None]

@@ -24,13 +24,11 @@ class System:
 
     def points(self, points: Floats) -> Floats:
         """(n, 3) points of this system, in the other one."""
-        moved: Floats = points @ self.axes.T + self.origin
-        return moved
+        return points @ self.axes.T + self.origin
 
     def vectors(self, vectors: Floats) -> Floats:
         """(n, 3) vectors of this system, in the other one."""
-        turned: Floats = vectors @ self.axes.T
-        return turned
+        return vectors @ self.axes.T
 
     def seen_from(self, other: System) -> System:
         """Return this system as it is seen from another one, both seen from the same."""

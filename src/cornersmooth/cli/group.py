@@ -69,8 +69,7 @@ class LazyGroup(click.Group):
         """Import the module of the command."""
         if cmd_name not in COMMANDS:
             return None
-        command: click.Command = import_module(f"cornersmooth.cli.{cmd_name}").command
-        return command
+        return import_module(f"cornersmooth.cli.{cmd_name}").command
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
