@@ -88,7 +88,7 @@ def test_real_files(form: str, corpus: Path) -> None:
 
 @pytest.mark.parametrize("dense", [True, False])
 def test_unequal_legs_pass_nearer_than_the_construction_says(dense: bool) -> None:
-    """By brute force: the curve in 20,001 points, or its chords."""
+    """By brute force: the curve in 20,001 points, or its chords; what is said is 1e-4 of it larger at most."""
     rng = np.random.default_rng(3)
     tip = np.cumsum(rng.normal(size=(60, 3)) * rng.choice([0.3, 3.0], (60, 1)), axis=0)
     axis = np.array([0.0, 0.0, 1.0]) + np.cumsum(0.1 * rng.normal(size=(60, 3)), axis=0)
@@ -103,9 +103,9 @@ def test_unequal_legs_pass_nearer_than_the_construction_says(dense: bool) -> Non
         tips, tops = _path(smoothed, row, dense)
         pose = smoothed.corners.pose[row]
         corner = program.tip[pose]
-        assert near_tip[k] == pytest.approx(np.linalg.norm(tips - corner, axis=1).min(), abs=2e-6)
+        assert near_tip[k] == pytest.approx(np.linalg.norm(tips - corner, axis=1).min(), abs=1e-5)
         top = corner + 10.0 * program.axis[pose]
-        assert near_axis[k] == pytest.approx(np.linalg.norm(tops - top, axis=1).min(), abs=2e-6)
+        assert near_axis[k] == pytest.approx(np.linalg.norm(tops - top, axis=1).min(), abs=1e-5)
 
 
 def _path(smoothed, row: int, dense: bool):  # type: ignore[no-untyped-def]

@@ -57,66 +57,7 @@ class _Batch:
     poses: Ints
     first: Ints  # row of the first, for each pose
     last: Ints  # row after the last
-    tip: Floats
-    other: Floats
-    move: Ints
-
-
-@dataclass(frozen=True)
-class _RunRows:
-    """Rows of whole runs, m in path order, and the poses of the program that they replace."""
-
-    move: Ints
-    tip: Floats
-    other: Floats
-    inside: Bools
-    sections: SectionRows | None = None
-
-    @classmethod
-    def lines(cls, smoothed: SmoothProgram) -> _RunRows:
-        """Ends of lines, with unit axes."""
-        program, runs = smoothed.program, smoothed.runs
-        inside = np.zeros(len(program), np.bool_)
-        found = [(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)))]
-        if runs is not None:
-            found += [run_lines(part, program, smoothed.settings) for part in some_at_once(runs)]
-        pose, tip, axis = map(np.concatenate, zip(*found, strict=True))
-        inside[pose] = True
-        return cls(pose, tip, axis, inside)
-
-    @classmethod
-    def curves(cls, smoothed: SmoothProgram) -> _RunRows:
-        """Control points of sections."""
-        runs = smoothed.runs
-        if runs is None:
-            return cls.lines(smoothed)
-        parts = [vars(section_rows(part, smoothed.program)) for part in some_at_once(runs)]
-        rows = SectionRows(**{name: np.concatenate([part[name] for part in parts]) for name in parts[0]})
-        inside = np.zeros(len(smoothed.program), np.bool_)
-        inside[runs.pose] = True
-        inside[runs.pose[starts(runs.count)[:-1]]] = False
-        inside[rows.move] = True
-        return cls(rows.move, rows.points[:, :3], rows.points[:, 3:], inside, rows)
-
-    def replace(self, counts: Ints, segments: Segments) -> Ints:
-        """Counts of rows with those of the runs in their places."""
-        segments.lines[self.inside] = 1
-        return np.where(self.inside, np.bincount(self.move, minlength=len(counts)), counts)
-
-    def fill(self, batch: _Batch) -> tuple[Ints, slice]:
-        """Put tips and axes into their rows; returns these rows of the batch, and which rows of the runs they are."""
-        here = np.flatnonzero(self.inside[batch.poses])
-        own = slice(*np.searchsorted(self.move, (batch.poses[0], batch.poses[-1] + 1)))
-        at = ranges(batch.first[here], batch.last[here] - batch.first[here])
-        batch.tip[at], batch.other[at] = self.tip[own], self.other[own]
-        return at, own
-
-    def fill_curves(self, batch: _Batch, curve: NDArray[np.int8], joined: Bools, spline: Floats) -> None:
-        """Put the control points into their rows."""
-        if self.sections is not None:
-            at, own = self.fill(batch)
-            curve[at], joined[at] = self.sections.number[own], self.sections.number[own] == 1
-            spline[at, 0], spline[at, 2] = self.sections.knot[own], self.sections.last_knot[own]
+    rows: Rows
 
 
 #: knots that go with the control points of a transition; the last four are 1
@@ -128,26 +69,7 @@ def dense_rows(smoothed: SmoothProgram, circles: Ints | None = None, poses: int 
 
     `circles` (k,) is the number of circular arcs that each arc of the program is written as, 0 for lines.
     """
-    program, corners = smoothed.program, smoothed.corners
-    segments = segments_of(smoothed, dense=True)
-    halves = lines_per_half(smoothed)
-    counts = np.where(segments.skip, 0, segments.lines)
-    rounded = corners.pose[corners.smoothed]
-    counts[rounded] = np.where(segments.has_line[rounded], segments.lines[rounded], 0) + 2 * np.abs(
-        halves[corners.smoothed]
-    )
-    arc_counts = _arc_row_counts(smoothed, circles)
-    runs = _RunRows.lines(smoothed)
-    counts = runs.replace(counts, segments)
-    for batch in _batches(smoothed, counts, arc_counts, poses):
-        sharp = (segments.row[batch.poses] < 0) & (batch.last > batch.first)
-        at = batch.last[sharp] - 1
-        batch.tip[at], batch.other[at] = program.tip[batch.poses[sharp]], program.axis[batch.poses[sharp]]
-        _fill_divided(smoothed, segments, batch)
-        _fill_transitions(smoothed, segments, batch, halves)
-        _fill_arcs(smoothed, batch, arc_counts)
-        runs.fill(batch)
-        yield Rows(batch.tip, batch.other, batch.move, *_no_curves(len(batch.tip)))
+    return _rows(smoothed, curves=False, divide=True, circles=circles, poses=poses)
 
 
 def curve_rows(smoothed: SmoothProgram, *, divide: bool = False, poses: int = 16384) -> Iterator[Rows]:
@@ -155,78 +77,98 @@ def curve_rows(smoothed: SmoothProgram, *, divide: bool = False, poses: int = 16
 
     `divide` says whether lines in which the axis turns much are divided: not all controls run the axis point straight.
     """
-    program, corners, height = smoothed.program, smoothed.corners, smoothed.settings.axis_length
+    return _rows(smoothed, curves=True, divide=divide, circles=None, poses=poses)
+
+
+def _rows(smoothed: SmoothProgram, *, curves: bool, divide: bool, circles: Ints | None, poses: int) -> Iterator[Rows]:
+    program, height = smoothed.program, smoothed.settings.axis_length
     segments = segments_of(smoothed, dense=divide)
-    counts = np.where(segments.has_line, segments.lines, 0) + np.where(segments.row >= 0, 5, 0)
+    halves = np.zeros(0, np.int64) if curves else lines_per_half(smoothed)
+    runs, replaced = _of_runs(smoothed, curves=curves)
+    segments.lines[replaced] = 1
+    counts = np.where(segments.has_line, segments.lines, 0)
+    rounded = np.flatnonzero(segments.row >= 0)
+    counts[rounded] += 5 if curves else 2 * np.abs(halves[segments.row[rounded]])
     counts[segments.skip] = 0
-    arc_counts = _arc_row_counts(smoothed)
-    sections = _RunRows.curves(smoothed)
-    counts = sections.replace(counts, segments)
-    for batch in _batches(smoothed, counts, arc_counts, poses):
-        row = segments.row[batch.poses]
+    counts = np.where(replaced, np.bincount(runs.move, minlength=len(counts)), counts)
+    if len(program.arcs):
+        lines = arc_lines(program, smoothed.settings)
+        counts[program.arcs.pose] = lines if circles is None else np.where(circles > 0, circles, lines)
+    for batch in _batches(counts, poses, curves=curves):
+        rows = batch.rows
+        sharp = (segments.row[batch.poses] < 0) & (batch.last > batch.first)
+        pose, at = batch.poses[sharp], batch.last[sharp] - 1
+        rows.tip[at], rows.other[at] = program.tip[pose], program.axis[pose]
         if divide:
             _fill_divided(smoothed, segments, batch)
-            batch.other[:] = batch.tip + height * batch.other
-        sharp = (row < 0) & (batch.last > batch.first)
-        pose, at = batch.poses[sharp], batch.last[sharp] - 1
-        batch.tip[at] = program.tip[pose]
-        batch.other[at] = program.tip[pose] + height * program.axis[pose]
-        _fill_arcs(smoothed, batch, arc_counts, height)
-
-        curve, joined = _no_curves(len(batch.tip))
-        spline = np.tile((0.0, 1.0, 0.0), (len(batch.tip), 1))
-        pose, first = batch.poses[row >= 0], batch.last[row >= 0] - 5
-        if len(pose):
-            tip_curve, axis_curve = nurbs.control_points(program, corners, segments.row[pose], height)
-            at = first[:, None] + np.arange(5)
-            batch.tip[at], batch.other[at] = tip_curve, axis_curve
-            curve[at] = np.arange(1, 6)
-            spline[at, 0], spline[at[:, -1], 2] = KNOTS, 1.0
-            spline[at, 1] = nurbs.full_weights(corners.weights[segments.row[pose]])
-            line = segments.has_line[pose]
-            joined[first] = ~line
-            batch.tip[first[line] - 1], batch.other[first[line] - 1] = tip_curve[line, 0], axis_curve[line, 0]
-        sections.fill_curves(batch, curve, joined, spline)
-        yield Rows(batch.tip, batch.other, batch.move, curve, joined, spline=spline)
+        _fill_arcs(smoothed, batch, counts)
+        if curves:
+            rows.other[:] = rows.tip + height * rows.other
+            _fill_curves(smoothed, segments, batch)
+        else:
+            _fill_transitions(smoothed, segments, batch, halves)
+        here = np.flatnonzero(replaced[batch.poses])
+        at = ranges(batch.first[here], batch.last[here] - batch.first[here])
+        own = slice(*np.searchsorted(runs.move, (batch.poses[0], batch.poses[-1] + 1)))
+        rows.tip[at], rows.other[at] = runs.points[own, :3], runs.points[own, 3:]
+        if rows.spline is not None:
+            rows.curve[at], rows.joined[at] = runs.number[own], runs.number[own] == 1
+            rows.spline[at, 0], rows.spline[at, 2] = runs.knot[own], runs.last_knot[own]
+        yield rows
 
 
-def _no_curves(count: int) -> tuple[NDArray[np.int8], Bools]:
-    return np.zeros(count, np.int8), np.zeros(count, np.bool_)
+def _of_runs(smoothed: SmoothProgram, *, curves: bool) -> tuple[SectionRows, Bools]:
+    """Rows of whole runs, ends of lines or control points of sections, and the poses (n,) that they replace."""
+    program, runs = smoothed.program, smoothed.runs
+    replaced = np.zeros(len(program), np.bool_)
+    if runs is None:
+        return SectionRows.joined([]), replaced
+    replaced[np.delete(runs.pose, starts(runs.count)[:-1])] = True
+    parts = some_at_once(runs)
+    made = (section_rows(p, program) if curves else run_lines(p, program, smoothed.settings) for p in parts)
+    return SectionRows.joined(made), replaced
 
 
-def _arc_row_counts(smoothed: SmoothProgram, circles: Ints | None = None) -> Ints:
-    """(k,) number of rows of each arc."""
-    if not len(smoothed.program.arcs):
-        return np.zeros(0, np.int64)
-    lines = arc_lines(smoothed.program, smoothed.settings)
-    return lines if circles is None else np.where(circles > 0, circles, lines)
-
-
-def _batches(smoothed: SmoothProgram, counts: Ints, arc_counts: Ints, poses: int) -> Iterator[_Batch]:
-    """Batches of empty rows, `counts` of them for each pose, `arc_counts` for each arc."""
-    program = smoothed.program
-    counts[program.arcs.pose] = arc_counts
-    for begin in range(0, len(program), poses):
-        own = np.arange(begin, min(begin + poses, len(program)))
+def _batches(counts: Ints, poses: int, *, curves: bool) -> Iterator[_Batch]:
+    """Batches of empty rows, `counts` of them for each pose."""
+    for begin in range(0, len(counts), poses):
+        own = np.arange(begin, min(begin + poses, len(counts)))
         last = np.cumsum(counts[own])
         total = int(last[-1])
-        yield _Batch(
-            own, last - counts[own], last, np.zeros((total, 3)), np.zeros((total, 3)), np.repeat(own, counts[own])
+        rows = Rows(
+            np.zeros((total, 3)),
+            np.zeros((total, 3)),
+            np.repeat(own, counts[own]),
+            np.zeros(total, np.int8),
+            np.zeros(total, np.bool_),
+            spline=np.tile((0.0, 1.0, 0.0), (total, 1)) if curves else None,
         )
+        yield _Batch(own, last - counts[own], last, rows)
 
 
-def _fill_arcs(smoothed: SmoothProgram, batch: _Batch, arc_counts: Ints, height: float | None = None) -> None:
-    """Points of the arcs in the batch with their axes or axis points."""
-    arcs = smoothed.program.arcs.pose
-    inside = np.flatnonzero((arcs >= batch.poses[0]) & (arcs <= batch.poses[-1]))
-    if not len(inside):
-        return
-    local, share = divided(arc_counts[inside])
-    rows = inside[local]
-    where = np.flatnonzero(np.isin(batch.move, arcs[inside]))
-    tip, axis = arc_points(smoothed.program, rows, share)
-    batch.tip[where] = tip
-    batch.other[where] = axis if height is None else tip + height * axis
+def _fill_arcs(smoothed: SmoothProgram, batch: _Batch, counts: Ints) -> None:
+    """Points of the arcs in the batch with their axes."""
+    pose = smoothed.program.arcs.pose
+    inside = np.flatnonzero((pose >= batch.poses[0]) & (pose <= batch.poses[-1]))
+    local, share = divided(counts[pose[inside]])
+    at = np.flatnonzero(np.isin(batch.rows.move, pose[inside]))
+    batch.rows.tip[at], batch.rows.other[at] = arc_points(smoothed.program, inside[local], share)
+
+
+def _fill_curves(smoothed: SmoothProgram, segments: Segments, batch: _Batch) -> None:
+    """Control points of the transitions of the batch."""
+    corners, rows = smoothed.corners, batch.rows
+    here = segments.row[batch.poses] >= 0
+    pose, first = batch.poses[here], batch.last[here] - 5
+    row, at = segments.row[pose], first[:, None] + np.arange(5)
+    tip, top = nurbs.control_points(smoothed.program, corners, row, smoothed.settings.axis_length)
+    rows.tip[at], rows.other[at], rows.curve[at] = tip, top, np.arange(1, 6)
+    assert rows.spline is not None
+    rows.spline[at, 0], rows.spline[at[:, -1], 2] = KNOTS, 1.0
+    rows.spline[at, 1] = nurbs.full_weights(corners.weights[row])
+    line = segments.has_line[pose]
+    rows.joined[first] = ~line
+    rows.tip[first[line] - 1], rows.other[first[line] - 1] = tip[line, 0], top[line, 0]
 
 
 def nodes(lines: int) -> Floats:
@@ -249,11 +191,11 @@ def _fill_transitions(smoothed: SmoothProgram, segments: Segments, batch: _Batch
         u = nodes(int(lines))
         points, levers = construction.points(smoothed, rows[chosen], u)
         where = (last[chosen] - len(u))[:, None] + np.arange(len(u))
-        batch.tip[where], batch.other[where] = points[:, 1:], unit(levers[:, 1:])
-        batch.move[where[:, len(u) // 2 :]] = segments.following[poses[chosen]][:, None]
+        batch.rows.tip[where], batch.rows.other[where] = points[:, 1:], unit(levers[:, 1:])
+        batch.rows.move[where[:, len(u) // 2 :]] = segments.following[poses[chosen]][:, None]
         first = segments.has_line[poses[chosen]]
         at = where[first, 0] - 1
-        batch.tip[at], batch.other[at] = points[first, 0], unit(levers[first, 0])
+        batch.rows.tip[at], batch.rows.other[at] = points[first, 0], unit(levers[first, 0])
 
 
 def _fill_divided(smoothed: SmoothProgram, segments: Segments, batch: _Batch) -> None:
@@ -269,5 +211,5 @@ def _fill_divided(smoothed: SmoothProgram, segments: Segments, batch: _Batch) ->
         fraction, axis = construction.divide(program, settings, segments.remainders(pose), int(number))
         rows = first[:, None] + np.arange(number - 1)
         step = program.tip[pose] - program.tip[start]
-        batch.tip[rows] = program.tip[start][:, None] + fraction[..., None] * step[:, None]
-        batch.other[rows] = axis
+        batch.rows.tip[rows] = program.tip[start][:, None] + fraction[..., None] * step[:, None]
+        batch.rows.other[rows] = axis

@@ -9,9 +9,10 @@ control points are the blossoms of the run's spline at the knots of the section.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -92,6 +93,25 @@ def largest_curvature(lines: Polylines, splines: Splines, control: Floats) -> Fl
 
 
 @dataclass(frozen=True)
+class SectionRows:
+    """Rows of runs in path order, m of them: control points of sections, or ends of lines."""
+
+    move: Ints  # pose in whose segment the section or line ends
+    number: Ints  # 1 for the first control point of a section; 0 for lines
+    points: Floats  # tip and axis point, (m, 6), mm; tip and unit axis for lines
+    knot: Floats  # that goes with each control point, from 0
+    last_knot: Floats  # of the section in its last row, else 0
+
+    @classmethod
+    def joined(cls, parts: Iterable[SectionRows]) -> SectionRows:
+        """All rows of some parts."""
+        nothing = np.zeros(0, np.int64)
+        parts = [cls(nothing, nothing, np.zeros((0, 6)), np.zeros(0), np.zeros(0)), *parts]
+        columns: dict[str, Any] = {key: np.concatenate([getattr(one, key) for one in parts]) for key in vars(parts[0])}
+        return cls(**columns)
+
+
+@dataclass(frozen=True)
 class LinePlaces:
     """Where the lines that runs are written as end: m places in path order."""
 
@@ -101,15 +121,16 @@ class LinePlaces:
     end: Ints  # row of the polylines that a place at the end of a run is, -1 for the others
 
 
-def run_lines(runs: Runs, program: Program, settings: Settings) -> tuple[Ints, Floats, Floats]:
-    """Ends of the lines that runs are written as: poses that their segments end in (m,), tips and unit axes (m, 3)."""
+def run_lines(runs: Runs, program: Program, settings: Settings) -> SectionRows:
+    """Ends of the lines that runs are written as."""
     lines = polylines_of(runs, program, settings.axis_length)
     found = line_places(runs, lines, program, settings)
     tip, axis = points_at(runs.control, Splines(runs.knot, runs.knot_count), found.span, found.s)
     at = np.flatnonzero(found.end >= 0)
     ends = lines.point[found.end[at]]  # which are passed exactly
     tip[at], axis[at] = ends[:, :3], unit(ends[:, 3:] - ends[:, :3])
-    return found.pose, tip, axis
+    nothing = np.zeros(len(tip))
+    return SectionRows(found.pose, np.zeros(len(tip), np.int64), np.hstack((tip, axis)), nothing, nothing)
 
 
 def line_places(runs: Runs, lines: Polylines, program: Program, settings: Settings) -> LinePlaces:
@@ -154,17 +175,6 @@ def _effort(
     turned = angle_between(hull[:, 0, 3:] - hull[:, 0, :3], hull[:, 3, 3:] - hull[:, 3, :3])
     by_turn = turned / turn_limit(settings, turn / 2.0, TURNING * settings.tolerance)
     return np.maximum(by_chord, by_turn)
-
-
-@dataclass(frozen=True)
-class SectionRows:
-    """Control points of all sections in path order, m rows."""
-
-    move: Ints  # pose in whose segment the section ends
-    number: Ints  # 1 for the first control point of a section
-    points: Floats  # tip and axis point, (m, 6), mm
-    knot: Floats  # that goes with each control point, from 0
-    last_knot: Floats  # of the section in its last row, else 0
 
 
 def section_rows(runs: Runs, program: Program) -> SectionRows:
