@@ -106,14 +106,18 @@ def test_a_program_without_corners_has_an_empty_report():
     assert contents["worst"] == []
 
 
-@pytest.mark.parametrize("count", [0, 1, 7, 8, 9, 60])
-def test_the_largest_come_first_however_few_are_sorted(monkeypatch, count):
+@pytest.mark.parametrize("count", [3, 22, 60])
+def test_the_worst_corners_are_found_some_at_a_time(monkeypatch, count):
+    """By the distances of all corners."""
     from cornersmooth.report import corners
+    from cornersmooth.smoothing.path_distance import path_distances
 
     monkeypatch.setattr(corners, "_TOGETHER", 3)
-    monkeypatch.setattr(corners, "_SORTED", 8)
-    bound = np.random.default_rng(count).integers(0, 20, count).astype(np.float64)
-    parts = list(corners._largest_first(bound))
-    assert all(0 < len(part) <= 3 for part in parts)
-    found = [row for part in parts for row in part.tolist()]
-    assert found == np.argsort(-bound, kind="stable").tolist()
+    steps = np.random.default_rng(count).normal(size=(count, 3))
+    smoothed = smooth(Program.from_poses(np.cumsum(steps, axis=0), np.tile([0.0, 0, 1], (count, 1))))
+    worst, rows = corners.worst_corners(smoothed), np.flatnonzero(smoothed.corners.rounded)
+    tip, axis_point = path_distances(smoothed, rows, dense=True)
+    larger = np.maximum(tip, axis_point)
+    assert worst.tip_error == tip.max()
+    assert worst.axis_error == axis_point.max()
+    assert worst.rows.tolist() == rows[np.lexsort((rows, -larger))][:20].tolist()

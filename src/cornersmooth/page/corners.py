@@ -8,6 +8,7 @@ import numpy as np
 
 from cornersmooth.model import Floats, Ints, LimitedBy, Program, SmoothProgram, Status
 from cornersmooth.report.corners import corner_table
+from cornersmooth.slices import some_rows
 from cornersmooth.smoothing.sharp import other_corners, sharp_rows
 from cornersmooth.vectors import angle_between
 from cornersmooth.verify import Verification
@@ -82,22 +83,22 @@ def smoothed_corners(smoothed: SmoothProgram, found: Verification | None, *, den
     if found is not None:
         tip = np.where(np.isfinite(found.pose_tip[pose]), found.pose_tip[pose], tip)
         axis = np.where(np.isfinite(found.pose_axis_point[pose]), found.pose_axis_point[pose], axis)
-    names = (*(each.key.replace("_", " ") for each in Status), *(each.key for each in LimitedBy if each))
     reason = np.where(corners.smoothed[rows], len(Status) - 1 + corners.limited_by[rows], status[rows]).astype(np.int64)
-    return _ranked(
+    listed = CornerList(
         pose,
-        np.append(kind[rows], np.ones(len(others.pose), np.int64)),
-        np.append(reason, others.status),
-        names,
-        np.append(table["tip_angle_deg"], others.tip_turn),
-        np.append(table["axis_angle_deg"], others.axis_turn),
-        np.append(np.asarray(table["tip_length_in_mm"]) + np.asarray(table["tip_length_out_mm"]), nothing),
-        tip,
-        axis,
-        smoothed.program.line[pose],
-        np.zeros(len(pose), np.int64) if found is None else found.pose_nc_line[pose],
-        counts,
+        kind=np.append(kind[rows], np.ones(len(others.pose), np.int64)),
+        reason=np.append(reason, others.status),
+        reasons=(*(each.key.replace("_", " ") for each in Status), *(each.key for each in LimitedBy if each)),
+        turn=np.append(table["tip_angle_deg"], others.tip_turn),
+        axis_turn=np.append(table["axis_angle_deg"], others.axis_turn),
+        length=np.append(np.asarray(table["tip_length_in_mm"]) + np.asarray(table["tip_length_out_mm"]), nothing),
+        tip_off=tip,
+        axis_off=axis,
+        cl_line=smoothed.program.line[pose],
+        nc_line=np.zeros(len(pose), np.int64) if found is None else found.pose_nc_line[pose],
+        counts=counts,
     )
+    return _ranked(listed)
 
 
 def measured_corners(program: Program, found: Verification) -> CornerList:
@@ -120,20 +121,21 @@ def measured_corners(program: Program, found: Verification) -> CornerList:
     drop = rounded[np.argsort(-off[rounded], kind="stable")][_MOST_ROUNDED:]
     rows = np.setdiff1d(listed, drop, assume_unique=True)
     own = pose[rows]
-    return _ranked(
+    listed_corners = CornerList(
         own,
-        kind[rows],
-        np.where(kind[rows] == 0, 0, np.where(kind[rows] == 1, 1, 2)).astype(np.int64),
-        ("off the path", "passed exactly", "rounded"),
-        turn[rows],
-        axis_turn[rows],
-        np.full(len(rows), np.nan),
-        found.pose_tip[own],
-        found.pose_axis_point[own],
-        program.line[own],
-        found.pose_nc_line[own],
-        counts,
+        kind=kind[rows],
+        reason=np.where(kind[rows] == 0, 0, np.where(kind[rows] == 1, 1, 2)).astype(np.int64),
+        reasons=("off the path", "passed exactly", "rounded"),
+        turn=turn[rows],
+        axis_turn=axis_turn[rows],
+        length=np.full(len(rows), np.nan),
+        tip_off=found.pose_tip[own],
+        axis_off=found.pose_axis_point[own],
+        cl_line=program.line[own],
+        nc_line=found.pose_nc_line[own],
+        counts=counts,
     )
+    return _ranked(listed_corners)
 
 
 def _turns(points: Floats, pose: Ints) -> Floats:
@@ -143,36 +145,10 @@ def _turns(points: Floats, pose: Ints) -> Floats:
     return np.degrees(np.where(moving, angle_between(before, after), 0.0))
 
 
-def _ranked(
-    pose: Ints,
-    kind: Ints,
-    reason: Ints,
-    reasons: tuple[str, ...],
-    turn: Floats,
-    axis_turn: Floats,
-    length: Floats,
-    tip: Floats,
-    axis: Floats,
-    cl_line: Ints,
-    nc_line: Ints,
-    counts: dict[str, int],
-) -> CornerList:
-    rank = np.minimum(kind, 2)
-    by = np.where(rank == 1, np.maximum(turn, axis_turn), np.fmax(tip, axis))
-    order = np.lexsort((pose, -np.nan_to_num(by), rank))
+def _ranked(listed: CornerList) -> CornerList:
+    """The corners in the order of what matters, without the least of very many sharp ones."""
+    rank = np.minimum(listed.kind, 2)
+    by = np.where(rank == 1, np.maximum(listed.turn, listed.axis_turn), np.fmax(listed.tip_off, listed.axis_off))
+    order = np.lexsort((listed.pose, -np.nan_to_num(by), rank))
     sharp = np.flatnonzero(rank[order] == 1)
-    order = np.delete(order, sharp[_MOST_SHARP:])
-    return CornerList(
-        pose=pose[order],
-        kind=kind[order],
-        reason=reason[order],
-        reasons=reasons,
-        turn=turn[order],
-        axis_turn=axis_turn[order],
-        length=length[order],
-        tip_off=tip[order],
-        axis_off=axis[order],
-        cl_line=cl_line[order],
-        nc_line=nc_line[order],
-        counts=counts,
-    )
+    return some_rows(listed, np.delete(order, sharp[_MOST_SHARP:]))

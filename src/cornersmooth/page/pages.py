@@ -6,16 +6,16 @@ import hashlib
 import io
 import json
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 from cornersmooth.errors import Finding
-from cornersmooth.feedrate import Comparison, Limits
+from cornersmooth.feedrate import Comparison, Limits, TimeLaw
 from cornersmooth.kinematics import Machine, with_dynamics
 from cornersmooth.model import Program
 from cornersmooth.nc import Frame, choose_form, write
-from cornersmooth.nc_reader import NcProgram, read_nc
+from cornersmooth.nc_reader import NcProgram
 from cornersmooth.page.document import page
 from cornersmooth.page.scene import Story, Subject
 from cornersmooth.report.surface import passes_text
@@ -24,7 +24,7 @@ from cornersmooth.saving import planned_saving
 from cornersmooth.settings import Settings
 from cornersmooth.surface.tool import Tool
 from cornersmooth.verdict import Verdict
-from cornersmooth.verify import Verification, verify
+from cornersmooth.verify import Verification
 
 if TYPE_CHECKING:
     from cornersmooth.pipeline import Result
@@ -61,20 +61,9 @@ def page_and_saving(
     tool : Tool, optional
         Instead of that of the file.
     """
-    smoothed, form, settings = result.smoothed, result.form, result.smoothed.settings
+    form, settings = result.form, result.smoothed.settings
     limits, axes = limits or Limits(), form.machine if axes is None else axes
-    subject = Subject(
-        program=result.program,
-        nc=read_written(result, frame),
-        settings=settings,
-        verification=result.verification,
-        smoothed=smoothed,
-        dense=not form.curve,
-        limits=limits,
-        machine=axes,
-        planner=form.table.lines.planner,
-        tool=tool,
-    )
+    subject = _subject(result, limits, axes, tool, frame=frame)
     badge, saving = result.verdict, None
     if timed and badge not in (Verdict.FAILED, Verdict.NOT_VERIFIED):
         saving = planned_saving(result.program, settings, form, limits, axes)
@@ -88,6 +77,30 @@ def page_and_saving(
         _notes(result.findings),
     )
     return page(subject, story), saving
+
+
+def _subject(
+    result: Result,
+    limits: Limits,
+    machine: Machine | None,
+    tool: Tool | None,
+    *,
+    frame: Frame | None = None,
+    laws: Mapping[str, TimeLaw] | None = None,
+) -> Subject:
+    return Subject(
+        program=result.program,
+        nc=read_written(result, frame),
+        settings=result.smoothed.settings,
+        verification=result.verification,
+        smoothed=result.smoothed,
+        dense=not result.form.curve,
+        laws=laws or {},
+        limits=limits,
+        machine=machine,
+        planner=result.form.table.lines.planner,
+        tool=tool,
+    )
 
 
 def read_written(result: Result, frame: Frame | None = None) -> NcProgram:
@@ -154,31 +167,16 @@ def verified_page(
 
 def times_page(compared: Comparison, *, source: bytes = b"", tool: Tool | None = None) -> str:
     """Page of planned times; the written path is that of dense lines for FANUC."""
-    from cornersmooth.pipeline import smooth
+    from cornersmooth.pipeline import postprocess
 
     program, form = compared.program, choose_form()
-    smoothed = smooth(program, compared.settings, form=form)
-    stream = io.BytesIO()
-    write(smoothed, stream, form=form)
-    settings = smoothed.settings
-    tolerance, own = settings.tolerance, settings.axis_tolerance
-    written = stream.getvalue()
-    nc = read_nc(written, tolerance=tolerance, axis_length=settings.axis_scale)
-    found = verify(program, written, tolerance=tolerance, axis_length=settings.axis_length, axis_tolerance=own)
-    subject = Subject(
-        program=program,
-        nc=nc,
-        settings=settings,
-        verification=found,
-        smoothed=smoothed,
-        laws={"direct": compared.laws["direct_velocity_jump"]},
-        limits=compared.limits,
-        machine=compared.machine,
-        tool=tool,
-    )
+    result = postprocess(program, io.BytesIO(), compared.settings, form=form)
+    laws = {"direct": compared.laws["direct_velocity_jump"]}
+    subject, found = _subject(result, compared.limits, compared.machine, tool, laws=laws), result.verification
+    assert found is not None
     facts = [
         *_input_facts(program, source),
-        *_settings_facts(settings),
+        *_settings_facts(result.smoothed.settings),
         *((f"time, {name.replace('_', ' ')}", f"{law.total:.3f} s") for name, law in compared.laws.items()),
         *_limit_facts(compared.limits, compared.machine),
     ]

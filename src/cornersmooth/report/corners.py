@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cornersmooth.geometry import nurbs
 from cornersmooth.model import Corners, Floats, Ints, LimitedBy, SmoothProgram, Status, Trait
-from cornersmooth.smoothing.construction import RUN_CURVATURE, construction_of
+from cornersmooth.smoothing.construction import RUN_CURVATURE, construction_of, legs_at
 from cornersmooth.smoothing.path_distance import path_distances
 from cornersmooth.vectors import angle_between, norm
 
@@ -24,9 +22,8 @@ _CURVATURE_AT = np.array([0.2, 0.3, 0.38, 0.44, 0.48, 0.5, 0.52, 0.56, 0.62, 0.7
 #: corners that a report lists as the worst
 _WORST = 20
 
-#: corners whose errors are found together, and those that are sorted at first
+#: corners whose errors are found together
 _TOGETHER = 4096
-_SORTED = 8 * _TOGETHER
 
 
 def corner_table(smoothed: SmoothProgram, rows: Ints | None = None, *, dense: bool = True) -> dict[str, Column]:
@@ -47,13 +44,10 @@ def corner_table(smoothed: SmoothProgram, rows: Ints | None = None, *, dense: bo
     """
     program, corners, settings = smoothed.program, smoothed.corners, smoothed.settings
     rows = np.arange(len(corners)) if rows is None else rows
-    pose, before, after = corners.pose[rows], corners.before[rows], np.maximum(corners.after[rows], 0)
-    tip_in, tip_out = program.tip[pose] - program.tip[before], program.tip[after] - program.tip[pose]
-    tip_out[corners.after[rows] < 0] = 0.0
-    turn_in = settings.axis_length * (program.axis[pose] - program.axis[before])
-    turn_out = settings.axis_length * (program.axis[after] - program.axis[pose])
-    turn_out[corners.after[rows] < 0] = 0.0
-    axis_in, axis_out = tip_in + turn_in, tip_out + turn_out
+    pose, before, after = corners.pose[rows], corners.before[rows], corners.after[rows]
+    legs = legs_at(program, settings.axis_length, pose, before, np.where(after < 0, pose, after))
+    tip_in, tip_out = legs.tip_in, legs.tip_out
+    axis_in, axis_out = tip_in + legs.turn_in, tip_out + legs.turn_out
     tip_error, axis_error = path_distances(smoothed, rows, dense=dense)
     columns: dict[str, Column] = {
         "corner": pose.astype(np.int64),
@@ -112,8 +106,7 @@ def _largest_curvature(smoothed: SmoothProgram, rows: Ints) -> Floats:
     return np.where(np.isnan(in_runs[rows]), curvature, in_runs[rows])
 
 
-@dataclass(frozen=True)
-class WorstCorners:
+class WorstCorners(NamedTuple):
     """The largest errors, and the smoothed corners nearest to the tolerance."""
 
     #: mm: the largest of all corners
@@ -127,27 +120,15 @@ def worst_corners(smoothed: SmoothProgram, *, dense: bool = True) -> WorstCorner
     corners = smoothed.corners
     rows = np.flatnonzero(corners.rounded)
     bound = np.maximum(corners.tip_error[rows], corners.axis_error[rows])
-    seen = np.zeros(0, np.int64)
+    order = np.argsort(-bound, kind="stable")
     tip, axis_point, larger = np.zeros((3, 0))
-    for part in _largest_first(bound):
-        least = min(
-            np.sort(larger)[-_WORST] if len(larger) >= _WORST else -np.inf,
-            tip.max(initial=-np.inf),
-            axis_point.max(initial=-np.inf),
-        )
-        if bound[part[0]] < least:
+    for begin in range(0, len(order), _TOGETHER):
+        known = np.sort(larger)[-_WORST] if len(larger) >= _WORST else -np.inf
+        if bound[order[begin]] < min(known, tip.max(initial=-np.inf), axis_point.max(initial=-np.inf)):
             break
-        more = rows[part]
-        more_tip, more_axis_point = path_distances(smoothed, more, dense=dense)
-        seen, tip, axis_point = np.append(seen, more), np.append(tip, more_tip), np.append(axis_point, more_axis_point)
+        more_tip, more_axis_point = path_distances(smoothed, rows[order[begin : begin + _TOGETHER]], dense=dense)
+        tip, axis_point = np.append(tip, more_tip), np.append(axis_point, more_axis_point)
         larger = np.maximum(tip, axis_point)
+    seen = rows[order[: len(larger)]]
     best = np.lexsort((seen, -larger))[:_WORST]
     return WorstCorners(float(tip.max(initial=0.0)), float(axis_point.max(initial=0.0)), seen[best])
-
-
-def _largest_first(bound: Floats) -> Iterator[Ints]:
-    """Indices of bounds, the largest first and ties in order, some at a time; all are only sorted if few do not do."""
-    few = np.partition(bound, -_SORTED)[-_SORTED] if len(bound) > _SORTED else -np.inf
-    for part in (np.flatnonzero(bound >= few), np.flatnonzero(~(bound >= few))):
-        order = part[np.argsort(-bound[part], kind="stable")]
-        yield from (order[begin : begin + _TOGETHER] for begin in range(0, len(order), _TOGETHER))
