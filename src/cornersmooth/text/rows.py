@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cornersmooth.errors import OutputError
-from cornersmooth.text.choices import Choices, refuse_zero_bytes, splice
+from cornersmooth.text.choices import Choices, refuse_zero_bytes
 from cornersmooth.text.layout import WORD, Layout, lay_out
 from cornersmooth.text.ticks import MOST_DECIMALS, TICK_LIMIT
 
@@ -86,7 +86,7 @@ class RowFormat:
         ticks : (m, c) int64
             Numbers in steps of their last digit, from `to_ticks`.
         prefix, suffix : sequence of bytes
-            Texts to choose from, of any length; a suffix carries the line end.
+            Texts to choose from; a suffix carries the line end.
         prefix_id, suffix_id : (m,) or () int
             Which of them each row has.
         left_out : (m, c) bool, optional
@@ -192,10 +192,7 @@ def _write_blocks(
         used = block != 0
         # compress takes the same time for every pattern; a Boolean index is slower for many short runs
         text = block.reshape(-1).compress(used.reshape(-1)).tobytes()
-        lengths = _count_by_row(used.view(np.uint64).reshape(-1, width // WORD))
-        if not (heads.all_laid_out and tails.all_laid_out):
-            text, lengths = splice(text, lengths, start, heads, tails)
-        yield text, lengths
+        yield text, _count_by_row(used.view(np.uint64).reshape(-1, width // WORD))
 
 
 def _count_by_row(used: NDArray[np.uint64]) -> Ints:
