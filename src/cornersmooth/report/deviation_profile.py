@@ -10,7 +10,7 @@ from cornersmooth.model import Floats, Ints, Program
 from cornersmooth.nc_reader.elements import NcProgram
 from cornersmooth.nc_reader.tool import written_at
 from cornersmooth.verify.batches import Batches
-from cornersmooth.verify.distances import of_original
+from cornersmooth.verify.distances import Gap, of_original
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.nearest import nearest_places
 from cornersmooth.verify.task import Task
@@ -112,7 +112,7 @@ def _of_elements(match: Match, offset: int, samples: int) -> Floats:
     place = nearest_places(six, match.path.points, middle, _REACH, *limits)
     original = match.original
     owner, fraction = original.move_at(place)
-    gap = match.task.gap(tip, axis, *original.at(owner, fraction))
+    gap = Gap.of(match.task, six - match.task.six(*original.at(owner, fraction)))
     way = match.path.lengths_at(place)
     pose = original.pose[owner]
     places = (fraction, share, pose, element + offset, original.program.line[pose], match.nc.line[element])

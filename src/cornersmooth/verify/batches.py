@@ -22,7 +22,7 @@ from cornersmooth.statements.tool_changes import ToolChanges
 from cornersmooth.verify.decision import Decision, Way
 from cornersmooth.verify.drilling import Holes
 from cornersmooth.verify.motions import Motion, written_motion
-from cornersmooth.verify.nearest import places_on_each
+from cornersmooth.verify.nearest import COLUMNS, on_segments
 from cornersmooth.verify.rapids import Rapids
 from cornersmooth.verify.task import Task
 
@@ -229,8 +229,9 @@ class _Part:
             if kind == Move.HOLE:  # out of it the way begins anywhere
                 tip = self.held.tip[at : at + 1]
                 six = task.six(tip, directions(self.held, tip, self.held.second[at : at + 1]))[0]
-                places, squares = places_on_each(six, path, start, int(last_vertex[move + 1]) - 1)
-                there = float(places[np.argmin(squares)])
+                segment = np.arange(start, int(last_vertex[move + 1]))
+                share, square = on_segments(six[None, None], path.points, segment[None], COLUMNS["both"])
+                there = path.length_at(float((segment + share[0])[np.argmin(square)]))
         self.move, self.element, self.continued, self.told, self.origin = move, element, False, False, None
         self.start, self.fraction, self.share = start, 0.0, 0.0
         if there > begin:

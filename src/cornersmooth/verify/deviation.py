@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.model import Floats, Ints
-from cornersmooth.verify.distances import Reached, gap_of_written, nearest, of_original, of_written
+from cornersmooth.verify.distances import Gap, Reached, nearest, of_original, of_written
 from cornersmooth.verify.findings import AXIS_OFF, Findings, Poses, Worst
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.nearest import COLUMNS, Metric, on_segments
@@ -41,7 +41,8 @@ def _say(match: Match, found: Findings, metric: Metric, one: Break) -> None:
         off[name], place, row = around.farthest(match, name)
         where = match.cl_lines(place), match.nc_lines(row)
         if name == "both":
-            gap = gap_of_written(match, *around.worst(match))
+            rows, worst_place = around.worst(match)
+            gap = Gap.of(match.task, match.six[rows] - match.path.at(worst_place))
             for values, worst in ((gap.tip, found.largest.together_tip), (gap.angle, found.largest.orientation)):
                 worst.update(values, *where)
             found.largest.together_axis_point.update(gap.axis_point, *where)
@@ -135,7 +136,7 @@ class _Around:
         share, _, nearest = _distances(point, match.six, self.steps, COLUMNS["both"])
         step, at = self.steps[nearest], share[:, None]
         six = match.six[step] + at * (match.six[step + 1] - match.six[step])
-        gap = match.task.gap(six[:, :3], match.task.axis_of(six), point[:, :3], trail.axis[vertices])
+        gap = Gap.of(match.task, six - point)
         return Poses(pose, gap.tip, gap.axis_point, gap.angle, match.nc_lines(step + 1))
 
 
@@ -182,22 +183,21 @@ def measure_original(match: Match, found: Findings) -> None:
 def _largest(match: Match, found: Findings, reached: Reached, lines: tuple[Ints, Ints]) -> None:
     """Take what the vertices of one of the two motions found; only the largest are looked at closely."""
     result, gap = found.largest, reached.gap
-
-    def take(worst: Worst, name: str, metric: Metric) -> None:
-        known: Floats = getattr(gap, name)
+    result.together_tip.update(gap.tip, *lines)
+    result.together_axis_point.update(gap.axis_point, *lines)
+    result.orientation.update(gap.angle, *lines)
+    alone: tuple[tuple[Worst, Floats, Metric], ...] = (
+        (result.tip, gap.tip, "tip"),
+        (result.axis_point, gap.axis_point, "axis point"),
+    )
+    for worst, known, metric in alone:
         rows, some = np.flatnonzero(known > worst.value), _SOME
         while len(rows):
             first = rows[np.argpartition(-known[rows], some)[:some]] if len(rows) > some else rows
-            off: Floats = getattr(nearest(match, reached, first, metric), name)
-            worst.update(np.minimum(off, known[first]), lines[0][first], lines[1][first])
+            off = np.minimum(nearest(match, reached, first, metric), known[first])
+            worst.update(off, lines[0][first], lines[1][first])
             rows = np.setdiff1d(rows[known[rows] > worst.value], first, assume_unique=True)
             some *= 4
-
-    take(result.together_tip, "tip", "both")
-    take(result.together_axis_point, "axis_point", "both")
-    take(result.orientation, "angle", "both")
-    take(result.tip, "tip", "tip")
-    take(result.axis_point, "axis_point", "axis point")
 
 
 def _check_exact_poses(match: Match, found: Findings, vertex: Ints, row: Ints) -> None:

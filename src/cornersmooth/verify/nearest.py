@@ -1,16 +1,14 @@
-"""Distances between poses, and the nearest places of points on polylines."""
+"""Nearest places of points on polylines of tips and axis points."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final, Literal
 
 import numpy as np
 
 from cornersmooth.model import Floats, Ints
-from cornersmooth.verify.chain import Path
 
-#: which distance is made smallest: tip and axis point together, or one of them
+#: which distance is meant: of tip and axis point together, or of one of them
 Metric = Literal["both", "tip", "axis point"]
 
 #: columns of a row of both that count for each
@@ -20,40 +18,11 @@ COLUMNS: Final[dict[Metric, slice]] = {"both": slice(0, 6), "tip": slice(0, 3), 
 _BLOCK: Final = 8192
 
 
-@dataclass(frozen=True)
-class Gap:
-    """How far poses are from a motion, k rows."""
-
-    tip: Floats  #: (k,) mm
-    axis_point: Floats  #: (k,) mm
-    angle: Floats  #: (k,) rad: between the tool axes
-
-    @property
-    def larger(self) -> Floats:
-        """(k,) the larger of the two distances."""
-        return np.maximum(self.tip, self.axis_point)
-
-
-def distance_between(points: Floats, others: Floats | float) -> Floats:
-    """(k,) distances of points taken pairwise."""
-    away = points - others
-    distance: Floats = np.sqrt(np.einsum("ij,ij->i", away, away))
-    return distance
-
-
 def larger_square(away: Floats) -> Floats:
     """(k,) the larger of the squares of both halves, tip and axis point, of differences (k, 6)."""
     tip, point = away[:, :3], away[:, 3:]
     square: Floats = np.maximum(np.einsum("ij,ij->i", tip, tip), np.einsum("ij,ij->i", point, point))
     return square
-
-
-def foot_share(away: Floats, way: Floats) -> Floats:
-    """(...,) fractions of segments (..., d) at which they are nearest to points, `away` (..., d) from their starts."""
-    size = np.einsum("...i,...i->...", way, way)
-    share: Floats = np.einsum("...i,...i->...", away, way)
-    np.divide(share, size, out=share, where=size > 0)
-    return np.clip(share, 0.0, 1.0, out=share)
 
 
 def nearest_places(
@@ -98,14 +67,9 @@ def on_segments(own: Floats, vertices: Floats, segment: Ints, columns: slice) ->
     start = vertices.take(segment, axis=0)[..., columns]
     way = vertices.take(segment + 1, axis=0)[..., columns] - start
     away = own - start
-    share = foot_share(away, way)
+    size = np.einsum("...i,...i->...", way, way)
+    share = np.einsum("...i,...i->...", away, way)
+    np.divide(share, size, out=share, where=size > 0)
+    np.clip(share, 0.0, 1.0, out=share)
     away -= share[..., None] * way
     return share, np.einsum("...i,...i->...", away, away)
-
-
-def places_on_each(point: Floats, path: Path, low: int, high: int) -> tuple[Floats, Floats]:
-    """Path lengths of the places nearest to a point (6,) on each of some segments, and the squared distances."""
-    segment = np.arange(low, high + 1)
-    share, square = on_segments(point[None, None], path.points, segment[None], slice(0, 6))
-    begin = path.length[segment]
-    return begin + share[0] * (path.length[segment + 1] - begin), square[0]

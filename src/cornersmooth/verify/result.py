@@ -43,9 +43,9 @@ class Verification:
         Largest distance between the tip paths, and between the axis-point paths, both ways, in order along the path.
         With an axis tolerance, which axis points are not part of, all that is said of them is NaN.
     together_tip, together_axis_point : Where, mm
-        The same where tip and axis point are compared with one common pose.
+        Largest distances at the common poses by which the decision was proved.
     orientation : Where, degrees
-        Largest angle between the tool axes at that pose; with an axis tolerance, at the place where that is kept best.
+        Largest angle between the tool axes there; with an axis tolerance, at the place where that is kept best.
     problems : tuple of Problem
         Sorted by NC line; at most `MOST_PROBLEMS` of each code.
     problem_count : int

@@ -10,10 +10,8 @@ import numpy as np
 
 from cornersmooth.model import Bools, Floats, Keep, Program
 from cornersmooth.nc_reader.elements import Elements
-from cornersmooth.nc_reader.tool import unit
 from cornersmooth.verify.chain import Path
 from cornersmooth.verify.cl_motion import Original, original_motion
-from cornersmooth.verify.nearest import Gap, distance_between
 
 #: slack of arithmetic on coordinates that are a million times larger, mm
 ARITHMETIC: Final = 1e-9
@@ -85,17 +83,6 @@ class Task:
     def six(self, tip: Floats, axis: Floats) -> Floats:
         """(..., 6) tips and axis points side by side, mm."""
         return side_by_side(tip, axis, self.axis_length, self.own_axis)
-
-    def axis_of(self, six: Floats) -> Floats:
-        """(k, 3) unit tool axes of tips and axis points side by side."""
-        return unit(six[:, 3:] if self.own_axis else six[:, 3:] - six[:, :3])
-
-    def gap(self, tip: Floats, axis: Floats, other_tip: Floats, other_axis: Floats) -> Gap:
-        """Distances between poses taken pairwise."""
-        off, turned = tip - other_tip, axis - other_axis
-        apart = self.axis_length * turned if self.own_axis else off + self.axis_length * turned
-        chord = distance_between(turned, 0.0)
-        return Gap(distance_between(off, 0.0), distance_between(apart, 0.0), 2 * np.arcsin(np.minimum(chord / 2, 1.0)))
 
     def degrees(self, off: Floats | float) -> Floats:
         """What axis points that are `off` by so many mm make of the axis, where that has a tolerance of its own."""
