@@ -69,7 +69,7 @@ def deviation_along(
     task = Task.of(program, tolerance, axis_length, axis_tolerance)
     parts = [np.zeros((0, _COLUMNS))]
     for batch in Batches(task, nc.events).of([nc]):
-        matched = Match(task, batch)
+        matched = Match(task=task, **vars(batch))
         parts += [_of_elements(matched, batch.offset, samples), _of_poses(matched)]
     rows = np.concatenate(parts)
     parts.clear()

@@ -19,10 +19,11 @@ from cornersmooth.nc_reader.ahead import Ahead
 from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem
 from cornersmooth.nc_reader.tool import directions, moving_rapids
 from cornersmooth.statements.tool_changes import ToolChanges
-from cornersmooth.verify.decision import Decision, Way
+from cornersmooth.verify.decision import Decision
 from cornersmooth.verify.drilling import Holes
 from cornersmooth.verify.motions import Motion, written_motion
-from cornersmooth.verify.nearest import COLUMNS, on_segments
+from cornersmooth.verify.nearest import COLUMNS, Metric, on_segments
+from cornersmooth.verify.passage import Break
 from cornersmooth.verify.rapids import Rapids
 from cornersmooth.verify.task import Task
 
@@ -39,18 +40,21 @@ STRETCH: Final = np.dtype(
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Batch:
     """Elements that are decided at once, and then measured."""
 
-    elements: Elements
+    nc: Elements
     offset: int  #: number of the first of them in the whole text
     stretches: NDArray[Any]  #: elements are counted in this batch
-    motion: Motion  #: the polyline of the elements from the end of the first stretch's `first` on
-    way: Way  #: the place of each of its vertices, and where the motions part
+    motion: Motion  #: the polyline of the elements from the end of the first stretch's `first` on, v vertices
+    #: (v,): segment plus fraction of the CL path, ascending; NaN where a vertex is none of a stretch, or not reached
+    place: Floats
+    breaks: tuple[tuple[Metric, Break], ...]  #: where the motions part, and what does
+    whole: bool  #: whether all was decided
     #: whether the first stretch begins in the batch before: one more element stands in front of it
-    continued: bool = False
-    goes_on: bool = False  #: whether the last stretch goes on in the next batch
+    continued: bool
+    goes_on: bool  #: whether the last stretch goes on in the next batch
 
     @property
     def first(self) -> int:
@@ -302,8 +306,18 @@ class _Part:
         part = elements.part(first, len(elements))
         motion = written_motion(part, task.tolerance, task.axis_length, own_axis=task.own_axis)
         ends = motion.last[table["first"] - first], motion.last[table["last"] - first]
-        way = self.batches.decision.take(part, motion, ends, table, goes_on=goes_on)
-        return Batch(elements, begin, table, motion, way, bool(lead), goes_on)
+        place, breaks, whole = self.batches.decision.take(part, motion, ends, table, goes_on=goes_on)
+        return Batch(
+            nc=elements,
+            offset=begin,
+            stretches=table,
+            motion=motion,
+            place=place,
+            breaks=breaks,
+            whole=whole,
+            continued=bool(lead),
+            goes_on=goes_on,
+        )
 
     def _lost(self, move_last: int, element_last: int, *, theirs: bool) -> None:
         """Say that only one of the two motions moves between two stops."""

@@ -49,7 +49,7 @@ def examine(task: Task, batch: Batch, asked: Ints, so_far: Largest) -> Examined:
     so_far : Largest
         What was met before: places with less are not looked at closely.
     """
-    match, found = Match(task, batch), Findings(largest=so_far)
+    match, found = Match(task=task, **vars(batch)), Findings(largest=so_far)
     for check in CHECKS:
         check(match, found)
     return Examined(found, *_places(match, asked, batch.offset))

@@ -45,7 +45,7 @@ def _jumps(match: Match) -> tuple[Ints, Floats, Ints, Floats]:
     Returns the elements (k,) behind the joints and the cosines of the angles between the tangents; those (c,) behind
     joints of which at least one side is a curve or an arc, and the differences of the curvatures there, 1/mm.
     """
-    nc, lead = match.nc, int(match.batch.continued)  # an element in front, if the batch begins in a stretch
+    nc, lead = match.nc, int(match.continued)  # an element in front, if the batch begins in a stretch
     first = match.first - lead
     last = match.first + len(match.motion.last) - 1
     part = slice(first, last + 1)

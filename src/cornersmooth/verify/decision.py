@@ -6,7 +6,6 @@ well: then together they have more room.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -20,16 +19,6 @@ from cornersmooth.verify.motions import Motion, inner_points
 from cornersmooth.verify.nearest import COLUMNS, Metric
 from cornersmooth.verify.passage import Break, Walk
 from cornersmooth.verify.task import ARITHMETIC, Task
-
-
-@dataclass(frozen=True)
-class Way:
-    """Where the vertices of a batch are on the CL path."""
-
-    #: (v,): Segment plus fraction, ascending; NaN where a vertex is not of a stretch, or could not be reached.
-    place: Floats
-    breaks: tuple[tuple[Metric, Break], ...]  #: where the motions part, and what does
-    whole: bool  #: whether all was looked at
 
 
 class Decision:
@@ -54,7 +43,7 @@ class Decision:
         stretches: NDArray[Any],
         *,
         goes_on: bool,
-    ) -> Way:
+    ) -> tuple[Floats, tuple[tuple[Metric, Break], ...], bool]:
         """Go on.
 
         Parameters
@@ -67,6 +56,11 @@ class Decision:
             Where they are on the CL path.
         goes_on : bool
             Whether the last of them does so in the next batch.
+
+        Returns
+        -------
+        place, breaks, whole
+            As in `Batch`.
         """
         start, stop = stretches["start"] + stretches["fraction"], stretches["stop"].astype(np.float64)
         place, breaks, whole = np.zeros(0), [], True
@@ -79,7 +73,7 @@ class Decision:
             breaks += [(metric, one) for one in passed.breaks]
             whole &= passed.whole
         self.reached = float(np.nanmax(place, initial=start[-1]))
-        return Way(place, tuple(breaks), whole)
+        return place, tuple(breaks), whole
 
 
 def _only(path: Path, metric: Metric) -> Path:

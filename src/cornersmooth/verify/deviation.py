@@ -9,7 +9,7 @@ import numpy as np
 
 from cornersmooth.model import Floats, Ints
 from cornersmooth.verify.distances import Gap, Reached, nearest, of_original, of_written
-from cornersmooth.verify.findings import AXIS_OFF, Findings, Poses, Worst
+from cornersmooth.verify.findings import AXIS_OFF, Findings, Poses, Violation, Worst
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.nearest import COLUMNS, Metric, on_segments
 from cornersmooth.verify.passage import AROUND, LONGER, MOST_BREAKS, Break
@@ -25,42 +25,46 @@ _MOST_ROWS, _MOST_SEGMENTS = 256, 4096
 
 def check_breaks(match: Match, found: Findings) -> None:
     """Both motions must be run beside each other within the tolerance: CS521, CS522, CS523, CS525, CS527."""
-    for metric, one in match.batch.way.breaks:
+    for metric, one in match.breaks:
         _say(match, found, metric, one)
-    if not match.batch.way.whole and match.batch.way.breaks:
-        line = int(match.nc_lines(np.array([match.batch.way.breaks[-1][1].row]))[0])
+    if not match.whole and match.breaks:
+        line = int(match.nc_lines(np.array([match.breaks[-1][1].row]))[0])
         found.unlooked.append((line, f"what comes after {MOST_BREAKS} places where the motions part"))
 
 
 def _say(match: Match, found: Findings, metric: Metric, one: Break) -> None:
     """Take down one break: what is off around it, or else that the order is wrong."""
-    limit, around = match.tolerance + ARITHMETIC, _Around.of(match, one)
+    task, limit, around = match.task, match.tolerance + ARITHMETIC, _Around.of(match, one)
     off: dict[str, float] = {}
-    cl_line, nc_line = match.cl_lines(np.array([one.place])), match.nc_lines(around.rows[:1])
+    lines = _lines(match, one.place, int(around.rows[0]))
     for name in COLUMNS:
         off[name], place, row = around.farthest(match, name)
-        where = match.cl_lines(place), match.nc_lines(row)
+        where = _lines(match, place, row)
         if name == "both":
-            rows, worst_place = around.worst(match)
-            gap = Gap.of(match.task, match.six[rows] - match.path.at(worst_place))
-            for values, worst in ((gap.tip, found.largest.together_tip), (gap.angle, found.largest.orientation)):
-                worst.update(values, *where)
-            found.largest.together_axis_point.update(gap.axis_point, *where)
+            gap = around.worst(match)
+            found.largest.together_tip.take(float(gap.tip[0]), *where)
+            found.largest.together_axis_point.take(float(gap.axis_point[0]), *where)
+            found.largest.orientation.take(float(gap.angle[0]), *where)
             found.poses.append(around.poses(match))
-            cl_line, nc_line = where if off[name] > limit else (cl_line, nc_line)
-        elif off[name] > limit and metric in (name, "both") and not (name == "axis point" and match.task.own_axis):
-            worst = found.largest.tip if name == "tip" else found.largest.axis_point
-            worst.update(np.array([off[name]]), *where)
-            found.violations.add(521 if name == "tip" else 522, place, *where, np.array([off[name]]))
-    if max(off["tip"], 0.0 if match.task.own_axis else off["axis point"]) > limit:
+            lines = where if off[name] > limit else lines
+        elif off[name] > limit and metric in (name, "both") and not (name == "axis point" and task.own_axis):
+            worst, code = (found.largest.tip, "CS521") if name == "tip" else (found.largest.axis_point, "CS522")
+            worst.take(off[name], *where)
+            found.violations.append(Violation(code, place, *where, off[name]))
+    if max(off["tip"], 0.0 if task.own_axis else off["axis point"]) > limit:
         return
     if off["both"] <= limit and not one.proved:
-        found.unlooked.append((int(nc_line[0]), "the order of the motion"))
+        found.unlooked.append((lines[1], "the order of the motion"))
         return
-    code, amount = 523 if off["both"] <= limit else 525, off["both"]
-    if code == 525 and match.task.own_axis:
+    code, amount = "CS523" if off["both"] <= limit else "CS525", off["both"]
+    if code == "CS525" and task.own_axis:
         code, amount = AXIS_OFF, float(np.degrees(gap.angle[0]))
-    found.violations.add(code, np.array([one.place]), cl_line, nc_line, np.array([amount]))
+    found.violations.append(Violation(code, one.place, *lines, amount))
+
+
+def _lines(match: Match, place: float, row: int) -> tuple[int, int]:
+    """CL line that leads to a place, and NC line that leads to a written vertex."""
+    return int(match.cl_lines(np.array([place]))[0]), int(match.nc_lines(np.array([row]))[0])
 
 
 @dataclass(frozen=True)
@@ -88,7 +92,7 @@ class _Around:
         if len(again):
             stop = float(match.place[resumed])
             vertices = vertices[: int(np.ceil(stop)) - int(one.place) - 1]
-        elif last < end or match.batch.goes_on:  # no farther than the rows that are looked at
+        elif last < end or match.goes_on:  # no farther than the rows that are looked at
             way = np.diff(match.six[max(row - 1, 0) : last + 1], axis=0)
             longest = LONGER * float(np.sqrt(np.einsum("ij,ij->i", way, way)).sum()) + AROUND * match.tolerance
             length = here + longest
@@ -102,8 +106,8 @@ class _Around:
         vertices = vertices if len(steps) else vertices[:0]
         return cls(np.arange(row, last + 1), np.arange(low, high), vertices, steps)
 
-    def farthest(self, match: Match, metric: Metric) -> tuple[float, Floats, Ints]:
-        """The largest distance of the vertices of both motions, mm; place and written vertex, (1,) each.
+    def farthest(self, match: Match, metric: Metric) -> tuple[float, float, int]:
+        """The largest distance of the vertices of both motions, mm; place and written vertex.
 
         The latter are those of the first that is beyond the tolerance: there it begins.
         """
@@ -117,13 +121,14 @@ class _Around:
             if off.max() > found[0]:  # else the written vertices tell more
                 place, row = float(self.vertices[k]), int(self.steps[nearest[k]]) + 1
                 found = (float(off.max()), place, row) if found[0] <= limit else (float(off.max()), *found[1:])
-        return found[0], np.array([found[1]]), np.array([found[2]])
+        return found
 
-    def worst(self, match: Match) -> tuple[Ints, Floats]:
-        """The written vertex that is farthest off both paths at common places, and where it is, (1,) each."""
+    def worst(self, match: Match) -> Gap:
+        """That of the written vertex that is farthest off both paths at common places."""
         share, off, nearest = _distances(match.six[self.rows], match.path.points, self.segments, COLUMNS["both"])
         k = int(off.argmax())
-        return self.rows[k : k + 1], self.segments[nearest[k : k + 1]] + share[k : k + 1]
+        place = self.segments[nearest[k : k + 1]] + share[k : k + 1]
+        return Gap.of(match.task, match.six[self.rows[k : k + 1]] - match.path.at(place))
 
     def poses(self, match: Match) -> Poses:
         """How far the original poses are from the written motion."""
@@ -223,9 +228,9 @@ def _check_exact_poses(match: Match, found: Findings, vertex: Ints, row: Ints) -
         exact[k] = _passed_elsewhere(match, int(vertex[k]), tip[k], axis[k])
     missed = np.flatnonzero(~exact)
     if len(missed):
-        place = vertex[missed].astype(np.float64)
-        lines = original.program.line[pose[missed]], match.nc.line[nearest[missed]]
-        found.violations.add(524, place, *lines, amount[missed])
+        columns = vertex, original.program.line[pose], match.nc.line[nearest], amount
+        rows = zip(*(column[missed].tolist() for column in columns), strict=True)
+        found.violations += [Violation("CS524", *row) for row in rows]
 
 
 def _passed_elsewhere(match: Match, vertex: int, tip: Floats, axis: Floats) -> bool:

@@ -59,7 +59,7 @@ def of_written(match: Match) -> Reached:
 
 def of_original(match: Match) -> Reached:
     """Every vertex of the original that is passed, against the written motion."""
-    vertex, row, share = match.passing.vertex, match.passing.row, match.passing.share
+    vertex, row, share = match.passing
     first, last = match.runs
     point = match.path.points[vertex]
     place = nearest_places(point, match.six, row, 1, first[row], last[row] - 1)

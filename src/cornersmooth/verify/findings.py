@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Final, Self
+from typing import Final, NamedTuple, Self
 
 import numpy as np
 
@@ -13,8 +13,8 @@ from cornersmooth.nc_reader.elements import Problem
 #: neighbouring violations no farther apart on the original than this many segments are one problem
 _SAME_PROBLEM: Final = 3.0
 
-#: number of the code of an axis that is beyond its own tolerance
-AXIS_OFF: Final = 527
+#: code of an axis that is beyond its own tolerance
+AXIS_OFF: Final = "CS527"
 
 #: what a violation of each code is said to be; its amount in mm, that of the tool axis in degrees
 _TEXT = {
@@ -35,58 +35,38 @@ class Worst:
     cl_line: int = 0
     nc_line: int = 0
 
+    def take(self, value: float, cl_line: int, nc_line: int) -> None:
+        """Take a value if it is larger than what was met."""
+        if value > self.value:
+            self.value, self.cl_line, self.nc_line = value, cl_line, nc_line
+
     def update(self, values: Floats, cl_line: Ints, nc_line: Ints) -> None:
         """Take the largest of (k,) values, if it is larger than what was met."""
         if len(values):
             k = int(np.argmax(values))
-            if values[k] > self.value:
-                self.value, self.cl_line, self.nc_line = float(values[k]), int(cl_line[k]), int(nc_line[k])
+            self.take(float(values[k]), int(cl_line[k]), int(nc_line[k]))
 
 
-@dataclass
-class Violations:
-    """Places where a promise is broken, in columns."""
+class Violation(NamedTuple):
+    """Where a promise is broken."""
 
-    place: list[Floats] = field(default_factory=list)
-    cl_line: list[Ints] = field(default_factory=list)
-    nc_line: list[Ints] = field(default_factory=list)
-    amount: list[Floats] = field(default_factory=list)
-    code: list[Ints] = field(default_factory=list)
+    code: str
+    place: float  #: on the CL path: segment plus fraction
+    cl_line: int
+    nc_line: int
+    amount: float
 
-    def add(self, code: int, place: Floats, cl_line: Ints, nc_line: Ints, amount: Floats) -> None:
-        """Add k places, or none."""
-        if not len(place):
-            return
-        self.place.append(place)
-        self.cl_line.append(cl_line)
-        self.nc_line.append(nc_line)
-        self.amount.append(amount)
-        self.code.append(np.full(len(place), code))
 
-    def extend(self, other: Violations) -> None:
-        """Add the places of another."""
-        for name, columns in vars(other).items():
-            getattr(self, name).extend(columns)
-
-    def problems(self) -> list[Problem]:
-        """One problem for each group of neighbouring places with the same code, at its worst place."""
-        if not self.place:
-            return []
-        place, code = np.concatenate(self.place), np.concatenate(self.code)
-        cl_line, nc_line = np.concatenate(self.cl_line), np.concatenate(self.nc_line)
-        amount = np.concatenate(self.amount)
-        order = np.lexsort((place, code))
-        place, code, amount = place[order], code[order], amount[order]
-        cl_line, nc_line = cl_line[order], nc_line[order]
-        new = np.append(True, (np.diff(place) > _SAME_PROBLEM) | (np.diff(code) != 0))
-        found = []
-        for rows in np.split(np.arange(len(place)), np.flatnonzero(new)[1:]):
-            k = int(rows[np.argmax(amount[rows])])
-            value = float(amount[k])
-            found.append(
-                Problem(name := f"CS{code[k]}", int(cl_line[k]), int(nc_line[k]), _TEXT[name].format(value), value)
-            )
-        return found
+def problems_of(violations: list[Violation]) -> list[Problem]:
+    """One problem for each group of neighbouring places with the same code, at its worst place."""
+    groups: list[list[Violation]] = []
+    for one in sorted(violations):
+        last = groups[-1][-1] if groups else None
+        if last is None or one.code != last.code or one.place - last.place > _SAME_PROBLEM:
+            groups.append([])
+        groups[-1].append(one)
+    worst = [max(group, key=lambda one: one.amount) for group in groups]
+    return [Problem(one.code, *one[2:4], _TEXT[one.code].format(one.amount), one.amount) for one in worst]
 
 
 class Peaks:
@@ -175,7 +155,7 @@ class Findings:
 
     largest: Largest = field(default_factory=Largest)  #: at least what it started from
     continuity: Continuity = field(default_factory=Continuity)
-    violations: Violations = field(default_factory=Violations)
+    violations: list[Violation] = field(default_factory=list)
     feeds: Runs = field(default_factory=Runs)  #: of elements with a wrong feed
     poses: list[Poses] = field(default_factory=list)
     unlooked: list[tuple[int, str]] = field(default_factory=list)  #: what was not looked at, and the NC line
@@ -184,7 +164,7 @@ class Findings:
         """Take over what is found elsewhere."""
         self.largest.take(other.largest)
         self.continuity.take(other.continuity)
-        self.violations.extend(other.violations)
+        self.violations += other.violations
         self.feeds.follow(other.feeds)
         self.poses += other.poses
         self.unlooked += other.unlooked

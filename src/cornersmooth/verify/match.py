@@ -8,56 +8,23 @@ from functools import cached_property
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.nc_reader.elements import Elements
 from cornersmooth.verify.batches import Batch
 from cornersmooth.verify.chain import Path, passed, points_at
 from cornersmooth.verify.cl_motion import Original
-from cornersmooth.verify.motions import Motion
-from cornersmooth.verify.nearest import larger_square
 from cornersmooth.verify.reachable import Reachable
 from cornersmooth.verify.task import Task
 
 
-@dataclass(frozen=True)
-class Passing:
-    """Vertices of the CL path and where the written motion passes them, k of them in order."""
-
-    vertex: Ints  #: (k,): of the CL path
-    row: Ints  #: (k,): vertex of the written motion that the step begins at
-    share: Floats  #: (k,): of that step
-
-
-@dataclass(frozen=True)
-class Match:
+@dataclass(frozen=True, kw_only=True)
+class Match(Batch):
     """A batch, v vertices."""
 
     task: Task
-    batch: Batch
-
-    @property
-    def nc(self) -> Elements:
-        """The elements."""
-        return self.batch.elements
-
-    @property
-    def motion(self) -> Motion:
-        """The polyline of the written motion; its elements are counted from `first` on."""
-        return self.batch.motion
-
-    @property
-    def first(self) -> int:
-        """The element at whose end the polyline begins."""
-        return self.batch.first
 
     @property
     def six(self) -> Floats:
         """(v, 6) vertices: tip and axis point."""
-        return self.batch.motion.six
-
-    @property
-    def place(self) -> Floats:
-        """(v,) segment plus fraction of the CL path; NaN where a vertex is none of a stretch, or not near it."""
-        return self.batch.way.place
+        return self.motion.six
 
     @property
     def original(self) -> Original:
@@ -87,7 +54,7 @@ class Match:
     @cached_property
     def section(self) -> Ints:
         """(v,) number of the stretch of each vertex in this batch; -1 for none."""
-        rows, ends = self.batch.stretches, self.motion.last
+        rows, ends = self.stretches, self.motion.last
         first, last = ends[rows["first"] - self.first], ends[rows["last"] - self.first]
         number = np.searchsorted(first, np.arange(len(self.six)), side="right") - 1
         inside = (number >= 0) & (np.arange(len(number)) <= last[np.maximum(number, 0)])
@@ -134,12 +101,12 @@ class Match:
     @cached_property
     def low(self) -> Ints:
         """(v,) first segment of the CL path in the stretch a vertex belongs to."""
-        return self.batch.stretches["start"][np.maximum(self.section, 0)].astype(np.int64)
+        return self.stretches["start"][np.maximum(self.section, 0)].astype(np.int64)
 
     @cached_property
     def high(self) -> Ints:
         """(v,) last segment of the CL path in the stretch a vertex belongs to."""
-        return self.batch.stretches["stop"][np.maximum(self.section, 0)] - 1
+        return self.stretches["stop"][np.maximum(self.section, 0)] - 1
 
     @cached_property
     def away(self) -> Floats:
@@ -152,16 +119,14 @@ class Match:
         return away
 
     @cached_property
-    def off(self) -> Floats:
-        """(v,) the larger distance of tip and axis point from its place, mm; 0 where there is none."""
-        return np.sqrt(larger_square(self.away))
+    def passing(self) -> tuple[Ints, Ints, Floats]:
+        """Vertices (k,) of the path that are passed, in order, those where runs begin included.
 
-    @cached_property
-    def passing(self) -> Passing:
-        """Vertices of the path that are passed, those where runs begin included."""
+        And the written vertices that the steps begin at on which they are, and fractions of these steps.
+        """
         on = np.flatnonzero(self.on)
         if len(on) < 2:
-            return Passing(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0))
+            return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)
         own, place = np.ascontiguousarray(self.six[on].T), self.place[on]
         row, vertex, share = passed(own, own[:, 1:] - own[:, :-1], self.path.points, place)
         row = on[row]
@@ -170,11 +135,11 @@ class Match:
         begin = begin[(self.place[begin] == self.segment[begin]) & (begin < len(self.six) - 1)]
         begin = begin[self.step[begin]]
         if not len(begin) and inside.all():
-            return Passing(vertex, row, share)
+            return vertex, row, share
         vertex = np.concatenate((vertex[inside], self.segment[begin]))
         order = np.argsort(vertex, kind="stable")
         row, share = np.concatenate((row[inside], begin)), np.concatenate((share[inside], np.zeros(len(begin))))
-        return Passing(vertex[order], row[order], share[order])
+        return vertex[order], row[order], share[order]
 
     @cached_property
     def reachable(self) -> Reachable:

@@ -29,97 +29,62 @@ class Where:
 
 @dataclass(frozen=True)
 class Verification:
-    """What the comparison found.
+    """What the comparison found."""
 
-    Parameters
-    ----------
-    passed : bool
-        Whether nothing is wrong: no problem of any kind.
-    tolerance, axis_length : float, mm
-        ε and H; NaN for H where the tool axis has a tolerance of its own.
-    axis_tolerance : float or None, degrees
-        What the tool axis may be off where the tip is within ε; None where the axis point has to keep ε.
-    tip, axis_point : Where, mm
-        Largest distance between the tip paths, and between the axis-point paths, both ways, in order along the path.
-        With an axis tolerance, which axis points are not part of, all that is said of them is NaN.
-    together_tip, together_axis_point : Where, mm
-        Largest distances at the common poses by which the decision was proved.
-    orientation : Where, degrees
-        Largest angle between the tool axes there; with an axis tolerance, at the place where that is kept best.
-    problems : tuple of Problem
-        Sorted by NC line; at most `MOST_PROBLEMS` of each code.
-    problem_count : int
-        All of them.
-    blocks : int
-        Blocks of the text.
-    elements : int
-        Path elements: rapids, lines, arcs, curves.
-    shortest : Where, mm
-        Shortest feed element that moves (the longer of the ways of tip and axis point); value is inf without one.
-    tangent_jump : Where, degrees
-        Largest change of direction of the tip path from one element to the next.
-    curvature_jump : Where, 1/mm
-        Largest change of curvature at an end of a curve or an arc.
-    pose_tip, pose_axis_point : (n,) float64, mm
-        Distance of every original pose from the written motion, NaN where the tool does not pass at feed. With an axis
-        tolerance the latter is what the axis is off, so that its tolerance shows as ε.
-    pose_angle : (n,) float64, degrees
-    pose_nc_line : (n,) int64
-        NC line that passes nearest.
-    trusted : tuple of (int, str)
-        NC lines, and blocks of the user's own, that were not compared with the CL file. Line 0: all statements of a
-        kind. `unverified` names those that may bear on the motion.
-    unverified : str
-        What of the text was not looked at and may bear on the motion, and its line; empty where all of it was.
-    left_out : int
-        Holes that the text leaves out, as the caller allowed.
-    taken_from_head : tuple of str
-        Words of the program's own head that say how it is measured, as ``E=0.04``.
-    apart : bool
-        Whether tips and axis points were run beside their paths each on its own: not at common poses.
-    rewinds : tuple of (int, int)
-        NC lines where a cut is left along the tool, and where the tool comes back into it.
-    """
-
-    passed: bool
+    passed: bool  #: whether nothing is wrong: no problem of any kind
+    #: mm: ε and H; NaN for H where the tool axis has a tolerance of its own
     tolerance: float
     axis_length: float
+    #: degrees: what the tool axis may be off where the tip is within ε; None where the axis point has to keep ε
     axis_tolerance: float | None
+    #: mm: largest distance between the tip paths, and between the axis-point paths, both ways, in order along the path;
+    #: with an axis tolerance, which axis points are not part of, all that is told of them is NaN
     tip: Where
     axis_point: Where
+    #: mm: largest distances at the common poses by which the decision was proved
     together_tip: Where
     together_axis_point: Where
+    #: degrees: largest angle between the tool axes there; with an axis tolerance, where that is kept best
     orientation: Where
-    problems: tuple[Problem, ...]
-    problem_count: int
-    blocks: int
-    elements: int
+    problems: tuple[Problem, ...]  #: sorted by NC line; at most `MOST_PROBLEMS` of each code
+    problem_count: int  #: all of them
+    blocks: int  #: of the text
+    elements: int  #: path elements: rapids, lines, arcs, curves
     curves: int
     poses: int
+    #: mm: shortest feed element that moves (the longer of the ways of tip and axis point); inf without one
     shortest: Where
+    #: degrees, 1/mm: largest change of direction of the tip path from one element to the next, and of curvature at an
+    #: end of a curve or an arc
     tangent_jump: Where
     curvature_jump: Where
+    #: (n,) mm: distance of every original pose from the written motion, NaN where the tool does not pass at feed; with
+    #: an axis tolerance the latter is what the axis is off, so that its tolerance shows as ε
     pose_tip: Floats = field(repr=False)
     pose_axis_point: Floats = field(repr=False)
-    pose_angle: Floats = field(repr=False)
-    pose_nc_line: Ints = field(repr=False)
+    pose_angle: Floats = field(repr=False)  #: (n,) degrees
+    pose_nc_line: Ints = field(repr=False)  #: (n,): NC line that passes nearest
+    #: NC lines, and blocks of the user's own, that were not compared with the CL file; line 0: all statements of a kind
     trusted: tuple[tuple[int, str], ...] = ()
+    #: what of the text was not looked at and may bear on the motion, and its line; empty where all of it was
     unverified: str = ""
+    #: NC lines where a cut is left along the tool, and where the tool comes back into it
     rewinds: tuple[tuple[int, int], ...] = ()
-    left_out: int = 0
-    taken_from_head: tuple[str, ...] = ()
+    left_out: int = 0  #: holes that the text leaves out, as the caller allowed
+    taken_from_head: tuple[str, ...] = ()  #: words of the program's own head that say how it is measured: ``E=0.04``
+    #: whether tips and axis points were run beside their paths each on its own: not at common poses
     apart: bool = False
 
     @property
     def motions_part(self) -> bool:
         """Whether the two motions cannot be run beside each other."""
-        return any(problem.code in ("CS521", "CS522", "CS523", "CS525", f"CS{AXIS_OFF}") for problem in self.problems)
+        return any(problem.code in ("CS521", "CS522", "CS523", "CS525", AXIS_OFF) for problem in self.problems)
 
     @property
     def only_apart(self) -> bool:
         """Whether the motions part though tips and axis points are near each other, each on its own."""
         codes = {problem.code for problem in self.problems}
-        return bool(codes & {"CS523", "CS525"}) and not codes & {"CS521", "CS522", f"CS{AXIS_OFF}"}
+        return bool(codes & {"CS523", "CS525"}) and not codes & {"CS521", "CS522", AXIS_OFF}
 
     @property
     def verdict(self) -> Verdict:
@@ -187,7 +152,7 @@ class Verification:
                     "cl_line": problem.cl_line,
                     "nc_line": problem.nc_line,
                     "text": problem.text,
-                    "amount_deg" if problem.code == f"CS{AXIS_OFF}" else "amount_mm": _finite(problem.amount),
+                    "amount_deg" if problem.code == AXIS_OFF else "amount_mm": _finite(problem.amount),
                 }
                 for problem in self.problems
             ],

@@ -29,7 +29,7 @@ from cornersmooth.statements.comparison import KINDS
 from cornersmooth.statements.left_out import gone_over, may_be_left_out
 from cornersmooth.verify.batches import Batch, Batches
 from cornersmooth.verify.checks import Examined, examine
-from cornersmooth.verify.findings import Findings, Largest, Poses
+from cornersmooth.verify.findings import Findings, Largest, Poses, problems_of
 from cornersmooth.verify.half_turns import half_turns
 from cornersmooth.verify.own_rapids import OwnRapids
 from cornersmooth.verify.result import Verification
@@ -319,7 +319,7 @@ class _Measured:
         if units != program.units:
             text = f"the program is in {units}, the CL file in {program.units}"
             problems.append(Problem("CS505", 0, 1, text))
-        problems += self.batches.problems + self.findings.feeds.problems + self.findings.violations.problems()
+        problems += self.batches.problems + self.findings.feeds.problems + problems_of(self.findings.violations)
         problems += half_turns(program)
         left_out = self.batches.left_out
         if not self.skip_cycles:
