@@ -123,10 +123,10 @@ def test_random_programs(lines: list[str], head: str, small: bool) -> None:
 def test_plain_lines_take_the_fast_path() -> None:
     text = b"GOTO/1.,2.,3.,0,0,1\nGOTO/1.,2.,4.\n" * 10 + b"RAPID\nGOTO / 1., 2., 3.,  $\n0., 0., 1.\n"
     (chunk,) = bulk.chunks(text)
-    assert len(chunk.tip) == 21
+    assert len(chunk.poses) == 21
     assert chunk.runs.tolist() == [[0, 20], [21, 23]]
-    assert chunk.line.tolist() == [*range(1, 21), 22]
-    assert np.array_equal(~np.isnan(chunk.axis[:, 0]), [True, False] * 10 + [True])
+    assert chunk.poses[:, 6].tolist() == [*range(1, 21), 22]
+    assert np.array_equal(~np.isnan(chunk.poses[:, 3]), [True, False] * 10 + [True])
 
 
 @pytest.mark.parametrize(
@@ -136,4 +136,4 @@ def test_plain_lines_take_the_fast_path() -> None:
 )
 def test_odd_lines_are_left_to_the_careful_reader(line: str) -> None:
     (chunk,) = bulk.chunks(f"{line}\n".encode())
-    assert len(chunk.tip) == 0
+    assert len(chunk.poses) == 0

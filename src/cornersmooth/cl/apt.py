@@ -113,13 +113,13 @@ def _run(data: bytes, state: ReaderState, decode: Decode, fast: bool) -> None:
         done += chunk.size
         follows = "GOTO" if done < len(data) else "the end of the file"
         begin = 0
-        rows = chunk.rows.tolist()
+        begins = chunk.begins.tolist()
         for run, (start, stop) in enumerate(chunk.runs.tolist()):
             if begin < start:
                 take(chunk.lines[begin:start], chunk.first + begin, "GOTO")
             if state.stopped:
                 return
-            plain(state, rows[run + 1] - rows[run], chunk.first + start)
+            plain(state, begins[run + 1] - begins[run], chunk.first + start)
             begin = stop
         if begin < len(chunk.lines):
             take(chunk.lines[begin:], chunk.first + begin, follows)

@@ -44,10 +44,8 @@ class Chunk:
     size: int  #: number of bytes
     first: int  #: number of the first line, from 1
     runs: Ints  #: (k, 2): ranges [start, stop) of lines that are plain GOTO statements, ascending
-    rows: Ints  #: (k+1,): first pose of every run; the last is the number of poses
-    tip: Floats  #: (m, 3): as written
-    axis: Floats  #: (m, 3): as written; NaN where a pose has none of its own
-    line: Ints  #: (m,): line of every pose
+    begins: Ints  #: (k+1,): first pose of every run; the last is the number of poses
+    poses: Floats  #: (m, 7): tip and axis as written, with NaN where a pose has no axis, and line
 
 
 def chunks(data: bytes, *, fast: bool = True) -> Iterator[Chunk]:
@@ -80,19 +78,8 @@ def _chunk_end(data: bytes, start: int) -> int:
 
 
 def _all_careful(text: bytes, first: int) -> Chunk:
-    none = np.zeros(0, np.int64)
-    lines = text.split(b"\n")[:-1]
-    return Chunk(
-        lines,
-        len(lines),
-        len(text),
-        first,
-        none.reshape(0, 2),
-        np.zeros(1, np.int64),
-        np.zeros((0, 3)),
-        np.zeros((0, 3)),
-        none,
-    )
+    lines, none = text.split(b"\n")[:-1], np.zeros((0, 2), np.int64)
+    return Chunk(lines, len(lines), len(text), first, none, np.zeros(1, np.int64), np.zeros((0, 7)))
 
 
 def _words(text: bytes) -> Words:
@@ -129,31 +116,20 @@ def _find_plain(text: bytes, first: int) -> Chunk | None:
     count = np.where(own_axis, 6, 3)
     if values is None or count.sum() != len(values):
         return None
+    poses = np.full((len(goto), 7), np.nan)
     if own_axis.all():
-        table = values.reshape(-1, 6)
-        tip, axis = table[:, :3], table[:, 3:]
-    elif not own_axis.any():
-        tip = values.reshape(-1, 3)
-        axis = np.full(tip.shape, np.nan)
+        poses[:, :6] = values.reshape(-1, 6)
     else:
         begin = np.cumsum(count) - count
-        tip = values[begin[:, None] + np.arange(3)]
-        axis = np.full(tip.shape, np.nan)
-        axis[own_axis] = values[begin[own_axis, None] + np.arange(3, 6)]
-    if not (np.abs(tip) <= FARTHEST).all():
+        poses[:, :3] = values[begin[:, None] + np.arange(3)]
+        poses[own_axis, 3:6] = values[begin[own_axis, None] + np.arange(3, 6)]
+    if not (np.abs(poses[:, :3]) <= FARTHEST).all():
         return None
-    poses = np.concatenate(([0], np.cumsum(taken > 0)))
-    return Chunk(
-        [] if plain.all() else text.split(b"\n")[:-1],
-        len(plain),
-        len(text),
-        first,
-        edges,
-        np.concatenate((poses[edges[:, 0]], [len(tip)])),
-        tip,
-        axis,
-        np.flatnonzero(taken) + first,
-    )
+    poses[:, 6] = np.flatnonzero(taken) + first
+    before = np.concatenate(([0], np.cumsum(taken > 0)))
+    begins = np.concatenate((before[edges[:, 0]], [len(poses)]))
+    lines = [] if plain.all() else text.split(b"\n")[:-1]
+    return Chunk(lines, len(plain), len(text), first, edges, begins, poses)
 
 
 def _classify(text: bytes, starts: Ints) -> tuple[NDArray[np.uint8], Bools]:

@@ -82,9 +82,7 @@ class Poses:
     axis_set: list[tuple[int, Vector]] = field(default_factory=lambda: [(0, UP)])
     systems: list[tuple[int, System]] = field(default_factory=list)  #: first pose, system seen from the first one
     last_axis: Vector = UP  #: of the last pose; where it has none of its own, the one that was set before it, or +Z
-    _tip: Floats = field(default_factory=lambda: np.empty((_ROOM, 3)))
-    _axis: Floats = field(default_factory=lambda: np.empty((_ROOM, 3)))  #: as written, NaN for none
-    _line: Ints = field(default_factory=lambda: np.empty(_ROOM, np.int64))
+    _rows: Floats = field(default_factory=lambda: np.empty((_ROOM, 7)))  #: as `Chunk.poses`
     _chunk: Chunk | None = None
     _taken: int = 0  #: poses of the chunk
 
@@ -95,37 +93,34 @@ class Poses:
     def take(self, count: int) -> None:
         """Append the next poses of the chunk."""
         assert self._chunk is not None
-        rows = slice(self._taken, self._taken + count)
-        here, axis = self._next(count), self._chunk.axis[rows]
-        self._tip[here], self._axis[here], self._line[here] = self._chunk.tip[rows], axis, self._chunk.line[rows]
+        here, rows = self._next(count), self._chunk.poses[self._taken : self._taken + count]
+        self._rows[here] = rows
         self._taken += count
         if not self.axis_locked.now:
-            x, y, z = axis[-1].tolist()
+            _, _, _, x, y, z, _ = rows[-1].tolist()
             if x == x:
                 self.last_axis = x, y, z
             elif self.short_axis_up:
                 self.last_axis = self.axis_set[-1][1]
-            elif len(own := np.flatnonzero(~np.isnan(axis[:, 0]))):
-                x, y, z = axis[own[-1]].tolist()
+            elif len(own := np.flatnonzero(~np.isnan(rows[:, 3]))):
+                x, y, z = rows[own[-1], 3:6].tolist()
                 self.last_axis = x, y, z
 
     def append(self, tip: Vector, axis: Vector | None, line: int) -> None:
         """Append one pose (InputError CS113)."""
         check_range(tip, self.file, line)
-        here = self._next(1).start
-        self._tip[here], self._axis[here], self._line[here] = tip, axis or _NONE, line
+        here = self._next(1)
+        self._rows[here] = (*tip, *(axis or _NONE), line)
         if not self.axis_locked.now and (axis is not None or self.short_axis_up):
             self.last_axis = axis or self.axis_set[-1][1]
 
     def _next(self, count: int) -> slice:
         """Rows of the next poses, which there is room for."""
         first, self.n = self.n, self.n + count
-        if self.n > len(self._line):
-            for name in ("_tip", "_axis", "_line"):
-                old = getattr(self, name)
-                new = np.empty((2 * self.n, *old.shape[1:]), old.dtype)
-                new[:first] = old[:first]
-                setattr(self, name, new)
+        if self.n > len(self._rows):
+            old = self._rows
+            self._rows = np.empty((2 * self.n, 7))
+            self._rows[:first] = old[:first]
         return slice(first, self.n)
 
     @property
@@ -142,7 +137,7 @@ class Poses:
 
     def last_tip(self) -> Vector:
         """Tip of the last pose, in the coordinate system of what follows."""
-        x, y, z = self._tip[self.n - 1].tolist()
+        x, y, z = self._rows[self.n - 1, :3].tolist()
         if not self.systems or self.systems[-1][0] < self.n:
             return x, y, z
         before = next((system for pose, system in reversed(self.systems) if pose < self.n), IDENTITY)
@@ -165,11 +160,11 @@ class Poses:
 
     def tips(self) -> Floats:
         """(n, 3) float64: all tips, in the first coordinate system."""
-        return self._placed(self._tip[: self.n], System.points)
+        return self._placed(self._rows[: self.n, :3], System.points)
 
     def lines(self) -> Ints:
         """(n,) int64: line of every pose."""
-        return self._line[: self.n]
+        return self._rows[: self.n, 6].astype(np.int64)
 
     def kinds(self) -> NDArray[np.uint8]:
         """(n,) uint8: `Move` of every pose."""
@@ -186,7 +181,7 @@ class Poses:
             CS111 for a zero vector, CS112 for one that is no unit vector, CS188 and CS197 for one that dialects read
             differently.
         """
-        axis = self._axis[: self.n]
+        axis = self._rows[: self.n, 3:6]
         given = np.flatnonzero(~np.isnan(axis[:, 0]))
         findings: list[Finding] = []
         unit = self._normalised(axis[given], given, findings)
@@ -194,7 +189,7 @@ class Poses:
         dropped = state[given] != _FREE
         off_axes = given[dropped], unit[dropped]
         if dropped.any():
-            findings.append(finding("CS137", int(self._line[off_axes[0][0]]), int(dropped.sum())))
+            findings.append(finding("CS137", int(self._rows[off_axes[0][0], 6]), int(dropped.sum())))
             unit, given = unit[~dropped], given[~dropped]
         axis = self._held(unit, given)
         if not self.off_known:
@@ -225,7 +220,7 @@ class Poses:
         pose = int(doubtful.argmax())
         at = np.flatnonzero(own == pose)
         words = ",".join(f"{part:g}" for part in (unit[at[0]] if len(at) else axis[pose]))
-        raise error("CS197" if len(at) else "CS188", self.file, int(self._line[pose]), axis=words)
+        raise error("CS197" if len(at) else "CS188", self.file, int(self._rows[pose, 6]), axis=words)
 
     def _placed(self, rows: Floats, place: Callable[[System, Floats], Floats]) -> Floats:
         """Rows of all poses, from their coordinate systems into the first one."""
@@ -245,7 +240,7 @@ class Poses:
         if wrong.any():
             refused = wrong & ((length == 0) | ~np.isfinite(length)) if self.lenient else wrong
             first = int((refused if refused.any() else wrong).argmax())
-            line, value = int(self._line[pose[first]]), float(length[first])
+            line, value = int(self._rows[pose[first], 6]), float(length[first])
             if refused.any():
                 raise error("CS111" if value == 0 else "CS112", self.file, line, length=value)
             findings.append(finding("CS139", line, int(wrong.sum()), length=value))
