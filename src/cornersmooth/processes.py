@@ -6,15 +6,12 @@ data of its parent without copying it.
 
 from __future__ import annotations
 
-import mmap
 import os
-import pickle
 import signal
 import sys
 import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from itertools import accumulate
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
@@ -28,10 +25,6 @@ MOST_PROCESSES: Final = 4
 
 #: items taken ahead of what has been given out, whatever the number of processes: what comes out never depends on it
 _AHEAD: Final = 5
-
-#: bytes of the arrays of an item that a process gets without a copy of its own; the system gives them as they are used
-_TRAY: Final = 1 << 25
-_ALIGNED: Final = 64
 
 #: only used where the system can fork
 _CONTEXT: Final = get_context("fork" if sys.platform == "linux" else None)
@@ -114,39 +107,11 @@ def map_in_processes(work: Callable[[Item], Result], items: Iterable[Item], proc
             crew.end()
 
 
-class _Tray:
-    """Memory that two processes share: one puts the arrays of an item there, the other uses them where they lie."""
-
-    def __init__(self) -> None:
-        self._memory = mmap.mmap(-1, _TRAY)
-
-    def put(self, item: Any) -> tuple[bytes, list[tuple[int, int]]]:
-        """What to send instead of an item: the item without its arrays, and where each of these begins and ends.
-
-        Where there is no room for them, the whole item.
-        """
-        arrays: list[pickle.PickleBuffer] = []
-        bare = pickle.dumps(item, protocol=5, buffer_callback=arrays.append)
-        raw = [array.raw() for array in arrays]
-        *begins, size = accumulate((-(-array.nbytes // _ALIGNED) * _ALIGNED for array in raw), initial=0)
-        if size > _TRAY:
-            return pickle.dumps(item, protocol=5), []
-        places = [(begin, begin + array.nbytes) for begin, array in zip(begins, raw, strict=True)]
-        for (begin, end), array in zip(places, raw, strict=True):
-            self._memory[begin:end] = array
-        return bare, places
-
-    def take(self, bare: bytes, places: list[tuple[int, int]]) -> Any:
-        """The item that was put there; its arrays are gone with the next."""
-        memory = memoryview(self._memory)
-        return pickle.loads(bare, buffers=[memory[begin:end] for begin, end in places])
-
-
 class _Member:
     """A process at the other end of a pipe, with one item at a time: a pipe full both ways would stand still."""
 
-    def __init__(self, process: BaseProcess, connection: Connection, tray: _Tray) -> None:
-        self.process, self.connection, self.tray = process, connection, tray
+    def __init__(self, process: BaseProcess, connection: Connection) -> None:
+        self.process, self.connection = process, connection
         self.given, self.found = 0, deque[Any]()
         self.fetched = 0
 
@@ -154,7 +119,7 @@ class _Member:
         """Send an item, after what was found for the one before has been taken in."""
         self.take()
         try:
-            self.connection.send(self.tray.put(item))
+            self.connection.send(item)
         except BrokenPipeError:
             raise MemoryError(_ENDED) from None
         self.given += 1
@@ -181,8 +146,7 @@ class _Crew:
         for _ in range(processes):
             ours, theirs = _CONTEXT.Pipe()
             own = [member.connection for member in self.members] + [ours]
-            tray = _Tray()
-            self.members.append(_Member(_forked(_serve, work, theirs, own, tray, daemon=True), ours, tray))
+            self.members.append(_Member(_forked(_serve, work, theirs, own, daemon=True), ours))
             theirs.close()
 
     def start(self, item: Any) -> Callable[[], Any]:
@@ -199,13 +163,13 @@ class _Crew:
         _end([member.process for member in self.members])
 
 
-def _serve(work: Callable[[Any], Any], connection: Connection, parents: list[Connection], tray: _Tray) -> None:
+def _serve(work: Callable[[Any], Any], connection: Connection, parents: list[Connection]) -> None:
     """Work on what comes until nothing more can come."""
     for other in parents:  # else the end of the parent would not be seen
         other.close()
     while True:
         try:
-            item = tray.take(*connection.recv())
+            item = connection.recv()
         except (EOFError, OSError):
             return
         _answer(connection, lambda item=item: work(item))  # type: ignore[misc]
