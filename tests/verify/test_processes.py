@@ -44,27 +44,6 @@ def test_large_items_and_results_do_not_stand_still():
     assert [len(item) for item in found] == [6_000_000] * 12
 
 
-@pytest.mark.parametrize("size", [1, 1000, crews._TRAY // 8])
-def test_arrays_arrive_as_they_were(size):
-    """By shared memory, and what is too large for that by the pipe; each item has its own, however long it is kept."""
-
-    def item(k):
-        table = np.zeros(3, [("first", np.int64), ("share", np.float64)])
-        table["first"] = k
-        fixed = np.full(size, float(k))
-        fixed.flags.writeable = False
-        return k, fixed, np.arange(4.0 * k).reshape(-1, 2)[:, :1], table, np.zeros((0, 3)), "word"
-
-    def work(given):
-        k, *arrays, word = given
-        same = all(np.array_equal(one, other) for one, other in zip(arrays, item(k)[1:-1], strict=True))
-        return same and word == "word" and [array.sum() for array in arrays if array.dtype == np.float64]
-
-    found = list(crews.map_in_processes(work, map(item, range(7)), 2))
-    assert found == [work(item(k)) for k in range(7)]
-    assert all(found)
-
-
 def test_items_are_taken_a_fixed_number_ahead():
     seen = []
     for processes in (1, 2, 3):
