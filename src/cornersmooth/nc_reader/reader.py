@@ -30,7 +30,7 @@ from cornersmooth.nc_reader.planes import ASIDE, NOT_ABOVE, TiltedPlane
 from cornersmooth.nc_reader.reading_options import ReadingOptions, Steps
 from cornersmooth.nc_reader.retracts import Retracts
 from cornersmooth.nc_reader.rotary import MOST_LINES
-from cornersmooth.nc_reader.words import MOTION_CODES, Line, Table, joined_tables
+from cornersmooth.nc_reader.words import MOTION_CODES, Line, Table, joined_tables, table_of
 
 #: name in `State.memory` of the tool that has been chosen
 TOOL: Final = "tool"
@@ -66,7 +66,7 @@ class Reader:
         self.waiting: list[Table | tuple[int, dict[str, float]]] = []
         self.ready: list[Elements] = []
         self.events: list[Event] = []
-        self.late: list[tuple[Line, str, float, str]] = []
+        self.late: list[Event] = []
         self.comments: list[tuple[int, str]] | None = None
         self.problems: list[Problem] = []
         self._told: set[str] = set()  # texts of problems that are told once for each tilted plane
@@ -145,7 +145,7 @@ class Reader:
         elif line.words:
             self.flush()
             self.dialect.words(line, self)
-            self.events += [Event(self._place, *self._event(*late)) for late in self.late]
+            self.events += [replace(event, element=self._place) for event in self.late]
             self.late = []
 
     def flush(self) -> None:
@@ -366,23 +366,8 @@ class Reader:
     @property
     def nothing(self) -> Elements:
         """No elements at all."""
-        none, rows = np.zeros(0), np.zeros((0, 3))
-        number, flag = np.zeros(0, np.int64), np.zeros(0, np.bool_)
-        kind, steps = np.zeros(0, np.uint8), self.steps
-        whole = Elements(
-            kind=kind,
-            tip=rows,
-            second=rows,
-            line=number,
-            feed=none,
-            per_revolution=flag,
-            other_feed=none,
-            least_feed=flag,
-            feed_room=none,
-            second_room=none,
-            tip_room=none,
-        )
-        return replace(whole, tip_step=steps.tip, second_step=steps.second)
+        none, _ = execute(table_of([(0, {"G": 0.0})]), self.modal, [])
+        return replace(none, tip_step=self.steps.tip, second_step=self.steps.second)
 
     def _collected(self) -> Elements:
         """Give out what is ready."""
@@ -416,14 +401,8 @@ class Reader:
             self._take_tool()
         if letter == "M" and self.rotary is not None and take_clamp(value, self.rotary.machine, self.memory):
             return
-        if late:
-            self.late.append((line, letter, value, text))
-        else:
-            self.events.append(Event(self._place, *self._event(line, letter, value, text)))
-
-    @staticmethod
-    def _event(line: Line, letter: str, value: float, text: str) -> tuple[int, str, float, str]:
-        return line.number, letter, value, text
+        event = Event(self._place, line.number, letter, value, text)
+        (self.late if late else self.events).append(event)
 
     def move(self, line: Line, row: dict[str, float], *, later: bool = False) -> None:
         """Execute a single motion block, `later` with those behind it; one without position only changes what holds."""

@@ -12,6 +12,8 @@ The lists are data, one TOML file for each control in `word_lists`, with the man
     Whether tip control is switched by blocks that the machine's file names.
 ``orders``
     What a comment begins with that the control would obey.
+``[grammar]``
+    How words of letters and numbers are read: attributes of `dialects.iso.Iso`.
 ``[[word]]``
     ``is``: the word, blanks left out. ``says``: what it means, for the documentation.
 
@@ -49,7 +51,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from importlib.resources import files
@@ -114,6 +116,7 @@ class WordList:
     points: frozenset[str] = frozenset()
     switches: bool = False
     orders: re.Pattern[str] | None = None
+    grammar: Mapping[str, Any] = field(default_factory=dict)
     #: what is the control's own comes first
     words: tuple[WordRule, ...] = ()
     blocks: tuple[WordRule, ...] = field(default=())
@@ -158,6 +161,7 @@ _READ: Final[dict[str, Callable[[Any], Any]]] = {
     "points": frozenset,
     "switches": bool,
     "orders": lambda text: re.compile(text, re.IGNORECASE),
+    "grammar": dict,
 }
 
 

@@ -14,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from cornersmooth.model import Floats, Ints, Program
+from cornersmooth.model import Floats, Ints
 from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem
 from cornersmooth.nc_reader.tool import leads_somewhere
 from cornersmooth.statements.asked import asked
@@ -97,13 +97,15 @@ class WordPlaces:
         statements = _statement_lengths(self.task)
         theirs = asked(self.task.original.program, statements, places.end, _of_holes(batches, places))
         theirs = [token for token in theirs if token.kind != "auxiliary" or token.value not in clamps]
-        here = [places.behind(event) for event in self.events]
+        here = [places.after(event) for event in self.events]
         reaches = [max(places.next_begin(event) - at, 0.0) for event, at in zip(self.events, here, strict=True)]
-        standing = [places.standing(event.element - 1) for event in self.events]
+        before = [(event.element - 1, places.standing(event.element - 1)) for event in self.events]
+        standing = [element if known is None else known for element, known in before]
         rooms = [self._rooms.get(element, 0.0) for element in standing]
         ours = said(self.events, here, rooms, reaches, [self._others.get(element, ()) for element in standing])
         found = compare(theirs, ours, self.margin, unsaid, self.task.path.way_apart, own)
-        homes = _lengths_of("GOHOME", self.task.original.program, statements)
+        said_there = zip(statements, self.task.original.program.statements, strict=True)
+        homes = [length for length, statement in said_there if statement.word == "GOHOME"]
         at_home = {
             event.line
             for event, at, room, reach in zip(self.events, here, rooms, reaches, strict=True)
@@ -113,72 +115,50 @@ class WordPlaces:
 
 
 class _Places:
-    """CL path lengths, mm, where elements of the text end and begin, as far as they are known."""
+    """CL path lengths, mm, where elements of the program end and begin, as far as they are known."""
 
     def __init__(self, words: WordPlaces, batches: Batches) -> None:
         self._task, self._still, stops = words.task, words._still, batches.stops
         length = self._task.path.length
         self.end = float(length[-1]) if len(self._task.original.pose) else 0.0
-        holes = np.frombuffer(batches.holes, np.int64).reshape(-1, 3)
-        self._holes = holes[:, 0].copy()  # searched often
+        hole, move, after = np.frombuffer(batches.holes, np.int64).reshape(-1, 3).T.copy()
         stop, there = np.frombuffer(stops.element, np.int64), np.frombuffer(stops.length)
-        known = sorted(words._lengths)
-        seen = np.array(known, np.int64), np.array([words._lengths[element] for element in known])
-        self._ends = _Lengths((self._holes, self.of_moves(holes[:, 1])), (stop, there), seen)
-        self._begins = _Lengths(
-            (np.array([batches.elements]), np.array([self.end])),
-            (stop, np.frombuffer(stops.begin)),
-            (self._holes, self.of_moves(np.maximum(holes[:, 2] - 1, 0))),
-            (stop + 1, there),
-        )
+        begin = np.frombuffer(stops.begin)
+        self._holes = frozenset(hole.tolist())
+        # what is known best comes last
+        self._ends = words._lengths | _by_element(stop, there) | _by_element(hole, self.of_moves(move))
+        self._ended = sorted(self._ends)
+        self._begins = _by_element(stop + 1, there)
+        self._begins |= _by_element(hole, self.of_moves(np.maximum(after - 1, 0)))
+        self._begins |= _by_element(stop, begin) | {batches.elements: self.end}
 
     def of_moves(self, moves: Ints) -> Floats:
         """(k,) where moves of the CL file end."""
         ends: Floats = self._task.path.length[self._task.original.trail.last[moves]]
         return ends
 
-    def standing(self, element: int) -> int:
+    def standing(self, element: int) -> int | None:
         """The element at whose end one leaves the tool that leads nowhere, as a second rapid to the same place does."""
-        return max(self._ends.up_to(element), default=element)
+        known = bisect_right(self._ended, element)
+        return self._ended[known - 1] if known else None
 
-    def behind(self, event: Event) -> float:
-        """Where a word stands: at the end of the element before it; that of a tap at the hole that is fed next."""
-        if (event.letter, event.value) == ("G", TAP) and event.element in _up_to(self._holes, event.element):
-            return self._ends.at(event.element, 0.0)
-        before = event.element - 1
-        return self._ends.at(self.standing(before), 0.0 if self._ends.up_to(before) else _BEFORE)
+    def after(self, event: Event) -> float:
+        """Where a word is: at the end of the element before it; that of a tap at the hole that is fed next."""
+        if (event.letter, event.value) == ("G", TAP) and event.element in self._holes:
+            return self._ends[event.element]
+        before = self.standing(event.element - 1)
+        return _BEFORE if before is None else self._ends[before]
 
     def next_begin(self, event: Event) -> float:
         """Where the next element that leads somewhere begins at the latest; -inf where that is not known.
 
-        Between the two the text may have passed all that leaves nothing in it.
+        Between the two the program may have passed all that leaves nothing in it.
         """
-        return self._begins.at(next(k for k in count(event.element) if k not in self._still), -math.inf)
+        return self._begins.get(next(k for k in count(event.element) if k not in self._still), -math.inf)
 
 
-class _Lengths:
-    """CL path lengths of elements: sources of both, elements ascending, of which the first that knows one counts."""
-
-    def __init__(self, *sources: tuple[Ints, Floats]) -> None:
-        self._sources = sources
-
-    def up_to(self, element: int) -> list[int]:
-        """The last element that each source knows before another, or that itself."""
-        return [last for known, _ in self._sources for last in _up_to(known, element)]
-
-    def at(self, element: int, otherwise: float) -> float:
-        """Length of an element, if it is known."""
-        for known, length in self._sources:
-            if element in _up_to(known, element):
-                return float(length[np.searchsorted(known, element, side="right") - 1])
-        return otherwise
-
-
-def _up_to(ascending: Ints, value: int) -> list[int]:
-    """The last of some values that is not larger than another, if there is one."""
-    stop = int(np.searchsorted(ascending, value, side="right"))
-    known: list[int] = ascending[stop - 1 : stop].tolist() if stop else []
-    return known
+def _by_element(elements: Ints, lengths: Floats) -> dict[int, float]:
+    return dict(zip(elements.tolist(), lengths.tolist(), strict=True))
 
 
 def _statement_lengths(task: Task) -> list[float]:
@@ -190,10 +170,6 @@ def _statement_lengths(task: Task) -> list[float]:
     there = task.path.length[original.trail.last[np.clip(move, 0, None)]]
     lengths: list[float] = np.where(move >= 0, there, _BEFORE).tolist()
     return lengths
-
-
-def _lengths_of(word: str, program: Program, lengths: list[float]) -> list[float]:
-    return [length for length, one in zip(lengths, program.statements, strict=True) if one.word == word]
 
 
 def _of_holes(batches: Batches, places: _Places) -> list[Token]:

@@ -9,13 +9,13 @@ from typing import Final
 from cornersmooth.errors import SettingsError
 from cornersmooth.nc_reader.dialects.base import Dialect, State
 from cornersmooth.nc_reader.dialects.heidenhain import Heidenhain
-from cornersmooth.nc_reader.dialects.iso import ISO_WORDS, Iso
+from cornersmooth.nc_reader.dialects.iso import Iso
 from cornersmooth.nc_reader.dialects.siemens import Siemens
 
 __all__ = ["CONTROLS", "Dialect", "State", "dialect_of"]
 
 _DIALECTS: Final[dict[str, Callable[[str], Dialect]]] = {
-    **{name: partial(Iso, name) for name in ISO_WORDS},
+    **{name: partial(Iso, name) for name in ("fanuc", "generic", "haas", "linuxcnc", "mitsubishi")},
     "heidenhain": Heidenhain,
     "siemens": Siemens,
 }

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Set
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping, Set
+from dataclasses import replace
+from typing import Any
 
 from cornersmooth.nc_reader.dialects.base import AFTER_MOTION, HIGH_SPEED, INCREMENTAL, KINEMATICS, Dialect, State
 from cornersmooth.nc_reader.hole_cycles import INITIAL_HEIGHT, HoleCycle, drill
@@ -37,87 +38,50 @@ _SPEED, _RIGID = "speed", "rigid"
 _NO_CYCLE = 80.0
 
 
-@dataclass(frozen=True)
-class IsoWords:
-    """What differs between these controls."""
-
-    #: Name of what a G word switches on, which takes a length register H with it; ``""`` switches off.
-    tip_control: Mapping[float, str]
-    controls: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  #: `Dialect.controls`
-    silent: frozenset[float] = frozenset()  #: further G words that change nothing measured
-    dwell: float = 1.0  #: milliseconds that ``G4 P`` counts in
-    others: str = "NOQ"  #: letters that say nothing here
-    unsaid: frozenset[str | tuple[str, float]] = frozenset()  #: `Dialect.unsaid`
-    curves_need: str = ""  #: `Dialect.curves_need`
-    semicolon: bool = False  #: whether a comment may begin with one
-    retracts: bool = True  #: `Dialect.retracts`
-    #: Name of the tool tip control under which hole cycles are taken; None where they are not known.
-    cycles_in: str | None = "G43"
-    rigid: bool = False  #: whether ``M29 S`` asks for taps that turn the spindle with the feed
-    planes: str = ""  #: what switches tilted planes on
-
-
-_FANUC = {43.0: "G43", 43.4: "G43.4", 43.5: "G43.5", 49.0: ""}
-_FANUC_CONTROLS = {"vector": ("G43.5",), "angles": ("G43.4",), "machine": ("", "G43")}
-_NO_THROUGH: frozenset[str | tuple[str, float]] = frozenset((("coolant", 88.0),))
-
-#: look ahead and smoothing: G5 P10000, G5.1 Q1, G8 P1
-_HIGH_SPEED = frozenset((5.0, 5.1, 8.0))
-#: further work offsets: G54.1 P1
-_OFFSETS = frozenset((54.1,))
-
-ISO_WORDS: Mapping[str, IsoWords] = {
-    "fanuc": IsoWords(
-        _FANUC, _FANUC_CONTROLS, silent=_HIGH_SPEED | _OFFSETS, unsaid=_NO_THROUGH, rigid=True, planes="G68.2"
-    ),
-    # high-speed high-accuracy control II, or III (P20000): program error P29 without it
-    "mitsubishi": IsoWords(
-        _FANUC,
-        _FANUC_CONTROLS,
-        silent=_HIGH_SPEED | _OFFSETS,
-        unsaid=_NO_THROUGH,
-        curves_need="G5 P10000",
-        planes="G68.2",
-    ),
-    "haas": IsoWords(
-        {43.0: "G43", 234.0: "G234", 49.0: ""},
-        {"angles": ("G234",), "machine": ("", "G43"), "vector": ("G234",)},
-        silent=frozenset((154.0, 187.0)),
-        others="NOQPE",
-        unsaid=frozenset((("coolant", 7.0),)),
-        dwell=1000.0,
-        planes="G254",
-    ),
-    "linuxcnc": IsoWords(
-        {43.0: "G43", 43.1: "G43.1", 49.0: ""},
-        silent=frozenset((59.1, 59.2, 59.3, 61.0, 61.1, 64.0)),
-        dwell=1000.0,
-        unsaid=_NO_THROUGH,
-        semicolon=True,
-    ),
-    "generic": IsoWords(_FANUC, unsaid=_NO_THROUGH | {"offset"}, retracts=False, cycles_in=None),
+#: how the values of a table `WordList.grammar` are read, where not as they are
+_READ: Mapping[str, Callable[[Any], Any]] = {
+    "tip_control": lambda table: {float(code): name for code, name in table.items()},
+    "controls": lambda table: {kind: tuple(names) for kind, names in table.items()},
+    "silent": lambda codes: frozenset(map(float, codes)),
+    "unsaid": lambda kinds: frozenset(tuple(kind) if isinstance(kind, list) else kind for kind in kinds),
 }
 
 
 class Iso(Dialect):
-    """Words of one letter and a number.
+    """Words of one letter and a number; what differs between these controls is in the table `WordList.grammar`.
 
     Parameters
     ----------
     name : str
-        Of the control, as in `ISO_WORDS`.
+        Of the control.
     rotary : str
         Addresses of the rotary axes; empty without a machine.
     """
 
     lexer: _IsoLexer
+    #: name of what a G word switches on, which takes a length register H with it; ``""`` switches off
+    tip_control: Mapping[float, str]
+    #: further G words that change nothing measured
+    silent: frozenset[float] = frozenset()
+    #: milliseconds that ``G4 P`` counts in
+    dwell: float = 1.0
+    #: letters that say nothing here
+    others: str = "NOQ"
+    #: whether a comment may begin with a semicolon
+    semicolon: bool = False
+    #: name of the tool tip control under which hole cycles are taken; ``"none"`` where they are not known
+    cycles_in: str = "G43"
+    #: whether ``M29 S`` asks for taps that turn the spindle with the feed
+    rigid: bool = False
+    #: what switches tilted planes on
+    planes: str = ""
 
     def __init__(self, name: str, rotary: str = "") -> None:
-        self.iso = ISO_WORDS[name]
-        self.switches = word_list(name).switches
-        super().__init__((_LinuxLexer if self.iso.semicolon else _IsoLexer)(rotary, word_list(name).points), rotary)
-        self.controls, self.unsaid, self.curves_need = self.iso.controls, self.iso.unsaid, self.iso.curves_need
-        self.retracts = self.iso.retracts
+        listed = word_list(name)
+        for key, value in listed.grammar.items():
+            setattr(self, key, _READ[key](value) if key in _READ else value)
+        self.switches = listed.switches
+        super().__init__((_LinuxLexer if self.semicolon else _IsoLexer)(rotary, listed.points), rotary)
 
     def decimals(self, text: bytes) -> tuple[int, int | None]:
         """As `Dialect.decimals`: the angles of a tilted plane are no vectors."""
@@ -135,7 +99,7 @@ class Iso(Dialect):
         if codes & _CYCLES.keys():
             self._cycle(line, codes, state)
             return
-        if codes & _PLANE_WORDS.get(self.iso.planes, frozenset()):
+        if codes & _PLANE_WORDS.get(self.planes, frozenset()):
             self._plane(line, codes, state)
             return
         if _NO_CYCLE in codes:
@@ -155,7 +119,7 @@ class Iso(Dialect):
                     return
                 else:
                     self._mode(value, line, state)
-            elif (letter, value) == ("M", 29.0) and self.iso.rigid:
+            elif (letter, value) == ("M", 29.0) and self.rigid:
                 state.memory[_RIGID] = True
             elif letter in _EVENT_LETTERS:
                 if letter == "S":
@@ -165,11 +129,11 @@ class Iso(Dialect):
                 motion[letter] = value
             elif letter in "ABC":
                 state.refuse(line, f"{text}: rotary words", "name the machine they are for, with --machine")
-            elif letter not in self.iso.others:
+            elif letter not in self.others:
                 state.refuse(line, f"{text} is not understood", "see that the control is the one the text is for")
         if self.lexer.odd_vector(motion.keys(), motion.get("G")):
             state.refuse(line, "I J K beside rotary words", "leave out --machine for a text with tool vectors")
-        state.move(line, motion, later=bool(codes & self.iso.tip_control.keys()) and not late)
+        state.move(line, motion, later=bool(codes & self.tip_control.keys()) and not late)
 
     def _switched(self, line: Line, state: State) -> bool:
         """Take a block that switches tip control of the kinematics; return whether it is one."""
@@ -189,11 +153,11 @@ class Iso(Dialect):
         needed = {*"GXYZR", *_CYCLES[code]} - ({"P"} if code == 84.0 else set())
         if codes != {code, _BACK_TO_START} or len(given) + 1 != len([w for w in line.words if w[0] != "N"]):
             state.refuse(line, f"G{code:g} beside other words", "give it G98 and nothing else")
-        if not needed <= given.keys() <= needed | {"F", *_CYCLES[code]} or self.iso.cycles_in is None:
+        if not needed <= given.keys() <= needed | {"F", *_CYCLES[code]} or self.cycles_in == "none":
             state.refuse(
                 line, f"G{code:g} with words that are missing or not understood", "give X Y Z R and F in its block"
             )
-        if state.tip_control != self.iso.cycles_in:
+        if state.tip_control != self.cycles_in:
             state.wrong("CS506", line, f"a hole cycle under {state.tip_control or 'no length of the tool'}")
         travel = state.memory.setdefault(INITIAL_HEIGHT, state.modal.tip[2])
         feed, turning = given.get("F", state.modal.feed), state.modal.per_revolution
@@ -205,14 +169,14 @@ class Iso(Dialect):
             given.get("F"),
             step=given.get("Q", 0.0),
             chip=code == 73.0,
-            dwell=self.iso.dwell * given.get("P", 0.0),
+            dwell=self.dwell * given.get("P", 0.0),
             feed_out=code in (85.0, 89.0),
         )
         if state.modal.inverse_time:
             state.wrong("CS506", line, "a hole cycle at inverse time feed (G93)")
         tap = code == 84.0
         if tap:
-            if self.iso.rigid and not state.memory.get(_RIGID):
+            if self.rigid and not state.memory.get(_RIGID):
                 state.wrong("CS506", line, "a tap without M29, which turns the spindle with the feed")
             pitch = feed if turning else feed / speed
             cycle = replace(cycle, feed=pitch, pitch=pitch)
@@ -266,7 +230,7 @@ class Iso(Dialect):
 
     def _dwell(self, given: Mapping[str, float], line: Line, state: State) -> None:
         """G4: P in milliseconds or seconds, X and U in seconds."""
-        time = self.iso.dwell * given["P"] if "P" in given else 1000.0 * given.get("X", given.get("U", 0.0))
+        time = self.dwell * given["P"] if "P" in given else 1000.0 * given.get("X", given.get("U", 0.0))
         state.event(line, "G", 4.0, f"{time:.10g}")
 
     def _mode(self, code: float, line: Line, state: State) -> None:
@@ -279,12 +243,12 @@ class Iso(Dialect):
             state.change(line, inch=code == 20.0)
         elif code in (93.0, 94.0, 95.0):
             state.change(line, per_revolution=code == 95.0, inverse_time=code == 93.0)
-        elif code in self.iso.tip_control:
-            state.tip_control = self.iso.tip_control[code]
+        elif code in self.tip_control:
+            state.tip_control = self.tip_control[code]
             state.event(line, "G", code, f"G{code:g}")
         elif code in _COMPENSATION:
             state.event(line, "G", code, f"G{code:g}")
-        elif code not in _SILENT and code not in self.iso.silent:
+        elif code not in _SILENT and code not in self.silent:
             hint = "only absolute milling with tool vectors, axis points or rotary words is read"
             state.refuse(line, f"G{code:g} is not understood", hint)
 
