@@ -7,10 +7,10 @@ from typing import Final
 
 from cornersmooth.errors import InputError
 from cornersmooth.model import Program, Statement
+from cornersmooth.nc.control import Blocks
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.operation import Operation
-from cornersmooth.nc.program_table import Blocks
 from cornersmooth.nc.statement_args import numbers_of, whole_number, words_of
 
 #: words for planes, with the G code of each

@@ -12,8 +12,7 @@ from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, get_args
 
-from cornersmooth.nc.control import Control, Digits, FormTable, Mode, Motion, Orientation, Words
-from cornersmooth.nc.program_table import STEPS, Blocks
+from cornersmooth.nc.control import STEPS, Blocks, Control, Digits, FormTable, Mode, Motion, Orientation, Words
 from cornersmooth.nc.trusted_words import trusted_words
 from cornersmooth.tables import Shelf, Table, filled, is_file
 

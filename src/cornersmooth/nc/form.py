@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import MM_PER_UNIT, Units
-from cornersmooth.nc.control import Control, CurveStyle, Extra, Mode, Orientation
-from cornersmooth.nc.program_table import Blocks
+from cornersmooth.nc.control import Blocks, Control, CurveStyle, Extra, Mode, Orientation
 from cornersmooth.settings import Settings
 
 #: share of ε, at the axis point, that rotary axes may take between and at the written words

@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program
+from cornersmooth.nc.control import Blocks
 from cornersmooth.nc.cycle_blocks import hole_feeds, kind_of
 from cornersmooth.nc.hole_cycles import Cycle
-from cornersmooth.nc.program_table import Blocks
 from cornersmooth.nc.run import Run
 from cornersmooth.smoothing.sampling import Rows
 from cornersmooth.text import format_number

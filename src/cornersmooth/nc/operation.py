@@ -11,16 +11,15 @@ from dataclasses import dataclass, field
 
 from cornersmooth.kinematics.dynamics import LINEAR
 from cornersmooth.model import MM_PER_UNIT, Units
-from cornersmooth.nc.control import Mode
+from cornersmooth.nc.control import STEPS, Blocks, Mode
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
-from cornersmooth.nc.program_table import Blocks
 from cornersmooth.text import format_number
 
 #: blocks of the steps `rotary_zero` and `rotary_start`; nothing without rotary axes
 RotaryBlocks = Mapping[str, Blocks]
 
-_NO_ROTARY: RotaryBlocks = {"rotary_zero": (), "rotary_start": ()}
+_NO_ROTARY: RotaryBlocks = {}
 
 #: what of `tool_end` is not done where the tool only goes home
 _RUNNING_ON = ("{spindle_off}", "{coolant_off}")
@@ -67,7 +66,6 @@ class Operation:
     def begin(self, rotary: RotaryBlocks = _NO_ROTARY) -> list[str]:
         """Blocks before the next motion of a tool; what a tool change stopped goes on again."""
         self._moved = self._used = self.begun = True
-        own = self.mode.begin
         blocks = [block for what in self.on for block in self._stopped.get(what, ())]
         if self._stopped:
             what = " and ".join(self._stopped)
@@ -76,11 +74,9 @@ class Operation:
         self.on |= self._stopped
         self._halted -= self._stopped.keys()
         self._stopped = {}
-        steps = self.form.table.program.begin if own is None else own
-        blocks += self._let_turn()
-        blocks += self._expand(steps, rotary if self.retracted else _NO_ROTARY)
-        standing = self.mode in (self.form.upright, self.form.plane)
-        return [*blocks, *(self._hold() if standing else ())]
+        steps = self.form.table.program.begin if self.mode.begin is None else self.mode.begin
+        blocks += [*self._let_turn(), *self._expand(steps, rotary if self.retracted else _NO_ROTARY)]
+        return blocks + (self._hold() if self.mode in (self.form.upright, self.form.plane) else [])
 
     @property
     def turning(self) -> bool:
@@ -154,7 +150,7 @@ class Operation:
         steps, blocks = self.form.table.program.end, self.end_tool()
         position = self._own_position("home")
         home = self._to_position({name: value for name, value in position.items() if name != "Z"})
-        zero = rotary["rotary_zero"]
+        zero = rotary.get("rotary_zero", ())
         if any(name not in LINEAR for name in position):  # they stand there, and are held
             zero = ()
         elif zero and "{rotary_zero}" in steps:
@@ -198,13 +194,13 @@ class Operation:
 
     def _expand(self, steps: Sequence[str], rotary: RotaryBlocks = _NO_ROTARY) -> list[str]:
         """Blocks of steps; what is no step is a block itself."""
-        given = {f"{{{name}}}": blocks for name, blocks in (*self.texts.items(), *rotary.items())}
-        blocks: list[str] = []
+        given, blocks = {**self.texts, **rotary}, list[str]()
         for step in steps:
+            name = step.strip("{}")
             if step in _STEPS:
                 blocks += _STEPS[step](self)
-            elif step in given:
-                blocks += given[step]
+            elif name in STEPS and name != step:
+                blocks += given.get(name, ())
             else:
                 blocks.append(step.format(**self.values))
         return blocks

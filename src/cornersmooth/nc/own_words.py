@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
 
 from cornersmooth.nc.control import Control, Mode
@@ -87,25 +87,27 @@ def _is_step(block: str) -> bool:
 
 def _blocks(table: Control) -> Iterator[str]:
     """All blocks of a table; the direction of the spindle and the units put in."""
-    for name in _FRAME:
-        for block in getattr(table.program, name):
-            for units in table.layout.units.values():
-                yield block.replace("{units}", units)
+    for block in _texts([getattr(table.program, name) for name in _FRAME]):
+        yield from (block.replace("{units}", units) for units in table.layout.units.values())
     for item in fields(table.words):
         yield from _of_field(table, item.name)
     for form in table.forms.values():
         for mode in filter(None, (*form.modes.values(), form.upright, form.plane)):
-            own = (mode.begin or (), mode.tool_end or ())
-            for blocks in (mode.on, mode.off, mode.within_on, mode.within_off, *own):
-                yield from blocks
-    for extra in table.extras.values():
-        yield from (*extra.on, *extra.off)
+            yield from _texts([mode.on, mode.off, mode.within_on, mode.within_off, mode.begin, mode.tool_end])
+    yield from _texts([(extra.on, extra.off) for extra in table.extras.values()])
 
 
 def _of_field(table: Control, name: str) -> Iterator[str]:
     """Blocks of a field of `Words`."""
-    words, value = table.words, getattr(table.words, name)
-    for blocks in list(value.values()) if isinstance(value, Mapping) else [value]:
-        for block in (blocks,) if isinstance(blocks, str) else blocks if isinstance(blocks, tuple) else ():
-            for turn in (words.clockwise, words.counterclockwise):
-                yield block.replace("{direction}", turn)
+    words = table.words
+    for block in _texts(getattr(words, name)):
+        yield from (block.replace("{direction}", turn) for turn in (words.clockwise, words.counterclockwise))
+
+
+def _texts(value: object) -> Iterator[str]:
+    """All texts of a value, of lists and tables in it."""
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, Mapping | Sequence):
+        for each in value.values() if isinstance(value, Mapping) else value:
+            yield from _texts(each)

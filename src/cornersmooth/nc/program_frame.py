@@ -13,10 +13,9 @@ import numpy as np
 from cornersmooth.errors import OutputError, SettingsError
 from cornersmooth.model import Move, Program
 from cornersmooth.nc.comments import comment_lines
-from cornersmooth.nc.control import LINE_ENDS, Control, TextStyle
+from cornersmooth.nc.control import LINE_ENDS, Blocks, Control, ProgramTable, TextStyle
 from cornersmooth.nc.control_tables import control_names, load_control
 from cornersmooth.nc.form import Form
-from cornersmooth.nc.program_table import Blocks, ProgramTable
 from cornersmooth.nc.tools import tool_loads
 from cornersmooth.settings import Settings
 from cornersmooth.tables import filled as filled_in

@@ -15,12 +15,11 @@ from cornersmooth.errors import InputError
 from cornersmooth.model import Move, Program, Statement
 from cornersmooth.nc.comments import comment_lines
 from cornersmooth.nc.compensation import begin_compensation
-from cornersmooth.nc.control import Words
+from cornersmooth.nc.control import Blocks, Words
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.hole_cycles import HoleCycles
 from cornersmooth.nc.operation import Operation
-from cornersmooth.nc.program_table import Blocks
 from cornersmooth.nc.spindle import milliseconds, revolutions
 from cornersmooth.nc.statement_args import number_after, numbers_of, spoken_text, whole_number, words_of
 from cornersmooth.nc.tools import TOOL_WORDS, ahead_of_tools, loaded_tool
