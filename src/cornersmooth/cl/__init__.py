@@ -9,9 +9,8 @@ from typing import Final
 
 from cornersmooth.cl.arcs import RULES, ArcRule
 from cornersmooth.cl.dialects import NAMES as DIALECTS
-from cornersmooth.cl.given_tool import with_tool
-from cornersmooth.cl.messages import unknown
 from cornersmooth.cl.source import clean, load
+from cornersmooth.errors import SettingsError
 from cornersmooth.model import MM_PER_UNIT, Program, Units
 
 __all__ = ["DIALECTS", "FORMATS", "read"]
@@ -89,7 +88,7 @@ def read(
         ("arc rule", arc_rule, RULES),
     ):
         if value is not None and value not in choices:
-            raise unknown(what, value, choices)
+            raise SettingsError("CS230", f"unknown {what} {value!r}", f"use one of {', '.join(choices)}")
     data, name = load(source, name, size_limit=size_limit)
     if format is None:
         format = _recognise(data)
@@ -103,11 +102,12 @@ def read(
         text = clean(data, name)
         program = read_apt(text, name=name, dialect=dialect, units=units, arc_rule=arc_rule, lenient=lenient)
     program = replace(program, source=replace(program.source, name=os.path.basename(name)))
-    if operation is not None:
-        from cornersmooth.cl.operations import one_operation
+    if operation is not None or tool_number is not None or spindle is not None:
+        from cornersmooth.cl.operations import one_operation, with_tool
 
-        program = one_operation(program, operation)
-    return with_tool(program, tool_number, spindle)
+        program = program if operation is None else one_operation(program, operation)
+        program = with_tool(program, tool_number, spindle)
+    return program
 
 
 def _recognise(data: bytes) -> str:

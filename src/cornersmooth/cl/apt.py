@@ -11,7 +11,7 @@ from cornersmooth.cl import arcs as arc_geometry
 from cornersmooth.cl.arcs import ArcRule
 from cornersmooth.cl.bulk import chunks
 from cornersmooth.cl.cards import without_card_columns
-from cornersmooth.cl.dialects import by_name, recognise
+from cornersmooth.cl.dialects import DIALECTS, recognise
 from cornersmooth.cl.grammar import Decode, Record, read_records
 from cornersmooth.cl.interpret import end, obey, plain
 from cornersmooth.cl.messages import error, finding
@@ -38,22 +38,12 @@ def read_apt(
     lenient: bool = False,
     fast: bool = True,
 ) -> Program:
-    """Read an APT / CL text.
+    """Read an APT / CL text; parameters are those of `cornersmooth.cl.read`, but for two.
 
     Parameters
     ----------
     data : bytes
-        Text with LF line ends (`cornersmooth.cl.source.load` makes it so).
-    name : str
-        File name for messages and report.
-    dialect : str or None
-        Name of a `Dialect`; None recognises it.
-    units : {"mm", "inch"} or None
-        None for what the file says.
-    arc_rule : {"left", "right", "tangent"} or None
-        Sense of rotation of CIRCLE about its normal; None for the dialect's.
-    lenient : bool
-        Go on where that is safe, with findings.
+        Text with LF line ends (`cornersmooth.cl.source.clean` makes it so).
     fast : bool
         Convert plain GOTO lines in bulk; the result is the same, bit for bit.
 
@@ -71,7 +61,7 @@ def read_apt(
     if block is not None:
         raise error("CS198", name, data.count(b"\n", 0, block.start()) + 1, word=block[0].decode("latin-1").strip())
     data, cut = without_card_columns(data, name)
-    known = by_name(dialect) if dialect else recognise(data)
+    known = next(one for one in DIALECTS if one.name == dialect) if dialect else recognise(data)
     decode = _decoder(data)
     state = ReaderState(
         file=name,

@@ -10,7 +10,6 @@ import re
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from cornersmooth.cl.messages import unknown
 from cornersmooth.model import Units
 
 #: how much of a file is looked at
@@ -61,36 +60,13 @@ DIALECTS: Final[tuple[Dialect, ...]] = (
         strips_zeros=True,
     ),
     Dialect("ncl", rb"^REMARK .*NCLCAM", multax_off="lock", units="inch"),
-    Dialect("plain", rb"(?!)"),
+    Dialect("plain", rb""),
 )
 
 NAMES: Final = tuple(dialect.name for dialect in DIALECTS)
 
 
 def recognise(data: bytes) -> Dialect:
-    """Return the dialect of a CL text by its fingerprint; `plain` where nothing tells.
-
-    Parameters
-    ----------
-    data : bytes
-        The text; its first 64 KiB decide.
-    """
-    head = data[:HEAD]
-    return next(
-        (dialect for dialect in DIALECTS if re.search(dialect.fingerprint, head, re.MULTILINE | re.IGNORECASE)),
-        DIALECTS[-1],
-    )
-
-
-def by_name(name: str) -> Dialect:
-    """Return the dialect of this name.
-
-    Raises
-    ------
-    SettingsError
-        CS230, with the names there are.
-    """
-    for dialect in DIALECTS:
-        if dialect.name == name:
-            return dialect
-    raise unknown("dialect", name, NAMES)
+    """Return the dialect of a CL text by its fingerprint; the last one fits any."""
+    head, flags = data[:HEAD], re.MULTILINE | re.IGNORECASE
+    return next(dialect for dialect in DIALECTS if re.search(dialect.fingerprint, head, flags))

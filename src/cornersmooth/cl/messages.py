@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from cornersmooth.errors import Finding, InputError, SettingsError, Severity
+from cornersmooth.errors import Finding, InputError, Severity
 
 #: code: (what is wrong, what to do)
 ERRORS: Final[dict[str, tuple[str, str]]] = {
@@ -104,11 +104,6 @@ ERRORS: Final[dict[str, tuple[str, str]]] = {
     "CS166": ("{cell!r} in the column {column!r} is neither rapid nor feed", "{want}"),
 }
 
-#: code: (what is wrong with the call, what to do)
-SETTINGS: Final[dict[str, tuple[str, str]]] = {
-    "CS230": ("unknown {what} {value!r}", "use one of {choices}"),
-}
-
 #: code: (severity, sentence)
 FINDINGS: Final[dict[str, tuple[Severity, str]]] = {
     "CS129": ("warning", "the last GOTO is cut short by the end of the file: read with the axis before it"),
@@ -166,12 +161,6 @@ def error(code: str, file: str, line: int | None, **values: object) -> InputErro
     what, hint = ERRORS[code]
     values = _cut(values)
     return InputError(code, what.format(**values), hint.format(**values), file=file, line=line)
-
-
-def unknown(what: str, value: str, choices: tuple[str, ...]) -> SettingsError:
-    """Return the error for an option value that is none of the choices."""
-    text, hint = SETTINGS["CS230"]
-    return SettingsError("CS230", text.format(what=what, value=value), hint.format(choices=", ".join(choices)))
 
 
 def finding(code: str, line: int, count: int = 1, **values: object) -> Finding:

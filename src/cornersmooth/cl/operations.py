@@ -1,4 +1,4 @@
-"""Operations of a CL file: stretches with a name or a tool of their own, and one of them as a program.
+"""Operations of a CL file: stretches with a name or a tool of their own, one of them as a program, a tool for it.
 
 An operation begins at a name (``TOOL PATH/NAME`` of NX, ``$$ OPERATION NAME : X`` of CATIA, ``$$-> FEATNO / N`` of
 Creo, ``PPRINT OPERATION: X``, PARTNO where a file has several) and where a tool is loaded after a move. A stretch
@@ -13,12 +13,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cornersmooth.errors import Finding, InputError
+from cornersmooth.errors import Finding, InputError, SettingsError
 from cornersmooth.model import Move, Program, Statement
 from cornersmooth.slices import some_poses
 from cornersmooth.statements.asked import Asking
 
-_LOADS = frozenset(("LOADTL", "LOAD", "TURRET", "TOOLNO"))
+_LOADS = ("LOADTL", "LOAD", "TURRET", "TOOLNO")
 _NAMED_TEXT = re.compile(r"\s*/?\s*OPERATION(?: NAME)?\s*[:=]\s*(.*\S)", re.IGNORECASE)
 _FEATURE = re.compile(r"\s*->\s*(FEATNO)\s*/\s*(\d+)", re.IGNORECASE)
 
@@ -139,6 +139,40 @@ def one_operation(program: Program, which: str) -> Program:
         findings=tuple(findings),
         source=replace(program.source, operation=own.number, operation_name=own.name),
     )
+
+
+def with_tool(program: Program, number: int | None, spindle: tuple[float, str] | None) -> Program:
+    """Return the program with a tool and a spindle speed of its own.
+
+    Parameters
+    ----------
+    number : int or None
+        Of the tool; None where the program keeps its own.
+    spindle : (float, str) or None
+        Revolutions per minute, and ``CLW`` or ``CCLW``; None as before.
+
+    Raises
+    ------
+    SettingsError
+        CS248: the program has such statements itself.
+    """
+    line = int(program.line[0]) if len(program) else 0
+    given: list[Statement] = []
+    if number is not None:
+        _refuse_own(program, _LOADS, "loads a tool", "--tool-number")
+        given.append(Statement(0, line, "LOADTL", (float(number),), f"LOADTL/{number}"))
+    if spindle is not None:
+        speed, direction = spindle
+        _refuse_own(program, ("SPINDL",), "starts the spindle", "--spindle")
+        given.append(Statement(0, line, "SPINDL", (speed, direction), f"SPINDL/{speed:g},{direction}"))
+    return replace(program, statements=(*given, *program.statements)) if given else program
+
+
+def _refuse_own(program: Program, words: Sequence[str], what: str, option: str) -> None:
+    own = next((statement for statement in program.statements if statement.word in words), None)
+    if own is not None:
+        name = program.source.name
+        raise SettingsError("CS248", f"the input {what} itself", f"leave out {option}", file=name, line=own.line)
 
 
 def _begins(program: Program, moved: Sequence[int]) -> Iterator[tuple[int, str]]:

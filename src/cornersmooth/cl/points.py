@@ -47,13 +47,7 @@ class _Rows:
 
 
 def looks_like_points(data: bytes) -> bool:
-    """Whether the text starts like a point file: a row of numbers, or one line of names and then a row.
-
-    Parameters
-    ----------
-    data : bytes
-        The file, or its first kilobytes.
-    """
+    """Whether a file, or its head, starts like a point file: a row of numbers, or one line of names and then a row."""
     first = list(islice(table.leading_lines(data), 2))
     if not first or any("/" in line and not points_header.is_header(line) for line in first):  # a CL statement
         return False
@@ -72,8 +66,6 @@ def read_points(data: bytes, *, name: str, units: Units | None = None, lenient: 
     data : bytes
         UTF-8, UTF-16 or Windows-1252; cells between commas, semicolons, tabs or blanks; decimal commas where
         semicolons or tabs separate; comments after ``#``, ``%`` or ``//``.
-    name : str
-        File name for messages; the report gets it without its folder.
     units : {"mm", "inch"} or None
         None for what the header says, or mm. Feeds are per minute in the same unit.
     lenient : bool

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, replace
-from itertools import chain
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
@@ -77,100 +76,58 @@ def command(given: Options) -> int:
       cornersmooth filter *.mpf --control siemens -d smooth/
       cat part.nc | cornersmooth filter - > smooth.nc
     """
-    folder, output = given.directory, given.output
     check_together(given)
     form, settings = filter_form_of(given), settings_of(given)
-    files = find_inputs(given, PATTERNS)
-    targets = [_target(one, folder) if folder else output or STANDARD for one in files]
+    jobs = [_job(one, given) for one in find_inputs(given, PATTERNS)]
+    sources, targets = [job.source for job in jobs], [job.target for job in jobs]
     if len(set(targets)) < len(targets):
         raise click.UsageError("two inputs would be written to one name; give each a -d of its own")
-    reports = [[path.replace("{stem}", one.stem) for path in given.reports] for one in files]
-    _check_reports(reports, given.reports)
-    if given.as_json and (STANDARD in targets or len(files) != 1):
+    for path in given.reports:
+        if suffix_of(path) not in (".json", ".html"):
+            raise click.UsageError(f"--report {path}: let the name end in .json or .html")
+    reports = [path for job in jobs for path in job.reports]
+    if len(set(reports)) < len(reports):
+        raise click.UsageError("two reports have the same name; with several inputs put {stem} into it")
+    if given.as_json and (STANDARD in targets or len(jobs) != 1):
         raise click.UsageError("--json needs one input and -o FILE; --report '{stem}.json' tells of several")
-    for path in (*targets, *chain.from_iterable(reports)):
-        check_path(path, [one.path for one in files], force=given.force)
-    if folder:
-        make_folder(folder)
+    for path in (*targets, *reports):
+        check_path(path, sources, force=given.force)
+    if given.directory:
+        make_folder(given.directory)
     worst = 0
-    for one, target, own in zip(files, targets, reports, strict=True):
+    for job in jobs:
         try:
-            worst = max(worst, _filter(one.path, target, own, form, settings, given))
+            worst = max(worst, _filter(job, form, settings, given))
         except CornersmoothError as error:
-            if len(files) == 1:
+            if len(jobs) == 1:
                 raise
-            error.file = error.file or one.path
+            error.file = error.file or job.source
             print_message(str(error))
             worst = max(worst, error.exit_code)
     return worst
 
 
-def _check_reports(reports: Sequence[Sequence[str]], given: Sequence[str]) -> None:
-    """Refuse names of reports that say another form, or are the same for several inputs."""
-    if wrong := [path for path in given if suffix_of(path) not in (".json", ".html")]:
-        raise click.UsageError(f"--report {wrong[0]}: let the name end in .json or .html")
-    paths = [*chain.from_iterable(reports)]
-    if len(set(paths)) < len(paths):
-        raise click.UsageError("two reports have the same name; with several inputs put {stem} into it")
+class _Job(NamedTuple):
+    """A program, and where it and its reports go."""
+
+    source: str
+    target: str
+    reports: list[str]
 
 
-def _pages(reports: Sequence[str]) -> bool:
+def _job(one: Input, given: Options) -> _Job:
+    target = given.output or STANDARD
+    if given.directory:
+        target = os.path.join(given.directory, one.stem + os.path.splitext(one.path)[1])
+        os.makedirs(os.path.dirname(target) or ".", exist_ok=True)
+    return _Job(one.path, target, [path.replace("{stem}", one.stem) for path in given.reports])
+
+
+def _pages(reports: Iterable[str]) -> bool:
     return any(suffix_of(path) == ".html" for path in reports)
 
 
-def _write_reports(
-    reports: Sequence[str],
-    contents: Mapping[str, Any],
-    page: Callable[[], str] | None,
-) -> None:
-    """Write the reports of a filtered program: JSON, and the page of its runs before and after, if any differs."""
-    from cornersmooth.report import report_json
-
-    for report in reports:
-        if suffix_of(report) != ".html":
-            write_report(report, [report_json(contents)])
-        elif page is None:
-            warn("no page is written: no run differs", report)
-        else:
-            write_report(report, [page()])
-
-
-def _page(
-    found: Filtered,
-    judgement: Judgement,
-    source: tuple[str, bytes],
-    name: str,
-    form: Form,
-    settings: Settings,
-    axes: Machine | None = None,
-) -> Callable[[], str] | None:
-    """What makes the page of the runs of a program before and after; None where no run differs."""
-    from cornersmooth.filter.checking import measure
-    from cornersmooth.page import verified_page
-
-    if found.motions is None:
-        return None
-    motions = found.motions
-    return lambda: verified_page(
-        *measure(*motions, settings, os.path.basename(source[0])),
-        name=name,
-        control=form.table.name,
-        form=form.name,
-        source=source[1],
-        machine=axes or form.machine,
-        planner=form.table.lines.planner,
-        judgement=judgement,
-        origin="old program",
-    )
-
-
-def _target(one: Input, folder: str) -> str:
-    path = os.path.join(folder, one.stem + os.path.splitext(one.path)[1])
-    os.makedirs(os.path.dirname(path) or ".", exist_ok=True)
-    return path
-
-
-def _filter(source: str, target: str, reports: Sequence[str], form: Form, settings: Settings, given: Options) -> int:
+def _filter(job: _Job, form: Form, settings: Settings, given: Options) -> int:
     """Filter one program; return the exit code."""
     from cornersmooth.filter import filter_program
     from cornersmooth.report import NcFile
@@ -178,7 +135,7 @@ def _filter(source: str, target: str, reports: Sequence[str], form: Form, settin
     from cornersmooth.report.verdict import Saving
     from cornersmooth.verify import useful_processes
 
-    data, name = read_input(source)
+    data, name = read_input(job.source)
     axes = machine_of(given.limits)
     with told_of(name):
         found = filter_program(
@@ -188,40 +145,46 @@ def _filter(source: str, target: str, reports: Sequence[str], form: Form, settin
             **how_read(given),
             verify=not given.no_verify,
             axes=axes,
-            paths=_pages(reports),
+            paths=_pages(job.reports),
             processes=useful_processes(),
         )
     bad = found.verdict is Verdict.FAILED or (given.strict and found.verdict is not Verdict.PASSED)
-    with open_output(target_of(target), hold=bad, replace=given.force) as output:
+    with open_output(target_of(job.target), hold=bad, replace=given.force) as output:
         output.failed = bad
         output.stream.write(found.data)
-    judgement = judgement_of(found, settings.tolerance)
-    path = None if target == STANDARD else target + FAILED * bad
-    written = NcFile.of(path, output.stream.digest, form)
+    path = None if job.target == STANDARD else job.target + FAILED * bad
     saving = None if found.seconds is None else Saving(*found.seconds, against="the program as it was")
-    times = planned_times(saving, axes)
-    contents = _report("filter", judgement, found.checked, (name, data), written, settings, times)
-    contents["summary"] = {
-        "cuts": found.cuts,
-        "smoothed": found.smoothed,
-        "runs": found.runs,
-        "lines_in": found.lines,
-        "lines_out": found.new_lines,
-    }
-    contents["left_as_it_is"] = [asdict(left) for left in found.left]
-    page = _page(found, judgement, (name, data), os.path.basename(target), form, settings, axes)
-    _write_reports(reports, contents, page)
-    line = contents["verdict_text"]
+    contents = _reported(
+        "filter",
+        found,
+        _judgement(found, settings.tolerance),
+        (name, data),
+        os.path.basename(job.target),
+        NcFile.of(path, output.stream.digest, form),
+        form,
+        settings,
+        job.reports,
+        axes,
+        times=planned_times(saving, axes),
+        summary={
+            "cuts": found.cuts,
+            "smoothed": found.smoothed,
+            "runs": found.runs,
+            "lines_in": found.lines,
+            "lines_out": found.new_lines,
+        },
+        left_as_it_is=[asdict(left) for left in found.left],
+    )
     if given.as_json:
         say_json(contents)
     elif not given.quiet:
-        _show(name, contents, found, given.verbose, given.units)
+        _show(name, contents, found, given)
     elif loosened(settings.tolerance):
-        print_line(f"{name}: {line}")
+        print_line(f"{name}: {contents['verdict_text']}")
     return int(bad)
 
 
-def verify_with_program(source: str, old: bytes, path: str, given: Options) -> int:
+def verify_with_program(source: str, old: bytes, given: Options) -> int:
     """Compare an NC program with what was made of it; return the exit code of ``verify``."""
     from cornersmooth.filter import verify_programs
     from cornersmooth.report import NcFile
@@ -229,7 +192,7 @@ def verify_with_program(source: str, old: bytes, path: str, given: Options) -> i
     from cornersmooth.report.verdict import Judgement
     from cornersmooth.verify import useful_processes
 
-    new, name = read_input(path)
+    new, name = read_input(given.text)
     settings, form = settings_of(given), filter_form_of(given)
     found = verify_programs(
         old, new, form, settings, **how_read(given), paths=_pages(given.reports), processes=useful_processes()
@@ -237,15 +200,75 @@ def verify_with_program(source: str, old: bytes, path: str, given: Options) -> i
     checked = found.checked
     assert checked is not None
     judgement = Judgement(found.verdict, 0, 0, "", _problems(checked.wrong) or _measured(checked, settings.tolerance))
-    written = replace(NcFile.of(None if path == STANDARD else path, sha256_of(new), form), form=None)
-    contents = _report("verify", judgement, checked, (source, old), written, settings)
-    _write_reports(given.reports, contents, _page(found, judgement, (source, old), name, form, settings))
+    path = None if given.text == STANDARD else given.text
+    written = replace(NcFile.of(path, sha256_of(new), form), form=None)
+    contents = _reported("verify", found, judgement, (source, old), name, written, form, settings, given.reports)
     show_wrong(name, checked.wrong)
     if given.as_json:
         say_json(contents)
     elif loosened(settings.tolerance) or not given.quiet:
         say_line(contents["verdict_text"])
     return int(found.verdict is not Verdict.PASSED)
+
+
+def _reported(
+    kind: Kind,
+    found: Filtered,
+    judgement: Judgement,
+    source: tuple[str, bytes],
+    name: str,
+    program: NcFile,
+    form: Form,
+    settings: Settings,
+    reports: Iterable[str],
+    axes: Machine | None = None,
+    times: Mapping[str, Any] | None = None,
+    **more: Any,
+) -> dict[str, Any]:
+    """Make the report of two programs, write it where it is asked for, and the page of the runs before and after."""
+    from cornersmooth.filter.checking import measure
+    from cornersmooth.page import verified_page
+    from cornersmooth.report import report_json
+    from cornersmooth.report.record import record, sha256_of
+
+    old_name, old = source
+    contents = record(
+        kind,
+        judgement,
+        source={"name": old_name, "sha256": sha256_of(old), "format": "nc"},
+        program=program,
+        settings=settings.as_dict(),
+        command=command_line(),
+        loosened=loosened(settings.tolerance),
+        times=times,
+    )
+    checked = found.checked
+    contents["compared"] = checked and {
+        "max_tip_deviation_mm": checked.tip,
+        "max_axis_point_deviation_mm": checked.axis_point,
+        "problem_count": len(checked.wrong),
+        "problems": [{"code": one.code, "nc_line": one.nc_line, "text": one.text} for one in checked.wrong],
+    }
+    contents |= more
+    for path in reports:
+        if suffix_of(path) != ".html":
+            write_report(path, [report_json(contents)])
+        elif found.motions is None:
+            warn("no page is written: no run differs", path)
+        else:
+            page = verified_page(
+                *measure(*found.motions, settings, os.path.basename(old_name)),
+                name=name,
+                control=form.table.name,
+                form=form.name,
+                source=old,
+                machine=axes or form.machine,
+                planner=form.table.lines.planner,
+                judgement=judgement,
+                origin="old program",
+            )
+            write_report(path, [page])
+    return contents
 
 
 def _problems(wrong: Sequence[Problem]) -> str:
@@ -257,7 +280,7 @@ def _measured(found: Checked, tolerance: float) -> str:
     return f"within {tolerance:g} mm: tip {found.tip:.4g} mm{point}"
 
 
-def _show(name: str, contents: Mapping[str, Any], found: Filtered, verbose: int, given_units: str | None) -> None:
+def _show(name: str, contents: Mapping[str, Any], found: Filtered, given: Options) -> None:
     """Print the verdict, what was measured, and what was left as it is."""
     verdict, _, what = contents["verdict_text"].partition(": ")
     print_heading(
@@ -271,9 +294,9 @@ def _show(name: str, contents: Mapping[str, Any], found: Filtered, verbose: int,
         before, after = found.seconds
         share = 100.0 * (after / before - 1.0)
         print_line(f"{INDENT}time of the runs {after:.1f} s instead of {before:.1f} s ({share:+.1f} %)")
-    if not found.units_said and given_units is None:
+    if not found.units_said and given.units is None:
         warn("the program does not say its units: millimetres are taken; give --units", name)
-    left = found.left if verbose else found.left[:_SHOWN]
+    left = found.left if given.verbose else found.left[:_SHOWN]
     if left:
         print_line(f"{'left as it is':>13}  first line  reason")
     for cuts in left:
@@ -284,7 +307,7 @@ def _show(name: str, contents: Mapping[str, Any], found: Filtered, verbose: int,
         print_line("--tip-control says that tool tip control is on where the program begins")
 
 
-def judgement_of(found: Filtered, tolerance: float) -> Judgement:
+def _judgement(found: Filtered, tolerance: float) -> Judgement:
     """Give the verdict, and what it rests on."""
     from cornersmooth.report.verdict import Judgement
 
@@ -299,35 +322,3 @@ def judgement_of(found: Filtered, tolerance: float) -> Judgement:
     else:
         what = f"{what} {_measured(found.checked, tolerance)}"
     return Judgement(found.verdict, 0, 0, unverified, what)
-
-
-def _report(
-    kind: Kind,
-    judgement: Judgement,
-    checked: Checked | None,
-    source: tuple[str, bytes],
-    program: NcFile,
-    settings: Settings,
-    times: Mapping[str, Any] | None = None,
-) -> dict[str, Any]:
-    """The report of a filtered program, or of one that was compared with the one it was made from."""
-    from cornersmooth.report.record import record, sha256_of
-
-    name, data = source
-    contents = record(
-        kind,
-        judgement,
-        source={"name": name, "sha256": sha256_of(data), "format": "nc"},
-        program=program,
-        settings=settings.as_dict(),
-        command=command_line(),
-        loosened=loosened(settings.tolerance),
-        times=times,
-    )
-    contents["compared"] = checked and {
-        "max_tip_deviation_mm": checked.tip,
-        "max_axis_point_deviation_mm": checked.axis_point,
-        "problem_count": len(checked.wrong),
-        "problems": [{"code": one.code, "nc_line": one.nc_line, "text": one.text} for one in checked.wrong],
-    }
-    return contents

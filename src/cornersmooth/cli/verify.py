@@ -100,7 +100,7 @@ def command(given: Options) -> int:
     check_reports(given.reports, ".json, .csv or .html", [source, text], force=given.force)
     data, name, is_program = read_source(given)
     if is_program:
-        return verify_with_program(name, data, text, given)
+        return verify_with_program(name, data, given)
     nc: bytes | str | os.PathLike[str] = read_input(text)[0] if text == STANDARD else text
     head = _take_over(given, nc, data)
     given = head.given
