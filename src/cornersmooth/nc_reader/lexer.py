@@ -19,8 +19,8 @@ NUMBER: Final = r"[-+]?(?:\d+\.?\d*|\.\d+)"
 #: no control reads so many digits before the point
 _LARGEST: Final = 1e12
 
-#: bytes at the end of a chunk in which the begin of a block is looked for first
-_TAIL: Final = 1 << 16
+#: bytes at the end of a chunk in which the begin of a block is looked for first, and next
+_TAILS: Final = 1 << 11, 1 << 16
 
 _HEAD: Final = re.compile(r"[ \t]*(/\d?)?[ \t]*")
 
@@ -112,8 +112,8 @@ class Lexer:
 
     def cut(self, piece: bytes) -> int:
         """Where to cut a text so that no curve is cut in two: behind a line end; 0 where there is no such place."""
-        for begin in (max(len(piece) - _TAIL, 0), 0):
-            found = [match.start() for match in self.begins.finditer(piece, begin)]
+        for tail in (*_TAILS, len(piece)):
+            found = [match.start() for match in self.begins.finditer(piece, max(len(piece) - tail, 0))]
             if found:
                 return found[-1] + 1
         return 0

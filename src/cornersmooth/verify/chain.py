@@ -33,6 +33,9 @@ _BLOCKS = 64, 512, 8192
 #: how far a row may be from where it is expected, as a share of the way and in radii (speed only)
 _SLACK, _RADII = 0.05, 100.0
 
+#: radii up to which a place is near enough: none on the segment beside it is tried (speed only)
+_NEAR = 0.1
+
 
 @dataclass(frozen=True)
 class Path:
@@ -135,7 +138,7 @@ class Window:
         k: Ints = np.clip(np.searchsorted(self.length, length, side="right") - 1, 0, self.way.shape[1] - 1)
         return k
 
-    def nearest(self, points: Floats, length: Floats) -> tuple[Floats, Floats]:
+    def nearest(self, points: Floats, length: Floats, radius: float) -> tuple[Floats, Floats]:
         """Places near points (3h, k), from path lengths on: a step along the tangent, then the neighbours.
 
         With the squares of the distances of the farthest of their triples.
@@ -144,27 +147,30 @@ class Window:
         away = points - self.start.take(k, axis=1)
         ahead = np.einsum("ij,ij->j", away, self.way.take(k, axis=1)) * self.inverse[k]
         k = self.segment_at(self.length[k] + ahead * (self.length[k + 1] - self.length[k]))
-        best: Floats | None = None
-        place = farthest = np.zeros(0)
-        for step in (0, -1, 1):
-            j = np.clip(k + step, 0, self.way.shape[1] - 1)
-            way = self.way.take(j, axis=1)
-            away = points - self.start.take(j, axis=1)
-            at = np.einsum("ij,ij->j", away, way) * self.inverse.take(j)
-            np.clip(at, 0.0, 1.0, out=at)
-            away -= at * way
-            squares = [np.einsum("ij,ij->j", away[c : c + 3], away[c : c + 3]) for c in range(0, len(away), 3)]
-            square = squares[0] if len(squares) == 1 else squares[0] + squares[1]
-            larger = squares[0] if len(squares) == 1 else np.maximum(*squares)
-            at += self.number.take(j)
-            if best is None:
-                best, place, farthest = square, at, larger
-            else:
-                nearer = square < best
-                np.copyto(best, square, where=nearer)
-                np.copyto(place, at, where=nearer)
-                np.copyto(farthest, larger, where=nearer)
+        at, square, farthest = self._on(points, k)
+        place = at + self.number.take(k)
+        nearer_end = np.where(at < 0.5, -1, 1)
+        for beyond, limit in ((nearer_end, _NEAR * radius), (-nearer_end, radius)):
+            rows = np.flatnonzero(farthest > limit * limit)
+            j = np.clip(k.take(rows) + beyond.take(rows), 0, self.way.shape[1] - 1)
+            at, other, other_farthest = self._on(points.take(rows, axis=1), j)
+            better = np.flatnonzero(other < square.take(rows))
+            rows, j = rows.take(better), j.take(better)
+            place[rows], square[rows] = self.number.take(j) + at.take(better), other.take(better)
+            farthest[rows] = other_farthest.take(better)
         return place, farthest
+
+    def _on(self, points: Floats, k: Ints) -> tuple[Floats, Floats, Floats]:
+        """Fractions at which segments are nearest to points; the squares of the distances, whole and of a triple."""
+        way = self.way.take(k, axis=1)
+        away = points - self.start.take(k, axis=1)
+        at = np.einsum("ij,ij->j", away, way) * self.inverse.take(k)
+        np.clip(at, 0.0, 1.0, out=at)
+        away -= at * way
+        squares = [np.einsum("ij,ij->j", away[c : c + 3], away[c : c + 3]) for c in range(0, len(away), 3)]
+        if len(squares) == 1:
+            return at, squares[0], squares[0].copy()
+        return at, squares[0] + squares[1], np.maximum(*squares)
 
 
 @dataclass(frozen=True)
@@ -271,7 +277,7 @@ def _places(own: Floats, gone: Floats, path: Path, radius: float, where: tuple[S
         expected = begin[k] + ratio * (gone[rows] - left[k])
         low, high = float(expected.min()), float(expected.max())
         slack = _SLACK * (high - low) + _RADII * radius
-        place[rows], square = Window.of(path, low - slack, high + slack).nearest(own[:, rows], expected)
+        place[rows], square = Window.of(path, low - slack, high + slack).nearest(own[:, rows], expected, radius)
         close = square <= radius * radius
         count = len(close)
         if size > _BLOCKS[0] and not close.all():
