@@ -146,10 +146,10 @@ def moved(line: str, word: str, by: float) -> str:
     return re.sub(rf"(?<=\b{word})[-+]?\d+\.\d*", lambda value: f"{float(value[0]) + by:+.4f}", line)
 
 
-def mutants(lines, control: str, place: int = 0) -> dict[str, list[str]]:
-    """What goes wrong around the first rewind."""
+def mutants(lines, control: str, place: tuple[int, int] | None = None) -> dict[str, list[str]]:
+    """What goes wrong around a rewind, the first one if its lines are not given."""
     lines = list(lines)
-    out, back = rewinds(lines, control)[place]
+    out, back = place or rewinds(lines, control)[0]
     up = next(k for k in range(out, back) if bare(lines)[k] == UP[control])
     rapid, feed = ("FMAX", "") if control == "heidenhain" else ("G0", "G1")
     in_rapid = f"{lines[back]} FMAX" if control == "heidenhain" else lines[back].replace(feed, rapid, 1)
@@ -316,12 +316,14 @@ def three_cuts(above: str = "GOTO/-10,0,70,0.5,0,0.8660254") -> bytes:
         ("heidenhain", "spl", "table-ac", "global"),
     ],
 )
-def test_only_cuts_that_are_left_are_lines_among_curves(control: str, form: str, name: str, method: str) -> None:
+def test_a_cut_is_left_between_curves(control: str, form: str, name: str, method: str) -> None:
     chosen = choose_form(control, form, machine=short(name), rewind=AWAY)
     program, stream = read(three_cuts()), io.BytesIO()
     settings = fit_settings(Settings(tolerance=EPS, method=method), chosen, "mm")
     written = write(smooth(program, settings), stream, form=chosen)
-    assert {one.code: one.count for one in written.findings}["CS381"] == 1
+    # no curve but the one that the place is on, if it is on one, becomes lines
+    lost = {one.code: one.count for one in written.findings}.get("CS378", 0)
+    assert lost <= 1
     lines = bare(stream.getvalue().decode().splitlines())
     curves = [k for k, line in enumerate(lines) if re.search("G6.2|BSPLINE|SPL |PL=", line)]
     assert curves
@@ -333,7 +335,7 @@ def test_only_cuts_that_are_left_are_lines_among_curves(control: str, form: str,
     assert any(k > back for k in curves)
     if control != "fanuc":
         return
-    wrong = mutants(stream.getvalue().decode().splitlines(), control, place=1)
+    wrong = mutants(stream.getvalue().decode().splitlines(), control, (out - 1, back - 1))
     for what in ("no retract", "back too deep", "a part of the cut is missing"):
         text = ("\n".join(wrong[what]) + "\n").encode()
         assert not verify(program, text, tolerance=EPS, control=control, machine=short(name)).passed, what

@@ -12,20 +12,13 @@ parameter; β is largest at u = ½, where it is c = ρ·w1/(2(w1 + w2)) and σ =
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cache
-
 import numpy as np
 
-from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.model import Bools, Corners, Floats, Ints, Program
 
 KNOTS = (0.0, 0.0, 0.0, 0.0, 0.5, 1.0, 1.0, 1.0, 1.0)
 
 DEGREE = 3
-
-#: all shares of the five control points in those of dyadic refinements are multiples of this and more
-_BINARY_DIGIT = 2.0**-20
 
 
 def deviation_factor(weights: Floats, ratio: Floats | float) -> Floats:
@@ -158,52 +151,24 @@ def derivatives(points: Floats, weights: Floats, u: Floats) -> tuple[Floats, Flo
     return p0, p1, p2
 
 
-@dataclass(frozen=True)
-class Refinement:
-    """The five-point curve on `spans` equal knot intervals, p = spans + 3 control points.
+def leg_derivatives(weights: Floats, ratio: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """First and second derivative by u, at u = 0, of the share of the leg that curves have passed, and of the weight.
 
-    Homogeneous control points are the matrix `from_five` (p, 5) times the five homogeneous ones; its rows sum to one.
+    Parameters
+    ----------
+    weights : (g, 5) float64
+    ratio : (g,) float64
+
+    Returns
+    -------
+    four (g,) float64
     """
-
-    spans: int
-    splines: Splines
-    from_five: Floats
-
-    @property
-    def knots(self) -> Floats:
-        """(p + 4,) clamped, from 0 to 1."""
-        return np.concatenate((np.zeros(DEGREE), self.splines.knot, np.ones(DEGREE)))
-
-    @property
-    def points(self) -> int:
-        """Number of control points."""
-        return self.spans + DEGREE
-
-    def basis(self, u: Floats) -> Floats:
-        """Polynomial basis at parameters in [0, 1]: (m,) -> (m, p)."""
-        span, values = self.splines.span_at(np.zeros(len(u), np.int64), u), np.zeros((len(u), self.points))
-        np.put_along_axis(values, self.splines.taps(span), self.splines.basis(span, u), axis=1)
-        return values
-
-    def rational_basis(self, u: Floats, weights: Floats) -> Floats:
-        """Rational basis for g curves at common parameters: (m,), (g, p) -> (g, m, p), or (1, m, p) if all agree."""
-        if len(weights) and (weights == weights[0]).all():
-            weights = weights[:1]
-        weighted = self.basis(u) * weights[:, None, :]
-        return weighted / weighted.sum(axis=2, keepdims=True)
-
-    def homogeneous(self, weights: Floats) -> Floats:
-        """Weights of the refined curves: (g, 5) -> (g, p)."""
-        return weights @ self.from_five.T
-
-    def control_points(self, points: Floats, weights: Floats) -> Floats:
-        """Control points of the refined curves: (g, 5, d) with the weights (g, 5) -> (g, p, d)."""
-        return (self.from_five @ (points * weights[:, :, None])) / self.homogeneous(weights)[:, :, None]
-
-
-@cache
-def refinement(spans: int) -> Refinement:
-    """Knots with so many intervals, a power of two from 2 on."""
-    own, finer = (Splines(np.linspace(0.0, 1.0, n + 1), np.array([n + 1])) for n in (2, spans))
-    matrix = np.round(own.on_knots(finer, np.eye(5)) / _BINARY_DIGIT) * _BINARY_DIGIT
-    return Refinement(spans, finer, matrix)
+    share = np.stack((np.zeros_like(ratio), weights[:, 1] * (1.0 - ratio), weights[:, 2]), axis=1)
+    (slope, bend), (weight_slope, weight_bend) = (
+        (
+            6.0 * (points[:, 1] - points[:, 0]),
+            12.0 * (points[:, 2] - points[:, 1]) - 24.0 * (points[:, 1] - points[:, 0]),
+        )
+        for points in (share, weights[:, :3])
+    )
+    return slope, bend - 2.0 * weight_slope * slope, weight_slope, weight_bend

@@ -137,7 +137,7 @@ def closest_second(machine: Machine, axis: Floats, first_angle: Floats) -> Float
     return wrap(frame.signs[1] * np.degrees(np.arctan2(y, x) - frame.zero))
 
 
-def continued(machine: Machine, axis: Floats, guess: Floats, branch: Ints, cone: float) -> tuple[Floats, Ints]:
+def continued(machine: Machine, axis: Floats, guess: Floats, branch: Ints, cone: float | Floats) -> tuple[Floats, Ints]:
     """Angles (n, 2) on a known branch, in the turn that lies nearest to a guess; degrees.
 
     The branch (n,) is as in `Solutions.angles`, -1 for the one nearer to the guess. Within the cone of the pole,

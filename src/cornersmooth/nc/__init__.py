@@ -30,7 +30,7 @@ from cornersmooth.nc.own_words import own_words
 from cornersmooth.nc.plane_travel import check_travel_in_planes, check_travel_without_axes
 from cornersmooth.nc.planes import Planes, plan_planes
 from cornersmooth.nc.program_frame import POINT_APPROACH, Frame, Stream
-from cornersmooth.nc.rewound_curve_rows import curve_rows_of, rewound_curve_rows
+from cornersmooth.nc.rotary_curve_rows import rotary_curve_rows
 from cornersmooth.nc.rotary_rows import rotary_rows
 from cornersmooth.nc.rotary_words import rotary_way
 from cornersmooth.nc.run_reach import within_reach
@@ -212,7 +212,7 @@ def _rows(smoothed: SmoothProgram, form: Form, circles: Circles, planes: Planes,
     if form.machine is not None and not form.rotary:
         check_travel_without_axes(form.machine, smoothed.program)
     if form.curves and form.rotary:
-        return (rewound_curve_rows if form.rewind else curve_rows_of)(smoothed, form, findings)
+        return rotary_curve_rows(smoothed, form, findings)
     if form.curves:
         return curve_rows(smoothed, divide=form.curve in _TURNING)
     long = smoothed.settings.lines == "long"

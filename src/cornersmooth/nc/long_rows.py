@@ -78,7 +78,7 @@ def corner_blends(
 
 def long_rows(rows: Iterator[Rows], smoothed: SmoothProgram, form: Form) -> Iterator[Rows]:
     """Rows with tool vectors at which long lines end; arcs stay as they are."""
-    tip, axis, move = whole_rows(rows)
+    tip, axis, move, _ = whole_rows(rows)
     if not len(move):
         return
     limits = line_limits(smoothed.settings, form)

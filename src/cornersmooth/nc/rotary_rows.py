@@ -64,8 +64,8 @@ def rotary_rows(
         return
     program, settings = smoothed.program, smoothed.settings
     machine, travel = machine_of(form).with_longest_tool(), ToolTravel(program, machine_of(form))
-    largest_turn = min(settings.axis_step or LARGEST_TURN, LARGEST_TURN)
-    limits = line_limits(settings, form, largest_turn)
+    max_step = largest_turn(settings)
+    limits = line_limits(settings, form, max_step)
     timed = _timed_cuts(way.angles, way.move, program) if form.orientation == "machine" else None
     times = _BlockTimes(smoothed, form, machine, limits)
     count, first_line, unsolved = 0, 0, np.zeros(0, np.int64)
@@ -79,10 +79,10 @@ def rotary_rows(
             way.tip[here],
             way.axis[here],
             way.angles[here],
-            tolerance=form.rotary_tolerance(settings.tolerance, settings.axis_scale),
+            tolerance=way.tolerance[here],
             rapid=way.free[here],
             tip_tolerance=TIP_SHARE * settings.tolerance if form.orientation == "machine" else None,
-            max_step=largest_turn,
+            max_step=max_step,
             line=line,
             file=program.source.name,
         )
@@ -117,6 +117,11 @@ def rotary_rows(
         yield part, np.where(inserted, -1, begin + pose)
     times.tell(findings)
     note_inserted(machine, count, first_line, unsolved, findings)
+
+
+def largest_turn(settings: Settings) -> float:
+    """Degrees that a rotary axis may turn in one block of a cut."""
+    return min(settings.axis_step or LARGEST_TURN, LARGEST_TURN)
 
 
 @dataclass(frozen=True)

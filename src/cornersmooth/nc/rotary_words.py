@@ -36,6 +36,8 @@ class RotaryWay:
     #: back there into a cut that it has left
     free: Bools
     left: Bools
+    place: Floats  #: (n,) as in `Rows`
+    tolerance: Floats  #: (n,), degrees by which the axis may be off on the way to the row
 
 
 def rotary_way(rows: Iterator[Rows], smoothed: SmoothProgram, form: Form, findings: Findings) -> RotaryWay:
@@ -44,10 +46,10 @@ def rotary_way(rows: Iterator[Rows], smoothed: SmoothProgram, form: Form, findin
     Raises InputError where the machine cannot follow the path.
     """
     program, settings, machine = smoothed.program, smoothed.settings, machine_of(form).with_longest_tool()
-    tip, axis, move = whole_rows(rows)
+    tip, axis, move, place = whole_rows(rows)
     if not len(move):
         none = np.zeros(0, np.bool_)
-        return RotaryWay(tip, axis, move, np.zeros((0, 2)), np.zeros(0, np.int8), none, none)
+        return RotaryWay(tip, axis, move, np.zeros((0, 2)), np.zeros(0, np.int8), none, none, place, place)
     tolerance = form.rotary_tolerance(settings.tolerance, settings.axis_scale)
     rapid, file = rapid_moves(program.kind)[move], program.source.name
     _check_reach(machine, program, axis, move, tolerance)
@@ -57,7 +59,7 @@ def rotary_way(rows: Iterator[Rows], smoothed: SmoothProgram, form: Form, findin
     if form.rewind:
         path, source, left = rewound_angles(machine, tip, axis, **how)
         if left.any():
-            tip, axis, move = tip[source], axis[source], move[source]
+            tip, axis, move, place = tip[source], axis[source], move[source], place[source]
             rapid = rapid[source] | left
             _note_rewinds(machine, path.angles, left, program.line[move], findings)
     else:
@@ -65,7 +67,7 @@ def rotary_way(rows: Iterator[Rows], smoothed: SmoothProgram, form: Form, findin
     findings.add_all(path.findings)
     angles = path.angles + from_zero(form, program, axis, path.angles, move, rapid)
     return_free_memory()  # rows are written while all of this is held
-    return RotaryWay(tip, axis, move, angles, path.branch, rapid, left)
+    return RotaryWay(tip, axis, move, angles, path.branch, rapid, left, place, np.broadcast_to(tolerance, len(move)))
 
 
 def machine_of(form: Form) -> Machine:
@@ -85,22 +87,22 @@ def note_inserted(machine: Machine, count: int, line: int, unsolved: Ints, findi
         findings.add("CS367", "note", line, text, count)
 
 
-def whole_rows(rows: Iterator[Rows]) -> tuple[Floats, Floats, Ints]:
-    """Tip, axis and move of all rows; what they were gathered in is given back part by part."""
-    columns: tuple[deque[Any], ...] = (deque(), deque(), deque())
+def whole_rows(rows: Iterator[Rows]) -> tuple[Floats, Floats, Ints, Floats]:
+    """Tip, axis, move and place of all dense rows; what they were gathered in is given back part by part."""
+    columns: tuple[deque[Any], ...] = (deque(), deque(), deque(), deque())
     for chunk in rows:
-        for column, part in zip(columns, (chunk.tip, chunk.other, chunk.move), strict=True):
+        for column, part in zip(columns, (chunk.tip, chunk.other, chunk.move, chunk.place), strict=True):
             column.append(part)
     total = sum(map(len, columns[2]))
-    tip, axis, move = np.empty((total, 3)), np.empty((total, 3)), np.empty(total, np.int64)
-    for whole, parts in zip((tip, axis, move), columns, strict=True):
+    tip, axis, move, place = np.empty((total, 3)), np.empty((total, 3)), np.empty(total, np.int64), np.empty(total)
+    for whole, parts in zip((tip, axis, move, place), columns, strict=True):
         begin = 0
         while parts:
             part = parts.popleft()
             whole[begin : begin + len(part)] = part
             begin += len(part)
         return_free_memory()
-    return tip, axis, move
+    return tip, axis, move, place
 
 
 def _check_reach(machine: Machine, program: Program, axis: Floats, move: Ints, tolerance: float) -> None:

@@ -6,6 +6,8 @@ of two motions is between N + 1 even samples no larger than at them but for (M�
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from cornersmooth.kinematics.machine import Machine
@@ -14,7 +16,7 @@ from cornersmooth.model import Floats
 from cornersmooth.vectors import dot, norm, unit
 
 
-def axis_bend(machine: Machine, turn: Floats, start: Floats, end: Floats, slack: float) -> Floats:
+def axis_bend(machine: Machine, turn: Floats, start: Floats, end: Floats, slack: Floats) -> Floats:
     """Bound (n,) on the second derivative of the tool axis when both rotary axes turn evenly, by `turn` (n, 2) rad.
 
     Tool axes (n, 3) at both ends may be off by the slack, rad.
@@ -24,11 +26,31 @@ def axis_bend(machine: Machine, turn: Floats, start: Floats, end: Floats, slack:
     return _turning_bend(away, turn, np.zeros_like(turn))
 
 
-def axis_curve_bend(machine: Machine, words: Floats) -> Floats:
-    """Bound (n,) on the second derivative of the tool axis along cubics of the angles: Bézier points (n, 4, 2), rad."""
-    speed, bend = (np.abs(part).max(axis=1) for part in (3.0 * np.diff(words, axis=1), 6.0 * np.diff(words, 2, axis=1)))
-    away = _sine(machine, tool_axis(machine, np.degrees(words[:, 0]))) + speed[:, 1]
+def axis_curve_bend(machine: Machine, words: Floats, weight: Floats) -> Floats:
+    """Bound (n,) on the second derivative of the tool axis along rational cubics of the angles.
+
+    Bézier points (n, 4, 2), rad, are times their weights (n, 4).
+    """
+    speed, bend = _rational(words, weight, np.abs)
+    away = _sine(machine, tool_axis(machine, np.degrees(words[:, 0] / weight[:, :1]))) + speed[:, 1]
     return _turning_bend(away, speed, bend)
+
+
+def _rational(points: Floats, weight: Floats, size: Callable[[Floats], Floats]) -> tuple[Floats, Floats]:
+    """Bounds (n, e) on the sizes (..., d) -> (..., e) of the first two derivatives of rational cubics.
+
+    Bézier points (n, 4, d) are times their weights (n, 4), which are positive. With the value q = N/W less that at the
+    start, W q′ = N′ − W′ q and W q″ = N″ − 2 W′ q′ − W″ q.
+    """
+    weight = weight[:, :, None]
+    off, least = points - weight * (points[:, :1] / weight[:, :1]), weight.min(axis=1)
+    away = size(off / weight).max(axis=1)
+    (first, second), (slope, curve) = (
+        [measure(factor * np.diff(values, order, axis=1)).max(axis=1) for factor, order in ((3.0, 1), (6.0, 2))]
+        for values, measure in ((off, size), (weight, np.abs))
+    )
+    speed = (first + slope * away) / least
+    return speed, (second + 2.0 * slope * speed + curve * away) / least
 
 
 def _turning_bend(away: Floats, speed: Floats, bend: Floats) -> Floats:
@@ -38,21 +60,19 @@ def _turning_bend(away: Floats, speed: Floats, bend: Floats) -> Floats:
     return total + away * bend[:, 0] + bend[:, 1]
 
 
-def lever_bend(lever: Floats) -> Floats:
-    """Bound (n,) on |u″| of the direction u of cubics with the Bézier points (n, 4, 3); infinite through the origin.
+def lever_bend(lever: Floats, weight: Floats) -> Floats:
+    """Bound (n,) on |u″| of the direction u of rational cubics; infinite through the origin.
 
-    With l = r u the part of u″ across u is that of (l″ − 2 r′ u′)/r, the part along it |u′|²; both |r′| and r |u′| are
-    at most |l′|.
+    Bézier points (n, 4, 3) are times their weights (n, 4). With l = r u the part of u″ across u is that of
+    (l″ − 2 r′ u′)/r, the part along it |u′|²; both |r′| and r |u′| are at most |l′|.
     """
-    middle = unit(lever.mean(axis=1))
-    shortest = np.einsum("kid,kd->ki", lever, middle).min(axis=1)
-    fastest, sharpest = (
-        norm(part).max(axis=1) for part in (3.0 * np.diff(lever, axis=1), 6.0 * np.diff(lever, 2, axis=1))
-    )
+    speed, bend = (part[:, 0] for part in _rational(lever, weight, lambda vectors: norm(vectors)[..., None]))
+    points = lever / weight[:, :, None]
+    shortest = np.einsum("kid,kd->ki", points, unit(points.mean(axis=1))).min(axis=1)
     inverse = np.divide(1.0, shortest, out=np.full(len(lever), np.inf), where=shortest > 0)
     with np.errstate(invalid="ignore"):
-        bend: Floats = np.nan_to_num(sharpest * inverse + 3.0 * (fastest * inverse) ** 2, nan=np.inf, posinf=np.inf)
-    return bend
+        bound: Floats = np.nan_to_num(bend * inverse + 3.0 * (speed * inverse) ** 2, nan=np.inf, posinf=np.inf)
+    return bound
 
 
 def ruled_bend(start: Floats, end: Floats) -> Floats:

@@ -4,12 +4,11 @@ In a straight block every axis runs evenly from word to word. With tool centre p
 but the tool axis follows its rotary angles and not the shortest turn; without it the tip leaves its line too.
 
 A division is enough only where that is proved: by bounds of the derivatives alone (`chord_bounds`), or by so many
-samples that the same bounds leave nearly nothing to what lies between them.
+samples that the same bounds leave nearly nothing to what lies between them. They say, too, how many parts to try.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -26,8 +25,6 @@ from cornersmooth.vectors import dot, unit
 
 #: Rounds of division.
 ROUNDS = 28
-#: Shares of an interval at which its error is looked at first: an error that vanishes at all three is none.
-SAMPLES = (0.25, 0.5, 0.75)
 #: The most parts that an interval is divided into at once.
 PARTS = 64
 #: The error of a smooth motion at a quarter of its way is ¾ of its largest. Where that holds to SMOOTH of it, and no
@@ -37,9 +34,7 @@ SMOOTH, SMOOTH_TURN, AIM = 0.1, 30.0, 0.93
 SURE = 0.5
 #: Share of the tolerance that a proof leaves to what lies between its samples, and the most intervals between them.
 PROOF, MOST_SAMPLES = 0.02, 256
-#: Squares of vectors that are nearer to 1 are those of unit vectors.
-UNIT = 1e-6
-#: Samples of proofs that are worked on at a time.
+#: Samples that are worked on at a time.
 CHUNK = 1 << 15
 
 
@@ -73,7 +68,7 @@ def insertions(
     axis: Floats,
     angles: Floats,
     *,
-    tolerance: float,
+    tolerance: float | Floats,
     rapid: Bools | None = None,
     tip_tolerance: float | None = None,
     max_step: float | None = None,
@@ -83,12 +78,12 @@ def insertions(
     """Points that a path needs so that straight blocks between its rotary words stay on the ruled motion.
 
     Tips (n, 3) are in mm, axes unit vectors, angles (n, 2) degrees from `rotary_angles`. The tool axis may be off that
-    of the ruled motion by the tolerance, degrees, and the tip off its line by `tip_tolerance`, mm, None where the
-    control keeps it there. A rotary axis may turn by `max_step` degrees in one block. `rapid` moves (n,) need no
-    points. CS362: a rotary axis would leave its limits between two poses within them.
+    of the ruled motion by the tolerance, degrees, on the way to each point (n,), and the tip off its line by
+    `tip_tolerance`, mm, None where the control keeps it there. A rotary axis may turn by `max_step` degrees in one
+    block. `rapid` moves (n,) need no points. CS362: a rotary axis would leave its limits between two poses within them.
     """
     rapid = np.zeros(len(axis), np.bool_) if rapid is None else rapid
-    motion = RuledMotion(machine, tip, axis, tolerance, tip_tolerance, max_step)
+    motion = RuledMotion(machine, tip, axis, np.broadcast_to(tolerance, len(axis)), tip_tolerance, max_step)
     found: list[Intervals] = []
     open_ = motion.segments(angles, np.flatnonzero(~rapid[1:]), branches=False)
     for number in range(ROUNDS + 1):
@@ -106,7 +101,7 @@ def insertions(
     limits = machine.limits
     inside = np.clip(inner, limits[:, 0], limits[:, 1])
     # At the pole the second axis may stop at its limit; anywhere else the way itself is outside.
-    outside = np.abs(inner - inside).max(axis=1, initial=0.0) > tolerance / 2
+    outside = np.abs(inner - inside).max(axis=1, initial=0.0) > motion.tolerance[segment + 1] / 2
     if outside.any():
         first = int(np.argmax(outside))
         here = slice(first, first + 1)
@@ -114,6 +109,22 @@ def insertions(
         number = 0 if line is None else int(line[segment[first] + 1])
         raise limit_error(machine, both, inner[first], number, file)
     return Insertions(segment, fraction, inside, np.unique(open_.segment))
+
+
+def runs_evenly(
+    machine: Machine, start: Floats, end: Floats, from_angles: Floats, to_angles: Floats, tolerance: Floats
+) -> Bools:
+    """(m,) whether even angles (m, 2), degrees, keep the tool within tolerances (m,) of the ruled motion between axes.
+
+    The unit axes (m, 3) are those at both ends. Both motions are compared at the same share of their way.
+    """
+    axis, angles = (
+        np.hstack(pair).reshape(2 * len(start), pair[0].shape[1]) for pair in ((start, end), (from_angles, to_angles))
+    )
+    moving = np.repeat(np.arange(len(axis), dtype=np.float64)[:, None], 3, axis=1)
+    motion = RuledMotion(machine, moving, axis, np.repeat(tolerance, 2), None, None)
+    even: Bools = motion.parts(motion.segments(angles, np.arange(0, len(axis), 2), branches=False)) == 1
+    return even
 
 
 def fill(tip: Floats, axis: Floats, angles: Floats, more: Insertions) -> FilledPath:
@@ -177,7 +188,7 @@ class RuledMotion:
     machine: Machine
     tip: Floats
     axis: Floats
-    tolerance: float
+    tolerance: Floats  #: (n,), degrees; on the way to each point
     tip_tolerance: float | None
     max_step: float | None
 
@@ -187,80 +198,56 @@ class RuledMotion:
         for side, pose in enumerate((segment, segment + 1) if branches else ()):
             found = solutions(self.machine, self.axis[pose])
             off = np.abs(wrap(found.angles - angles[pose, None, :])).sum(axis=2)
-            branch[side] = np.where(found.pole_distance <= self.tolerance / 2, -1, np.argmin(off, axis=1))
+            cone = self.tolerance[segment + 1] / 2
+            branch[side] = np.where(found.pole_distance <= cone, -1, np.argmin(off, axis=1))
         ends = np.zeros(len(segment)), np.ones(len(segment))
         return Intervals(segment, *ends, angles[segment], angles[segment + 1], *branch)
 
     def parts(self, intervals: Intervals) -> Ints:
         """Into how many parts each interval is to be divided: 1 where it is good as it is."""
-        turn = intervals.turn
-        parts = np.ones(len(turn), np.int64)
+        parts = np.ones(len(intervals.segment), np.int64)
         if self.max_step is not None:
-            parts += np.ceil(turn.max(axis=1, initial=0.0) / self.max_step - 1).clip(0).astype(np.int64)
-        check = self._not_obvious(intervals)
-        checked = intervals.take(check)
-        bends = self._bends(checked)
+            turn = intervals.turn.max(axis=1, initial=0.0)
+            parts += np.ceil(turn / self.max_step - 1).clip(0).astype(np.int64)
+        bends = self._bends(intervals)
         doubtful = np.flatnonzero((bends[0] + bends[1] > SURE) | (bends[2] > 1.0))
-        check = check[doubtful]
-        parts[check] = np.maximum(parts[check], self._checked(checked.take(doubtful), bends[:, doubtful]))
+        samples = np.sqrt(np.maximum(bends[0] + bends[1], bends[2])[doubtful] / PROOF)
+        samples = np.exp2(np.ceil(np.log2(samples.clip(4.0, MOST_SAMPLES)))).astype(np.int64)
+        for number in np.unique(samples).tolist():
+            group = doubtful[samples == number]
+            size = max(1, CHUNK // (number + 1))
+            for some in (group[begin : begin + size] for begin in range(0, len(group), size)):
+                parts[some] = np.maximum(parts[some], self._needed(intervals.take(some), bends[:, some], number))
         return np.minimum(parts, PARTS)
 
-    def _not_obvious(self, part: Intervals) -> Ints:
-        """Intervals but for whole segments with turns so small that both motions leave their chord by next to nothing.
+    def _needed(self, part: Intervals, bends: Floats, number: int) -> Ints:
+        """Into how many parts to divide intervals, by their errors in so many even samples: a power of two from 4 on.
 
-        Between unit vectors the ruled axis bends by 1.3 times the square of the turns at most where these are below ½.
+        1 where the tolerances are kept everywhere: between samples by the bounds.
         """
-        turn = np.radians(part.turn.sum(axis=1))
-        obvious = (turn <= min(0.5, math.sqrt(SURE * math.radians(self.tolerance) * 8 / 2.3))) & (part.end == 1.0)
-        obvious &= (part.start == 0.0) & (self.tip_tolerance is None)
-        if obvious.any():
-            units = np.abs(dot(self.axis, self.axis) - 1) < UNIT
-            obvious &= units[part.segment] & units[part.segment + 1]
-        return np.flatnonzero(~obvious)
-
-    def _checked(self, part: Intervals, bends: Floats) -> Ints:
-        """Into how many parts to divide intervals with errors that may be too large: by what is found on them."""
-        ends = self._ends(part)
-        excess = np.full((len(SAMPLES), len(part.segment)), np.inf)
-        for share, least in zip(SAMPLES, excess, strict=True):
-            for _, tip, axis in self._errors(part, ends, np.full(len(least), share)):
-                np.minimum(least, np.maximum(tip, axis), out=least)
-        worst = excess.max(axis=0, initial=0.0)
-        smooth = (np.abs(excess[[0, 2]] - 0.75 * excess[1]) <= SMOOTH * excess[1]).all(axis=0)
-        smooth &= part.turn.sum(axis=1) <= SMOOTH_TURN
-        count = np.where(smooth, np.ceil(np.sqrt(np.minimum(worst, 1e9) / AIM)), 2).astype(np.int64)
-        parts = np.where(worst > 1, np.maximum(count, 2), 1)
-        samples = np.sqrt(np.maximum(np.maximum(bends[0] + bends[1], bends[2]), 0.0) / PROOF)
-        samples = np.exp2(np.ceil(np.log2(np.maximum(samples, 1.0))))
-        parts[samples > MOST_SAMPLES] = np.maximum(parts[samples > MOST_SAMPLES], 2)
-        for number in np.unique(samples[parts == 1]).astype(np.int64).tolist():
-            group = np.flatnonzero((parts == 1) & (samples == number))
-            size = max(1, CHUNK // (number + 1))
-            for begin in range(0, len(group), size):
-                some = group[begin : begin + size]
-                proved = self._proved(part.take(some), bends[:, some], [end[some] for end in ends], number)
-                parts[some[~proved]] = 2
-        return parts
-
-    def _proved(self, part: Intervals, bends: Floats, ends: list[Floats], number: int) -> Bools:
-        """Whether the error of intervals keeps its tolerances everywhere: measured in so many even samples and more."""
         shape = (len(part.segment), number + 1)
         samples = np.tile(np.arange(number + 1) / number, shape[0])
         repeated = part.take(np.repeat(np.arange(shape[0]), number + 1))
-        repeated_ends = [np.repeat(end, number + 1, axis=0) for end in ends]
-        proved: Bools = np.zeros(shape[0], np.bool_)
-        for along, tip, axis in self._errors(repeated, repeated_ends, samples):
+        ends = [np.repeat(end, number + 1, axis=0) for end in self._ends(part)]
+        proved, least = np.zeros(shape[0], np.bool_), np.full(shape, np.inf)
+        for along, tip, axis in (
+            [values.reshape(shape) for values in errors] for errors in self._errors(repeated, ends, samples)
+        ):
             # any way of pairing the two motions will do: this one is even between the samples
-            step = np.diff(along.reshape(shape), axis=1)
-            between = bends[0] / number**2 + bends[1] * (step**2).max(axis=1)
-            fits = tip.reshape(shape).max(axis=1) + bends[2] / number**2 <= 1
-            proved |= fits & (axis.reshape(shape).max(axis=1) + between <= 1)
-        return proved
+            between = bends[0] / number**2 + bends[1] * (np.diff(along, axis=1) ** 2).max(axis=1)
+            proved |= (tip.max(axis=1) + bends[2] / number**2 <= 1) & (axis.max(axis=1) + between <= 1)
+            np.minimum(least, np.maximum(tip, axis), out=least)
+        quarter, half, last = least[:, number // 4 : -1 : number // 4].T
+        worst = np.maximum(np.maximum(quarter, half), last)
+        smooth = np.maximum(np.abs(quarter - 0.75 * half), np.abs(last - 0.75 * half)) <= SMOOTH * half
+        smooth &= (part.turn.sum(axis=1) <= SMOOTH_TURN) & (worst > 1)
+        count = np.where(smooth, np.ceil(np.sqrt(np.minimum(worst, 1e9) / AIM)), 2).astype(np.int64)
+        return np.where(proved, 1, np.maximum(count, 2))
 
     def _bends(self, part: Intervals) -> Floats:
         """(3, p) how far intervals may leave their chords over the tolerances: real axis, ruled axis, tip."""
         turn = np.radians(part.turn)
-        tolerance = np.radians(self.tolerance)
+        tolerance = np.radians(self.tolerance[part.segment + 1])
         start, end = (self._lever(part.segment, fraction) for fraction in (part.start, part.end))
         bends = np.zeros((3, len(turn)))
         bends[0] = axis_bend(self.machine, turn, unit(start), unit(end), tolerance) / (8 * tolerance)
@@ -310,7 +297,7 @@ class RuledMotion:
             tip = np.zeros(len(along))
             if self.tip_tolerance is not None:
                 tip = np.linalg.norm(real - along[:, None] * way, axis=1) / self.tip_tolerance
-            yield along, tip, angle_between(axis, wanted) / self.tolerance
+            yield along, tip, angle_between(axis, wanted) / self.tolerance[part.segment + 1]
 
     def _swept(self, part: Intervals, axis: Floats, fraction: Floats) -> Floats:
         """Share of each interval where the ruled axis is nearest to another, where the tip stands: else `fraction`.
@@ -343,7 +330,8 @@ class RuledMotion:
         known = np.where(at.start_branch < 0, at.end_branch, at.start_branch)
         known[(at.start_branch >= 0) & (at.end_branch >= 0) & (at.start_branch != at.end_branch)] = -1
         _, axis = ruled(self.tip, self.axis, at.segment, start[new])
-        words[new], branch[new] = continued(self.machine, axis, words[new], known, self.tolerance / 2)
+        cone = self.tolerance[at.segment + 1] / 2
+        words[new], branch[new] = continued(self.machine, axis, words[new], known, cone)
         last = number == count[owner] - 1
         end, end_words, end_branch = old.end.copy(), old.end_angles.copy(), old.end_branch.copy()
         end[~last], end_words[~last], end_branch[~last] = start[new], words[new], branch[new]

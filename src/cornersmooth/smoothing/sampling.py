@@ -48,6 +48,8 @@ class Rows:
     #: (r,): Rows at which the tool comes back into a cut that it has left at the row before; None where there is
     #: none.
     left: Bools | None = None
+    #: (r,): Of dense rows: share of the parameter of the curve that they are on, above 0; NaN on straight motion.
+    place: Floats | None = None
 
 
 @dataclass(frozen=True)
@@ -64,12 +66,15 @@ class _Batch:
 KNOTS = (0.0, 0.0, 0.0, 0.0, 0.5)
 
 
-def dense_rows(smoothed: SmoothProgram, circles: Ints | None = None, poses: int = 16384) -> Iterator[Rows]:
+def dense_rows(
+    smoothed: SmoothProgram, circles: Ints | None = None, poses: int = 16384, *, divide: bool = True
+) -> Iterator[Rows]:
     """Rows of the smoothed motion as lines with tool vectors, in batches of about `poses` poses.
 
-    `circles` (k,) is the number of circular arcs that each arc of the program is written as, 0 for lines.
+    `circles` (k,) is the number of circular arcs that each arc of the program is written as, 0 for lines. `divide` says
+    whether straight lines in which the axis turns much are divided.
     """
-    return _rows(smoothed, curves=False, divide=True, circles=circles, poses=poses)
+    return _rows(smoothed, curves=False, divide=divide, circles=circles, poses=poses)
 
 
 def curve_rows(smoothed: SmoothProgram, *, divide: bool = False, poses: int = 16384) -> Iterator[Rows]:
@@ -111,6 +116,8 @@ def _rows(smoothed: SmoothProgram, *, curves: bool, divide: bool, circles: Ints 
         at = ranges(batch.first[here], batch.last[here] - batch.first[here])
         own = slice(*np.searchsorted(runs.move, (batch.poses[0], batch.poses[-1] + 1)))
         rows.tip[at], rows.other[at] = runs.points[own, :3], runs.points[own, 3:]
+        if rows.place is not None:
+            rows.place[at] = runs.knot[own]
         if rows.spline is not None:
             rows.curve[at], rows.joined[at] = runs.number[own], runs.number[own] == 1
             rows.spline[at, 0], rows.spline[at, 2] = runs.knot[own], runs.last_knot[own]
@@ -142,6 +149,7 @@ def _batches(counts: Ints, poses: int, *, curves: bool) -> Iterator[_Batch]:
             np.zeros(total, np.int8),
             np.zeros(total, np.bool_),
             spline=np.tile((0.0, 1.0, 0.0), (total, 1)) if curves else None,
+            place=None if curves else np.full(total, np.nan),
         )
         yield _Batch(own, last - counts[own], last, rows)
 
@@ -192,6 +200,8 @@ def _fill_transitions(smoothed: SmoothProgram, segments: Segments, batch: _Batch
         points, levers = construction.points(smoothed, rows[chosen], u)
         where = (last[chosen] - len(u))[:, None] + np.arange(len(u))
         batch.rows.tip[where], batch.rows.other[where] = points[:, 1:], unit(levers[:, 1:])
+        assert batch.rows.place is not None
+        batch.rows.place[where] = u
         batch.rows.move[where[:, len(u) // 2 :]] = segments.following[poses[chosen]][:, None]
         first = segments.has_line[poses[chosen]]
         at = where[first, 0] - 1

@@ -122,15 +122,18 @@ class LinePlaces:
 
 
 def run_lines(runs: Runs, program: Program, settings: Settings) -> SectionRows:
-    """Ends of the lines that runs are written as."""
+    """Ends of the lines that runs are written as; with the share of the run's parameter there for a knot."""
     lines = polylines_of(runs, program, settings.axis_length)
     found = line_places(runs, lines, program, settings)
-    tip, axis = points_at(runs.control, Splines(runs.knot, runs.knot_count), found.span, found.s)
+    splines = Splines(runs.knot, runs.knot_count)
+    tip, axis = points_at(runs.control, splines, found.span, found.s)
+    place = found.s / splines.knot[splines.first[1:] - 1][splines.span_run[found.span]]
     at = np.flatnonzero(found.end >= 0)
     ends = lines.point[found.end[at]]  # which are passed exactly
     tip[at], axis[at] = ends[:, :3], unit(ends[:, 3:] - ends[:, :3])
+    place[at] = 1.0
     nothing = np.zeros(len(tip))
-    return SectionRows(found.pose, np.zeros(len(tip), np.int64), np.hstack((tip, axis)), nothing, nothing)
+    return SectionRows(found.pose, np.zeros(len(tip), np.int64), np.hstack((tip, axis)), place, nothing)
 
 
 def line_places(runs: Runs, lines: Polylines, program: Program, settings: Settings) -> LinePlaces:
@@ -180,34 +183,54 @@ def _effort(
 def section_rows(runs: Runs, program: Program) -> SectionRows:
     """Cut the runs into sections; poses with a statement after them are ends of sections."""
     splines = Splines(runs.knot, runs.knot_count)
-    begin_run, begin_s, end_s = _cuts(runs, splines, program)
-    # distinct knots of every section: its ends and the run's knots between
-    inside = search(splines.knot, splines.count, begin_run, begin_s, side="right")
-    after = search(splines.knot, splines.count, begin_run, end_s)
-    spans = after - inside + 1
-    # clamped knots u of a section with m spans: m + 7, control points m + 3
-    section, place = spread(spans + 7)
-    inner = np.clip(inside[section] + place - 4, 0, len(splines.knot) - 1)
-    u = splines.knot[inner]
-    u = np.where(place <= 3, begin_s[section], np.where(place >= spans[section] + 3, end_s[section], u))
-    first_u = starts(spans + 7)[:-1]
-    owner, number = spread(spans + 3)
-    arguments = u[(first_u[owner] + number + 1)[:, None] + np.arange(3)]
-    # any span that the control point belongs to: the run's span at the middle of one of the section's
-    local = np.clip(number - 1, 0, spans[owner] - 1)
-    low = u[first_u[owner] + local + 3]
-    points = splines.blossom(splines.span_at(begin_run[owner], low), arguments, runs.control)
-    last = number == spans[owner] + 2
+    run, begin, end = section_ends(runs, splines, program)
+    owner, number, knot, points = clamped(splines, runs.control, run, begin, end)
+    last = np.append(number[1:] == 1, True)
     return SectionRows(
-        move=_moves(runs, begin_run, end_s)[owner],
-        number=number + 1,
+        move=moves_at(runs, run, end)[owner],
+        number=number,
         points=points,
-        knot=(u[first_u[owner] + number] - begin_s[owner]) / STEPS_PER_UNIT,
-        last_knot=np.where(last, (end_s - begin_s)[owner], 0.0) / STEPS_PER_UNIT,
+        knot=knot / STEPS_PER_UNIT,
+        last_knot=np.where(last, (end - begin)[owner], 0.0) / STEPS_PER_UNIT,
     )
 
 
-def _cuts(runs: Runs, splines: Splines, program: Program) -> tuple[Ints, Floats, Floats]:
+def clamped(
+    splines: Splines, control: Floats, run: Ints, begin: Floats, end: Floats
+) -> tuple[Ints, Ints, Floats, Floats]:
+    """Parts of splines as curves of their own, clamped at both ends, in path order.
+
+    Parameters
+    ----------
+    control : (c, d) float64
+    run, begin, end : (k,) int64 and float64
+        Which spline each part is of, and from where to where.
+
+    Returns
+    -------
+    (m,), (m,), (m,), (m, d)
+        Of each control point: its part, its number from 1 on, the knot that goes with it from 0 on, itself.
+    """
+    # distinct knots of every part: its ends and the spline's knots between
+    inside = search(splines.knot, splines.count, run, begin, side="right")
+    after = search(splines.knot, splines.count, run, end)
+    spans = after - inside + 1
+    # clamped knots u of a part with m spans: m + 7, control points m + 3
+    part, place = spread(spans + 7)
+    inner = np.clip(inside[part] + place - 4, 0, len(splines.knot) - 1)
+    u = splines.knot[inner]
+    u = np.where(place <= 3, begin[part], np.where(place >= spans[part] + 3, end[part], u))
+    first_u = starts(spans + 7)[:-1]
+    owner, number = spread(spans + 3)
+    arguments = u[(first_u[owner] + number + 1)[:, None] + np.arange(3)]
+    # any span that the control point belongs to: the spline's span at the start of one of the part's
+    local = np.clip(number - 1, 0, spans[owner] - 1)
+    low = u[first_u[owner] + local + 3]
+    points = splines.blossom(splines.span_at(run[owner], low), arguments, control)
+    return owner, number + 1, u[first_u[owner] + number] - begin[owner], points
+
+
+def section_ends(runs: Runs, splines: Splines, program: Program) -> tuple[Ints, Floats, Floats]:
     """Run, start and end of every section.
 
     Sections end in the middle of wide knot intervals, away from sharp corners: there a place belongs to one segment.
@@ -240,6 +263,6 @@ def _cuts(runs: Runs, splines: Splines, program: Program) -> tuple[Ints, Floats,
     return pairs[same, 0], pairs[same, 1].astype(np.float64), pairs[same + 1, 1].astype(np.float64)
 
 
-def _moves(runs: Runs, run: Ints, s: Floats) -> Ints:
+def moves_at(runs: Runs, run: Ints, s: Floats) -> Ints:
     """Pose in whose segment each place lies; a pose is in the segment that leads to it."""
     return runs.pose[search(runs.s, runs.count, run, s)]

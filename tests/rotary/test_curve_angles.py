@@ -19,7 +19,7 @@ from cornersmooth.kinematics import Machine, load_machine
 from cornersmooth.model import Program, Runs
 from cornersmooth.nc import Form, choose_form, fit_settings
 from cornersmooth.rotary import rotary_angles
-from cornersmooth.rotary.run_angles import Guide, run_angles
+from cornersmooth.rotary.curve_angles import CurveAngles, Curves, Guide, curve_angles
 from cornersmooth.smoothing.runs.rows import line_places, polylines_of
 from nc.cases import MACHINES, Case
 from nc.promise import random_verdict
@@ -67,15 +67,26 @@ def guide_of(
     return Guide(np.zeros(len(s), np.int64), s, path.angles, path.branch.astype(np.int64))
 
 
-def off_the_lever(found: Runs, angles: np.ndarray, name: str) -> np.ndarray:
+def fitted(runs: Runs, machine: Machine, guide: Guide, *, tolerance: float, cone: float) -> CurveAngles:
+    """Angles of one run."""
+    control = runs.control
+    points = np.hstack((control[:, :3], control[:, 3:] - control[:, :3], np.ones((len(control), 1))))
+    ends = np.full((2, 1, 3, 2), np.nan)
+    ends[:, 0, 0] = guide.angles[[0, -1]]
+    curves = Curves(Splines(runs.knot, runs.knot_count), points, ends, np.array([tolerance]))
+    return curve_angles(curves, machine, guide, cone=cone)
+
+
+def off_the_lever(found: CurveAngles, name: str) -> np.ndarray:
     """(spans, 60) degrees between the axis that the angles give, by scipy, and the lever: closely in every span."""
-    knots = np.concatenate(([found.knot[0]] * 3, found.knot, [found.knot[-1]] * 3))
+    knot = found.curves.splines.knot
+    knots = np.concatenate(([knot[0]] * 3, knot, [knot[-1]] * 3))
     share = np.linspace(0.0, 1.0, 60)
-    s = found.knot[:-1, None] + np.diff(found.knot)[:, None] * share
-    words = BSpline(knots, angles, 3)(s.ravel())
+    s = knot[:-1, None] + np.diff(knot)[:, None] * share
+    words = BSpline(knots, found.angles, 3)(s.ravel())
     names = load_machine(name).names
     axis = unit(tool_direction(name, dict(zip(names, words.T, strict=True))))
-    lever = unit(BSpline(knots, found.control[:, 3:] - found.control[:, :3], 3)(s.ravel()))
+    lever = unit(BSpline(knots, found.curves.points[:, 3:6], 3)(s.ravel()))
     return np.degrees(2 * np.arcsin(np.linalg.norm(axis - lever, axis=1) / 2)).reshape(s.shape)
 
 
@@ -85,17 +96,17 @@ def test_bounds_hold_and_knots_are_put_in_until_the_tolerance_is_kept(name: str,
     program, machine = waves(), load_machine(name)
     smoothed, runs = smoothed_runs(program, form_of("fanuc", name))
     assert len(runs) == 1
-    found = run_angles(runs, machine, guide_of(program, runs, smoothed, machine, 1e-3), tolerance=tolerance, cone=1e-3)
+    found = fitted(runs, machine, guide_of(program, runs, smoothed, machine, 1e-3), tolerance=tolerance, cone=1e-3)
     assert (found.error <= tolerance).all()
-    off = off_the_lever(found.runs, found.angles, name).max(axis=1)
+    off = off_the_lever(found, name).max(axis=1)
     assert (off <= found.error).all()
     assert off.max() > 1e-8  # something has been measured
-    more = len(found.runs.knot) - len(runs.knot)
+    more = len(found.curves.splines.knot) - len(runs.knot)
     assert (more == 0) == (tolerance == 0.04), more
     # the curves have stayed what they were
     before, after = (
-        BSpline(np.concatenate(([one.knot[0]] * 3, one.knot, [one.knot[-1]] * 3)), one.control, 3)
-        for one in (runs, found.runs)
+        BSpline(np.concatenate(([knot[0]] * 3, knot, [knot[-1]] * 3)), tip, 3)
+        for knot, tip in ((runs.knot, runs.control[:, :3]), (found.curves.splines.knot, found.curves.points[:, :3]))
     )
     s = np.linspace(0.0, runs.knot[-1], 500)
     np.testing.assert_allclose(after(s), before(s), atol=1e-9)
@@ -108,11 +119,11 @@ def test_spans_that_ask_for_too_many_samples_are_not_proved() -> None:
     program = Program.from_poses(np.stack((20 * t, t**2, 0 * t), axis=1), axis, feed=500.0)
     machine = load_machine("table-ac")
     smoothed, runs = smoothed_runs(program, form_of("fanuc", "table-ac"))
-    found = run_angles(runs, machine, guide_of(program, runs, smoothed, machine, 1e-6), tolerance=1e-4, cone=1e-6)
+    found = fitted(runs, machine, guide_of(program, runs, smoothed, machine, 1e-6), tolerance=1e-4, cone=1e-6)
     good = found.error <= 1e-4
     assert good.any()
     assert not good.all()
-    off = off_the_lever(found.runs, found.angles, "table-ac").max(axis=1)
+    off = off_the_lever(found, "table-ac").max(axis=1)
     assert (off <= found.error).all()
 
 
@@ -162,8 +173,9 @@ def test_sections_of_angles_meet_with_their_first_two_derivatives() -> None:
     program, machine = waves(900, tilt=0.6), load_machine("table-ac")
     smoothed, runs = smoothed_runs(program, form_of("siemens", "table-ac"), tolerance=0.0001)
     guide = guide_of(program, runs, smoothed, machine, 1e-3)
-    found = run_angles(runs, machine, guide, tolerance=1e-3, cone=1e-3)
-    rows = section_rows(replace(found.runs, control=np.hstack((found.runs.control[:, :3], found.angles))), program)
+    found = fitted(runs, machine, guide, tolerance=1e-3, cone=1e-3)
+    splines, control = found.curves.splines, np.hstack((found.curves.points[:, :3], found.angles))
+    rows = section_rows(replace(runs, knot=splines.knot, knot_count=splines.count, control=control), program)
     begin = np.flatnonzero(rows.number == 1)
     assert len(begin) > 1
     sections = []
