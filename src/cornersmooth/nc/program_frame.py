@@ -49,53 +49,32 @@ class Stream(Protocol):
 
 @dataclass(frozen=True)
 class Frame:
-    """What a user wants around the motion.
+    """What a user wants around the motion."""
 
-    Parameters
-    ----------
-    program : str or None
-        Name or number of the program; None for that of the control's table.
-    block_numbers : bool
-        Whether blocks are numbered where the control does not ask for it.
-    header, footer : tuple of str
-        Lines after the head and before the tail, with ``{program}``, ``{units}`` and ``{blend}``.
-    comments : bool
-        Whether what the CL file says in words is written, and `provenance`.
-    work_offset : str or None
-        Such as ``G54``, or the number of a preset; None for that of the control's table, empty for none.
-    provenance : tuple of str
-        What the text is made of, for comments before the header.
-    approach, retract : float, mm
-        How far the tool comes down along its axis to the first position after a retract, and goes back along it before
-        a retract; 0 for neither. A form with a point on the axis comes down by `POINT_APPROACH` at least.
-    skip_cycles : bool
-        Whether holes whose cycle cannot be written are only gone over, with a warning and a comment NOT DRILLED; an
-        error otherwise.
-    cycles : {"moves", "native"}
-        How holes are written: as plain moves, or as the control's own cycles where it has such and the tool stays along
-        Z. Taps are its own cycles anyway.
-    modal : bool
-        Whether words that repeat are left out where the control keeps them.
-    line_ends : {"lf", "crlf"} or None
-        What lines end with; None for that of the control's table.
-    stem : str
-        Name of the CL file without its ending, for the program where `program` is None; empty for none.
-    """
-
-    program: str | None = None
-    block_numbers: bool = False
+    program: str | None = (
+        None  #: name or number; None for that of the CL file, or of the control's table
+    )
+    block_numbers: bool = False  #: whether blocks are numbered where the control does not ask for it
+    #: lines after the head and before the tail, with ``{program}``, ``{units}`` and ``{blend}``
     header: tuple[str, ...] = ()
     footer: tuple[str, ...] = ()
-    comments: bool = True
+    comments: bool = True  #: whether what the CL file says in words is written, and `provenance`
+    #: such as ``G54``, or the number of a preset; None for that of the control's table, empty for none
     work_offset: str | None = None
-    provenance: tuple[str, ...] = ()
-    stem: str = ""
+    provenance: tuple[str, ...] = ()  #: what the program is made of, for comments before the header
+    stem: str = ""  #: name of the CL file without its ending, for `program`; empty for none
+    #: whether holes whose cycle cannot be written are only gone over, with a warning and a comment NOT DRILLED, rather
+    #: than an error
     skip_cycles: bool = False
+    #: how holes are written: as plain moves ("moves"), or as the control's own cycles ("native") where it has such and
+    #: the tool stays along Z. Taps are its own cycles anyway.
     cycles: str = "moves"
+    #: mm; how far the tool comes down along its axis to the first position after a retract, and goes back along it
+    #: before a retract; 0 for neither. A form with a point on the axis comes down by `POINT_APPROACH` at least.
     approach: float = 0.0
     retract: float = 0.0
-    modal: bool = False
-    line_ends: str | None = None
+    modal: bool = False  #: whether words that repeat are left out where the control keeps them
+    line_ends: str | None = None  #: "lf" or "crlf": what lines end with; None for that of the control's table
 
     def values(self, form: Form, program: Program, settings: Settings) -> dict[str, str]:
         """What stands for braces in blocks around the motion and in those of extras; refuses a program name (CS216)."""

@@ -6,20 +6,17 @@ the bottom, and out again. Everything that is measured of holes is measured on t
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from cornersmooth.nc_reader.dialects.base import CLAMPED, State
 from cornersmooth.nc_reader.words import Line
+
+if TYPE_CHECKING:
+    from cornersmooth.nc_reader.reader import Reader
 
 #: how a comment begins that says that a hole is left out on purpose
 NOT_DRILLED: Final = "NOT DRILLED"
-
-#: name in `State.memory` of the height at which a run of modal cycles began (G98), in units of the text
-INITIAL_HEIGHT: Final = "initial height"
-
-#: name in `State.memory` of the cycle that a block defines for others to call
-DEFINED: Final = "cycle"
 
 #: share of a peck that the tool stays above the last depth when it comes back
 _ABOVE: Final = 0.05
@@ -48,7 +45,7 @@ class HoleCycle:
     pitch: float | None = None  #: of a tap, per revolution
 
 
-def drill(cycle: HoleCycle, x: float, y: float, line: Line, state: State) -> None:
+def drill(cycle: HoleCycle, x: float, y: float, line: Line, state: Reader) -> None:
     """Carry out a cycle at a place.
 
     Raises
@@ -60,9 +57,10 @@ def drill(cycle: HoleCycle, x: float, y: float, line: Line, state: State) -> Non
         state.refuse(line, "a cycle whose heights are not one below another", "give them in their order")
     if cycle.step and (cycle.clearance - cycle.bottom) / cycle.step > _MOST_PECKS:
         state.refuse(line, "a cycle of more pecks than anybody wants", "give a larger step")
-    free = [axis for axis, clamped in state.memory.get(CLAMPED, {}).items() if not clamped]
+    free = [axis for axis, clamped in state.memory.clamped.items() if not clamped]
     if free:
         state.wrong("CS538", line, f"a hole cycle while {' and '.join(free)} is not clamped")
+    before = state.modal
     # all moves up to the next event are carried out together
     state.move(line, {"G": 0.0, "X": x, "Y": y}, later=True)
     state.move(line, {"G": 0.0, "Z": cycle.clearance}, later=True)
@@ -83,6 +81,7 @@ def drill(cycle: HoleCycle, x: float, y: float, line: Line, state: State) -> Non
     if cycle.feed_out or cycle.pitch is not None:
         state.move(line, {"G": 1.0, "Z": cycle.clearance}, later=True)
     state.move(line, {"G": 0.0, "Z": cycle.travel})
+    state.change(line, code=math.nan, feed=before.feed, per_revolution=before.per_revolution)
 
 
 def numbers(text: str) -> list[float | None]:

@@ -2,26 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence, Set
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Iterator, Sequence, Set
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from cornersmooth.model import Bools, Ints
-from cornersmooth.nc_reader.dialects.base import (
-    BY_WORD,
-    CLAMPED,
-    HIGH_SPEED,
-    KINEMATICS,
-    SPLINE_AXES,
-    Dialect,
-    State,
-)
+from cornersmooth.nc_reader.dialects.base import BY_WORD, Memory
 from cornersmooth.nc_reader.elements import Element, Elements, Problem
 from cornersmooth.nc_reader.words import BSPLINE, NURBS, Table
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine, RotaryAxis
+    from cornersmooth.nc_reader.reader import Reader
 
 #: code of words that want another state of the control
 CONTROL_WORDS: Final = "CS506"
@@ -47,9 +40,7 @@ def _first(code: str, wrong: Bools, line: Ints, text: str) -> Iterator[Problem]:
         yield Problem(code, 0, int(line[np.argmax(wrong)]), text)
 
 
-def control_problems(
-    table: Table, dialect: Dialect, state: State, code: float, approach: Set[int]
-) -> Iterator[Problem]:
+def control_problems(table: Table, state: Reader, code: float, approach: Set[int]) -> Iterator[Problem]:
     """What of a run of motion blocks the control would not take for what it is.
 
     Parameters
@@ -64,14 +55,14 @@ def control_problems(
     else:
         kind, letters = ("point", set("UVW")) if state.modal.points else ("vector", set("IJ"))
     motion = table.column("G")
-    if dialect.curves_need and not state.memory.get(HIGH_SPEED):
-        text = f"a curve where {dialect.curves_need} must be in force"
+    if state.dialect.curves_need and not state.memory.high_speed:
+        text = f"a curve where {state.dialect.curves_need} must be in force"
         yield from _first(CONTROL_WORDS, motion == NURBS, table.line, text)
-    unnamed = letters - state.memory.get(SPLINE_AXES, set())
-    if dialect.names_spline_axes and kind == "angles" and unnamed:
+    unnamed = letters - state.memory.spline_axes
+    if state.dialect.names_spline_axes and kind == "angles" and unnamed:
         text = f"a spline of {' and '.join(sorted(unnamed))}, which no SPLINEPATH(1,X,Y,Z,...) names"
         yield from _first(CONTROL_WORDS, motion == BSPLINE, table.line, text)
-    wanted, used = dialect.controls.get(kind), table.columns.keys() & letters
+    wanted, used = state.dialect.controls.get(kind), table.columns.keys() & letters
     if wanted is not None and used and state.tip_control not in wanted:
         rows = np.zeros(len(table), np.bool_)
         rows[table.rows_with(used, code)] = True
@@ -81,7 +72,7 @@ def control_problems(
 
 
 def axis_problems(
-    table: Table, run: Elements, machine: Machine, way: str, memory: Mapping[str, Any], step: float
+    table: Table, run: Elements, machine: Machine, way: str, memory: Memory, step: float
 ) -> Iterator[Problem]:
     """What is wrong with the rotary words of a run: beyond the limits of their axes, or words of modulo axes.
 
@@ -107,7 +98,7 @@ def axis_problems(
             yield from _first(CONTROL_WORDS, given & ~told, table.line, text)
         elif way == BY_WORD:
             yield from _first(CONTROL_WORDS, told, table.line, f"{name} with {BY_WORD}(), which is for modulo axes")
-        elif way and axis.modulo and not memory.get(way):
+        elif way and axis.modulo and not memory.shorter_way:
             text = f"{name} without {way} in force, which sends it the shorter way"
             yield from _first(CONTROL_WORDS, given, table.line, text)
         if axis.limits is not None:
@@ -142,24 +133,22 @@ def turn_problems(run: Elements, before: Sequence[float], machine: Machine) -> I
                 yield from _first("CS526", amount > MOST_TURN, line, text)
 
 
-def take_clamp(word: float, machine: Machine, memory: dict[str, Any]) -> bool:
+def take_clamp(word: float, machine: Machine, memory: Memory) -> bool:
     """Note an M word that clamps a rotary axis or lets it turn; return whether it is one."""
     for axis in machine.axes:
         for said, clamped in zip(axis.clamp or (), (True, False), strict=False):
             if float(said[1:]) == word:
-                memory[CLAMPED] = {**memory.get(CLAMPED, {}), axis.name: clamped}
+                memory.clamped[axis.name] = clamped
                 return True
     return False
 
 
-def is_clamped(axis: RotaryAxis, memory: Mapping[str, Any]) -> bool:
+def is_clamped(axis: RotaryAxis, memory: Memory) -> bool:
     """Whether an axis is held, or may be, as no word has said that it is not."""
-    return axis.clamp is not None and bool(memory.get(CLAMPED, {}).get(axis.name, True))
+    return axis.clamp is not None and memory.clamped.get(axis.name, True)
 
 
-def clamp_problems(
-    run: Elements, before: Sequence[float], machine: Machine, memory: Mapping[str, Any]
-) -> Iterator[Problem]:
+def clamp_problems(run: Elements, before: Sequence[float], machine: Machine, memory: Memory) -> Iterator[Problem]:
     """Which rotary axes turn in a run although they are clamped, or nobody has said that they are not."""
     for column, axis in enumerate(machine.axes):
         if axis.clamp is not None and is_clamped(axis, memory):
@@ -168,16 +157,14 @@ def clamp_problems(
             yield from _first("CS538", turned, run.line, f"{axis.name} turns without {axis.clamp[1]} before it")
 
 
-def unclamped_problems(machine: Machine, memory: Mapping[str, Any]) -> Iterator[Problem]:
+def unclamped_problems(machine: Machine, memory: Memory) -> Iterator[Problem]:
     """Which rotary axes are not clamped at the end of a program."""
     for axis in machine.axes:
         if axis.clamp is not None and not is_clamped(axis, memory):
             yield Problem("CS538", 0, 0, f"{axis.name} is not clamped at the end")
 
 
-def kinematics_problems(
-    run: Elements, machine: Machine, memory: Mapping[str, Any], *, tip_control: bool
-) -> Iterator[Problem]:
+def kinematics_problems(run: Elements, machine: Machine, memory: Memory, *, tip_control: bool) -> Iterator[Problem]:
     """What is wrong with a run where the machine's file says what switches tip control of its kinematics.
 
     Parameters
@@ -188,7 +175,7 @@ def kinematics_problems(
         Whether the words are those of the tip; without it, of the machine's axes. With both rotary axes at zero that is
         the same.
     """
-    on = memory.get(KINEMATICS)
+    on = memory.keeps_tip
     if machine.tip_control and on is not tip_control:
         here, other = machine.tip_control if tip_control else machine.tip_control[::-1]
         before = "before any word of tip control" if on is None else f"under {other}"

@@ -13,7 +13,7 @@ import numpy as np
 from cornersmooth.errors import InputError
 from cornersmooth.model import MM_PER_UNIT, Floats, Ints, Units
 from cornersmooth.nc_reader.block_tables import Readable, read_lines
-from cornersmooth.nc_reader.dialects.base import INCREMENTAL
+from cornersmooth.nc_reader.dialects.base import Memory
 from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem, Second, settle
 from cornersmooth.nc_reader.execution import Modal, execute
 from cornersmooth.nc_reader.needed_states import (
@@ -32,12 +32,6 @@ from cornersmooth.nc_reader.retracts import Retracts
 from cornersmooth.nc_reader.rotary import MOST_LINES
 from cornersmooth.nc_reader.words import MOTION_CODES, Line, Table, joined_tables, table_of
 
-#: name in `State.memory` of the tool that has been chosen
-TOOL: Final = "tool"
-
-#: name in `State.memory` of where a tool of another length has left
-LEFT_AT: Final = "left at"
-
 #: share of the tolerance, at the axis point, that a tool without words for its axis may lean
 FIXED_SHARE: Final = 0.1
 
@@ -49,7 +43,7 @@ GIVEN_OUT: Final = 1 << 15
 
 
 class Reader:
-    """Collects what the lines say; holds the modal state of the control (`dialects.State`).
+    """Collects what the lines say; holds the modal state of the control, for the dialects.
 
     Parameters
     ----------
@@ -62,7 +56,9 @@ class Reader:
         self.rotary = options.rotary(steps)
         self.modal = Modal(rotary=self.rotary.names if self.rotary is not None else "")
         self.tip_control = ""
-        self.memory: dict[str, Any] = {}
+        self.memory = Memory()
+        self._tool = -1.0  # that has been chosen
+        self._left_at: Floats | None = None  # where a tool of another length has left
         self.waiting: list[Table | tuple[int, dict[str, float]]] = []
         self.ready: list[Elements] = []
         self.events: list[Event] = []
@@ -155,7 +151,7 @@ class Reader:
         factor = MM_PER_UNIT[self.units]
         for table in joined_tables(self.waiting, sys.maxsize if self.retracts.open else FEW_ROWS):
             before = self.modal
-            if self.memory.get(INCREMENTAL):
+            if self.memory.incremental:
                 hint = "write G90 after a position of the machine"
                 raise InputError(
                     "CS503", "motion in incremental words (G91)", hint, file=self.name, line=int(table.line[0])
@@ -175,7 +171,7 @@ class Reader:
             if self.plane is not None:
                 self._in_plane(table, run, self.plane, factor, before)
                 continue
-            self._tell_once(control_problems(table, self.dialect, self, before.code, approach))
+            self._tell_once(control_problems(table, self, before.code, approach))
             if self.modal.points and not before.points:
                 self._know_points(run)
             run = self._in_mm(run, factor, before)
@@ -292,14 +288,14 @@ class Reader:
         """Go on with the length of another tool."""
         assert self.rotary is not None
         before, last = self.rotary.machine, [*self.given, *self.ready][-1:]
-        machine = before.with_tool(int(self.memory.get(TOOL, -1)))
+        machine = before.with_tool(int(self._tool))
         self.rotary = replace(self.rotary, machine=machine)
         if last and machine.tool_length != before.tool_length:
-            self.memory[LEFT_AT] = last[0].tip[-1]
+            self._left_at = last[0].tip[-1]
 
     def _arrive_again(self, run: Elements, step: float) -> None:
         """Put another tool to where the one before has left, if no more than printed digits are between."""
-        left_at = self.memory.pop(LEFT_AT, None)
+        left_at, self._left_at = self._left_at, None
         if left_at is not None and np.linalg.norm(run.tip[0] - left_at) <= step:
             run.tip[0] = left_at
 
@@ -395,7 +391,7 @@ class Reader:
         """Say a word that stands beside the motion; a late one acts after the motion of its block."""
         self.flush()
         if letter == "T":
-            self.memory[TOOL] = value
+            self._tool = value
             self.retracts.forget()
         elif (letter, value) == ("M", 6.0) and self.rotary is not None:
             self._take_tool()

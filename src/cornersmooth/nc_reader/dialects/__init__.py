@@ -7,12 +7,12 @@ from functools import partial
 from typing import Final
 
 from cornersmooth.errors import SettingsError
-from cornersmooth.nc_reader.dialects.base import Dialect, State
+from cornersmooth.nc_reader.dialects.base import Dialect
 from cornersmooth.nc_reader.dialects.heidenhain import Heidenhain
 from cornersmooth.nc_reader.dialects.iso import Iso
 from cornersmooth.nc_reader.dialects.siemens import Siemens
 
-__all__ = ["CONTROLS", "Dialect", "State", "dialect_of"]
+__all__ = ["CONTROLS", "Dialect", "dialect_of"]
 
 _DIALECTS: Final[dict[str, Callable[[str], Dialect]]] = {
     **{name: partial(Iso, name) for name in ("fanuc", "generic", "haas", "linuxcnc", "mitsubishi")},

@@ -2,80 +2,44 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Protocol
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NoReturn
 
 from cornersmooth.nc_reader.lexer import Lexer
 from cornersmooth.nc_reader.words import Columns, Line
 
 if TYPE_CHECKING:
-    from cornersmooth.nc_reader.execution import Modal
-    from cornersmooth.nc_reader.planes import TiltedPlane
-    from cornersmooth.nc_reader.rotary import Rotary
+    from cornersmooth.nc_reader.hole_cycles import HoleCycle
+    from cornersmooth.nc_reader.reader import Reader
 
 
 #: M words that act after the motion of their block: stops, spindle off, coolant off, end
 AFTER_MOTION = (0.0, 1.0, 2.0, 5.0, 9.0, 30.0)
 
 
-#: name in `State.memory` of whether incremental words (G91) are in force, which are read in no motion
-INCREMENTAL = "incremental"
-
-#: name in `State.memory` of whether look ahead of the kind that some controls ask for with curves is on
-HIGH_SPEED = "high speed"
-
-
-#: name in `State.memory` of the set of axes that have been said to be those of splines
-SPLINE_AXES = "spline axes"
-
-#: name in `State.memory` of whether each rotary axis that has been spoken of is clamped
-CLAMPED = "clamped"
-
-#: name in `State.memory` of whether the kinematics keep the tip, where the machine's file says what switches that
-KINEMATICS = "kinematics"
-
 #: word around the number of a modulo axis that sends it the shorter way; a column of tables with the axis behind it
 BY_WORD = "DC"
 
 
-class State(Protocol):
-    """What a dialect may ask of the reader, and tell it."""
+@dataclass
+class Memory:
+    """What words have said that no other state of the reader holds, from line to line."""
 
-    modal: Modal
-    #: how rotary words move the tool; None without a machine
-    rotary: Rotary | None
-    #: what keeps the tip where it is told, in the words of the dialect; empty for nothing
-    tip_control: str
-    #: what else a dialect has to remember from line to line
-    memory: dict[str, Any]
-
-    def event(self, line: Line, letter: str, value: float, text: str = "", *, late: bool = False) -> None:
-        """Say a word that stands beside the motion; a late one acts after the motion of its block."""
-
-    def move(self, line: Line, row: dict[str, float], *, later: bool = False) -> None:
-        """Execute a single motion block, at once or with those behind it."""
-
-    def change(self, line: Line, **modes: Any) -> None:
-        """Change what holds from block to block."""
-
-    def wrong(self, code: str, line: Line, text: str) -> None:
-        """Note what breaks the rules of the control."""
-
-    def leave(self, axes: str) -> None:
-        """Say that axes go to positions of the machine: where they are in the part is not known any more."""
-
-    def tilt(self, line: Line, plane: TiltedPlane) -> None:
-        """Switch a tilted plane on."""
-
-    def turn_to_plane(self, line: Line) -> None:
-        """Turn the rotary axes to the tilted plane that is on."""
-
-    def level(self, line: Line) -> None:
-        """Switch the tilted plane off, where one is on."""
-
-    def refuse(self, line: Line, what: str, hint: str) -> None:
-        """Give up: words that make it impossible to tell where the tool is."""
+    incremental: bool = False  #: G91 is in force, in which no motion is read
+    high_speed: bool = False  #: look ahead of the kind that some controls ask for with curves is on
+    spline_axes: frozenset[str] = frozenset()  #: those that have been said to be axes of splines
+    clamped: dict[str, bool] = field(default_factory=dict)  #: rotary axes that words have clamped, or let turn
+    keeps_tip: bool | None = None  #: whether the kinematics do, where the machine's file says what switches that
+    shorter_way: bool = False  #: whether rotary axes go it
+    speed: float = math.nan  #: of the spindle
+    rigid: bool = False  #: M29 asks the spindle to turn with the feed
+    height: float | None = None  #: at which a run of modal cycles began (G98), in units of the program
+    cycle: HoleCycle | None = None  #: that a block defines for others to call
+    centre: dict[str, float] = field(default_factory=dict)  #: of circles to come
+    orientation: str = ""  #: how the tool axis is interpolated
 
 
 class Dialect:
@@ -97,7 +61,7 @@ class Dialect:
     controls: Mapping[str, tuple[str, ...]] = {}
     #: whether texts can send the tool up, so that rotary axes turn there
     retracts: bool = True
-    #: what sends a modulo axis the shorter way: `BY_WORD`, a name in `State.memory`, or empty for a parameter
+    #: what sends a modulo axis the shorter way: `BY_WORD`, a word that is in force, or empty for a parameter
     shorter_way: str = ""
     #: what must be in force for curves; empty for nothing
     curves_need: str = ""
@@ -120,9 +84,16 @@ class Dialect:
         columns = self.lexer.motion(line)
         return None if columns is None else values(columns)
 
-    def words(self, line: Line, state: State) -> None:
+    def words(self, line: Line, state: Reader) -> None:
         """Interpret a line that is no motion block."""
         raise NotImplementedError
+
+    @staticmethod
+    def refuse(line: Line, name: str, text: str, state: Reader) -> NoReturn:
+        """Give up at a word that is not understood."""
+        if name in "ABC":
+            state.refuse(line, f"{text}: rotary words", "name the machine they are for, with --machine")
+        state.refuse(line, f"{text} is not understood here", "see that the control is the one the text is for")
 
     def decimals(self, text: bytes) -> tuple[int, int | None]:
         """Decimals of the tip and of the second triple, from a sample of the text; None without any."""

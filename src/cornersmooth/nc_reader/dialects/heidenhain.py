@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from cornersmooth.nc_reader.dialects.base import AFTER_MOTION, Dialect, State, values
-from cornersmooth.nc_reader.hole_cycles import DEFINED, HoleCycle, drill
+from cornersmooth.nc_reader.dialects.base import AFTER_MOTION, Dialect, values
+from cornersmooth.nc_reader.hole_cycles import HoleCycle, drill
 from cornersmooth.nc_reader.lexer import NUMBER, Lexer, fixed, number_of
 from cornersmooth.nc_reader.planes import TiltedPlane, room_of, rotated_frame
 from cornersmooth.nc_reader.words import SPL, Columns, Line, Word
+
+if TYPE_CHECKING:
+    from cornersmooth.nc_reader.reader import Reader
 
 _VECTOR: Final = {"TX": "I", "TY": "J", "TZ": "K"}
 _PATHS: Final = ("L", "LN", "SPL")
@@ -43,9 +45,6 @@ _CYCLES: Final = {
 }
 _CYCLE_NAMES: Final = {200: "DRILLING", 201: "REAMING", 207: "RIGID TAPPING NEW"}
 
-#: name in `State.memory` of whether rotary axes go the shorter way
-_SHORTER: Final = "M126"
-
 _SIDES = {"R0": 40.0, "RL": 41.0, "RR": 42.0}
 
 
@@ -59,7 +58,7 @@ class Heidenhain(Dialect):
     """
 
     lexer: _KlartextLexer
-    shorter_way = _SHORTER
+    shorter_way = "M126"
     feed_step = 1e-3
     inch_feed = 0.1
     unsaid = frozenset(("offset", "compensation", "register", ("spindle", 19.0), ("coolant", 7.0), ("coolant", 88.0)))
@@ -69,7 +68,7 @@ class Heidenhain(Dialect):
     def __init__(self, rotary: str = "") -> None:
         super().__init__(_KlartextLexer(rotary), rotary)
 
-    def words(self, line: Line, state: State) -> None:
+    def words(self, line: Line, state: Reader) -> None:
         """Interpret a line that is no motion block."""
         if line.words[0].name == "block":
             self._block(line.words[0].text, line, state)
@@ -90,12 +89,10 @@ class Heidenhain(Dialect):
                 state.event(line, "S", value, text)
             elif name in self.lexer.names or name in ("circle", "centre", "turn", "R"):
                 motion[name] = value
-            elif name in "ABC":
-                state.refuse(line, f"{text}: rotary words", "name the machine they are for, with --machine")
             else:
-                state.refuse(line, f"{text} is not understood here", "see that the control is the one the text is for")
+                self.refuse(line, name, text, state)
         if "centre" in motion:
-            state.memory["centre"] = {axis: motion[axis] for axis in "XY" if axis in motion}
+            state.memory.centre = {axis: motion[axis] for axis in "XY" if axis in motion}
         elif "circle" in motion:
             state.move(line, self._circle(motion, line, state))
         else:
@@ -107,22 +104,20 @@ class Heidenhain(Dialect):
                 state.refuse(
                     line, "words that this kind of block does not take", "give L, LN or SPL what belongs to it"
                 )
-            state.move(line, values(columns or {}))
+            state.move(line, values(columns))
         if called:
             self._call(line, state)
 
-    def _call(self, line: Line, state: State) -> None:
+    def _call(self, line: Line, state: Reader) -> None:
         """M99: the hole cycle that was defined last, where the block ends."""
-        defined, modal = state.memory.get(DEFINED), state.modal
-        if not isinstance(defined, HoleCycle):
+        defined, modal = state.memory.cycle, state.modal
+        if defined is None:
             state.refuse(line, "M99 without a cycle before it", "define the cycle that it calls")
-            return
         if state.tip_control:
             state.wrong("CS506", line, f"a hole cycle under {state.tip_control}")
         drill(defined, modal.tip[0], modal.tip[1], line, state)
-        state.change(line, code=math.nan, feed=modal.feed, per_revolution=modal.per_revolution)
 
-    def _define(self, number: int, text: str, line: Line, state: State) -> None:
+    def _define(self, number: int, text: str, line: Line, state: Reader) -> None:
         """CYCL DEF 200, 201, 207 with their parameters."""
         given = {int(q): float(value) for q, value in _PARAMETER.findall(text)}
         rest = _PARAMETER.sub("", text).split("CYCL DEF", 1)[1].split()
@@ -143,9 +138,9 @@ class Heidenhain(Dialect):
         wrong = (number == 200 and (given[210] != 0.0 or not given[202] > 0.0)) or depth < 0.0
         if wrong or given.get(208, given.get(206)) != given.get(206) or given.get(239, 1.0) <= 0.0:
             state.refuse(line, f"CYCL DEF {number} with values that are not understood", "see its parameters")
-        state.memory[DEFINED] = cycle
+        state.memory.cycle = cycle
 
-    def _to_machine(self, line: Line, state: State) -> None:
+    def _to_machine(self, line: Line, state: Reader) -> None:
         """M91: a rapid in machine coordinates."""
         axes, names = "", {word[0] for word in line.words}
         for name, value, text, *_ in line.words:
@@ -159,9 +154,9 @@ class Heidenhain(Dialect):
             state.refuse(line, "M91 without FMAX", "positions of the machine are read in rapids only")
         state.leave(axes)
 
-    def _circle(self, motion: dict[str, float], line: Line, state: State) -> dict[str, float]:
+    def _circle(self, motion: dict[str, float], line: Line, state: Reader) -> dict[str, float]:
         """C: about the centre that CC has said, in the plane XY; CR: with a radius."""
-        centre = state.memory.get("centre", {})
+        centre = state.memory.centre
         by_radius = line.words[0].text == "CR"
         known = "R" in motion if by_radius else "R" not in motion and len(centre) == 2
         if "turn" not in motion or not known or {*motion} & {"Z", *self.rotary}:
@@ -172,19 +167,19 @@ class Heidenhain(Dialect):
             return {**row, "G": motion["turn"]}
         return {**row, "G": motion["turn"], "I": centre["X"] - x, "J": centre["Y"] - y}
 
-    def _miscellaneous(self, value: float, text: str, line: Line, state: State) -> None:
+    def _miscellaneous(self, value: float, text: str, line: Line, state: Reader) -> None:
         if value in (136.0, 137.0):
             state.change(line, per_revolution=value == 136.0)
         elif value in (128.0, 129.0):
             state.tip_control = "M128" if value == 128.0 else ""
         elif value in (126.0, 127.0):
-            state.memory[_SHORTER] = value == 126.0  # for others turns are less than half a turn either way
+            state.memory.shorter_way = value == 126.0  # for others turns are less than half a turn either way
         elif value in (91.0, 92.0):
             state.refuse(line, f"{text}: positions of the machine", "only positions of the part are read")
         else:
             state.event(line, "M", value, text, late=value in AFTER_MOTION)
 
-    def _block(self, text: str, line: Line, state: State) -> None:
+    def _block(self, text: str, line: Line, state: Reader) -> None:
         """Blocks that are words: tools, cycles, functions."""
         if text.startswith(("BEGIN PGM", "END PGM")):
             unit = text.split()[-1]

@@ -6,14 +6,17 @@ import math
 import re
 from collections.abc import Callable, Mapping, Set
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from cornersmooth.nc_reader.dialects.base import AFTER_MOTION, HIGH_SPEED, INCREMENTAL, KINEMATICS, Dialect, State
-from cornersmooth.nc_reader.hole_cycles import INITIAL_HEIGHT, HoleCycle, drill
+from cornersmooth.nc_reader.dialects.base import AFTER_MOTION, Dialect
+from cornersmooth.nc_reader.hole_cycles import HoleCycle, drill
 from cornersmooth.nc_reader.lexer import NUMBER, Lexer, fixed, number_of
 from cornersmooth.nc_reader.planes import TiltedPlane, room_of, rotated_frame, turned_frame
 from cornersmooth.nc_reader.word_list import word_list
 from cornersmooth.nc_reader.words import MOTION_CODES, NURBS, Columns, Line, Word
+
+if TYPE_CHECKING:
+    from cornersmooth.nc_reader.reader import Reader
 
 #: letters whose words are events
 _EVENT_LETTERS = "TSMHD"
@@ -33,8 +36,6 @@ _PLANE_WORDS: Mapping[str, frozenset[float]] = {
     "G68.2": frozenset((_TILTED, 53.1, 69.0)),
     "G254": frozenset((254.0, 255.0)),
 }
-#: names in `State.memory` of the speed of the spindle, and of whether M29 asks it to turn with the feed
-_SPEED, _RIGID = "speed", "rigid"
 _NO_CYCLE = 80.0
 
 
@@ -88,7 +89,7 @@ class Iso(Dialect):
         planes = b"G68.2" in text or b"g68.2" in text  # the pattern takes long where there are none
         return super().decimals(_PLANE_LINE.sub(b"", text) if planes else text)
 
-    def words(self, line: Line, state: State) -> None:
+    def words(self, line: Line, state: Reader) -> None:
         """Interpret a line that is no motion block."""
         if self._switched(line, state):
             return
@@ -103,13 +104,12 @@ class Iso(Dialect):
             self._plane(line, codes, state)
             return
         if _NO_CYCLE in codes:
-            state.memory.pop(INITIAL_HEIGHT, None)
-            state.memory.pop(_RIGID, None)
+            state.memory.height, state.memory.rigid = None, False
         motion: dict[str, float] = {}
         late = any(word.name == "M" and word.value in AFTER_MOTION for word in line.words)
         given = {letter: value for letter, value, *_ in line.words}
         if given.get("G") == 5.0:
-            state.memory[HIGH_SPEED] = given.get("P", 0.0) >= 10000.0
+            state.memory.high_speed = given.get("P", 0.0) >= 10000.0
         for letter, value, text, *_ in line.words:
             if letter == "G":
                 if value in MOTION_CODES:
@@ -120,33 +120,31 @@ class Iso(Dialect):
                 else:
                     self._mode(value, line, state)
             elif (letter, value) == ("M", 29.0) and self.rigid:
-                state.memory[_RIGID] = True
+                state.memory.rigid = True
             elif letter in _EVENT_LETTERS:
                 if letter == "S":
-                    state.memory[_SPEED] = value
+                    state.memory.speed = value
                 state.event(line, letter, value, text, late=letter == "M" and value in AFTER_MOTION)
             elif letter in self.lexer.letters:
                 motion[letter] = value
-            elif letter in "ABC":
-                state.refuse(line, f"{text}: rotary words", "name the machine they are for, with --machine")
             elif letter not in self.others:
-                state.refuse(line, f"{text} is not understood", "see that the control is the one the text is for")
+                self.refuse(line, letter, text, state)
         if self.lexer.odd_vector(motion.keys(), motion.get("G")):
             state.refuse(line, "I J K beside rotary words", "leave out --machine for a text with tool vectors")
         state.move(line, motion, later=bool(codes & self.tip_control.keys()) and not late)
 
-    def _switched(self, line: Line, state: State) -> bool:
+    def _switched(self, line: Line, state: Reader) -> bool:
         """Take a block that switches tip control of the kinematics; return whether it is one."""
         blocks = state.rotary.machine.tip_control if self.switches and state.rotary is not None else None
         given = {(word.name, word.value) for word in line.words if word.name != "N"}
         for block, on in zip(blocks or (), (True, False), strict=False):
             if given == {(word[0], float(word[1:])) for word in block.split()}:
                 state.change(line)
-                state.memory[KINEMATICS] = on
+                state.memory.keeps_tip = on
                 return True
         return False
 
-    def _cycle(self, line: Line, codes: set[float], state: State) -> None:
+    def _cycle(self, line: Line, codes: set[float], state: Reader) -> None:
         """A hole cycle, with G98: all that it takes stands in its block."""
         code = next(iter(codes & _CYCLES.keys()))
         given = {letter: value for letter, value, *_ in line.words if letter != "N"}
@@ -159,9 +157,10 @@ class Iso(Dialect):
             )
         if state.tip_control != self.cycles_in:
             state.wrong("CS506", line, f"a hole cycle under {state.tip_control or 'no length of the tool'}")
-        travel = state.memory.setdefault(INITIAL_HEIGHT, state.modal.tip[2])
+        travel = state.modal.tip[2] if state.memory.height is None else state.memory.height
+        state.memory.height = travel
         feed, turning = given.get("F", state.modal.feed), state.modal.per_revolution
-        speed = state.memory.get(_SPEED, math.nan)
+        speed = state.memory.speed
         cycle = HoleCycle(
             travel,
             given["R"],
@@ -176,14 +175,14 @@ class Iso(Dialect):
             state.wrong("CS506", line, "a hole cycle at inverse time feed (G93)")
         tap = code == 84.0
         if tap:
-            if self.rigid and not state.memory.get(_RIGID):
+            if self.rigid and not state.memory.rigid:
                 state.wrong("CS506", line, "a tap without M29, which turns the spindle with the feed")
             pitch = feed if turning else feed / speed
             cycle = replace(cycle, feed=pitch, pitch=pitch)
+        state.modal = state.modal.but(feed=feed)  # that of the blocks after it, too
         drill(cycle, given["X"], given["Y"], line, state)
-        state.change(line, code=math.nan, feed=feed, per_revolution=turning)
 
-    def _plane(self, line: Line, codes: set[float], state: State) -> None:
+    def _plane(self, line: Line, codes: set[float], state: Reader) -> None:
         """G68.2, G53.1 and G69, or G254 and G255."""
         given = {word.name: word for word in line.words if word.name not in "GN"}
         count = sum(word.name != "N" for word in line.words)
@@ -208,9 +207,9 @@ class Iso(Dialect):
             else:
                 state.tilt(line, TiltedPlane(frame, math.radians(state.rotary.angle_step), "G43"))
 
-    def _to_machine(self, line: Line, codes: set[float], state: State) -> None:
+    def _to_machine(self, line: Line, codes: set[float], state: Reader) -> None:
         """G91 G28 Z0. and the like: to the reference position without a detour; G53: in machine coordinates."""
-        incremental = state.memory.get(INCREMENTAL, False)
+        incremental = state.memory.incremental
         incremental = 91.0 in codes or (incremental and 90.0 not in codes)
         known = {*_TO_REFERENCE, _IN_MACHINE, 0.0, 90.0, 91.0}
         axes = ""
@@ -223,20 +222,20 @@ class Iso(Dialect):
                 state.refuse(line, f"{text} beside a position of the machine", "give it a block of its own")
         if _IN_MACHINE in codes and (incremental or 0.0 not in codes):
             state.refuse(line, "G53 without G90 and G0", "write G90 before it, and G0")
-        state.memory[INCREMENTAL] = incremental
+        state.memory.incremental = incremental
         if 0.0 in codes:
             state.move(line, {"G": 0.0})
         state.leave(axes)
 
-    def _dwell(self, given: Mapping[str, float], line: Line, state: State) -> None:
+    def _dwell(self, given: Mapping[str, float], line: Line, state: Reader) -> None:
         """G4: P in milliseconds or seconds, X and U in seconds."""
         time = self.dwell * given["P"] if "P" in given else 1000.0 * given.get("X", given.get("U", 0.0))
         state.event(line, "G", 4.0, f"{time:.10g}")
 
-    def _mode(self, code: float, line: Line, state: State) -> None:
+    def _mode(self, code: float, line: Line, state: Reader) -> None:
         """Take a G word outside group 01 that changes the state."""
         if code == 90.0:
-            state.memory[INCREMENTAL] = False
+            state.memory.incremental = False
         elif code in (17.0, 18.0, 19.0):
             state.change(line, plane=int(code))
         elif code in (20.0, 21.0):

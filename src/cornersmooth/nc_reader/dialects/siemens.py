@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from cornersmooth.nc_reader.dialects.base import AFTER_MOTION, BY_WORD, SPLINE_AXES, Dialect, State
+from cornersmooth.nc_reader.dialects.base import AFTER_MOTION, BY_WORD, Dialect
 from cornersmooth.nc_reader.hole_cycles import HoleCycle, drill, numbers
 from cornersmooth.nc_reader.lexer import NUMBER, Lexer, fixed, number_of
 from cornersmooth.nc_reader.planes import TiltedPlane, room_of, rotated_frame
 from cornersmooth.nc_reader.words import BSPLINE, POLY, Columns, Line, Word
+
+if TYPE_CHECKING:
+    from cornersmooth.nc_reader.reader import Reader
 
 #: names of words of several letters: vectors are I J K, second points U V W, as in `motion`
 _NAMES: Final = {
@@ -39,9 +41,6 @@ _SILENT_CODES = frozenset((9.0, 53.0, *map(float, range(54, 60)), 60.0, 64.0, 90
 _SILENT_CODES |= frozenset(map(float, (153, 601, 602, 641, 642, 643, 644, 645)))
 _ORIENTATIONS = ("ORIVECT", "ORIPLANE", "ORICURVE", "ORIAXES")
 _CODES = (0.0, 1.0, 2.0, 3.0)
-
-#: name in `State.memory` of the speed of the spindle
-_SPEED: Final = "speed"
 
 #: hole cycles, and how many arguments they may have
 _CYCLES: Final = {"CYCLE81": (4,), "CYCLE82": (6,), "CYCLE83": (12,), "CYCLE84": (12,), "CYCLE85": (8,)}
@@ -83,7 +82,7 @@ class Siemens(Dialect):
     def __init__(self, rotary: str = "") -> None:
         super().__init__(_SiemensLexer(rotary), rotary)
 
-    def words(self, line: Line, state: State) -> None:
+    def words(self, line: Line, state: Reader) -> None:
         """Interpret a line that is no motion block."""
         if any(name == "G" and value == 4.0 for name, value, *_ in line.words):
             given = {name: value for name, value, *_ in line.words}
@@ -108,7 +107,7 @@ class Siemens(Dialect):
                 self._mode(value, line, state)
             elif name in ("M", "T", "S"):
                 if name == "S":
-                    state.memory[_SPEED] = value
+                    state.memory.speed = value
                 state.event(line, name, value, text, late=name == "M" and value in AFTER_MOTION)
             elif name == "SPOS":
                 state.event(line, "M", 19.0, text)
@@ -117,12 +116,12 @@ class Siemens(Dialect):
             elif name in ("TRAORI", "TRAFOOF", *_ORIENTATIONS):
                 self._transform(name, state)
             elif name == "SPLINEPATH":
-                state.memory[SPLINE_AXES] = frozenset(re.split("[(), ]+", text)[2:])
+                state.memory.spline_axes = frozenset(re.split("[(), ]+", text)[2:])
             elif name not in ("D", "N", "%") and name not in _SILENT_CALLS:
-                self._refuse(line, name, text, state)
+                self.refuse(line, name, text, state)
         state.move(line, motion)
 
-    def _cycle(self, line: Line, state: State) -> None:
+    def _cycle(self, line: Line, state: Reader) -> None:
         """CYCLE81 to CYCLE85, called where the tool stands."""
         words = [word for word in line.words if word.name != "N"]
         name, (_, _, inside) = words[0].name, words[0].text.partition("(")
@@ -149,17 +148,15 @@ class Siemens(Dialect):
             if args[6:8] != [3.0, None] or not whole[8] > 0.0 or whole[10] != whole[11]:
                 state.refuse(line, f"{words[0].text} is not understood", "give a pitch, SDAC 3 and one speed")
             known = replace(known, pitch=whole[8], feed=whole[8], dwell=1000.0 * fifth)
-            if state.memory.get(_SPEED) != whole[10]:
+            if state.memory.speed != whole[10]:
                 state.wrong("CS506", line, f"CYCLE84 at {whole[10]:g} revolutions, where S says otherwise")
         elif name == "CYCLE85":
             if whole[6] != whole[7] or not whole[6] > 0.0:
                 state.refuse(line, f"{words[0].text} is not understood", "give one feed for both ways")
             known = replace(known, feed=whole[6], feed_out=True, dwell=1000.0 * fifth)
-        modal = state.modal
-        drill(known, modal.tip[0], modal.tip[1], line, state)
-        state.change(line, code=math.nan, feed=modal.feed, per_revolution=modal.per_revolution)
+        drill(known, state.modal.tip[0], state.modal.tip[1], line, state)
 
-    def _plane(self, line: Line, state: State) -> None:
+    def _plane(self, line: Line, state: Reader) -> None:
         """CYCLE800: a plane by turns about its own axes, one after another; without arguments none."""
         words = [word for word in line.words if word.name != "N"]
         match = _SWIVEL.fullmatch(words[0].text)
@@ -179,7 +176,7 @@ class Siemens(Dialect):
             x, y, z = (np.array(before) + frame @ behind).tolist()
             state.tilt(line, TiltedPlane(frame, room_of(angles), origin=(x, y, z)))
 
-    def _to_machine(self, line: Line, state: State) -> None:
+    def _to_machine(self, line: Line, state: Reader) -> None:
         """SUPA: a rapid in machine coordinates, without frames."""
         axes = ""
         for name, value, text, *_ in line.words:
@@ -192,20 +189,15 @@ class Siemens(Dialect):
         state.move(line, {"G": 0.0})
         state.leave(axes)
 
-    def _refuse(self, line: Line, name: str, text: str, state: State) -> None:
-        if name in "ABC":
-            state.refuse(line, f"{text}: rotary words", "name the machine they are for, with --machine")
-        state.refuse(line, f"{text} is not understood here", "see that the control is the one the text is for")
-
-    def _transform(self, name: str, state: State) -> None:
+    def _transform(self, name: str, state: Reader) -> None:
         on = state.tip_control.startswith("TRAORI")
         if name in _ORIENTATIONS:
-            state.memory["orientation"] = name
+            state.memory.orientation = name
         else:
             on = name == "TRAORI"
-        state.tip_control = f"TRAORI {state.memory.get('orientation', '')}".rstrip() if on else ""
+        state.tip_control = f"TRAORI {state.memory.orientation}".rstrip() if on else ""
 
-    def _mode(self, code: float, line: Line, state: State) -> None:
+    def _mode(self, code: float, line: Line, state: Reader) -> None:
         if code in (17.0, 18.0, 19.0):
             state.change(line, plane=int(code))
         elif code in (70.0, 71.0, 700.0, 710.0):
