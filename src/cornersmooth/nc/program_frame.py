@@ -51,9 +51,7 @@ class Stream(Protocol):
 class Frame:
     """What a user wants around the motion."""
 
-    program: str | None = (
-        None  #: name or number; None for that of the CL file, or of the control's table
-    )
+    program: str | None = None  #: name or number; None for that of the CL file, or of the control's table
     block_numbers: bool = False  #: whether blocks are numbered where the control does not ask for it
     #: lines after the head and before the tail, with ``{program}``, ``{units}`` and ``{blend}``
     header: tuple[str, ...] = ()

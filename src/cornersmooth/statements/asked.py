@@ -157,8 +157,7 @@ class Asking:
     def auxiliary(self, words: list[str], numbers: list[float], statement: Statement) -> None:
         """An M word by its number, unless it would end or change more than a word may."""
         if len(numbers) == 1 and not words and _whole(numbers[0]) and numbers[0] not in (2, 6, 30, 98, 99):
-            for token in of_m(numbers[0], self.place, self.line):
-                self.say(token.kind, token.value)
+            self.say(*of_m(numbers[0]))
 
     def end(self, words: list[str], numbers: list[float], statement: Statement) -> None:
         """END in the middle of the path is a stop."""

@@ -1,74 +1,63 @@
-"""What a text says beside the motion: its words as tokens."""
+"""What a program says beside the motion: its words as tokens."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from functools import partial
 
 from cornersmooth.nc_reader.elements import Event
-from cornersmooth.statements.tokens import PAUSES, SPEED_DECIMALS, TAP, Token, of_m
+from cornersmooth.statements.tokens import PAUSES, SPEED_DECIMALS, TAP, Place, Token, of_m
 
-#: letters whose words are tokens as they stand
-_PLAIN = {"S": "speed", "H": "offset", "D": "register"}
+#: letters whose words are tokens as they are, and G words
+_PLAIN = {"H": "offset", "D": "register"}
+_CODES = {TAP: "tap", 40.0: "compensation", 41.0: "compensation", 42.0: "compensation"}
+
+#: words that take another tool, and that end the program or that
+_CHANGE = ("M", 6.0)
+_ENDS = (_CHANGE, ("M", 2.0), ("M", 30.0))
 
 
-def said(
-    events: Sequence[Event],
-    places: Sequence[float],
-    rooms: Sequence[float],
-    reaches: Sequence[float],
-    others: Sequence[tuple[float, ...]],
-) -> list[Token]:
-    """What the words of the NC text do; the rest, in mm, is what `Token` has as place, room, reach and others."""
+def said(events: Sequence[Event], places: Sequence[Place]) -> list[Token]:
+    """What the words of the NC program do, each at its place."""
     tokens: list[Token] = []
     chosen: float | None = None
     moment = element = 0
-    speaking = [event for event in events if event.letter != "("]
-    rows = [row for row in zip(events, places, rooms, reaches, others, strict=True) if row[0].letter != "("]
-    for k, (event, place, room, reach, elsewhere) in enumerate(rows):
-        value, line, before = event.value, event.line, len(tokens)
+    spoken = [(event, place) for event, place in zip(events, places, strict=True) if event.letter != "("]
+    words = [(event.letter, event.value) for event, _ in spoken]
+    elements = [event.element for event, _ in spoken]
+    for k, (event, place) in enumerate(spoken):
+        letter, value = words[k]
         moment, element = moment + (event.element != element), event.element
-        if event.letter == "T":
+        meaning: tuple[str, float] | None = None
+        if letter == "T":
             chosen = value
-            following = speaking[k + 1] if k + 1 < len(speaking) else None
-            if following is None or (following.letter, following.value) != ("M", 6.0):
-                tokens.append(Token("next tool", value, place, line))
-        elif event.letter == "M" and value == 6:
-            if chosen is not None:
-                tokens.append(Token("tool", chosen, place, line))
-        elif event.letter == "M" and value in (2, 30):
-            tokens.append(Token("end", 30.0, place, line))
-        elif event.letter == "M":
-            tokens += of_m(value, place, line)
-        elif event.letter == "G" and value == 4:
-            tokens.append(Token("dwell", round(float(event.text)), place, line))
-        elif event.letter == "G" and value == TAP:
-            tokens.append(Token("tap", value, place, line))
-        elif event.letter == "G" and value in (40, 41, 42):
-            tokens.append(Token("compensation", value, place, line))
-        elif event.letter in _PLAIN:
-            number = round(value, SPEED_DECIMALS) if event.letter == "S" else value
-            tokens.append(Token(_PLAIN[event.letter], number, place, line))
-        habit = (event.letter, value) == ("M", 1.0) and _before_a_tool(speaking, k)
-        idle = (event.letter, value) == ("M", 6.0) and _is_idle(speaking, k)
-        place_of = partial(replace, room=room, reach=reach, others=elsewhere, moment=moment, element=event.element)
-        tokens[before:] = [place_of(token, habit=habit, idle=idle) for token in tokens[before:]]
-        moment += any(token.kind in PAUSES and not token.habit for token in tokens[before:])
+            if words[k + 1 : k + 2] != [_CHANGE]:
+                meaning = "next tool", value
+        elif words[k] == _CHANGE:
+            meaning = None if chosen is None else ("tool", chosen)
+        elif letter == "M":
+            meaning = of_m(value)
+        elif (letter, value) == ("G", 4.0):
+            meaning = "dwell", round(float(event.text))
+        elif letter == "G" and value in _CODES:
+            meaning = _CODES[value], value
+        elif letter == "S":
+            meaning = "speed", round(value, SPEED_DECIMALS)
+        elif letter in _PLAIN:
+            meaning = _PLAIN[letter], value
+        if meaning is None:
+            continue
+        # the next word is that of a tool, there has been one before, and nothing moves between
+        after = next((j for j in range(k + 1, len(words)) if words[j] != ("G", 40.0)), None)  # R0 of M91
+        habit = words[k] == ("M", 1.0) and after is not None and words[after][0] == "T" and elements[after] == element
+        habit = habit and any(letter == "T" for letter, _ in words[:k])
+        # the next tool, or the end of the program, comes before any motion
+        idle = words[k] == _CHANGE
+        if idle:
+            end = next((j for j in range(k + 1, len(words)) if words[j] in _ENDS), None)
+            idle = end is not None and elements[end] == element
+        token = Token(
+            *meaning, place.at, event.line, place.room, moment, habit, place.others, idle, place.reach, element
+        )
+        tokens.append(token)
+        moment += meaning[0] in PAUSES and not habit
     return tokens
-
-
-def _before_a_tool(speaking: Sequence[Event], k: int) -> bool:
-    """Whether the next word is that of a tool, with no motion between; and there has been one before."""
-    event = speaking[k]
-    behind = (other for other in speaking[k + 1 :] if (other.letter, other.value) != ("G", 40.0))  # R0 of M91
-    following = next(behind, None)
-    changes = following is not None and following.letter == "T" and following.element == event.element
-    return changes and any(before.letter == "T" for before in speaking[:k])
-
-
-def _is_idle(speaking: Sequence[Event], k: int) -> bool:
-    """Whether the next tool, or the end of the program, comes before any motion."""
-    here = speaking[k].element
-    ends = (other for other in speaking[k + 1 :] if other.letter == "M" and other.value in (2.0, 6.0, 30.0))
-    return next((other.element == here for other in ends), False)

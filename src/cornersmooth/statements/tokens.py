@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 #: decimals of a spindle speed that count: FANUC's S takes whole numbers only
 SPEED_DECIMALS = 0
@@ -33,16 +34,25 @@ class Token:
     element: int = -1  #: element of the text that it stands before; -1 in the CL file
 
 
+class Place(NamedTuple):
+    """Where a word of the program is, as in `Token`."""
+
+    at: float
+    room: float = 0.0
+    reach: float = 0.0
+    others: tuple[float, ...] = ()
+
+
 #: kinds during which a state matters although nothing moves
 PAUSES = ("stop", "dwell")
 
 
-def of_m(value: float, place: float, line: int) -> list[Token]:
-    """Token of an M word other than M6."""
+def of_m(value: float) -> tuple[str, float]:
+    """Kind and value of what an M word other than M6 does."""
     if value in (3, 4, 5, 19):
-        return [Token("spindle", value, place, line)]
+        return "spindle", value
     if value in (7, 8, 9, 88, 89):
-        return [Token("coolant", 9.0 if value == 89 else value, place, line)]
-    if value in (0, 1):
-        return [Token("stop", value, place, line)]
-    return [Token("auxiliary", value, place, line)]
+        return "coolant", 9.0 if value == 89 else value
+    if value in (2, 30):
+        return "end", 30.0
+    return ("stop" if value in (0, 1) else "auxiliary"), value

@@ -20,7 +20,7 @@ from cornersmooth.nc_reader.tool import leads_somewhere
 from cornersmooth.statements.asked import asked
 from cornersmooth.statements.comparison import compare
 from cornersmooth.statements.said import said
-from cornersmooth.statements.tokens import TAP, Token
+from cornersmooth.statements.tokens import TAP, Place, Token
 from cornersmooth.verify.batches import Batches
 from cornersmooth.verify.checks import Examined
 from cornersmooth.verify.task import Task
@@ -97,19 +97,15 @@ class WordPlaces:
         statements = _statement_lengths(self.task)
         theirs = asked(self.task.original.program, statements, places.end, _of_holes(batches, places))
         theirs = [token for token in theirs if token.kind != "auxiliary" or token.value not in clamps]
-        here = [places.after(event) for event in self.events]
-        reaches = [max(places.next_begin(event) - at, 0.0) for event, at in zip(self.events, here, strict=True)]
-        before = [(event.element - 1, places.standing(event.element - 1)) for event in self.events]
-        standing = [element if known is None else known for element, known in before]
-        rooms = [self._rooms.get(element, 0.0) for element in standing]
-        ours = said(self.events, here, rooms, reaches, [self._others.get(element, ()) for element in standing])
-        found = compare(theirs, ours, self.margin, unsaid, self.task.path.way_apart, own)
+        here = list(map(places.of, self.events))
+        found = compare(theirs, said(self.events, here), self.margin, unsaid, self.task.path.way_apart, own)
         said_there = zip(statements, self.task.original.program.statements, strict=True)
         homes = [length for length, statement in said_there if statement.word == "GOHOME"]
         at_home = {
             event.line
-            for event, at, room, reach in zip(self.events, here, rooms, reaches, strict=True)
-            if any(-self.margin - room <= home - at <= reach + self.margin + room for home in homes)
+            for event, place in zip(self.events, here, strict=True)
+            for room in [self.margin + place.room]
+            if any(-room <= home - place.at <= place.reach + room for home in homes)
         }
         return found, at_home
 
@@ -118,7 +114,7 @@ class _Places:
     """CL path lengths, mm, where elements of the program end and begin, as far as they are known."""
 
     def __init__(self, words: WordPlaces, batches: Batches) -> None:
-        self._task, self._still, stops = words.task, words._still, batches.stops
+        self._task, self._words, stops = words.task, words, batches.stops
         length = self._task.path.length
         self.end = float(length[-1]) if len(self._task.original.pose) else 0.0
         hole, move, after = np.frombuffer(batches.holes, np.int64).reshape(-1, 3).T.copy()
@@ -137,24 +133,22 @@ class _Places:
         ends: Floats = self._task.path.length[self._task.original.trail.last[moves]]
         return ends
 
-    def standing(self, element: int) -> int | None:
-        """The element at whose end one leaves the tool that leads nowhere, as a second rapid to the same place does."""
-        known = bisect_right(self._ended, element)
-        return self._ended[known - 1] if known else None
+    def of(self, event: Event) -> Place:
+        """Where a word is: at the end of the element before it; that of a tap at the hole that is fed next.
 
-    def after(self, event: Event) -> float:
-        """Where a word is: at the end of the element before it; that of a tap at the hole that is fed next."""
-        if (event.letter, event.value) == ("G", TAP) and event.element in self._holes:
-            return self._ends[event.element]
-        before = self.standing(event.element - 1)
-        return _BEFORE if before is None else self._ends[before]
-
-    def next_begin(self, event: Event) -> float:
-        """Where the next element that leads somewhere begins at the latest; -inf where that is not known.
-
-        Between the two the program may have passed all that leaves nothing in it.
+        Between that and where the next element that leads somewhere begins, at the latest, the program may have passed
+        all that leaves nothing in it. An element that leads nowhere, as a second rapid to the same place does, is one
+        with that before it.
         """
-        return self._begins.get(next(k for k in count(event.element) if k not in self._still), -math.inf)
+        before = event.element - 1
+        known = bisect_right(self._ended, before)
+        before = self._ended[known - 1] if known else before
+        at = self._ends.get(before, _BEFORE)
+        if (event.letter, event.value) == ("G", TAP) and event.element in self._holes:
+            at = self._ends[event.element]
+        following = next(k for k in count(event.element) if k not in self._words._still)
+        reach = max(self._begins.get(following, -math.inf) - at, 0.0)
+        return Place(at, self._words._rooms.get(before, 0.0), reach, self._words._others.get(before, ()))
 
 
 def _by_element(elements: Ints, lengths: Floats) -> dict[int, float]:
