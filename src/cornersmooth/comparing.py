@@ -35,58 +35,35 @@ _BY_CHORD = 1.0
 
 @dataclass(frozen=True)
 class Candidate:
-    """A way to write a part.
-
-    Parameters
-    ----------
-    form : Form
-    settings : Settings
-    lines : str
-        "fine" as short as the control can take them, "chord" by the chord tolerance alone, or "long"; empty in curves.
-    options : tuple of str
-        What asks `cornersmooth smooth` for it, besides the control and the tolerance.
-    """
+    """A way to write a part."""
 
     form: Form
     settings: Settings
+    #: "fine" as short as the control can take them, "chord" by the chord tolerance alone, or "long"; empty in curves.
     lines: str
-    options: tuple[str, ...]
+    options: tuple[str, ...]  #: What asks `cornersmooth smooth` for it, besides the control and the tolerance
 
 
 @dataclass(frozen=True)
 class Row:
-    """What became of a candidate.
+    """What became of a candidate."""
 
-    Parameters
-    ----------
-    form, words, method, lines : str
-        Form of the control; "vectors" or "rotary words of MACHINE"; method; lines as in `Candidate`.
-    options : tuple of str
-        As in `Candidate`.
-    verdict : str
-        Of verification; what was wrong where it was not written.
-    blocks, bytes : int
-    seconds, saved : float or None
-        As written, and less than the unsmoothed lines; None where nothing was written.
-    tip, axis_point : float or None, mm
-        Largest measured deviation; of the axis point None under an axis tolerance.
-    limits : tuple of (str, float)
-        What the program reaches the longest.
-    """
-
+    #: Form of the control; "vectors" or "rotary words of MACHINE"; method; lines as in `Candidate`.
     form: str
     words: str
     method: str
     lines: str
-    options: tuple[str, ...]
-    verdict: str
+    options: tuple[str, ...]  #: As in `Candidate`
+    verdict: str  #: Of verification; what was wrong where it was not written
     blocks: int = 0
     bytes: int = 0
+    #: As written, and less than the unsmoothed lines; None where nothing was written.
     seconds: float | None = None
     saved: float | None = None
+    #: mm: Largest measured deviation; of the axis point None under an axis tolerance.
     tip: float | None = None
     axis_point: float | None = None
-    limits: tuple[tuple[str, float], ...] = ()
+    limits: tuple[tuple[str, float], ...] = ()  #: What the program reaches the longest
 
     @classmethod
     def of(cls, candidate: Candidate) -> Row:
@@ -103,25 +80,12 @@ class Row:
 
 @dataclass(frozen=True)
 class Table:
-    """All rows, and what they are measured against.
+    """All rows, and what they are measured against."""
 
-    Parameters
-    ----------
-    unsmoothed : float, s
-        Time of the lines of the CL file.
-    against : str
-        What these lines are, where that is not the path of the CL file.
-    share : float
-        Part of the poses that was looked at.
-    law : str
-        By which lines are planned.
-    rows : tuple of Row
-    """
-
-    unsmoothed: float
-    against: str
-    share: float
-    law: str
+    unsmoothed: float  #: s: Time of the lines of the CL file
+    against: str  #: What these lines are, where that is not the path of the CL file
+    share: float  #: Part of the poses that was looked at
+    law: str  #: By which lines are planned
     rows: tuple[Row, ...]
 
     @property

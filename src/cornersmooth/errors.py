@@ -138,26 +138,13 @@ class VerdictError(CornersmoothError):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """Something noticed that did not stop the work.
+    """Something noticed that did not stop the work."""
 
-    Parameters
-    ----------
-    code : str
-        Stable identifier, as in `CornersmoothError`.
-    severity : {"note", "warning", "error"}
-    line : int
-        Source line it was first met on, 0 where no line applies.
-    text : str
-        One sentence in the user's words: what was noticed; after the first ``"; "``, what to do.
-    count : int
-        How often it was met.
-    """
-
-    code: str
+    code: str  #: Stable identifier, as in `CornersmoothError`
     severity: Severity
-    line: int
-    text: str
-    count: int = 1
+    line: int  #: Source line it was first met on, 0 where no line applies
+    text: str  #: One sentence in the user's words: what was noticed; after the first ``"; "``, what to do
+    count: int = 1  #: How often it was met
 
     @property
     def leaves_out(self) -> bool:

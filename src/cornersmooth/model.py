@@ -69,28 +69,15 @@ ACTING_WORDS = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class Statement:
-    """A CL statement that is not a motion; it keeps its place between moves.
+    """A CL statement that is not a motion; it keeps its place between moves."""
 
-    Parameters
-    ----------
-    pose : int
-        Index of the pose it stands before (``len(program)`` after the last one).
-    line : int
-        Source line it starts on, from 1.
-    word : str
-        Major word in upper case (``"SPINDL"``, ``"TOOL PATH"``); ``"$$"`` for a comment.
-    args : tuple of (float | str)
-        Numbers as floats, minor words in upper case; empty arguments are ``""``. Text statements (PPRINT, PARTNO,
-        comments, ...) have one string, untouched.
-    text : str
-        The statement as written, joined over continuation lines, without line ends.
-    """
-
-    pose: int
-    line: int
-    word: str
+    pose: int  #: Index of the pose it stands before (``len(program)`` after the last one)
+    line: int  #: Source line it starts on, from 1
+    word: str  #: Major word in upper case (``"SPINDL"``, ``"TOOL PATH"``); ``"$$"`` for a comment
+    #: Numbers as floats, minor words in upper case; empty arguments are ``""``. Text statements (PPRINT, PARTNO,
+    #: comments, ...) have one string, untouched.
     args: tuple[float | str, ...] = ()
-    text: str = ""
+    text: str = ""  #: The statement as written, joined over continuation lines, without line ends
 
     @property
     def acts(self) -> bool:
@@ -100,25 +87,16 @@ class Statement:
 
 @dataclass(frozen=True)
 class Arcs:
-    """Side table of the circular moves, k rows; the start of arc r is the pose before ``pose[r]``.
+    """Side table of the circular moves, k rows; the start of arc r is the pose before ``pose[r]``."""
 
-    Parameters
-    ----------
-    pose : (k,) int64
-        Index of the pose that the arc ends in, ascending.
-    centre : (k, 3) float64, mm
-        Any point of the arc's axis.
-    normal : (k, 3) float64
-        Unit vector; the rotation is positive (right-handed) about it. Dialects with the opposite convention are
-        turned round by the reader.
-    sweep : (k,) float64, rad
-        Total rotation, > 0; more than 2π for several turns. A height difference between start and end along
-        `normal` makes the arc a helix.
-    """
-
+    #: (k,): Index of the pose that the arc ends in, ascending.
     pose: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
-    centre: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    centre: Floats = field(default_factory=lambda: np.zeros((0, 3)))  #: (k, 3), mm: Any point of the arc's axis
+    #: (k, 3): Unit vector; the rotation is positive (right-handed) about it. Dialects with the opposite convention are
+    #: turned round by the reader.
     normal: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    #: (k,), rad: Total rotation, > 0; more than 2π for several turns. A height difference between start and end along
+    #: `normal` makes the arc a helix.
     sweep: Floats = field(default_factory=lambda: np.zeros(0))
 
     def __len__(self) -> int:
@@ -127,75 +105,38 @@ class Arcs:
 
 @dataclass(frozen=True)
 class Source:
-    """Where a program came from: the `input` part of the report.
+    """Where a program came from: the `input` part of the report."""
 
-    Parameters
-    ----------
-    name : str
-        File name without its folder, ``"<stdin>"`` for a stream.
-    format : str
-        ``"apt"`` or ``"points"``.
-    dialect : str
-        ``"nx"``, ``"catia"``, ``"creo"``, ``"solidworks"``, ``"hsm"``, ``"ncl"``, ``"makino"``, ``"plain"``, ``"csv"``.
-    operation : int
-        Number of the operation that was taken alone; 0 for the whole file.
-    operation_name : str
-        Empty where the file gives none.
-    """
-
-    name: str = "<memory>"
-    format: str = "apt"
+    name: str = "<memory>"  #: File name without its folder, ``"<stdin>"`` for a stream
+    format: str = "apt"  #: ``"apt"`` or ``"points"``
+    #: ``"nx"``, ``"catia"``, ``"creo"``, ``"solidworks"``, ``"hsm"``, ``"ncl"``, ``"makino"``, ``"plain"``, ``"csv"``.
     dialect: str = "plain"
-    operation: int = 0
-    operation_name: str = ""
+    operation: int = 0  #: Number of the operation that was taken alone; 0 for the whole file
+    operation_name: str = ""  #: Empty where the file gives none
 
 
 @dataclass(frozen=True)
 class Program:
     """A tool path of n poses and what is said between them.
 
-    Parameters
-    ----------
-    tip : (n, 3) float64, mm
-        Tool tip points in part coordinates.
-    axis : (n, 3) float64
-        Unit tool axis vectors from tip to spindle; always full, also where the file is modal.
-    kind : (n,) uint8
-        `Move`: how pose i is reached from pose i-1.
-    feed : (n,) float64
-        Programmed feed of the move into pose i in the unit of `feed_mode`; NaN where the file gives none.
-    line : (n,) int64
-        Source line of pose i, from 1.
-    feed_mode : (n,) uint8
-        `FeedMode` of each feed.
-    keep : (n,) uint8
-        `Keep`: reason why the pose is passed exactly, 0 for none.
-    arcs : Arcs
-        Geometry of the poses with kind `Move.ARC`.
-    statements : tuple of Statement
-        Sorted by `Statement.pose`, then by source order.
-    units : {"mm", "inch"}
-        Units of the file, and of the NC text made from it.
-    findings : tuple of Finding
-        What the reader noticed.
-
     Notes
     -----
     FEDRAT and RAPID are no statements: they are `feed` and `kind`.
     """
 
-    tip: Floats
-    axis: Floats
-    kind: NDArray[np.uint8]
+    tip: Floats  #: (n, 3), mm: Tool tip points in part coordinates
+    axis: Floats  #: (n, 3): Unit tool axis vectors from tip to spindle; always full, also where the file is modal
+    kind: NDArray[np.uint8]  #: (n,): `Move`: how pose i is reached from pose i-1
+    #: (n,): Programmed feed of the move into pose i in the unit of `feed_mode`; NaN where the file gives none.
     feed: Floats
-    line: Ints
-    feed_mode: NDArray[np.uint8]
-    keep: NDArray[np.uint8]
-    arcs: Arcs = field(default_factory=Arcs)
-    statements: tuple[Statement, ...] = ()
-    units: Units = "mm"
+    line: Ints  #: (n,): Source line of pose i, from 1
+    feed_mode: NDArray[np.uint8]  #: (n,): `FeedMode` of each feed
+    keep: NDArray[np.uint8]  #: (n,): `Keep`: reason why the pose is passed exactly, 0 for none
+    arcs: Arcs = field(default_factory=Arcs)  #: Geometry of the poses with kind `Move.ARC`
+    statements: tuple[Statement, ...] = ()  #: Sorted by `Statement.pose`, then by source order
+    units: Units = "mm"  #: Units of the file, and of the NC text made from it
     source: Source = field(default_factory=Source)
-    findings: tuple[Finding, ...] = ()
+    findings: tuple[Finding, ...] = ()  #: What the reader noticed
 
     def __post_init__(self) -> None:
         n = len(self.tip)
@@ -386,47 +327,31 @@ class Corners:
     the pose, D⁻ and D⁺ the segments to its neighbours `before` and `after`, the tip curve P has
     ``X − trim_in·D⁻, X − ratio·trim_in·D⁻, X, X + ratio·trim_out·D⁺, X + trim_out·D⁺``, and the axis-point curve Q the
     same with the axis points and `axis_trim_*`.
-
-    Parameters
-    ----------
-    pose, before, after : (k,) int64
-        The corner's pose and the distinct poses next to it.
-    status : (k,) uint8
-        `Status`.
-    limited_by : (k,) uint8
-        `LimitedBy`.
-    trim_in, trim_out : (k,) float64
-        Fraction of the tip segment taken by the transition before and after the corner; 0 where not smoothed.
-    axis_trim_in, axis_trim_out : (k,) float64
-        The same for the axis-point segments; the same numbers where one parameter drives both curves.
-    weights : (k, 2) float64
-        w1 (second and fourth control point) and w2 (third); the first and the last are 1.
-    ratio : (k,) float64
-        Distance of the second control point from the corner over that of the first; 2/3 in the paper.
-    tip_error, axis_error : (k,) float64, mm
-        Largest distance between both motions at a common parameter: at the tip, and at b = tip + H·axis. The paths
-        themselves are at least as near (`smoothing.path_distance`). With an axis tolerance the latter is what the axis
-        turns, at `Settings.axis_scale` from the tip.
-    orientation_error : (k,) float64, rad
-        Largest angle between the axis on the transition and on the original motion at the common parameter.
-    extra : mapping of str to (k,) float64
-        What only the method knows of its transitions, NaN where not smoothed; the method's module says what it is.
     """
 
+    #: (k,): The corner's pose and the distinct poses next to it.
     pose: Ints
     before: Ints
     after: Ints
-    status: NDArray[np.uint8]
-    limited_by: NDArray[np.uint8]
+    status: NDArray[np.uint8]  #: (k,): `Status`
+    limited_by: NDArray[np.uint8]  #: (k,): `LimitedBy`
+    #: (k,): Fraction of the tip segment taken by the transition before and after the corner; 0 where not smoothed.
     trim_in: Floats
     trim_out: Floats
+    #: (k,): The same for the axis-point segments; the same numbers where one parameter drives both curves.
     axis_trim_in: Floats
     axis_trim_out: Floats
-    weights: Floats
+    weights: Floats  #: (k, 2): w1 (second and fourth control point) and w2 (third); the first and the last are 1
+    #: (k,): Distance of the second control point from the corner over that of the first; 2/3 in the paper.
     ratio: Floats
+    #: (k,), mm: Largest distance between both motions at a common parameter: at the tip, and at b = tip + H·axis. The
+    #: paths themselves are at least as near (`smoothing.path_distance`). With an axis tolerance the latter is what the
+    #: axis turns, at `Settings.axis_scale` from the tip.
     tip_error: Floats
     axis_error: Floats
+    #: (k,), rad: Largest angle between the axis on the transition and on the original motion at the common parameter.
     orientation_error: Floats
+    #: What only the method knows of its transitions, NaN where not smoothed; the method's module says what it is.
     extra: Mapping[str, Floats] = field(default_factory=dict)
 
     def __len__(self) -> int:
@@ -450,30 +375,16 @@ class Runs:
     Poses and knots stand at whole steps of the parameter s, which is the six-dimensional length (docs/method.md)
     but for the rounding to `step`. Knots of a run start at 0; the first and the last stand four-fold in its knot
     vector, so a run with m + 1 knots has m + 3 control points.
-
-    Parameters
-    ----------
-    pose : (n,) int64
-        The distinct poses of all runs, first and last of each included; those two are passed exactly.
-    count : (r,) int64
-        Poses of each run.
-    s : (n,) float64, steps
-    step : float, mm
-    knot : (k,) float64, steps
-        Distinct knots of all runs.
-    knot_count : (r,) int64
-    control : (c, 6) float64, mm
-    tip_bound, axis_bound : (r,) float64, mm
-        Proven bounds of the deviation at common parameters: of the tip, and of b = tip + H·axis.
     """
 
-    pose: Ints
-    count: Ints
-    s: Floats
-    step: float
-    knot: Floats
-    knot_count: Ints
-    control: Floats
+    pose: Ints  #: (n,): The distinct poses of all runs, first and last of each included; those two are passed exactly
+    count: Ints  #: (r,): Poses of each run
+    s: Floats  #: (n,), steps
+    step: float  #: mm
+    knot: Floats  #: (k,), steps: Distinct knots of all runs
+    knot_count: Ints  #: (r,)
+    control: Floats  #: (c, 6), mm
+    #: (r,), mm: Proven bounds of the deviation at common parameters: of the tip, and of b = tip + H·axis.
     tip_bound: Floats
     axis_bound: Floats
 
@@ -483,22 +394,10 @@ class Runs:
 
 @dataclass(frozen=True)
 class SmoothProgram:
-    """A program with its rounded corners: what writers, report and feedrate planning work from.
+    """A program with its rounded corners: what writers, report and feedrate planning work from."""
 
-    Parameters
-    ----------
-    program : Program
-        The original motion.
-    settings : Settings
-        What it was made with.
-    findings : tuple of Finding
-        Those of the reader and those of the smoothing.
-    runs : Runs or None
-        Curves of whole runs; their corners have the status `Status.IN_RUN`.
-    """
-
-    program: Program
+    program: Program  #: The original motion
     corners: Corners
-    settings: Settings
-    findings: tuple[Finding, ...] = ()
-    runs: Runs | None = None
+    settings: Settings  #: What it was made with
+    findings: tuple[Finding, ...] = ()  #: Those of the reader and those of the smoothing
+    runs: Runs | None = None  #: Curves of whole runs; their corners have the status `Status.IN_RUN`

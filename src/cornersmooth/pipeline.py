@@ -45,36 +45,20 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True)
 class Result:
-    """What `postprocess` made.
-
-    Parameters
-    ----------
-    frame : Frame
-        What stands around the motion, with what the text says of how it was made.
-    verification : Verification or None
-        None where the text was not read back.
-    unverified : str
-        What of the text was not verified, and why; empty where all of it was.
-    findings : tuple of Finding
-        Everything that was noticed on the way.
-    seconds : mapping of str to float
-        Time of the stages ``read``, ``smooth``, ``write`` and ``verify``.
-    path : str or None
-        File that holds the text; None where it went to a stream, or nowhere.
-    source_sha256, sha256 : str
-        Of the CL file, empty where it is not known, and of the written program.
-    """
+    """What `postprocess` made."""
 
     program: Program
     smoothed: SmoothProgram
     form: Form
-    frame: Frame
+    frame: Frame  #: What stands around the motion, with what the text says of how it was made
     written: Written
-    verification: Verification | None
-    unverified: str
-    findings: tuple[Finding, ...]
+    verification: Verification | None  #: None where the text was not read back
+    unverified: str  #: What of the text was not verified, and why; empty where all of it was
+    findings: tuple[Finding, ...]  #: Everything that was noticed on the way
+    #: Time of the stages ``read``, ``smooth``, ``write`` and ``verify``.
     seconds: Mapping[str, float] = field(default_factory=dict)
-    path: str | None = None
+    path: str | None = None  #: File that holds the text; None where it went to a stream, or nowhere
+    #: Of the CL file, empty where it is not known, and of the written program.
     source_sha256: str = ""
     sha256: str = ""
 

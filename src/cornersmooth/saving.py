@@ -29,26 +29,13 @@ _SAME = 1e-3
 
 @dataclass(frozen=True)
 class Timing:
-    """Under which limits programs of a form are planned.
-
-    Parameters
-    ----------
-    form : Form
-    settings : Settings
-        Those the program is smoothed with.
-    limits : Limits
-        Of the tip.
-    machine : Machine
-        Limits of the axes.
-    blocks : BlockLimits
-        What the control makes of blocks.
-    """
+    """Under which limits programs of a form are planned."""
 
     form: Form
-    settings: Settings
-    limits: Limits
-    machine: Machine
-    blocks: BlockLimits
+    settings: Settings  #: Those the program is smoothed with
+    limits: Limits  #: Of the tip
+    machine: Machine  #: Limits of the axes
+    blocks: BlockLimits  #: What the control makes of blocks
 
     @classmethod
     def of(

@@ -24,77 +24,55 @@ def _setting(default: Any, low: float, high: float, unit: str = "") -> Any:
 
 @dataclass(frozen=True)
 class Settings:
-    """What `cornersmooth.smooth` promises and how it goes about it. Lengths in mm, angles in degrees.
+    """What `cornersmooth.smooth` promises and how it goes about it. Lengths in mm, angles in degrees."""
 
-    Parameters
-    ----------
-    tolerance : float, mm
-        ε: bound on the deviation of the written tip path and axis-point path (docs/method.md).
-    axis_length : float, mm
-        H: distance of the axis point from the tip. Choose the length of the cutting edge. An axis tolerance takes its
-        place: H follows from it then, whatever is given.
-    axis_tolerance : float or None, degrees
-        τ: in place of ε at the axis point, what the tool axis may be off where the tip is within ε.
-    method : str
-        A name in `cornersmooth.methods.METHODS`, or "auto" for what suits the form: global in curves, if nothing that
-        is given is against it, else proportional.
-    weights : (float, float)
-        w1 and w2 of the five-point curve, in (0, 3]; rounded to the three decimals that controls accept.
-    ratio : float
-        Second control point over first, in [0.5, 0.9]; the paper's 2/3 divides the leg so that knots need no care.
-    reversal_angle : float, degrees
-        A corner that turns by more (in the six-dimensional sense) stays sharp.
-    max_axis_step : float, degrees
-        A corner next to a segment whose axis turns by more stays sharp: the ruled motion is not a motion any more.
-    chord_tolerance : float or None, mm
-        Largest distance between the written lines and the curve in dense output; None for a tenth of ε, at most
-        0.0005 mm.
-    block_time : float or None, s
-        Shortest time in which the control takes a block: dense lines follow the curves as closely as 0.00005 mm where
-        none is passed sooner at the programmed feed. 0 for lines by the chord tolerance alone; None for what the
-        control's table says, and without a control 0.
-    axis_step : float or None, degrees
-        Largest change of axis in one written line next to a rounded corner; None for what ε and H ask for.
-    lines : {"dense", "long"} or None
-        Whether lines follow the curves closely, or are as few as ε allows; None for what suits the control.
-    curve_share, line_share : float
-        Parts of what the rounding of the digits leaves of ε: for the curves, and for long lines along them. What is
-        left of `line_share` is for what the control does to lines by itself.
-    blend_share : float
-        Part of ε within which the control is told to round the corners of lines by itself, where it can be told.
-    round_feed_changes : bool
-        Whether a corner where the feed changes may be rounded; false for output that cannot change F inside a curve,
-        and has no curves at a feed per revolution.
-    tip_resolution : float, mm
-        Step of the written tip coordinates; half of it per axis is taken off ε. 0 for no rounding.
-    axis_point_resolution : float, mm
-        Step of the written axis points, or of the written vectors times H.
-    duplicate_distance : float, mm
-        Poses closer than this, in tip and axis point, are one pose.
-    shortest_line : float, mm
-        A straight remainder shorter than this between two transitions is not written as a line of its own.
-    """
-
+    #: mm: ε: bound on the deviation of the written tip path and axis-point path (docs/method.md).
     tolerance: float = _setting(0.01, 1e-6, 10.0, "mm")
+    #: mm: H: distance of the axis point from the tip. Choose the length of the cutting edge. An axis tolerance takes
+    #: its place: H follows from it then, whatever is given.
     axis_length: float = _setting(10.0, 1e-3, 1e4, "mm")
+    #: degrees: τ: in place of ε at the axis point, what the tool axis may be off where the tip is within ε.
     axis_tolerance: float | None = _setting(None, 1e-4, 45.0, "deg")
+    #: A name in `cornersmooth.methods.METHODS`, or "auto" for what suits the form: global in curves, if nothing that
+    #: is given is against it, else proportional.
     method: str = AUTO
+    #: w1 and w2 of the five-point curve, in (0, 3]; rounded to the three decimals that controls accept.
     weights: tuple[float, float] = _setting((1.0, 1.0), 0.001, 3.0)
+    #: Second control point over first, in [0.5, 0.9]; the paper's 2/3 divides the leg so that knots need no care.
     ratio: float = _setting(2.0 / 3.0, 0.5, 0.9)
+    #: degrees: A corner that turns by more (in the six-dimensional sense) stays sharp.
     reversal_angle: float = _setting(170.0, 1.0, 180.0, "deg")
+    #: degrees: A corner next to a segment whose axis turns by more stays sharp: the ruled motion is not a motion any
+    #: more.
     max_axis_step: float = _setting(90.0, 1.0, 90.0, "deg")
+    #: mm: Largest distance between the written lines and the curve in dense output; None for a tenth of ε, at most
+    #: 0.0005 mm.
     chord_tolerance: float | None = _setting(None, 1e-7, 1.0, "mm")
+    #: s: Shortest time in which the control takes a block: dense lines follow the curves as closely as 0.00005 mm
+    #: where none is passed sooner at the programmed feed. 0 for lines by the chord tolerance alone; None for what the
+    #: control's table says, and without a control 0.
     block_time: float | None = _setting(None, 0.0, 1.0, "s")
+    #: degrees: Largest change of axis in one written line next to a rounded corner; None for what ε and H ask for.
     axis_step: float | None = _setting(None, 1e-3, 90.0, "deg")
+    #: Whether lines follow the curves closely, or are as few as ε allows; None for what suits the control.
     lines: Lines | None = None
+    #: Parts of what the rounding of the digits leaves of ε: for the curves, and for long lines along them. What is
+    #: left of `line_share` is for what the control does to lines by itself.
     curve_share: float = _setting(1.0, 0.01, 1.0)
     line_share: float = _setting(1.0, 0.01, 1.0)
+    #: Part of ε within which the control is told to round the corners of lines by itself, where it can be told.
     blend_share: float = _setting(0.1, 0.0, 1.0)
+    #: Whether a corner where the feed changes may be rounded; false for output that cannot change F inside a curve,
+    #: and has no curves at a feed per revolution.
     round_feed_changes: bool = True
     # what forms in rotary words take off for them grows with the tolerance
+    #: mm: Step of the written tip coordinates; half of it per axis is taken off ε. 0 for no rounding.
     tip_resolution: float = _setting(0.0, 0.0, 10.0, "mm")
+    #: mm: Step of the written axis points, or of the written vectors times H.
     axis_point_resolution: float = _setting(0.0, 0.0, 10.0, "mm")
+    #: mm: Poses closer than this, in tip and axis point, are one pose.
     duplicate_distance: float = _setting(1e-6, 0.0, 0.01, "mm")
+    #: mm: A straight remainder shorter than this between two transitions is not written as a line of its own.
     shortest_line: float = _setting(1e-3, 0.0, 1.0, "mm")
 
     def __post_init__(self) -> None:

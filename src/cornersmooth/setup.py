@@ -47,14 +47,9 @@ _DIGITS: Final = 2
 
 @dataclass(frozen=True)
 class Setup:
-    """How the part is clamped: turned about Z, then tilted about X, then about Y, the axes of the machine.
+    """How the part is clamped: turned about Z, then tilted about X, then about Y, the axes of the machine."""
 
-    Parameters
-    ----------
-    turn, tilt_x, tilt_y : float, degrees
-        Right-handed, as the part is seen to turn.
-    """
-
+    #: degrees: Right-handed, as the part is seen to turn.
     turn: float = 0.0
     tilt_x: float = 0.0
     tilt_y: float = 0.0
@@ -75,23 +70,12 @@ class Setup:
 
 @dataclass(frozen=True)
 class Rating:
-    """What a setup is worth.
-
-    Parameters
-    ----------
-    setup : Setup
-    estimate : float, s
-        Only to compare with others; infinite where the machine does not reach a pose.
-    seconds : float, s
-        Of the program as it is written; NaN where it was not planned, or is out of reach.
-    why : str
-        What is out of reach.
-    """
+    """What a setup is worth."""
 
     setup: Setup
-    estimate: float
-    seconds: float = math.nan
-    why: str = ""
+    estimate: float  #: s: Only to compare with others; infinite where the machine does not reach a pose
+    seconds: float = math.nan  #: s: Of the program as it is written; NaN where it was not planned, or is out of reach
+    why: str = ""  #: What is out of reach
 
     @property
     def rank(self) -> tuple[bool, float, float]:
@@ -102,23 +86,12 @@ class Rating:
 
 @dataclass(frozen=True)
 class Setups:
-    """What was found.
+    """What was found."""
 
-    Parameters
-    ----------
-    pivot : (3,) float64, mm
-        The point of the part that stays where it is: the middle of the cuts.
-    today : Rating
-        The part as it is.
-    best : tuple of Rating
-        Others that were planned, the fastest first; those out of reach are not among them.
-    tried, out_of_reach : int
-        Setups that were estimated, and those of them beyond the axes of the machine.
-    """
-
-    pivot: Floats
-    today: Rating
-    best: tuple[Rating, ...]
+    pivot: Floats  #: (3,), mm: The point of the part that stays where it is: the middle of the cuts
+    today: Rating  #: The part as it is
+    best: tuple[Rating, ...]  #: Others that were planned, the fastest first; those out of reach are not among them
+    #: Setups that were estimated, and those of them beyond the axes of the machine.
     tried: int
     out_of_reach: int
 
