@@ -259,33 +259,19 @@ _COLUMNS: Final = (
 
 @dataclass(frozen=True, kw_only=True)
 class NcProgram(Elements):
-    """An NC text as a control understands it: path elements and what stands between them.
+    """An NC text as a control understands it: path elements and what stands between them."""
 
-    Parameters
-    ----------
-    events : tuple of Event
-        In the order of the text.
-    problems : tuple of Problem
-        What breaks the rules of the control.
-    units : {"mm", "inch"}
-    blocks : int
-        Number of blocks that are not empty, ``%`` and comments left out.
-    unsaid : frozenset
-        Kinds of tokens (see `statements`), or pairs of kind and value, that the control has no words for.
-    along_tool : tuple of (int, bool)
-        Rapids straight along the tool beside retracts, which posts add: the element, and whether it goes back to the
-        retract from the element before or down from it to the element behind.
-    left_cuts : tuple of (int, int, int, int)
-        Cuts that are left along the tool for a retract and gone on with: the elements along the tool, out and above,
-        and NC lines of leaving and of coming back.
-    """
-
-    events: tuple[Event, ...]
-    problems: tuple[Problem, ...]
+    events: tuple[Event, ...]  #: in the order of the text
+    problems: tuple[Problem, ...]  #: what breaks the rules of the control
     units: Units
-    blocks: int
+    blocks: int  #: those that are not empty, ``%`` and comments left out
+    #: kinds of tokens (see `statements`), or pairs of kind and value, that the control has no words for
     unsaid: frozenset[str | tuple[str, float]] = frozenset()
+    #: rapids straight along the tool beside retracts, which posts add: the element, and whether it goes back to the
+    #: retract from the element before or down from it to the element after it
     along_tool: tuple[tuple[int, bool], ...] = ()
+    #: cuts that are left along the tool for a retract and gone on with: the elements along the tool, out and above, and
+    #: NC lines of leaving and of coming back
     left_cuts: tuple[tuple[int, int, int, int], ...] = ()
 
     @property

@@ -43,13 +43,26 @@ class Around:
     reached: list[Reached] = field(default_factory=list)  #: row by row of the space, from that place on
 
     @classmethod
-    def of(cls, rows: Rows, path: Path, radius: float, start: float, top: int) -> Around:
-        """Rows against the path from the place of the first up to a vertex."""
+    def of(
+        cls, rows: Rows, path: Path, radius: float, start: float, top: int, inner: Inner | None, *, fine: bool
+    ) -> Around:
+        """Rows against the path from the place of the first up to a vertex.
+
+        Their bends are taken off the radius; `fine`: bent steps and segments are divided before.
+        """
         base = min(int(start), top - 1)
-        vertices = slice(base, top + 1)
-        space = FreeSpace(rows.own.T, path.points[vertices].T, radius, rows.bend, path.bend[base:top])
-        places = np.arange(base, top + 1, dtype=np.float64)
-        return cls(space, rows.begin, np.arange(len(rows.own)), places, start)
+        theirs = _parts(path.bend[base:top], radius if fine else np.inf)
+        ours = _parts(rows.bend, radius if fine and inner is not None else np.inf)
+        places = _divided(np.arange(base, top + 1, dtype=np.float64), theirs)
+        at = np.append(0, np.cumsum(ours))
+        own = np.empty((rows.own.shape[1], at[-1] + 1))
+        own[:, at] = rows.own.T
+        between = np.setdiff1d(np.arange(at[-1] + 1), at, assume_unique=True)
+        if inner is not None and len(between):
+            own[:, between] = inner(_divided(rows.number, ours)[between]).T
+        points = path.at(places) if fine else path.points[base : top + 1]
+        bends = np.repeat(rows.bend / ours**2, ours), np.repeat(path.bend[base:top] / theirs**2, theirs)
+        return cls(FreeSpace(own, points.T, radius, *bends), rows.begin, at, places, start)
 
     @property
     def base(self) -> int:
@@ -73,22 +86,6 @@ class Around:
         last = max(max(row, default=0) for row in self.reached) + 2
         largest = max(self.space.path_bend[:last].max(), self.space.own_bend[: len(self.reached)].max(initial=0.0))
         return bool(largest > FINE * self.space.radius)
-
-    def finer(self, rows: Rows, path: Path, inner: Inner | None) -> Around:
-        """The same with bent steps and segments divided, as their bends are taken off the radius."""
-        space, radius = self.space, self.space.radius
-        theirs = _parts(space.path_bend, radius)
-        places, path_bend = _divided(self.places, theirs), np.repeat(space.path_bend / theirs**2, theirs)
-        ours = _parts(space.own_bend, radius) if inner is not None else np.ones(len(space.own_bend), np.int64)
-        at = np.append(0, np.cumsum(ours))
-        own = np.empty((len(space.own), at[-1] + 1))
-        own[:, at] = space.own
-        between = np.setdiff1d(np.arange(at[-1] + 1), at, assume_unique=True)
-        if inner is not None and len(between):
-            own[:, between] = inner(_divided(rows.number, ours)[between]).T
-        own_bend = np.repeat(space.own_bend / ours**2, ours)
-        finer = FreeSpace(own, path.at(places).T, radius, own_bend, path_bend)
-        return Around(finer, self.begin, at, places, self.start)
 
     def inward(self, place: float) -> float:
         """A place of the whole path, counted here."""

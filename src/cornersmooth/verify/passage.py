@@ -237,15 +237,14 @@ class _Part:
             until = end if back > _SOON else min(last + _SOON, end)
             rows = Rows(begin, *(values[begin : until + 1] for values in (self.own, self.bend[:until], self.number)))
             top = self._within_reach(begin, until, stop)
-            around = Around.of(rows, self.path, self.radius, float(self.place[begin]), top)
             ends = -1 if until < end else None if unfinished else stop
-            places = self.place[begin : until + 1]
-            goal = around.goal(places, last - begin, ends)
-            if goal is None and around.bent:
-                around = around.finer(rows, self.path, inner)
-                goal = around.goal(places, last - begin, ends)
-            if goal is not None:
-                return self._settle(around, goal)
+            for fine in (False, True):
+                around = Around.of(rows, self.path, self.radius, float(self.place[begin]), top, inner, fine=fine)
+                goal = around.goal(self.place[begin : until + 1], last - begin, ends)
+                if goal is not None:
+                    return self._settle(around, goal)
+                if not around.bent:
+                    break
             if not around.reached[0] and begin not in (known, 0):  # what bends take off leaves nothing of that place
                 continue
             if around.reached[-1] and until < end:

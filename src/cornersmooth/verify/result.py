@@ -166,12 +166,9 @@ class Verification:
         problems: list[Problem],
         *,
         task: Task,
-        poses: int,
-        blocks: int,
-        elements: int,
-        curves: int,
+        **counts: Any,
     ) -> Verification:
-        """Make it of what was found, of the poses that were passed, and of all problems."""
+        """Make it of what was found, of the poses that were passed, of all problems, and of fields that are counted."""
         problems = sorted(problems, key=lambda problem: (problem.nc_line, problem.cl_line))
         kept: list[Problem] = []
         count: dict[str, int] = {}
@@ -196,10 +193,7 @@ class Verification:
             orientation=orientation,
             problems=tuple(kept),
             problem_count=len(problems),
-            blocks=blocks,
-            elements=elements,
-            curves=curves,
-            poses=poses,
+            poses=len(passed.tip),
             shortest=_where(continuity.shortest, -continuity.shortest.value),
             tangent_jump=_where(continuity.tangent, tangent),
             curvature_jump=_where(continuity.curvature),
@@ -207,6 +201,7 @@ class Verification:
             pose_axis_point=passed.axis_point,
             pose_angle=np.degrees(passed.angle),
             pose_nc_line=passed.nc_line,
+            **counts,
         )
 
 

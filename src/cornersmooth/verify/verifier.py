@@ -5,9 +5,9 @@ from __future__ import annotations
 import contextlib
 import os
 from collections.abc import Iterator, Sequence, Set
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Final, Self
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, Self
 
 import numpy as np
 
@@ -204,12 +204,10 @@ class Verifier:
     def _of_read(self, nc: NcProgram) -> Verification:
         task = self._task(rotary=nc.rotary)
         elements, events = OwnRapids(task).left_out(nc)
-        text = _Text(iter([elements.at_most() if self._slower else elements]), events)
-        measured = _measure(task, text, words=self._words, processes=self._processes)
-        measured.skip_cycles = self._skip_cycles
-        found = measured.verification(list(nc.problems), nc.units, nc.unsaid, blocks=nc.blocks, curves=len(nc.curves))
-        found = found.not_verified("the words of the text: they are looked at where it is read, not afterwards")
-        return replace(found, rewinds=tuple((out, back) for *_, out, back in nc.left_cuts))
+        measured = self._measured(task, iter([elements]), events)
+        said = _Said(list(nc.problems), nc.units, nc.unsaid, nc.blocks, len(nc.curves), nc.left_cuts)
+        found = self._verification(measured, said)
+        return found.not_verified("the words of the text: they are looked at where it is read, not afterwards")
 
     def _of_text(self, source: Source) -> Verification:
         options = self._options
@@ -233,30 +231,90 @@ class Verifier:
         own_rapids = OwnRapids(task)
         reader.retracts.added, reader.retracts.asked = own_rapids.added, own_rapids.goes_to
         chunks = reader.chunks(check.watch(lines) if self._words else lines)
-        text = _Text((part.at_most() for part in chunks) if self._slower else chunks, reader.events)
-        measured = _measure(task, text, words=self._words, processes=self._processes)
-        problems = [*reader.problems, *check.problems]
-        own = KINDS & set(self._trusted)
-        measured.own, measured.clamps, measured.skip_cycles = own, self._clamps, self._skip_cycles
-        measured.coarse = reader.coarse
+        measured = self._measured(task, chunks, reader.events)
         measured.findings.unlooked += reader.unlooked
-        found = measured.verification(
-            problems, reader.units, reader.dialect.unsaid, blocks=reader.blocks, curves=reader.curves
+        said = _Said(
+            [*reader.problems, *check.problems],
+            reader.units,
+            reader.dialect.unsaid,
+            reader.blocks,
+            reader.curves,
+            reader.retracts.left_cuts,
+            reader.coarse,
         )
-        rewinds = tuple((out, back) for *_, out, back in reader.retracts.left_cuts)
-        trusted = [(0, _own_table(own - _OF_MOTION))] if own - _OF_MOTION else []
-        found = found.not_verified(self._unverified(check, own))
-        return replace(found, trusted=(*trusted, *check.trusted), rewinds=rewinds)
+        found = self._verification(measured, said).not_verified(self._unverified(check))
+        beside = self._own_kinds - _OF_MOTION
+        return replace(found, trusted=(*([(0, _own_table(beside))] if beside else []), *check.trusted))
 
-    def _unverified(self, check: WordCheck, own: Set[str]) -> str:
+    def _measured(self, task: Task, chunks: Iterator[Elements], events: list[Event]) -> _Measured:
+        """Match and measure all that is read."""
+        found = _Measured(task, Batches(task, events), WordPlaces(task, events), Poses.nowhere(len(self._program)))
+        if self._slower:
+            chunks = (part.at_most() for part in chunks)
+
+        def items() -> Iterator[tuple[Batch, Ints, Largest]]:
+            for batch in found.batches.of(found.places.watch(chunks)):
+                with_words = found.places.elements(batch.offset, batch.offset + batch.last)
+                yield batch, with_words, found.findings.largest.copy()
+
+        def work(item: tuple[Batch, Ints, Largest]) -> Examined:
+            return examine(task, *item)
+
+        for examined in map_in_processes(work, items(), self._processes):
+            for poses in examined.findings.poses:
+                found.poses.put(poses)
+            examined.findings.poses = []
+            found.findings.take(examined.findings)
+            found.places.take(examined)
+        return found
+
+    def _verification(self, measured: _Measured, said: _Said) -> Verification:
+        """Put everything together."""
+        program, batches, findings = self._program, measured.batches, measured.findings
+        problems = [problem for problem in said.problems if self._words or problem.code != CONTROL_WORDS]
+        if said.units != program.units:
+            text = f"the program is in {said.units}, the CL file in {program.units}"
+            problems.append(Problem("CS505", 0, 1, text))
+        problems += batches.problems + findings.feeds.problems + problems_of(findings.violations)
+        problems += half_turns(program)
+        if not self._skip_cycles:
+            problems += batches.left_out
+        if self._words and batches.elements:  # without any motion nothing has a place
+            of_statements, at_home = measured.places.problems(batches, said.unsaid, self._own_kinds, self._clamps)
+            problems = [one for one in problems if one.text != GONE_ON or one.nc_line not in at_home] + of_statements
+        if said.coarse:  # a pose missed within the tolerance where digits are too few for it is not verified
+            limit = measured.task.tolerance
+            missed = [one for one in problems if one.code in ("CS524", "CS531") and one.amount <= limit]
+            text = f"exact poses: the digits are too few for {limit:g} mm"
+            findings.unlooked += [(one.nc_line, text) for one in missed]
+            problems = [one for one in problems if one not in missed] if missed else problems
+        found = Verification.of(
+            findings,
+            measured.poses,
+            problems,
+            task=measured.task,
+            blocks=said.blocks,
+            elements=batches.elements,
+            curves=said.curves,
+            left_out=len(batches.left_out) if self._skip_cycles else 0,
+            rewinds=tuple((out, back) for *_, out, back in said.left_cuts),
+        )
+        return found.not_verified(*_texts(findings.unlooked))
+
+    @property
+    def _own_kinds(self) -> frozenset[str]:
+        """Kinds of statements that the user says in words of his own."""
+        return KINDS & set(self._trusted)
+
+    def _unverified(self, check: WordCheck) -> str:
         """What of the text was not looked at and may bear on the motion."""
         if not self._words:
             return "words beside the motion, which a table of your own may define"
         unsure = [f"{block}, NC line {line}" for line, block in check.unsure[:_UNSURE_TOLD]]
         if len(check.unsure) > _UNSURE_TOLD:
             unsure.append(f"{len(check.unsure) - _UNSURE_TOLD} more blocks of your own")
-        if own & _OF_MOTION:
-            unsure.append(_own_table(own & _OF_MOTION))
+        if moving := self._own_kinds & _OF_MOTION:
+            unsure.append(_own_table(moving))
         return "; ".join(unsure)
 
 
@@ -281,75 +339,27 @@ def verify(*args: Any, **how: Any) -> Verification:
         return verifier.result()
 
 
+class _Said(NamedTuple):
+    """What a text says of itself, when it has been read; as of `NcProgram`."""
+
+    problems: list[Problem]
+    units: Units
+    unsaid: frozenset[str | tuple[str, float]]
+    blocks: int
+    curves: int  #: how many
+    left_cuts: Sequence[tuple[int, int, int, int]]
+    coarse: int = 0  #: NC line from which on digits are too few for the tolerance; 0 for none
+
+
 @dataclass(frozen=True)
-class _Text:
-    """The path elements of a text as they are read, and the words between those that have been given out."""
-
-    chunks: Iterator[Elements]
-    events: list[Event]
-
-
-@dataclass
 class _Measured:
     """What all batches show together."""
 
     task: Task
     batches: Batches
-    findings: Findings
-    poses: Poses  #: of the whole CL program
     places: WordPlaces
-    words: bool
-    own: frozenset[str] = frozenset()  #: kinds of statements that the user says in words of his own
-    clamps: frozenset[float] = frozenset()  #: M words that clamp a rotary axis or let it turn
-    skip_cycles: bool = False  #: whether holes may be left out
-    coarse: int = 0  #: NC line from which on digits are too few for the tolerance; 0 for none
-
-    def verification(
-        self,
-        problems: list[Problem],
-        units: Units,
-        unsaid: frozenset[str | tuple[str, float]],
-        *,
-        blocks: int,
-        curves: int,
-    ) -> Verification:
-        """Put everything together; `problems` are those of the text alone, the rest is as of `NcProgram`."""
-        program = self.task.original.program
-        problems = [problem for problem in problems if self.words or problem.code != CONTROL_WORDS]
-        if units != program.units:
-            text = f"the program is in {units}, the CL file in {program.units}"
-            problems.append(Problem("CS505", 0, 1, text))
-        problems += self.batches.problems + self.findings.feeds.problems + problems_of(self.findings.violations)
-        problems += half_turns(program)
-        left_out = self.batches.left_out
-        if not self.skip_cycles:
-            problems += left_out
-        if self.words and self.batches.elements:  # without any motion nothing has a place
-            of_statements, at_home = self.places.problems(self.batches, unsaid, self.own, self.clamps)
-            problems = [one for one in problems if one.text != GONE_ON or one.nc_line not in at_home] + of_statements
-        problems = self._told_by_digits(problems)
-        found = Verification.of(
-            self.findings,
-            self.poses,
-            problems,
-            task=self.task,
-            poses=len(program),
-            blocks=blocks,
-            elements=self.batches.elements,
-            curves=curves,
-        )
-        found = replace(found, left_out=len(left_out) if self.skip_cycles else 0)
-        return found.not_verified(*_texts(self.findings.unlooked))
-
-    def _told_by_digits(self, problems: list[Problem]) -> list[Problem]:
-        """Take out poses missed within the tolerance where digits are too few for it: these are not verified."""
-        if not self.coarse:
-            return problems
-        limit = self.task.tolerance
-        missed = [one for one in problems if one.code in ("CS524", "CS531") and one.amount <= limit]
-        text = f"exact poses: the digits are too few for {limit:g} mm"
-        self.findings.unlooked += [(one.nc_line, text) for one in missed]
-        return [one for one in problems if one not in missed] if missed else problems
+    poses: Poses  #: of the whole CL program
+    findings: Findings = field(default_factory=Findings)
 
 
 def _texts(unlooked: list[tuple[int, str]]) -> list[str]:
@@ -363,29 +373,6 @@ def _texts(unlooked: list[tuple[int, str]]) -> list[str]:
         f"{text} at NC line {line}" + (f" and {count[text] - 1:,} more places" if count[text] > 1 else "")
         for text, line in first.items()
     ]
-
-
-def _measure(task: Task, text: _Text, *, words: bool, processes: int) -> _Measured:
-    """Match and measure all that is read."""
-    batches = Batches(task, text.events)
-    places = WordPlaces(task, text.events)
-    found = _Measured(task, batches, Findings(), Poses.nowhere(len(task.original.program)), places, words)
-
-    def items() -> Iterator[tuple[Batch, Ints, Largest]]:
-        for batch in batches.of(places.watch(text.chunks)):
-            with_words = places.elements(batch.offset, batch.offset + batch.last)
-            yield batch, with_words, found.findings.largest.copy()
-
-    def work(item: tuple[Batch, Ints, Largest]) -> Examined:
-        return examine(task, *item)
-
-    for examined in map_in_processes(work, items(), processes):
-        for poses in examined.findings.poses:
-            found.poses.put(poses)
-        examined.findings.poses = []
-        found.findings.take(examined.findings)
-        places.take(examined)
-    return found
 
 
 def _check_bounds(**values: float) -> None:
