@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cornersmooth.model import Floats, Ints, SmoothProgram
+from cornersmooth.slices import joined_rows
 from cornersmooth.smoothing.sampling import dense_rows
 
 
@@ -50,8 +51,7 @@ def sample(smoothed: SmoothProgram, *, chord: float | None = None) -> PathPoints
     """
     if chord is not None:
         smoothed = replace(smoothed, settings=smoothed.settings.but(chord_tolerance=chord))
-    blocks = list(dense_rows(smoothed))
-    if not blocks:
-        return PathPoints(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(0, np.uint8))
-    tip, axis, pose = (np.concatenate([getattr(rows, name) for rows in blocks]) for name in ("tip", "other", "move"))
-    return PathPoints(tip, axis, pose, smoothed.program.kind[pose])
+    kind = smoothed.program.kind
+    none = PathPoints(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, np.int64), kind[:0])
+    some = (PathPoints(rows.tip, rows.other, rows.move, kind[rows.move]) for rows in dense_rows(smoothed))
+    return joined_rows((none, *some))

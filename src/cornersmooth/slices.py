@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import fields, replace
 from typing import Any, TypeVar
 
@@ -17,6 +18,13 @@ def some_rows(columns: Columns, which: slice | Bools | Ints) -> Columns:
     arrays = {item.name: getattr(columns, item.name) for item in fields(columns)}  # type: ignore[arg-type]
     own: dict[str, Any] = {name: column[which] for name, column in arrays.items() if isinstance(column, np.ndarray)}
     return replace(columns, **own)  # type: ignore[type-var]
+
+
+def joined_rows(parts: Iterable[Columns]) -> Columns:
+    """Rows of some such dataclasses, one or more, after one another; what is no array is that of the first."""
+    some = list(parts)
+    names = [name for name, column in vars(some[0]).items() if isinstance(column, np.ndarray)]
+    return replace(some[0], **{name: np.concatenate([getattr(one, name) for one in some]) for name in names})  # type: ignore[type-var]
 
 
 def some_poses(program: Program, first: int, stop: int) -> Program:

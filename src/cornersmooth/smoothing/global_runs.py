@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from cornersmooth.geometry.ragged import batches, ranges, spread, starts
 from cornersmooth.model import Bools, Corners, Floats, Ints, LimitedBy, Program, Runs, SmoothProgram, Status, Trait
 from cornersmooth.processes import map_in_processes
 from cornersmooth.settings import Settings
-from cornersmooth.slices import some_runs
+from cornersmooth.slices import joined_rows, some_runs
 from cornersmooth.smoothing.construction import RUN_CURVATURE, place_corners, with_rows
 from cornersmooth.smoothing.neighbours import find_neighbours
 from cornersmooth.smoothing.proportional import Proportional
@@ -62,18 +61,13 @@ class GlobalRuns(Proportional):
             poses, runs = pose[begin[number] : begin[number + 1]], count[first[number] : first[number + 1]]
             return _solve(program, settings, poses, runs, *((progress, processes) if alone else (None, 1)))
 
-        parts: dict[str, list[Any]] = {item.name: [] for item in fields(Runs)}
-        left = [pose[:0]]
+        parts: list[_Solved] = []
         for number, solved in enumerate(map_in_processes(solve, range(len(first) - 1), 1 if alone else processes)):
             _mark(corners, solved)
-            left.append(solved.left)
-            for name, columns in parts.items():
-                columns.append(getattr(solved.runs, name))
+            parts.append(solved)
             if progress is not None:
                 progress(int(begin[number + 1]), len(pose))
-        alike: dict[str, Any] = {"step": parts.pop("step")[0]}
-        runs = Runs(**alike | {name: np.concatenate(parts.pop(name)) for name in tuple(parts)})
-        lost = np.concatenate(left)
+        runs, lost = joined_rows(part.runs for part in parts), np.concatenate([part.left for part in parts])
         if len(lost):
             text = "corner rounded by itself: the curves of its run were not proved to keep the tolerance"
             findings = (*findings, Finding("CS226", "note", int(program.line[lost[0]]), text, len(lost)))

@@ -16,8 +16,9 @@ from cornersmooth.geometry import nurbs
 from cornersmooth.geometry.arcs import arc_lines, arc_points, divided
 from cornersmooth.geometry.ragged import ranges, starts
 from cornersmooth.model import Bools, Floats, Ints, SmoothProgram
+from cornersmooth.slices import joined_rows
 from cornersmooth.smoothing.construction import construction_of
-from cornersmooth.smoothing.runs.rows import SectionRows, run_lines, section_rows, some_at_once
+from cornersmooth.smoothing.runs.rows import NO_ROWS, SectionRows, run_lines, section_rows, some_at_once
 from cornersmooth.smoothing.segments import Segments, lines_per_half, segments_of
 from cornersmooth.vectors import unit
 
@@ -129,11 +130,11 @@ def _of_runs(smoothed: SmoothProgram, *, curves: bool) -> tuple[SectionRows, Boo
     program, runs = smoothed.program, smoothed.runs
     replaced = np.zeros(len(program), np.bool_)
     if runs is None:
-        return SectionRows.joined([]), replaced
+        return NO_ROWS, replaced
     replaced[np.delete(runs.pose, starts(runs.count)[:-1])] = True
     parts = some_at_once(runs)
     made = (section_rows(p, program) if curves else run_lines(p, program, smoothed.settings) for p in parts)
-    return SectionRows.joined(made), replaced
+    return joined_rows(made), replaced
 
 
 def _batches(counts: Ints, poses: int, *, curves: bool) -> Iterator[_Batch]:

@@ -38,10 +38,6 @@ class EnvelopePoints:
     def __len__(self) -> int:
         return len(self.station)
 
-    def chosen(self, rows: Ints) -> EnvelopePoints:
-        """Some of them."""
-        return EnvelopePoints(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
-
 
 def envelope_points(
     motion: RuledMotion, tool: Tool, edge: float, *, levels: int = 7, stations: int = 2000

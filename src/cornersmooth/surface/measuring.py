@@ -10,6 +10,7 @@ import numpy as np
 from cornersmooth.errors import SettingsError
 from cornersmooth.model import Bools, Floats, Program
 from cornersmooth.nc_reader import NcProgram
+from cornersmooth.slices import some_rows
 from cornersmooth.surface.distance import distance_to_motion
 from cornersmooth.surface.envelope import EnvelopePoints, envelope_points
 from cornersmooth.surface.motion import original_cuts, written_cuts
@@ -133,7 +134,7 @@ def measure_surface(
     own = distance_to_motion(points.point, original, tool, edge, reach=reach)
     on = own > -BURIED  # never NaN: the point is on the tool somewhere
     rows = np.flatnonzero(on)
-    points, own = points.chosen(rows), own[rows]
+    points, own = some_rows(points, rows), own[rows]
     off = distance_to_motion(points.point, written, tool, edge, reach=reach) - own
     passes = neighbouring_passes(original, written, tool.corner_radius, tool.diameter, stations=stations)
     return SurfaceMap(points, off, tool, edge, tolerance, reach, int(np.count_nonzero(~on)), passes)

@@ -19,11 +19,13 @@ import numpy as np
 from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.geometry.ragged import ranges, spread, starts
 from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.slices import some_rows
 from cornersmooth.smoothing.runs.banded import TAPS, Gather
 from cornersmooth.smoothing.runs.fitting import holding_poses
-from cornersmooth.smoothing.runs.interior import COLD, WARM, Task, dot, smoothest
+from cornersmooth.smoothing.runs.interior import COLD, WARM, Task, smoothest
 from cornersmooth.smoothing.runs.polylines import Pieces, Polylines, Samples
 from cornersmooth.smoothing.runs.windows import Windows
+from cornersmooth.vectors import dot, norm
 
 #: share of the tolerance that the samples may use
 SHARE = 0.97
@@ -181,7 +183,7 @@ class _Places:
         splines, pieces = problem.splines, problem.pieces
         number = problem.first_piece[windows.span + 1] - problem.first_piece[windows.span]
         rows = ranges(problem.first_piece[windows.span], number)
-        own = pieces.only(rows)
+        own = some_rows(pieces, rows)
         samples = Samples.of(splines, problem.lines, own)
         span = np.repeat(np.arange(len(windows.span)), number)[samples.piece]
         begins = np.concatenate(([True], samples.piece[1:] != samples.piece[:-1]))
@@ -191,7 +193,7 @@ class _Places:
         near = Gather(windows.local[span], samples.basis, len(windows.control))
         smooth = Gather(windows.local, splines.third[windows.span], len(windows.control))
         lever = samples.target[:, 3:] - samples.target[:, :3]
-        length = np.sqrt(dot(lever, lever))
+        length = norm(lever)
         rough = (near.apply(problem.rough[windows.control]) - samples.target) / np.repeat(problem.tolerances, 3)
         axis, short = lever / length[:, None], length / problem.axis_length
         normal = problem.normal[splines.span_run[windows.span[span]]]

@@ -7,6 +7,7 @@ import numpy as np
 from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.geometry.ragged import ranges, spread
 from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.slices import some_rows
 from cornersmooth.smoothing.runs.banded import Gather, applied, solve_scalar
 from cornersmooth.smoothing.runs.polylines import Pieces, Polylines, Samples
 from cornersmooth.smoothing.runs.windows import Windows
@@ -49,7 +50,7 @@ def fit(lines: Polylines, tolerances: tuple[float, float]) -> tuple[Splines, Flo
         windows = Windows.where(splines, active)
         pieces = Pieces.of(splines, lines)
         rows = np.flatnonzero(active[pieces.span])
-        samples = Samples.of(splines, lines, pieces.only(rows))
+        samples = Samples.of(splines, lines, some_rows(pieces, rows))
         control = _least_squares(splines, windows, samples, control)
         off[active] = _largest(splines, samples, control, tolerances)[active]
         close = np.where(holding_poses(splines, lines), CLOSE_TO_POSES, CLOSE)
@@ -112,7 +113,7 @@ def _least_squares(splines: Splines, windows: Windows, samples: Samples, control
     local = np.full(len(splines.span_run), -1, np.int64)
     local[windows.span] = windows.local
     rows = np.flatnonzero(local[samples.span] >= 0)
-    chosen = samples.only(rows)
+    chosen = some_rows(samples, rows)
     near = Gather(local[chosen.span], chosen.basis, size)
     width = splines.width[windows.span]
     smooth = Gather(windows.local, splines.third[windows.span], size)

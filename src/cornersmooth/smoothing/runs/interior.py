@@ -186,8 +186,3 @@ def _bend(task: Task, force: Floats, penalty: Floats, bent: Floats, pull: Floats
 def product(one: Floats, other: Floats) -> Floats:
     """(m,) products of columns (3, m)."""
     return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
-
-
-def dot(one: Floats, other: Floats) -> Floats:
-    """(m,) products of rows."""
-    return np.einsum("ij,ij->i", one, other)

@@ -89,10 +89,6 @@ class Pieces:
     low: Floats
     high: Floats
 
-    def only(self, rows: Ints) -> Pieces:
-        """Some of the pieces."""
-        return Pieces(self.span[rows], self.segment[rows], self.low[rows], self.high[rows])
-
     @classmethod
     def of(cls, splines: Splines, lines: Polylines) -> Pieces:
         """Cut the runs at all knots and poses; knots at poses have the very same s."""
@@ -136,7 +132,3 @@ class Samples:
         share = (s - lines.s[segment]) / (lines.s[segment + 1] - lines.s[segment])
         target = lines.point[segment] + share[:, None] * (lines.point[segment + 1] - lines.point[segment])
         return cls(piece, span, s, splines.basis(span, s), target)
-
-    def only(self, rows: Ints) -> Samples:
-        """Some of the samples."""
-        return Samples(self.piece[rows], self.span[rows], self.s[rows], self.basis[rows], self.target[rows])

@@ -9,10 +9,9 @@ control points are the blossoms of the run's spline at the knots of the section.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
@@ -102,13 +101,9 @@ class SectionRows:
     knot: Floats  # that goes with each control point, from 0
     last_knot: Floats  # of the section in its last row, else 0
 
-    @classmethod
-    def joined(cls, parts: Iterable[SectionRows]) -> SectionRows:
-        """All rows of some parts."""
-        nothing = np.zeros(0, np.int64)
-        parts = [cls(nothing, nothing, np.zeros((0, 6)), np.zeros(0), np.zeros(0)), *parts]
-        columns: dict[str, Any] = {key: np.concatenate([getattr(one, key) for one in parts]) for key in vars(parts[0])}
-        return cls(**columns)
+
+#: where there are no runs
+NO_ROWS = SectionRows(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 6)), np.zeros(0), np.zeros(0))
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.geometry.ragged import batches, spread, starts
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.processes import map_in_processes
+from cornersmooth.slices import some_rows
 from cornersmooth.smoothing.runs.batches import Problem, solve_windows
 from cornersmooth.smoothing.runs.fitting import fit
 from cornersmooth.smoothing.runs.polylines import Pieces, Polylines
@@ -88,7 +89,7 @@ def solve_runs(
     changed = np.arange(len(pieces.span))
     limits = np.array(tolerances)
     for number in range(MENDINGS + 1):
-        proven[changed] = bounds(splines, control, lines, pieces.only(changed), axis_length, tolerances)
+        proven[changed] = bounds(splines, control, lines, some_rows(pieces, changed), axis_length, tolerances)
         failed = np.flatnonzero((proven > limits).any(axis=1))
         if not len(failed) or number == MENDINGS:
             break
@@ -108,7 +109,7 @@ def solve_runs(
         share = _fade(splines, pieces.span[failed], part)[:, None]
         control = rough + share * (control - rough)
         changed = _touched(splines, pieces, np.flatnonzero(share[:, 0] < 1.0))
-        proven[changed] = bounds(splines, control, lines, pieces.only(changed), axis_length, tolerances)
+        proven[changed] = bounds(splines, control, lines, some_rows(pieces, changed), axis_length, tolerances)
     worst = np.zeros((len(lines.count), 2))
     np.maximum.at(worst, run, proven)
     tip, axis = worst[:, 0], worst[:, 1]
