@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -15,11 +15,12 @@ from cornersmooth.filter.motion import Stretch, motion, program_of
 from cornersmooth.filter.runs import Reading, Run
 from cornersmooth.filter.state import State
 from cornersmooth.filter.writing import Job
-from cornersmooth.model import Floats, Program
+from cornersmooth.model import Program
 from cornersmooth.nc_reader import NcProgram, Problem
 from cornersmooth.nc_reader.block_tables import CHUNK
 from cornersmooth.nc_reader.rotary import LINE_SHARE
 from cornersmooth.settings import Settings
+from cornersmooth.vectors import unit
 from cornersmooth.verify import Verification, verify
 
 #: words that are the same number, and directions that are the same in six digits
@@ -29,7 +30,7 @@ _SAME, _SAME_DIRECTION = 1e-9, 2e-6
 #: off that of the new program
 _SHARE: Final = (1.0 - 2.0 * LINE_SHARE) / (1.0 - LINE_SHARE)
 
-#: the last block of a run in distances
+#: the last block of a run in distances: the word that says distances again after it
 _DISTANCES: Final = re.compile(rb"G91(?=[ \t]*\r?\n?\Z)")
 
 
@@ -114,7 +115,7 @@ def check(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> Check
             wrong.append(Problem("CS592", 0, place.stop, f"the program goes on otherwise after the run: {text}"))
     for own in shared(old, new, where):
         try:
-            found = measure(*_motions(job, old, new, own), job.settings, share=_SHARE, processes=job.processes)[2]
+            found = measure(*pair(job, old, new, own), job.settings, share=_SHARE, processes=job.processes)[2]
         except CornersmoothError as error:
             wrong.append(Problem(error.code, 0, own[0].first + 1, error.what))
             continue
@@ -138,20 +139,11 @@ def shared(old: Reading, new: Reading, where: Sequence[Place]) -> list[list[Plac
     return list(found.values())
 
 
-def motions(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> Iterator[tuple[NcProgram, NcProgram]]:
-    """Give the motion of runs before and after, some of them at a time."""
-    return (_motions(job, old, new, own) for own in shared(old, new, where))
-
-
-def whole_motions(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> tuple[NcProgram, NcProgram]:
-    """Give the motion before and after of all runs with the units of the first."""
-    unit = where[0].run.state.unit
-    return _motions(job, old, new, [place for place in where if place.run.state.unit == unit])
-
-
-def _motions(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> tuple[NcProgram, NcProgram]:
-    """Motion of runs with the same units, before and after."""
-    after = [Stretch(place.run, _absolute(new.lines(place.first, place.stop)), place.first + 1) for place in where]
+def pair(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> tuple[NcProgram, NcProgram]:
+    """Give the motion of runs with the same units, before and after."""
+    after = [
+        Stretch(place.run, _DISTANCES.sub(b"", new.lines(place.first, place.stop)), place.first + 1) for place in where
+    ]
     return (
         motion([job.stretch(old, place.run) for place in where], job.own, job.spelling, job.settings),
         motion(after, job.form, job.spelling, job.settings),
@@ -179,18 +171,12 @@ def measure(
     return program, after, found
 
 
-def _absolute(text: bytes) -> bytes:
-    """Blocks of a run without the word that says distances again behind it."""
-    return _DISTANCES.sub(b"", text)
-
-
 def _left_otherwise(run: Run, state: State) -> str:
     """Say what holds after the blocks of a run that does not after the run; empty where all is the same."""
     place = [state.place[letter] for letter in state.axes]
-    there, wanted = np.array(place), run.place[-1]
+    there, wanted = np.array(place), run.place[-1].copy()
     if state.axes[3:] == ("I", "J", "K"):  # only the direction counts, in its printed digits
-        there = np.append(there[:3], _unit(there[3:]))
-        wanted = np.append(wanted[:3], _unit(wanted[3:]))
+        there[3:], wanted[3:] = unit(there[3:]), unit(wanted[3:])
     room = np.where(np.arange(len(there)) < 3, _SAME, _SAME_DIRECTION if len(there) > 5 else _SAME)
     if not (np.abs(there - wanted) <= room).all():
         return f"the run ends at {_told(state.axes, place)}, not at {_told(state.axes, run.place[-1].tolist())}"
@@ -201,10 +187,6 @@ def _left_otherwise(run: Run, state: State) -> str:
     if run.state.feed_mode == 94 and not math.isclose(state.feed, run.feed, rel_tol=1e-9):
         return f"the feed after the run is {state.feed:g}, not {run.feed:g}"
     return ""
-
-
-def _unit(vector: Floats) -> Floats:
-    return vector / np.linalg.norm(vector)
 
 
 def _told(axes: Sequence[str], place: Sequence[float]) -> str:

@@ -64,37 +64,23 @@ def compare_filtered(
     before = time_as_it_is(job, old, axes)
 
     def work(candidate: Candidate) -> Row:
-        return _row(data, candidate, before, axes, most=most, tip_from_start=tip_from_start, inch=inch)
+        row, form, settings = Row.of(candidate), candidate.form, candidate.settings
+        try:
+            found = filter_program(data, form, settings, tip_from_start=tip_from_start, inch=inch, axes=axes, most=most)
+        except CornersmoothError as failure:
+            return replace(row, verdict=getattr(failure, "what", str(failure)))
+        saved = 0.0 if found.seconds is None else found.seconds[0] - found.seconds[1]
+        checked = found.checked
+        return replace(
+            row,
+            verdict=str(found.verdict),
+            blocks=found.new_lines,
+            bytes=len(found.data),
+            seconds=before - saved,
+            saved=saved,
+            tip=None if checked is None else checked.tip,
+            axis_point=None if checked is None or checked.axis_point != checked.axis_point else checked.axis_point,
+        )
 
     rows = rows_of(tried, work, processes, progress)
     return Table(before, "the program as it is", share, law_of_lines(timing), rows)
-
-
-def _row(
-    data: bytes, candidate: Candidate, before: float, axes: Machine, *, most: int, tip_from_start: bool, inch: bool
-) -> Row:
-    row = Row.of(candidate)
-    try:
-        found = filter_program(
-            data,
-            candidate.form,
-            candidate.settings,
-            tip_from_start=tip_from_start,
-            inch=inch,
-            axes=axes,
-            most=most,
-        )
-    except CornersmoothError as failure:
-        return replace(row, verdict=getattr(failure, "what", str(failure)))
-    saved = 0.0 if found.seconds is None else found.seconds[0] - found.seconds[1]
-    checked = found.checked
-    return replace(
-        row,
-        verdict=str(found.verdict),
-        blocks=found.new_lines,
-        bytes=len(found.data),
-        seconds=before - saved,
-        saved=saved,
-        tip=None if checked is None else checked.tip,
-        axis_point=None if checked is None or checked.axis_point != checked.axis_point else checked.axis_point,
-    )

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import islice
 from typing import Final
 
 import numpy as np
 
 from cornersmooth.errors import SettingsError
-from cornersmooth.filter.checking import Checked, Place, check, places, whole_motions
-from cornersmooth.filter.runs import ProgramReader, Reading
+from cornersmooth.filter.checking import Checked, Place, check, pair, places
+from cornersmooth.filter.runs import Left, ProgramReader, Reading
 from cornersmooth.filter.spelling import SAMPLE, Spelling
 from cornersmooth.filter.times import planned_times
 from cornersmooth.filter.writing import Job, smoothed
@@ -25,15 +25,6 @@ from cornersmooth.verdict import Verdict
 
 #: words that say the units of a program
 _UNITS: Final = re.compile(rb"(?i)G(20|21|70|71|700|710)(?!\d)|BEGIN PGM")
-
-
-@dataclass(frozen=True)
-class Left:
-    """Cuts that stay as they are."""
-
-    reason: str
-    line: int  #: the first of them, from 1
-    count: int
 
 
 @dataclass(frozen=True)
@@ -122,8 +113,7 @@ def filter_program(
         checked = check(job, old, after, where) if verify else Checked(())
         bad = {p.run.first: one.text for p in where for one in checked.wrong if p.first < one.nc_line <= p.stop}
         if not bad:
-            found = _result(old, after, where, why, checked if verify else None)
-            return _with_motion(found, job, (old, after), where, axes, paths=paths)
+            return _result(job, old, after, where, why, checked if verify else None, axes, paths=paths)
         texts = {p.run.first: after.lines(p.first, p.stop) for p in where if p.run.first not in bad}
         why |= {first: f"verification found: {text}" for first, text in bad.items()}
 
@@ -146,8 +136,7 @@ def verify_programs(
     where, wrong = places(before, job.reader.read(new))
     after = job.reader.read(new, [place.stop for place in where])
     checked = Checked(tuple(wrong)) if wrong else check(job, before, after, where)
-    found = _result(before, after, where, {}, checked)
-    return found if wrong else _with_motion(found, job, (before, after), where, axes, paths=paths)
+    return _result(job, before, after, where, {}, checked, None if wrong else axes, paths=paths and not wrong)
 
 
 def read_program(
@@ -224,29 +213,22 @@ def left_all_but(reading: Reading, most: int) -> None:
     reading.runs[:] = reading.runs[first:stop]
 
 
-def _with_motion(
-    found: Filtered,
+def _result(
     job: Job,
-    readings: tuple[Reading, Reading],
+    old: Reading,
+    new: Reading,
     where: list[Place],
+    why: dict[int, str],
+    checked: Checked | None,
     axes: Machine | None,
     *,
     paths: bool,
 ) -> Filtered:
-    """Say what the control does in the runs, and how long it takes, as far as that is asked for."""
-    if not where:
-        return found
-    return replace(
-        found,
-        seconds=None if axes is None else planned_times(job, *readings, where, axes),
-        motions=whole_motions(job, *readings, where) if paths else None,
-    )
-
-
-def _result(old: Reading, new: Reading, where: list[Place], why: dict[int, str], checked: Checked | None) -> Filtered:
+    """What became of a program; how long its runs take, and what the control does in them, as far as asked for."""
     for run in old.runs:
         if run.first in why:
             old.why[run.first : run.stop] = old.number(why[run.first])
+    drawn = [place for place in where if place.run.state.unit == where[0].run.state.unit]
     return Filtered(
         data=new.data,
         lines=len(old.why),
@@ -254,7 +236,9 @@ def _result(old: Reading, new: Reading, where: list[Place], why: dict[int, str],
         cuts=old.cuts,
         smoothed=sum(len(place.run) for place in where),
         runs=len(where),
-        left=tuple(Left(*one) for one in old.left()),
+        left=old.left(),
         checked=checked,
         units_said=_UNITS.search(old.data) is not None,
+        seconds=planned_times(job, old, new, where, axes) if axes is not None and where else None,
+        motions=pair(job, old, new, drawn) if paths and where else None,
     )

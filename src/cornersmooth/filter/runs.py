@@ -59,6 +59,15 @@ class Run:
         return np.array([self.state.place[letter] for letter in self.state.axes])
 
 
+@dataclass(frozen=True)
+class Left:
+    """Cuts that stay as they are."""
+
+    reason: str
+    line: int  #: the first of them, from 1
+    count: int
+
+
 @dataclass
 class Reading:
     """What was read."""
@@ -83,10 +92,10 @@ class Reading:
         """Bytes of lines that follow one another."""
         return self.data[int(self.start[first]) : int(self.start[stop])]
 
-    def left(self) -> list[tuple[str, int, int]]:
-        """Why cuts are left, with the first line, from 1, and their number."""
+    def left(self) -> tuple[Left, ...]:
+        """Why cuts are left, the most first."""
         found = Counter(self.why[self.why > _CUT].tolist())
-        return [(self.reasons[k - 2], int(np.argmax(self.why == k)) + 1, n) for k, n in found.most_common()]
+        return tuple(Left(self.reasons[k - 2], int(np.argmax(self.why == k)) + 1, n) for k, n in found.most_common())
 
     @property
     def cuts(self) -> int:

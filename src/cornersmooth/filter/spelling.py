@@ -96,7 +96,9 @@ class Spelling:
         program = replace(
             table.program, retract=(), position="", start=(), begin=(), tool_end=(), between_tools=(), end=()
         )
-        digits = self._digits(table.digits)
+        tip, other = self.tip or table.digits.mm, self.other or table.digits.angle
+        inch, vector = self.tip or table.digits.inch, max(other, table.digits.vector)
+        digits = replace(table.digits, mm=tip, inch=inch, angle=other, vector=vector, vector_length=1)
         layout = replace(table.layout, block_number="", longest_block=0)
         lines = table.lines if rounding else replace(table.lines, rounding="")
         bare = replace(table, program=program, digits=digits, layout=layout, lines=lines)
@@ -106,13 +108,6 @@ class Spelling:
         """Return the same with no fewer digits than a control has."""
         tip = max(self.tip, digits.inch if inch else digits.mm)
         return replace(self, tip=tip, other=max(self.other, digits.angle))
-
-    def _digits(self, digits: Digits) -> Digits:
-        tip = self.tip or digits.mm
-        other = self.other or digits.angle
-        return replace(
-            digits, mm=tip, inch=self.tip or digits.inch, angle=other, vector=max(other, digits.vector), vector_length=1
-        )
 
     def _mode(self, mode: Mode) -> Mode:
         motion = replace(

@@ -190,7 +190,8 @@ class State:
             on_arc = self.motion in (2.0, 3.0)
             for letter in axes:
                 if not (on_arc and letter in "IJK"):
-                    self._go(letter, given[letter])
+                    before = 0.0 if self.absolute else self.place[letter]
+                    self.place[letter] = math.nan if self.absolute is None else given[letter] + before
             if not on_arc and 0 < len({"I", "J", "K"} & set(axes)) < 3:  # what the others are then is not known
                 self.lose_place("IJK")
         if names & {"U", "V", "W", "circle"} or any(name.startswith("DC ") for name in names):
@@ -202,12 +203,6 @@ class State:
             self.compensated = given.get("side", 40.0) != 40.0
         cuts = bool(axes) and self.motion in (1.0, 2.0, 3.0) and not done & {Does.MACHINE}
         return "other words in the block" if cuts else ""
-
-    def _go(self, letter: str, value: float) -> None:
-        if self.absolute is None:
-            self.place[letter] = math.nan
-        else:
-            self.place[letter] = value + (0.0 if self.absolute else self.place[letter])
 
     def _code(self, word: Word, names: set[str]) -> set[Does]:
         """Take a G or M word; return what it does beside changing the state."""

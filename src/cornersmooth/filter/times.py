@@ -10,7 +10,7 @@ from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate import plan_text
 from cornersmooth.feedrate.linuxcnc import line_times
 from cornersmooth.feedrate.linuxcnc_program import axis_limits, program_lines
-from cornersmooth.filter.checking import Place, motions, shared
+from cornersmooth.filter.checking import Place, pair, shared
 from cornersmooth.filter.motion import motion
 from cornersmooth.filter.runs import Reading
 from cornersmooth.filter.writing import Job
@@ -33,8 +33,8 @@ def planned_times(job: Job, old: Reading, new: Reading, where: Sequence[Place], 
     """
     if by_own_law(job):
         return _on_linuxcnc(old, axes), _on_linuxcnc(new, axes)
-    pairs = [(_planned(job, one, axes), _planned(job, two, axes)) for one, two in motions(job, old, new, where)]
-    before, after = np.sum(pairs, axis=0).tolist()
+    pairs = (pair(job, old, new, some) for some in shared(old, new, where))
+    before, after = np.sum([[_planned(job, nc, axes) for nc in both] for both in pairs], axis=0).tolist()
     return before, after
 
 
