@@ -64,39 +64,52 @@ def arc_points(program: Program, rows: Ints, share: Floats) -> tuple[Floats, Flo
     axis : (m, 3) float64
         Unit vectors.
     """
-    arcs = program.arcs
-    pose = arcs.pose[rows]
-    start, end, normal = program.tip[pose - 1], program.tip[pose], arcs.normal[rows]
-    radius = start - arcs.centre[rows]
-    radius -= dot(radius, normal)[:, None] * normal
-    side = np.cross(normal, radius)
-
-    def swung(angle: Floats) -> Floats:
-        return (np.cos(angle) - 1.0)[:, None] * radius + np.sin(angle)[:, None] * side
-
-    sweep = arcs.sweep[rows]
-    closing = (end - start) - swung(sweep)
-    tip: Floats = start + swung(sweep * share) + share[:, None] * closing
+    pose, sweep, radius, side, closing = _swings(program, rows)
+    swung = (np.cos(sweep * share) - 1.0)[:, None] * radius + np.sin(sweep * share)[:, None] * side
+    tip = program.tip[pose - 1] + swung + share[:, None] * closing
     first, last = program.axis[pose - 1], program.axis[pose]
     axis = first + share[:, None] * (last - first)
     length = norm(axis)
     axis = np.where((length > 0.0)[:, None], axis / np.where(length > 0.0, length, 1.0)[:, None], last)
     ends = share >= 1.0
-    tip[ends], axis[ends] = end[ends], last[ends]
+    tip[ends], axis[ends] = program.tip[pose[ends]], last[ends]
     return tip, axis
 
 
 def arc_tangents(program: Program, rows: Ints, share: float) -> Floats:
     """Derivatives (m, 3) of the tips on arcs `rows` (m,) by their share, mm: where the tool goes there."""
+    _, sweep, radius, side, closing = _swings(program, rows)
+    swing = np.cos(sweep * share)[:, None] * side - np.sin(sweep * share)[:, None] * radius
+    return sweep[:, None] * swing + closing
+
+
+def _swings(program: Program, rows: Ints) -> tuple[Ints, Floats, Floats, Floats, Floats]:
+    """Pose, sweep, radius vector at the start, direction there as long as that, and what rounding leaves at the end."""
     arcs = program.arcs
     pose, normal, sweep = arcs.pose[rows], arcs.normal[rows], arcs.sweep[rows]
     radius = program.tip[pose - 1] - arcs.centre[rows]
     radius -= dot(radius, normal)[:, None] * normal
-    side, angle = np.cross(normal, radius), sweep * share
+    side = np.cross(normal, radius)
     closing = program.tip[pose] - program.tip[pose - 1]
     closing -= (np.cos(sweep) - 1.0)[:, None] * radius + np.sin(sweep)[:, None] * side
-    swing: Floats = np.cos(angle)[:, None] * side - np.sin(angle)[:, None] * radius
-    return sweep[:, None] * swing + closing
+    return pose, sweep, radius, side, closing
+
+
+def poses_and_arcs(program: Program, step: float) -> tuple[Ints, Floats, Floats]:
+    """Poses of a program and places on its arcs, turns of `step` (rad) apart at most.
+
+    Returns
+    -------
+    The pose that each leads to (m,), tips (m, 3), mm, and unit axes (m, 3).
+    """
+    arcs, row = program.arcs, np.full(len(program), -1, np.int64)
+    pieces = np.ones(len(program), np.int64)
+    pieces[arcs.pose], row[arcs.pose] = np.maximum(np.ceil(arcs.sweep / step), 1.0), np.arange(len(arcs))
+    pose, share = divided(pieces)
+    tip, axis = program.tip[pose], program.axis[pose]
+    bow = np.flatnonzero(row[pose] >= 0)
+    tip[bow], axis[bow] = arc_points(program, row[pose[bow]], share[bow])
+    return pose, tip, axis
 
 
 def divided(counts: Ints) -> tuple[Ints, Floats]:

@@ -4,8 +4,13 @@ from cornersmooth.kinematics.dynamics import Dynamics, Travel
 from cornersmooth.kinematics.machine import Machine, RotaryAxis, endless, with_dynamics
 from cornersmooth.kinematics.machine_tables import load_machine, machine_names, machine_table, parse_machine
 from cornersmooth.kinematics.poses import Solutions, solutions, tool_axis
-from cornersmooth.kinematics.position import inverse_time, machine_position, tip_position
-from cornersmooth.kinematics.travel import check_travel, nose_position
+from cornersmooth.kinematics.position import (
+    check_travel,
+    inverse_time,
+    machine_position,
+    nose_position,
+    tip_position,
+)
 
 __all__ = [
     "Dynamics",

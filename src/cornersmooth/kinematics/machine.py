@@ -111,7 +111,7 @@ class Machine:
     #: mm; where the zero of the part sits in the coordinates in which the points of the tables are given
     part_zero: Vector = (0.0, 0.0, 0.0)
     dynamics: tuple[Dynamics, ...] = ()  #: limits of any of the five axes; only the planning of the time asks for them
-    #: how far any of X, Y and Z goes; what is written is checked against it (`cornersmooth.kinematics.travel`)
+    #: how far any of X, Y and Z goes; what is written is checked against it (`check_travel`)
     travel: tuple[Travel, ...] = ()
     #: mm; the same by number of tool, for those that `tool_length` is not for
     tool_lengths: tuple[tuple[int, float], ...] = ()

@@ -14,8 +14,7 @@ from cornersmooth.errors import SettingsError
 from cornersmooth.kinematics.dynamics import LINEAR
 from cornersmooth.kinematics.machine import Machine
 from cornersmooth.kinematics.poses import Solutions, solutions, tool_axis, wrap
-from cornersmooth.kinematics.position import machine_position
-from cornersmooth.kinematics.travel import nose_position
+from cornersmooth.kinematics.position import machine_position, nose_position
 from cornersmooth.model import Floats
 
 _WORD = re.compile(r"([A-Za-z])\s*=?\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)")

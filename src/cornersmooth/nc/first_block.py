@@ -15,7 +15,7 @@ import numpy as np
 
 from cornersmooth.errors import InputError
 from cornersmooth.kinematics import Machine, check_travel, solutions
-from cornersmooth.kinematics.travel import nose_position
+from cornersmooth.kinematics.position import nose_position
 from cornersmooth.model import Floats
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form

@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from cornersmooth.kinematics.poses import continued
-from cornersmooth.kinematics.travel import nose_position
+from cornersmooth.kinematics.position import nose_position
 from cornersmooth.model import Bools, Floats, Ints, Move, Program, Statement
 from cornersmooth.nc.block_writer import BlockWriter
 from cornersmooth.nc.control import INVERSE_TIME

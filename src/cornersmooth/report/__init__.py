@@ -10,7 +10,8 @@ import numpy as np
 from cornersmooth.errors import Finding
 from cornersmooth.geometry.arcs import arc_radii
 from cornersmooth.model import Floats, Ints, Move, SmoothProgram, Status
-from cornersmooth.report.corners import corner_table, counts_of, worst_corners
+from cornersmooth.report.corners import Column, corner_table, counts_of, worst_corners
+from cornersmooth.report.csv_text import csv_text
 from cornersmooth.report.record import SCHEMA, NcFile, cl_file, findings_table, record, report_json
 from cornersmooth.report.verdict import judge, sharp_corners
 from cornersmooth.smoothing.construction import construction_of
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
     from cornersmooth.verify import Verification
 
 __all__ = ["SCHEMA", "NcFile", "corners_csv", "findings_table", "report", "report_json"]
-
-_CSV_BLOCK = 4096
 
 
 def report(
@@ -104,13 +103,12 @@ def report(
 def corners_csv(smoothed: SmoothProgram, *, dense: bool = True) -> Iterator[str]:
     """The table of corners as CSV text, a block of rows at a time; `dense` as for `report`."""
     count = len(smoothed.corners)
-    for start in range(0, max(count, 1), _CSV_BLOCK):
-        table = corner_table(smoothed, np.arange(start, min(start + _CSV_BLOCK, count)), dense=dense)
-        if start == 0:
-            yield ",".join(table) + "\n"
-        columns = [column.tolist() for column in table.values()]
-        form = ",".join("%.10g" if isinstance(c, np.ndarray) and c.dtype.kind == "f" else "%s" for c in table.values())
-        yield "".join(form % row + "\n" for row in zip(*columns, strict=True))
+
+    def table(part: slice) -> dict[str, Column]:
+        return corner_table(smoothed, np.arange(*part.indices(count)), dense=dense)
+
+    forms = {name: "%.10g" if column.dtype.kind == "f" else "%s" for name, column in table(slice(0)).items()}
+    return csv_text(forms, count, lambda part: table(part).values())
 
 
 def _records(smoothed: SmoothProgram, rows: Ints, *, dense: bool) -> list[dict[str, Any]]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cornersmooth.geometry.arcs import arc_points
+from cornersmooth.geometry.arcs import poses_and_arcs
 from cornersmooth.model import Bools, Floats, Ints, Move, Program
 from cornersmooth.nc_reader import NcProgram
 from cornersmooth.nc_reader.elements import Element
@@ -70,18 +70,7 @@ class WrittenPath:
 
 def original_path(program: Program) -> OriginalPath:
     """Polyline of a program."""
-    arcs, n = program.arcs, len(program)
-    pieces = np.ones(n, np.int64)
-    pieces[arcs.pose] = np.maximum(np.ceil(arcs.sweep / _ARC_CHORD), 1.0).astype(np.int64)
-    pose = np.repeat(np.arange(n), pieces)
-    last = np.cumsum(pieces)
-    share = (np.arange(len(pose)) - np.repeat(last - pieces, pieces) + 1) / pieces[pose]
-    tip, axis = program.tip[pose].copy(), program.axis[pose].copy()
-    if len(arcs):
-        row = np.full(n, -1, np.int64)
-        row[arcs.pose] = np.arange(len(arcs))
-        bow = np.flatnonzero(row[pose] >= 0)
-        tip[bow], axis[bow] = arc_points(program, row[pose[bow]], share[bow])
+    pose, tip, axis = poses_and_arcs(program, _ARC_CHORD)
     breaks = np.zeros(len(pose), np.bool_)
     breaks[:1] = True
     breaks[1:] = (program.kind[pose[:-1]] == Move.FROM) & (program.kind[pose[1:]] != Move.ARC)
@@ -89,7 +78,8 @@ def original_path(program: Program) -> OriginalPath:
     step[1:] = np.linalg.norm(np.diff(tip, axis=0), axis=1)
     step[breaks] = 0.0
     rapid = np.isin(program.kind[pose], (Move.RAPID, Move.HOLE))
-    return OriginalPath(tip, axis, pose, rapid, breaks, np.cumsum(step)[last - 1])
+    last = np.flatnonzero(np.append(pose[1:] != pose[:-1], True))[: len(program)]
+    return OriginalPath(tip, axis, pose, rapid, breaks, np.cumsum(step)[last])
 
 
 def written_path(

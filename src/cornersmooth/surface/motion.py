@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cornersmooth.geometry.arcs import arc_points, divided
+from cornersmooth.geometry.arcs import divided, poses_and_arcs
 from cornersmooth.geometry.ragged import spread
 from cornersmooth.model import Bools, Floats, Ints, Move, Program
 from cornersmooth.nc_reader import NcProgram
@@ -90,16 +90,7 @@ def original_cuts(program: Program) -> RuledMotion:
     cutting = (program.kind == Move.LINEAR) | (program.kind == Move.ARC)
     cutting[:1] = False
     cutting[1:] &= (program.kind[:-1] != Move.FROM) | (program.kind[1:] == Move.ARC)
-    arcs = program.arcs
-    pieces = np.ones(len(program), np.int64)
-    pieces[arcs.pose] = np.maximum(np.ceil(arcs.sweep / _ARC_STEP), 1.0).astype(np.int64)
-    pose, share = divided(pieces)
-    tip, axis = program.tip[pose].copy(), program.axis[pose].copy()
-    if len(arcs):
-        row = np.full(len(program), -1, np.int64)
-        row[arcs.pose] = np.arange(len(arcs))
-        bow = np.flatnonzero(row[pose] >= 0)
-        tip[bow], axis[bow] = arc_points(program, row[pose[bow]], share[bow])
+    pose, tip, axis = poses_and_arcs(program, _ARC_STEP)
     return _segments(tip, axis, program.line[pose], cutting[pose])
 
 
