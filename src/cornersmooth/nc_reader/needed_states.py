@@ -34,7 +34,7 @@ _KINDS = {
 }
 
 
-def _first(code: str, wrong: Bools, line: Ints, text: str) -> Iterator[Problem]:
+def first_wrong(code: str, wrong: Bools, line: Ints, text: str) -> Iterator[Problem]:
     """The first of some rows where something is wrong, if there is one; `line` are the NC lines of the rows."""
     if wrong.any():
         yield Problem(code, 0, int(line[np.argmax(wrong)]), text)
@@ -57,18 +57,18 @@ def control_problems(table: Table, state: Reader, code: float, approach: Set[int
     motion = table.column("G")
     if state.dialect.curves_need and not state.memory.high_speed:
         text = f"a curve where {state.dialect.curves_need} must be in force"
-        yield from _first(CONTROL_WORDS, motion == NURBS, table.line, text)
+        yield from first_wrong(CONTROL_WORDS, motion == NURBS, table.line, text)
     unnamed = letters - state.memory.spline_axes
     if state.dialect.names_spline_axes and kind == "angles" and unnamed:
         text = f"a spline of {' and '.join(sorted(unnamed))}, which no SPLINEPATH(1,X,Y,Z,...) names"
-        yield from _first(CONTROL_WORDS, motion == BSPLINE, table.line, text)
+        yield from first_wrong(CONTROL_WORDS, motion == BSPLINE, table.line, text)
     wanted, used = state.dialect.controls.get(kind), table.columns.keys() & letters
     if wanted is not None and used and state.tip_control not in wanted:
         rows = np.zeros(len(table), np.bool_)
         rows[table.rows_with(used, code)] = True
         need = " or ".join(word or "no tool tip control" for word in wanted)
         text = f"{_KINDS[kind]} under {state.tip_control or 'no tool tip control'}, where {need} must be in force"
-        yield from _first(CONTROL_WORDS, rows & ~np.isin(table.line, list(approach)), table.line, text)
+        yield from first_wrong(CONTROL_WORDS, rows & ~np.isin(table.line, list(approach)), table.line, text)
 
 
 def axis_problems(
@@ -92,21 +92,23 @@ def axis_problems(
         given, told = ~np.isnan(values), ~np.isnan(table.column(f"{BY_WORD} {axis.name}"))
         if axis.modulo:
             text = f"a word of {name} that is not from 0 to 360 degrees"
-            yield from _first(CONTROL_WORDS, (values < 0.0) | (values >= 360.0), table.line, text)
+            yield from first_wrong(CONTROL_WORDS, (values < 0.0) | (values >= 360.0), table.line, text)
         if way == BY_WORD and axis.modulo:
             text = f"{name} without {BY_WORD}(), which sends it the shorter way"
-            yield from _first(CONTROL_WORDS, given & ~told, table.line, text)
+            yield from first_wrong(CONTROL_WORDS, given & ~told, table.line, text)
         elif way == BY_WORD:
-            yield from _first(CONTROL_WORDS, told, table.line, f"{name} with {BY_WORD}(), which is for modulo axes")
+            yield from first_wrong(
+                CONTROL_WORDS, told, table.line, f"{name} with {BY_WORD}(), which is for modulo axes"
+            )
         elif way and axis.modulo and not memory.shorter_way:
             text = f"{name} without {way} in force, which sends it the shorter way"
-            yield from _first(CONTROL_WORDS, given, table.line, text)
+            yield from first_wrong(CONTROL_WORDS, given, table.line, text)
         if axis.limits is not None:
             angles, line = (run.second[:, column], run.line) if len(run.curves) else (values, table.line)
             beyond = (angles < axis.low - step / 2) | (angles > axis.high + step / 2)
             for angle in angles[beyond][:1].tolist():
                 text = f"{name} goes to {angle:g} deg, its limits are {axis.low:g} and {axis.high:g}"
-                yield from _first("CS581", beyond, line, text)
+                yield from first_wrong("CS581", beyond, line, text)
 
 
 def turn_problems(run: Elements, before: Sequence[float], machine: Machine) -> Iterator[Problem]:
@@ -130,7 +132,7 @@ def turn_problems(run: Elements, before: Sequence[float], machine: Machine) -> I
         for amount, line in ((turn, run.line), (between, of_points[1:])):
             for degrees in amount[amount > MOST_TURN][:1].tolist():
                 text = f"{axis.name} turns by {degrees:.0f} deg in one feed move"
-                yield from _first("CS526", amount > MOST_TURN, line, text)
+                yield from first_wrong("CS526", amount > MOST_TURN, line, text)
 
 
 def take_clamp(word: float, machine: Machine, memory: Memory) -> bool:
@@ -154,7 +156,7 @@ def clamp_problems(run: Elements, before: Sequence[float], machine: Machine, mem
         if axis.clamp is not None and is_clamped(axis, memory):
             angles = np.append(before[column], run.second[:, column])
             turned = (angles[1:] != angles[:-1]) & ~np.isnan(angles[1:])
-            yield from _first("CS538", turned, run.line, f"{axis.name} turns without {axis.clamp[1]} before it")
+            yield from first_wrong("CS538", turned, run.line, f"{axis.name} turns without {axis.clamp[1]} before it")
 
 
 def unclamped_problems(machine: Machine, memory: Memory) -> Iterator[Problem]:
@@ -181,4 +183,4 @@ def kinematics_problems(run: Elements, machine: Machine, memory: Memory, *, tip_
         before = "before any word of tip control" if on is None else f"under {other}"
         text = f"{_KINDS['angles' if tip_control else 'machine']} {before}, where {here} must be in force"
         turned = np.any(np.abs(run.second[:, : len(machine.names)]) > _ZERO, axis=1)
-        yield from _first(CONTROL_WORDS, turned, run.line, text)
+        yield from first_wrong(CONTROL_WORDS, turned, run.line, text)

@@ -20,6 +20,7 @@ from cornersmooth.nc_reader.needed_states import (
     axis_problems,
     clamp_problems,
     control_problems,
+    first_wrong,
     is_clamped,
     kinematics_problems,
     take_clamp,
@@ -256,11 +257,10 @@ class Reader:
         """Complain of motion behind a plane where no word has said since how the rotary axes stand."""
         assert self.rotary is not None
         if self._left_turned:
-            unknown = np.isnan(run.second[:, : len(self.rotary.names)]).any(axis=1)
+            unknown = np.any(np.isnan(run.second[:, : len(self.rotary.names)]), axis=1)
             self._left_turned = False
-            if unknown.any():
-                text = "motion after a tilted plane, and no word says where the rotary axes are"
-                self.problems.append(Problem("CS506", 0, int(run.line[np.argmax(unknown)]), text))
+            text = "motion after a tilted plane, and no word says where the rotary axes are"
+            self.problems += first_wrong("CS506", unknown, run.line, text)
 
     def _above(self, line: Line, text: str) -> None:
         """Complain where the tool is not above a retract."""

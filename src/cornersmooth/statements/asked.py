@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -26,7 +27,7 @@ class Asking:
         self.tokens: list[Token] = []
         self.place, self.line, self.moment = 0.0, 0, 0
         self.running, self.speed, self.diameter = 3.0, 0.0, 0.0
-        self.tool, self.offset = -1.0, 1.0
+        self.tool, self.offset, self.offset_at = -1.0, 1.0, (-1, 0)
         self.moving = np.flatnonzero(program.kind != Move.FROM)
         said = {statement.word for statement in program.statements}
         self.handlers: dict[str, Callable[[list[str], list[float], Statement], None]] = {
@@ -82,8 +83,15 @@ class Asking:
         offset = next((number for number in registers if number is not None), numbers[0])
         self.tool, self.offset = numbers[0], offset if _whole(offset) else numbers[0]
         self.say("tool", self.tool)
-        if len(self.moving) and statement.pose <= self.moving[-1]:  # nothing moves with a tool that comes last
-            self.say("offset", self.offset)
+        self.idle_from(statement.pose)
+        self.say("offset", self.offset)
+        self.offset_at = len(self.tokens) - 1, statement.pose
+
+    def idle_from(self, pose: int) -> None:
+        """Let the last offset be optional if nothing moves with its tool before a pose."""
+        at, loaded = self.offset_at
+        if at >= 0 and np.searchsorted(self.moving, loaded) == np.searchsorted(self.moving, pose):
+            self.tokens[at] = replace(self.tokens[at], optional=True)
 
     def select(self, words: list[str], numbers: list[float], statement: Statement) -> None:
         """Bring the next tool near."""
@@ -180,6 +188,7 @@ def asked(program: Program, places: Sequence[float], end: float, dwells: Sequenc
     asking = Asking(program)
     for statement, place in zip(program.statements, places, strict=True):
         asking.take(statement, place)
+    asking.idle_from(len(program.kind))
     line = max((item.line for item in program.statements if item.word in ("FINI", "END")), default=0)
     tokens = sorted([*dwells, *asking.tokens], key=lambda token: token.place) if dwells else asking.tokens
     return [*tokens, Token("end", 30.0, end, line)]

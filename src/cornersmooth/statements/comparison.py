@@ -108,13 +108,12 @@ def compare(
     unsaid = unsaid - {token.kind for token in found if token.kind == "compensation" and token.value != 40.0}
     asked_for = [token for token in asked_for if not {token.kind, (token.kind, token.value)} & (unsaid | own)]
     found = [token for token in found if token.kind not in unsaid | (own & _LOOSE)]
-    asked_for, found = _without_idle_offsets(asked_for, found)
     near = _Nearness(room, apart)
     changes = [token.line for token in found if token.kind == "tool"]
     problems: list[Problem] = []
     for kind, (code, name) in _NAMES.items():
         theirs, ours = ([token for token in tokens if token.kind == kind] for tokens in (asked_for, found))
-        for wanted, token in _unlike(theirs, ours, _superseded(theirs), _habits(ours, changes, end, near), near):
+        for wanted, token in _unlike(theirs, ours, _optional(theirs), _habits(ours, changes, end, near), near):
             if wanted is None:
                 assert token is not None
                 text = f"{name.format(token.value)} is nothing that the CL file asks for"
@@ -134,13 +133,13 @@ def compare(
 
 
 def _unlike(
-    theirs: list[Token], ours: list[Token], superseded: Set[int], habits: Set[int], near: _Nearness
+    theirs: list[Token], ours: list[Token], optional: Set[int], habits: Set[int], near: _Nearness
 ) -> Iterator[_Pair]:
     """Tokens of one kind that are wrong, in another place, missing or too much: as few as can be.
 
     Parameters
     ----------
-    superseded, habits : set of int
+    optional, habits : set of int
         Tokens of the CL file, and of the program, that may be left over.
     """
 
@@ -162,7 +161,7 @@ def _unlike(
         if token is not None and (j in habits or token.value == held):
             waiting.appendleft(((i, j + 1, held), way, None))
         if wanted is not None:
-            if i in superseded or wanted.value == held:
+            if i in optional or wanted.value == held:
                 waiting.appendleft(((i + 1, j, held), way, None))
             after = wanted.value if kind in _STATES else None
             both = (i + 1, j + 1, after)
@@ -183,19 +182,19 @@ def _unlike(
     yield from rest
 
 
-def _superseded(tokens: list[Token]) -> set[int]:
-    """Tokens that no motion, stop or dwell meets, as another of their kind follows: of what a tool change stops."""
-    return {k for k, (one, after) in enumerate(pairwise(tokens)) if one.kind in _STOPPED and one.moment == after.moment}
+def _optional(tokens: list[Token]) -> set[int]:
+    """Tokens that may be left over: also those that no motion, stop or dwell meets, of what a tool change stops."""
+    stopped = [one.kind in _STOPPED and one.moment == after.moment for one, after in pairwise(tokens)]
+    return {k for k, (token, idle) in enumerate(zip_longest(tokens, stopped)) if token.optional or idle}
 
 
 def _habits(ours: list[Token], changes: list[int], end: float, near: _Nearness) -> set[int]:
     """Tokens of the program that posts write on their own.
 
-    Those are optional stops before another tool; what only ends what ends with the program anyway; and what ends a
-    state which begins again before any motion, also where the program waits after a tool change: `changes` are the
-    lines of those.
+    Those are what only ends what ends with the program anyway; and what ends a state which begins again before any
+    motion, also where the program waits after a tool change: `changes` are the lines of those.
     """
-    found = {k for k, token in enumerate(ours) if token.habit} | _superseded(ours)
+    found = _optional(ours)
     off = [token.value == _ENDED.get(token.kind) for token in ours]
     last = len(ours) - len(list(takewhile(bool, reversed(off))))
     found |= {k for k in range(last, len(ours)) if ours[k].place >= end or not near.away(end, ours[k])}
@@ -214,39 +213,3 @@ def _goes_on(off: Token, on: Token, changes: list[int]) -> bool:
         return True
     at = bisect_left(changes, off.line)
     return on.element == off.element and at < len(changes) and changes[at] < on.line
-
-
-def _without_idle_offsets(asked_for: list[Token], found: list[Token]) -> tuple[list[Token], list[Token]]:
-    """Both without the offsets of tools with which nothing moves: those may be said or not."""
-    theirs, ours = _effective(asked_for, "tool"), _effective(found, "tool")
-    if [tool.value for tool in theirs] != [tool.value for tool in ours]:
-        return asked_for, found
-    idle = {k for k, tool in enumerate(ours) if tool.idle}
-    if not idle:
-        return asked_for, found
-    return _outside(asked_for, theirs, idle), _outside(found, ours, idle)
-
-
-def _outside(tokens: list[Token], tools: list[Token], idle: set[int]) -> list[Token]:
-    """Tokens without the offsets behind some of the tools."""
-    kept: list[Token] = []
-    at = -1
-    for token in tokens:
-        at += at + 1 < len(tools) and token is tools[at + 1]
-        if token.kind != "offset" or at not in idle:
-            kept.append(token)
-    return kept
-
-
-def _effective(tokens: list[Token], kind: str) -> list[Token]:
-    """Tokens of one kind without those that change nothing."""
-    mine = [token for token in tokens if token.kind == kind]
-    if kind not in _STATES:
-        return mine
-    kept: list[Token] = []
-    state = _AT_START.get(kind)
-    for token in mine:
-        if token.value != state:
-            kept.append(token)
-            state = token.value
-    return kept

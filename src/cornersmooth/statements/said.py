@@ -46,18 +46,15 @@ def said(events: Sequence[Event], places: Sequence[Place]) -> list[Token]:
             meaning = _PLAIN[letter], value
         if meaning is None:
             continue
-        # the next word is that of a tool, there has been one before, and nothing moves between
-        after = next((j for j in range(k + 1, len(words)) if words[j] != ("G", 40.0)), None)  # R0 of M91
-        habit = words[k] == ("M", 1.0) and after is not None and words[after][0] == "T" and elements[after] == element
-        habit = habit and any(letter == "T" for letter, _ in words[:k])
-        # the next tool, or the end of the program, comes before any motion
-        idle = words[k] == _CHANGE
-        if idle:
-            end = next((j for j in range(k + 1, len(words)) if words[j] in _ENDS), None)
-            idle = end is not None and elements[end] == element
-        token = Token(
-            *meaning, place.at, event.line, place.room, moment, habit, place.others, idle, place.reach, element
-        )
-        tokens.append(token)
-        moment += meaning[0] in PAUSES and not habit
+        optional = False
+        if words[k] == ("M", 1.0):  # before another tool, and nothing moves between
+            after = next((j for j in range(k + 1, len(words)) if words[j] != ("G", 40.0)), None)  # R0 of M91
+            another = after is not None and words[after][0] == "T" and elements[after] == element
+            optional = another and any(letter == "T" for letter, _ in words[:k])
+        elif letter == "H":  # nothing moves before the next tool, or the end
+            after = next((j for j in range(k + 1, len(words)) if words[j] in _ENDS), None)
+            optional = after is not None and elements[after] == element
+        at, room, reach, others = place
+        tokens.append(Token(*meaning, at, event.line, room, moment, optional, others, reach, element))
+        moment += meaning[0] in PAUSES and not optional
     return tokens

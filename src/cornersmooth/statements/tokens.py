@@ -26,9 +26,9 @@ class Token:
     room: float = 0.0
     #: tokens of one moment have no motion, stop or dwell between them: of a state only the last one counts
     moment: int = 0
-    habit: bool = False  #: whether posts write it on their own: an optional stop right before another tool
+    #: whether it may be missing: an optional stop right before another tool, the offset of a tool that never moves
+    optional: bool = False
     others: tuple[float, ...] = ()  #: mm: other places that it may have, where the path goes to and fro
-    idle: bool = False  #: whether a tool is changed for another, or the program ends, before anything moves
     #: mm: how much farther along it may be, too: what the CL file has there leaves nothing in the text
     reach: float = 0.0
     element: int = -1  #: element of the text that it stands before; -1 in the CL file
