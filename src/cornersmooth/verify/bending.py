@@ -52,52 +52,63 @@ def arc_bend(radius: Floats, sweep: Floats) -> Floats:
 def curve_bend(group: CurveGroup, second: Second, axis_length: float) -> Floats:
     """(k, s) bend, mm, of rational curves between their knots, each of s intervals.
 
-    In each interval a curve is N / w with Bernstein coefficients, which bound N, w and their derivatives. Seen from a
-    point c in the middle it is c + N / w with |N / w| <= R, so with the least weight w0
+    In each interval a curve is N / w, and its control points there and their divided differences bound N, w and their
+    derivatives. Seen from a point c in the middle it is c + N / w with |N / w| <= R, so with the least weight w0
 
         |P'| <= (|N'| + |w'| R) / w0,    |P"| <= (|N"| + |w"| R + 2 |w'| |P'|) / w0.
 
     The direction of the tool does not depend on the weights.
     """
+    # each number of all curves side by side: the fastest
+    points, weight = np.ascontiguousarray(group.points.transpose(1, 2, 0)), np.ascontiguousarray(group.weight.T)
+    tip, other = points[:, :3], points[:, 3:]
+    vector = other - tip if second == "point" else other
+    vector = vector if group.plain else vector * weight[:, None]
     bends = []
-    for k in range(len(group.spans) - 1):
-        by_curve, by_weight = group.bezier(k)
-        points, weight = by_curve.transpose(1, 2, 0), by_weight.T  # each number of all curves side by side: the fastest
-        tip, other = points[:, :3], points[:, 3:]
-        vector = (other - tip if second == "point" else other) * weight[:, None]
-        bends.append(_point_bend(tip, weight) + axis_length * _direction_bend(vector))
+    for start in group.spans[:-1]:
+        stop = int(np.searchsorted(group.knot, start, side="right"))  # the knot that ends the interval
+        own, knots = slice(stop - group.order, stop), group.knot[stop - group.order + 1 : stop + group.order - 1]
+        bend = _point_bend(tip[own], weight[own], knots) + axis_length * _direction_bend(vector[own], knots)
+        bends.append(bend)
     return np.stack(bends, axis=1) if bends else np.zeros((len(group.index), 0))
 
 
-def _point_bend(points: Floats, weight: Floats) -> Floats:
-    """(k,) bend of rational Bézier curves with control points (d + 1, 3, k) and weights (d + 1, k)."""
+def _point_bend(points: Floats, weight: Floats, knots: Floats) -> Floats:
+    """(k,) bend of rational curves with control points (d + 1, 3, k) and weights (d + 1, k) in one interval."""
     if not np.ptp(weight):
-        one: Floats = _derivatives(points)[1] / 8.0
+        one: Floats = _derivatives(points, knots)[1] / 8.0
         return one
     away = points - points.mean(axis=0)
     reach = _largest(away)
-    first, second = _derivatives(away * weight[:, None])
+    first, second = _derivatives(away * weight[:, None], knots)
     least = weight.min(axis=0)
-    fall, curl = _derivatives(weight[:, None])
+    fall, curl = _derivatives(weight[:, None], knots)
     slope = (first + fall * reach) / least
     bend: Floats = (second + curl * reach + 2.0 * fall * slope) / least / 8.0
     return np.where(least > 0.0, bend, np.inf)
 
 
-def _direction_bend(vector: Floats) -> Floats:
-    """(k,) bend of the directions of Bézier curves with control points (d + 1, 3, k)."""
+def _direction_bend(vector: Floats, knots: Floats) -> Floats:
+    """(k,) bend of the directions of curves with control points (d + 1, 3, k) in one interval."""
     middle = vector.mean(axis=0)
     middle /= np.maximum(np.sqrt(np.einsum("ik,ik->k", middle, middle)), np.finfo(np.float64).tiny)
     least = np.einsum("jik,ik->jk", vector, middle).min(axis=0)  # the curve is in the hull of its control points
-    first, second = _derivatives(vector)
+    first, second = _derivatives(vector, knots)
     safe = np.where(least > 0.0, least, 1.0)
     return np.where(least > 0.0, (second / safe + _GOLDEN * (first / safe) ** 2) / 8.0, np.inf)
 
 
-def _derivatives(points: Floats) -> tuple[Floats, Floats]:
-    """(k,) bounds of the first and of the second derivative of Bézier curves with control points (d + 1, n, k)."""
-    degree, step = len(points) - 1, points[1:] - points[:-1]
-    return degree * _largest(step), degree * max(degree - 1, 0) * _largest(step[1:] - step[:-1])
+def _derivatives(points: Floats, knots: Floats) -> tuple[Floats, Floats]:
+    """(k,) bounds of the first and second derivative, by the fraction of an interval, of curves (d + 1, n, k) there.
+
+    They are curves of lower degree, whose control points are divided differences. The knots (2 d,) are those around the
+    interval, in their middle.
+    """
+    degree = len(points) - 1
+    width = knots[degree] - knots[degree - 1]
+    first = np.diff(points, axis=0) * (degree * width / (knots[degree:] - knots[:degree]))[:, None, None]
+    share = (degree - 1) * width / (knots[degree:-1] - knots[1:degree])
+    return _largest(first), _largest(np.diff(first, axis=0) * share[:, None, None])
 
 
 def _largest(vectors: Floats) -> Floats:
