@@ -14,7 +14,7 @@ import pytest
 from cornersmooth import Settings, choose_form
 from cornersmooth.cli import worker
 from cornersmooth.cli.job import Job
-from cornersmooth.cli.options import Options
+from cornersmooth.cli.values import Given
 from cornersmooth.nc import Frame
 from interruptions import HOW, LEFT, OLD, Bench, Try, cl_text, members, tries
 from oracle.command import PATIENCE, command, environment, run, wait_for
@@ -48,7 +48,7 @@ def test_a_batch_whose_parent_is_killed_leaves_no_process(bench: Bench) -> None:
 
 def test_a_worker_that_nobody_listens_to_ends_in_silence(tmp_path: Path) -> None:
     """Its parent was killed between two jobs, and it has not yet seen that no job will come."""
-    job = Job("none.cls", "none.nc", (), Options(directory="out"), Settings(), choose_form(), Frame())
+    job = Job("none.cls", "none.nc", (), Given(directory="out"), Settings(), choose_form(), Frame())
     command = [sys.executable, "-P", "-c", worker._COMMAND]
     with subprocess.Popen(
         command, cwd=tmp_path, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE

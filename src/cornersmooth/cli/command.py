@@ -14,6 +14,7 @@ from cornersmooth.cli.headings import EXIT_CODES, HeadedOption
 from cornersmooth.cli.options import Options
 from cornersmooth.cli.parameters import ControlName, MachineName, Path
 from cornersmooth.cli.shop import ShopCommand
+from cornersmooth.cli.values import Given
 
 #: arguments as the usage line has them, and their fields
 _ARGUMENTS: Final[dict[str, tuple[str, dict[str, Any]]]] = {
@@ -27,7 +28,7 @@ _ARGUMENTS: Final[dict[str, tuple[str, dict[str, Any]]]] = {
     "SHELL": ("name", {"type": click.Choice(["bash", "zsh", "fish"]), "metavar": None}),
 }
 
-Decorator = Callable[[Callable[[Options], int]], click.Command]
+Decorator = Callable[[Callable[[Given], int]], click.Command]
 
 
 def new_command(
@@ -39,7 +40,7 @@ def new_command(
     cls: type[click.Command] = ShopCommand,
     **changes: str | Mapping[str, Any],
 ) -> Decorator:
-    """Make a command of a function that takes `Options`.
+    """Make a command of a function of what was given.
 
     Parameters
     ----------
@@ -49,7 +50,7 @@ def new_command(
         Helps of some options in this command, or all that is different of them there.
     """
 
-    def decorate(function: Callable[[Options], int]) -> click.Command:
+    def decorate(function: Callable[[Given], int]) -> click.Command:
         params: list[click.Parameter] = []
         for metavar in arguments.split():
             field, more = _ARGUMENTS[metavar]
@@ -57,23 +58,13 @@ def new_command(
         for field in options.split():
             change = changes.get(field, {})
             params.append(_option(field, {"help": change} if isinstance(change, str) else change))
-        return cls(
-            name,
-            params=params,
-            callback=lambda **given: function(
-                Options(**{key: value for key, value in given.items() if value is not None})
-            ),
-            help=function.__doc__,
-            epilog=epilog,
-        )
+
+        def called(**given: Any) -> int:
+            return function(Given(**{key: value for key, value in given.items() if value is not None}))
+
+        return cls(name, params=params, callback=called, help=function.__doc__, epilog=epilog)
 
     return decorate
-
-
-def typed(name: str) -> bool:
-    """Whether an option of the command that runs was given on the command line."""
-    context = click.get_current_context(silent=True)
-    return context is not None and context.get_parameter_source(name) == click.core.ParameterSource.COMMANDLINE
 
 
 @cache

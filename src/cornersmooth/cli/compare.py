@@ -14,15 +14,9 @@ import click
 from cornersmooth.cli.command import new_command
 from cornersmooth.cli.files import check_inputs, check_path, target_of, told_of
 from cornersmooth.cli.headings import EXIT_CODES_OF_READERS
-from cornersmooth.cli.options import CURVES, READING, Options
+from cornersmooth.cli.options import CURVES, READING
 from cornersmooth.cli.show import progress_bar, say_json, say_line
-from cornersmooth.cli.values import (
-    control_of,
-    machine_of,
-    read_source,
-    reading_of,
-    settings_of,
-)
+from cornersmooth.cli.values import Given
 from cornersmooth.output import open_output
 
 if TYPE_CHECKING:
@@ -39,7 +33,7 @@ _OWN = frozenset(("as_json", "csv", "verbose", "quiet", "force", "machine", "lim
     "as_json csv force quiet verbose",
     epilog=EXIT_CODES_OF_READERS,
 )
-def command(given: Options) -> int:
+def command(given: Given) -> int:
     """Write the CL file IN in every form, method and line density that the control can run, and compare the times.
 
     Every program is verified and planned as it is written, under the limits of the axes of --limits, or of --machine.
@@ -65,17 +59,17 @@ def command(given: Options) -> int:
     check_inputs(source)
     if given.csv:
         check_path(given.csv, [source], force=given.force)
-    machine, limits = machine_of(given.machine), machine_of(given.limits)
+    machine, limits = given.load_machine(), given.load_limits()
     axes = axes_of(given)
-    control, settings = control_of(given), settings_of(given)
-    data, name, is_program = read_source(given)
+    control, settings = given.load_control(), given.settings()
+    data, name, is_program = given.read()
     with told_of(name), progress_bar(given.quiet) as progress:
         step = None if progress is None else lambda done, total: progress("programs", done, total)
         if is_program:  # it has one kind of words
             tried = [one for one in candidates(control, settings, machine) if one.form.rotary == (machine is not None)]
             table = compare_filtered(data, tried, axes, **how_read(given), progress=step)
         else:
-            program = with_feed(read(data, name=name, **reading_of(given)), given.feed)
+            program = with_feed(read(data, name=name, **given.reading()), given.feed)
             tried = candidates(control, settings, limits if machine is None else machine)
             blocks = BlockLimits(look_ahead=given.look_ahead)
             table = compare_programs(program, tried, axes, blocks, progress=step)
@@ -141,7 +135,7 @@ def _cells(row: Row) -> tuple[str, ...]:
     )
 
 
-def _command(given: Options, row: Row, machine: Any, command: str, suffix: str) -> str:
+def _command(given: Given, row: Row, machine: Any, command: str, suffix: str) -> str:
     """Options that were typed, and those of the row; a machine is called as the user has called it."""
     context, typed = click.get_current_context(), []
     for option in context.command.params:

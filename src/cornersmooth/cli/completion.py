@@ -5,11 +5,11 @@ from __future__ import annotations
 import click
 
 from cornersmooth.cli.command import new_command
-from cornersmooth.cli.options import Options
+from cornersmooth.cli.values import Given
 
 
 @new_command("completion", "SHELL", "", cls=click.Command)
-def command(given: Options) -> int:
+def command(given: Given) -> int:
     """Print what makes SHELL complete commands, options, names of controls, machines and forms, and files.
 
     \b

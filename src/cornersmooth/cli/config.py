@@ -10,8 +10,8 @@ import click
 
 from cornersmooth.cli import shop
 from cornersmooth.cli.command import new_command
-from cornersmooth.cli.options import Options
 from cornersmooth.cli.show import say_json, say_line
+from cornersmooth.cli.values import Given
 from cornersmooth.errors import InputError
 
 #: where a help says what holds without the option
@@ -19,7 +19,7 @@ _DEFAULT: Final = re.compile(r"\[default: ([^]]+)\]")
 
 
 @new_command("config", "[IN]", "as_json", cls=click.Command)
-def command(given: Options) -> int:
+def command(given: Given) -> int:
     """Say which values 'cornersmooth smooth' would use for the file or folder IN, and where each comes from.
 
     Options come first, then the environment (CORNERSMOOTH_TOLERANCE), the file cornersmooth.toml in the folder of the

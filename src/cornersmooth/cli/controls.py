@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from cornersmooth.cli.command import new_command
-from cornersmooth.cli.options import Options
 from cornersmooth.cli.show import say_json, say_line
+from cornersmooth.cli.values import Given
 
 if TYPE_CHECKING:
     from cornersmooth.nc import Control
@@ -24,7 +24,7 @@ _MODES = {
 
 
 @new_command("controls", "[CONTROL]", "table as_json", cls=click.Command)
-def command(given: Options) -> int:
+def command(given: Given) -> int:
     """List the controls with their forms, or check and describe one.
 
     A TOML file of your own is like one of them and says only what is different; see docs/controls.md.

@@ -12,8 +12,8 @@ from typing import Any, Final
 import click
 
 from cornersmooth.cli.command import new_command
-from cornersmooth.cli.options import Options
 from cornersmooth.cli.show import say_json, say_line
+from cornersmooth.cli.values import Given
 
 #: what the hundreds of the codes are about
 PARTS: Final = {
@@ -35,7 +35,7 @@ _WIDTH: Final = 80
 
 
 @new_command("explain", "[CODE]", "as_json", cls=click.Command)
-def command(given: Options) -> int:
+def command(given: Given) -> int:
     """Explain the code of a message: its cause, what to do, and how it is printed. Without a code, list them all.
 
     \b

@@ -13,7 +13,7 @@ from cornersmooth.cli.command import new_command
 from cornersmooth.cli.files import STANDARD, check_path, read_input, suffix_of, target_of, told_of, write_report
 from cornersmooth.cli.headings import EXIT_CODES_OF_WRITERS
 from cornersmooth.cli.inputs import Input, check_together, find_inputs
-from cornersmooth.cli.options import LINES, Options
+from cornersmooth.cli.options import LINES
 from cornersmooth.cli.programs import filter_form_of, how_read, show_wrong
 from cornersmooth.cli.shop import command_line, loosened
 from cornersmooth.cli.show import (
@@ -26,10 +26,7 @@ from cornersmooth.cli.show import (
     say_line,
     warn,
 )
-from cornersmooth.cli.values import (
-    machine_of,
-    settings_of,
-)
+from cornersmooth.cli.values import Given
 from cornersmooth.errors import CornersmoothError
 from cornersmooth.output import FAILED, make_folder, open_output
 from cornersmooth.verdict import Verdict
@@ -61,7 +58,7 @@ _SHOWN = 10
     reports="Write what was done: .json, or .html for a page to look at. May be repeated; {stem} is the input's name.",
     units="Units of a program that does not say them.",
 )
-def command(given: Options) -> int:
+def command(given: Given) -> int:
     """Smooth the cutting runs of the finished NC programs IN; every other byte stays.
 
     Runs of plain cuts are replaced where the state of the control is surely known. What the program does there today
@@ -77,7 +74,7 @@ def command(given: Options) -> int:
       cat part.nc | cornersmooth filter - > smooth.nc
     """
     check_together(given)
-    form, settings = filter_form_of(given), settings_of(given)
+    form, settings = filter_form_of(given), given.settings()
     jobs = [_job(one, given) for one in find_inputs(given, PATTERNS)]
     sources, targets = [job.source for job in jobs], [job.target for job in jobs]
     if len(set(targets)) < len(targets):
@@ -115,7 +112,7 @@ class _Job(NamedTuple):
     reports: list[str]
 
 
-def _job(one: Input, given: Options) -> _Job:
+def _job(one: Input, given: Given) -> _Job:
     target = given.output or STANDARD
     if given.directory:
         target = os.path.join(given.directory, one.stem + os.path.splitext(one.path)[1])
@@ -127,7 +124,7 @@ def _pages(reports: Iterable[str]) -> bool:
     return any(suffix_of(path) == ".html" for path in reports)
 
 
-def _filter(job: _Job, form: Form, settings: Settings, given: Options) -> int:
+def _filter(job: _Job, form: Form, settings: Settings, given: Given) -> int:
     """Filter one program; return the exit code."""
     from cornersmooth.filter import filter_program
     from cornersmooth.report import NcFile
@@ -136,7 +133,7 @@ def _filter(job: _Job, form: Form, settings: Settings, given: Options) -> int:
     from cornersmooth.verify import useful_processes
 
     data, name = read_input(job.source)
-    axes = machine_of(given.limits)
+    axes = given.load_limits()
     with told_of(name):
         found = filter_program(
             data,
@@ -184,7 +181,7 @@ def _filter(job: _Job, form: Form, settings: Settings, given: Options) -> int:
     return int(bad)
 
 
-def verify_with_program(source: str, old: bytes, given: Options) -> int:
+def verify_with_program(source: str, old: bytes, given: Given) -> int:
     """Compare an NC program with what was made of it; return the exit code of ``verify``."""
     from cornersmooth.filter import verify_programs
     from cornersmooth.report import NcFile
@@ -193,7 +190,7 @@ def verify_with_program(source: str, old: bytes, given: Options) -> int:
     from cornersmooth.verify import useful_processes
 
     new, name = read_input(given.text)
-    settings, form = settings_of(given), filter_form_of(given)
+    settings, form = given.settings(), filter_form_of(given)
     found = verify_programs(
         old, new, form, settings, **how_read(given), paths=_pages(given.reports), processes=useful_processes()
     )
@@ -280,7 +277,7 @@ def _measured(found: Checked, tolerance: float) -> str:
     return f"within {tolerance:g} mm: tip {found.tip:.4g} mm{point}"
 
 
-def _show(name: str, contents: Mapping[str, Any], found: Filtered, given: Options) -> None:
+def _show(name: str, contents: Mapping[str, Any], found: Filtered, given: Given) -> None:
     """Print the verdict, what was measured, and what was left as it is."""
     verdict, _, what = contents["verdict_text"].partition(": ")
     print_heading(

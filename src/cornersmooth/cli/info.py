@@ -7,16 +7,13 @@ from typing import Any
 
 from cornersmooth.cli.command import new_command
 from cornersmooth.cli.headings import EXIT_CODES_OF_READERS
-from cornersmooth.cli.options import READING, Options
+from cornersmooth.cli.options import READING
 from cornersmooth.cli.show import say_json, say_line, told_finding
-from cornersmooth.cli.values import (
-    read_source,
-    reading_of,
-)
+from cornersmooth.cli.values import Given
 
 
 @new_command("info", "IN", f"tolerance axis_length {READING} as_json", epilog=EXIT_CODES_OF_READERS)
-def command(given: Options) -> int:
+def command(given: Given) -> int:
     """Say what the CL file IN holds: dialect, moves, lengths, turns, axis changes, arcs, statements, findings.
 
     IN is an APT/CL file or a table of points; - is standard input. -e and -H do not write anything: they tell how many
@@ -32,7 +29,7 @@ def command(given: Options) -> int:
     from cornersmooth.cli.programs import describe_program
     from cornersmooth.report.info import describe
 
-    data, name, is_program = read_source(given)
+    data, name, is_program = given.read()
     if is_program:
         told = describe_program(data, name)
         if given.as_json:
@@ -43,7 +40,7 @@ def command(given: Options) -> int:
         say_line(f"cuts   {told['cuts']}")
         say_line("       'cornersmooth filter' smooths them; name the control and the machine there")
         return 0
-    info = describe(read(data, name=name, **reading_of(given)), given.tolerance, given.axis_length)
+    info = describe(read(data, name=name, **given.reading()), given.tolerance, given.axis_length)
     if given.as_json:
         say_json(info)
         return 0

@@ -10,8 +10,8 @@ from fnmatch import fnmatch
 import click
 
 from cornersmooth.cli.files import STANDARD
-from cornersmooth.cli.options import Options
 from cornersmooth.cli.show import print_line
+from cornersmooth.cli.values import Given
 from cornersmooth.errors import SettingsError
 
 #: names of CL files, for folders
@@ -26,7 +26,7 @@ class Input:
     stem: str  #: its place below the folder that was named, without the ending: where its outputs go below theirs
 
 
-def check_together(given: Options) -> None:
+def check_together(given: Given) -> None:
     """Refuse options that do not go together, or not with so many inputs."""
     folder, inputs = given.directory, given.inputs
     if given.quiet and given.verbose:
@@ -43,7 +43,7 @@ def check_together(given: Options) -> None:
         raise click.UsageError("standard input goes with no other input")
 
 
-def find_inputs(given: Options, patterns: tuple[str, ...] = PATTERNS) -> list[Input]:
+def find_inputs(given: Given, patterns: tuple[str, ...] = PATTERNS) -> list[Input]:
     """Files that were named, and in batches those of the folders that were, with all below, in alphabetical order.
 
     Parameters

@@ -6,14 +6,13 @@ import hashlib
 import os
 import traceback
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, is_dataclass
 from typing import TYPE_CHECKING, Any, BinaryIO, cast
 
+from cornersmooth import __version__
 from cornersmooth.cli.files import STANDARD, Beginning, check_path, read_input, suffix_of, target_of, write_report
-from cornersmooth.cli.fingerprint import fingerprint
-from cornersmooth.cli.options import Options
 from cornersmooth.cli.show import more
-from cornersmooth.cli.values import reading_of
+from cornersmooth.cli.values import Given
 from cornersmooth.errors import CornersmoothError, SettingsError, VerdictError, message, printable
 from cornersmooth.memory import return_large_arrays
 from cornersmooth.output import ClosedPipe, make_folder, read_mark
@@ -52,7 +51,7 @@ class Job:
     source: str
     target: str
     reports: tuple[str, ...]
-    given: Options
+    given: Given
     settings: Settings
     form: Form
     frame: Frame
@@ -171,10 +170,28 @@ def _exists(job: Job, outcome: Outcome) -> bool:
 
 
 def _made_of(job: Job, source: bytes) -> str:
-    """Name for everything that the text of a job depends on."""
-    text, given = hashlib.sha256(source).hexdigest(), job.given
+    """Hash of all that the program of a job depends on, in hexadecimal digits: the same settings have the same."""
+    given = job.given
     wanted = (given.no_verify, given.strict, given.feed, job.plan_feeds)
-    return fingerprint(text, reading_of(given), job.settings, job.form, job.frame, *wanted)
+    digest = hashlib.sha256(source).hexdigest()
+    parts = (__version__, digest, given.reading(), job.settings, job.form, job.frame, *wanted)
+    return hashlib.sha256(_plain(parts).encode("utf-8", "surrogateescape")).hexdigest()
+
+
+def _plain(value: object) -> str:
+    """Text that tells a value from others and does not depend on the order of sets or the place in memory."""
+    if is_dataclass(value) and not isinstance(value, type):
+        parts = [f"{item.name}={_plain(getattr(value, item.name))}" for item in fields(value)]
+        return f"{type(value).__name__}({', '.join(parts)})"
+    if isinstance(value, Mapping):
+        return f"{{{', '.join(sorted(f'{_plain(key)}: {_plain(item)}' for key, item in value.items()))}}}"
+    if isinstance(value, (set, frozenset)):
+        return f"{{{', '.join(sorted(map(_plain, value)))}}}"
+    if isinstance(value, (list, tuple)):
+        return f"({', '.join(map(_plain, value))})"
+    if hasattr(value, "tolist"):
+        return _plain(value.tolist())
+    return repr(value)
 
 
 def _may_replace(job: Job, made_of: str, outcome: Outcome) -> bool | None:
@@ -220,7 +237,7 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> dict[
             job.settings,
             form=job.form,
             frame=job.frame,
-            reading={"name": name, **reading_of(given)},
+            reading={"name": name, **given.reading()},
             feed=given.feed,
             plan_feeds=job.plan_feeds,
             verify=not given.no_verify,

@@ -7,12 +7,12 @@ from dataclasses import asdict
 import click
 
 from cornersmooth.cli.command import new_command
-from cornersmooth.cli.options import Options
 from cornersmooth.cli.show import say_json, say_line
+from cornersmooth.cli.values import Given
 
 
 @new_command("machines", "[MACHINE]", "table as_json pose", cls=click.Command)
-def command(given: Options) -> int:
+def command(given: Given) -> int:
     """List the machines that come with the program, or check and describe one.
 
     A machine has up to two rotary axes, each in a table or a head, with direction, point and limits. A TOML file

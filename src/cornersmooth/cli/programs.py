@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from cornersmooth.cli.files import read_input, told_of
-from cornersmooth.cli.options import Options
 from cornersmooth.cli.show import more, print_line, print_message, say_json, say_line
-from cornersmooth.cli.values import control_of, form_of, machine_of, settings_of
+from cornersmooth.cli.values import Given
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics import Machine
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
 _WRONG_SHOWN = 20
 
 
-def filter_form_of(given: Options) -> Form:
+def filter_form_of(given: Given) -> Form:
     """Form of the control that blocks are read and written in.
 
     Raises
@@ -33,36 +32,36 @@ def filter_form_of(given: Options) -> Form:
     from cornersmooth.errors import SettingsError
     from cornersmooth.filter.vocabulary import VOCABULARIES
 
-    control = control_of(given)
+    control = given.load_control()
     if control.dialect not in VOCABULARIES:
         known = ", ".join(sorted(VOCABULARIES))
         raise SettingsError("CS240", f"programs for {control.name} are not read as a filter", f"use one of {known}")
-    return form_of(given)
+    return given.choose_form()
 
 
-def how_read(given: Options) -> dict[str, Any]:
+def how_read(given: Given) -> dict[str, Any]:
     """What is to be known of a program that it does not say."""
     return {"tip_from_start": given.tip_control, "inch": given.units == "inch"}
 
 
-def axes_of(given: Options) -> Machine:
+def axes_of(given: Given) -> Machine:
     """Machine under whose limits a program is planned."""
     from cornersmooth.comparing import limits_machine
 
-    axes = limits_machine(machine_of(given.limits), machine_of(given.machine))
+    axes = limits_machine(given.load_limits(), given.load_machine())
     if axes is None:
         raise click.UsageError("programs are planned within limits of axes: name a machine with [dynamics]: --limits")
     return axes
 
 
-def time_of_program(data: bytes, name: str, given: Options) -> int:
+def time_of_program(data: bytes, name: str, given: Given) -> int:
     """Say the time of a program as it is and smoothed, or beside another one; return the exit code of ``time``."""
     from cornersmooth.filter import filter_program, verify_programs
     from cornersmooth.filter.program import read_program
     from cornersmooth.filter.times import time_as_it_is
     from cornersmooth.verify import useful_processes
 
-    form, settings, axes = filter_form_of(given), settings_of(given), axes_of(given)
+    form, settings, axes = filter_form_of(given), given.settings(), axes_of(given)
     how = {**how_read(given), "axes": axes, "processes": useful_processes()}
     with told_of(name):
         if given.text:

@@ -8,15 +8,9 @@ from typing import TYPE_CHECKING
 from cornersmooth.cli.command import new_command
 from cornersmooth.cli.files import read_input
 from cornersmooth.cli.headings import EXIT_CODES_OF_READERS
-from cornersmooth.cli.options import FEED_OF_ALL, LIMITS, LINES, READING, Options
+from cornersmooth.cli.options import FEED_OF_ALL, LIMITS, LINES, READING
 from cornersmooth.cli.show import progress_bar, say_json, say_line
-from cornersmooth.cli.values import (
-    control_of,
-    limits_of,
-    machine_of,
-    reading_of,
-    settings_of,
-)
+from cornersmooth.cli.values import Given
 
 if TYPE_CHECKING:
     from cornersmooth.model import Floats
@@ -40,7 +34,7 @@ _WORTH = 0.1
         "examples), or a TOML file with [dynamics.X] and so on.",
     },
 )
-def command(given: Options) -> int:
+def command(given: Given) -> int:
     """Find how to clamp the part of the CL file IN so that its program takes the least time.
 
     The part is turned about Z and tilted about X and Y of the machine. Many setups are estimated; the best are
@@ -58,15 +52,15 @@ def command(given: Options) -> int:
     from cornersmooth.processes import useful_processes
     from cornersmooth.setup import find_setups
 
-    machine = machine_of(given.limits)
-    form = choose_form(control_of(given), given.form, machine=machine)
+    machine = given.load_limits()
+    form = choose_form(given.load_control(), given.form, machine=machine)
     data, name = read_input(given.source, size_limit=not given.no_size_limit)
     with progress_bar(given.quiet) as progress:
         found = find_setups(
-            read(data, name=name, **reading_of(given)),
+            read(data, name=name, **given.reading()),
             form,
-            settings_of(given),
-            limits_of(given),
+            given.settings(),
+            given.path_limits(),
             tilt=given.tilt,
             turns=not given.no_turn,
             plans=given.plans,

@@ -16,7 +16,7 @@ from cornersmooth.cli.files import STANDARD, check_inputs, check_path, read_line
 from cornersmooth.cli.headings import EXIT_CODES_OF_WRITERS
 from cornersmooth.cli.inputs import Input, check_together, find_inputs
 from cornersmooth.cli.job import Job, Outcome, run_job
-from cornersmooth.cli.options import CURVES, LINES, PLANNED, READING, WRITING, Options
+from cornersmooth.cli.options import CURVES, LINES, PLANNED, READING, WRITING
 from cornersmooth.cli.shop import command_line, loosened
 from cornersmooth.cli.show import (
     more,
@@ -30,7 +30,7 @@ from cornersmooth.cli.show import (
     warn,
 )
 from cornersmooth.cli.summary import batch_report, check_summary, end_lines, interrupted_line, line_of, write_summary
-from cornersmooth.cli.values import form_of, machine_of, planned_limits_of, settings_of
+from cornersmooth.cli.values import Given
 from cornersmooth.errors import printable
 from cornersmooth.output import make_folder
 from cornersmooth.verdict import Verdict
@@ -51,7 +51,7 @@ _NAMED = 3
     f"{READING} tool_number spindle no_verify strict force quiet verbose",
     epilog=f"{EXIT_CODES_OF_WRITERS} With several inputs: that of the worst.",
 )
-def command(given: Options) -> int:
+def command(given: Given) -> int:
     """Round the corners of the CL files IN and write NC programs.
 
     IN is an APT/CL file (NX, CATIA, Creo, ...) or a table of points (x y z i j k, or two points); - is standard input.
@@ -141,7 +141,7 @@ def _tell(outcome: Outcome, told: bool = False) -> None:
         show_findings(job.source, findings, given.verbose)
 
 
-def _make_jobs(given: Options) -> list[Job]:
+def _make_jobs(given: Given) -> list[Job]:
     """One job for every input, all of them checked for names that clash."""
     from cornersmooth.nc import fit_settings
 
@@ -149,7 +149,7 @@ def _make_jobs(given: Options) -> list[Job]:
     _check_usage(given)
     files = find_inputs(given)
     _check_side_outputs(files, given)
-    settings, form, frame = settings_of(given), form_of(given), _frame(given)
+    settings, form, frame = given.settings(), given.choose_form(), _frame(given)
     fit_settings(settings, form, "mm")  # refuses wrong ones before any file is touched
     jobs = [
         Job(
@@ -160,10 +160,10 @@ def _make_jobs(given: Options) -> list[Job]:
             settings=settings,
             form=form,
             frame=replace(frame, stem="" if found.path == STANDARD else os.path.basename(found.stem)),
-            plan_feeds=planned_limits_of(given),
+            plan_feeds=given.planned_limits(),
             alone=len(files) == 1,
             beginning=not folder and not given.output and _to_terminal(),
-            axes=machine_of(given.limits),
+            axes=given.load_limits(),
             loosened=loosened(settings.tolerance),
             command=command_line(),
         )
@@ -177,7 +177,7 @@ def _make_jobs(given: Options) -> list[Job]:
     return jobs
 
 
-def _check_usage(given: Options) -> None:
+def _check_usage(given: Given) -> None:
     """Refuse options that do not go together, or not with so many inputs."""
     folder = given.directory
     check_together(given)
@@ -191,7 +191,7 @@ def _check_usage(given: Options) -> None:
         raise click.UsageError("--feed must be a positive number of mm/min")
 
 
-def _check_side_outputs(files: list[Input], given: Options) -> None:
+def _check_side_outputs(files: list[Input], given: Given) -> None:
     """Refuse a summary or reports that cannot be written for these files."""
     if given.summary:
         check_summary(given.summary)
@@ -200,7 +200,7 @@ def _check_side_outputs(files: list[Input], given: Options) -> None:
         raise click.UsageError("with several inputs a report needs {stem} in its name, as in 'out/{stem}.json'")
 
 
-def _frame(given: Options) -> Frame:
+def _frame(given: Given) -> Frame:
     """What stands around the motion, with the texts of header and footer."""
     from cornersmooth.nc import Frame
 

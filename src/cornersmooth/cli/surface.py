@@ -9,13 +9,9 @@ import click
 
 from cornersmooth.cli.command import new_command
 from cornersmooth.cli.files import STANDARD, check_inputs, check_reports, read_input, suffix_of, write_report
-from cornersmooth.cli.options import READING, Options
+from cornersmooth.cli.options import READING
 from cornersmooth.cli.show import say_json, say_line
-from cornersmooth.cli.values import (
-    control_of,
-    reading_back_of,
-    reading_of,
-)
+from cornersmooth.cli.values import Given
 from cornersmooth.errors import SettingsError
 from cornersmooth.verdict import Verdict
 
@@ -33,7 +29,7 @@ if TYPE_CHECKING:
     reports="Write what was found: .json, .csv for a row per point, .html, or a map: .png, .svg, .pdf. May be "
     "repeated.",
 )
-def command(given: Options) -> int:
+def command(given: Given) -> int:
     """Measure the surface that the NC program NC leaves against that of the CL file IN.
 
     Points are taken on the envelope of the original motion of the tool, up to the length of its cutting edge (-H). At
@@ -56,9 +52,9 @@ def command(given: Options) -> int:
         raise click.UsageError("only one of the inputs can be standard input")
     check_inputs(source, text)
     check_reports(given.reports, ".json, .csv, .html, .png, .svg, .pdf", [source, text], force=given.force)
-    how = reading_back_of(given)
+    how = given.reading_back()
     data, name = read_input(source, size_limit=not given.no_size_limit)
-    program = read(data, name=name, **reading_of(given))
+    program = read(data, name=name, **given.reading())
     tool = _tool(program, given.tool)
     written = read_input(text)[0] if text == STANDARD else text
     nc = read_nc(written, tolerance=given.tolerance, axis_length=given.axis_length, **how)
@@ -103,7 +99,7 @@ def _tool(program: Program, asked: Tool | None) -> Tool:
 
 
 def _report(
-    form: str, program: Program, source: bytes, written: bytes | str, nc: Any, found: SurfaceMap, given: Options
+    form: str, program: Program, source: bytes, written: bytes | str, nc: Any, found: SurfaceMap, given: Given
 ) -> Iterator[str | bytes]:
     from cornersmooth.report import report_json
     from cornersmooth.report.surface import draw_surface, surface_csv
@@ -116,9 +112,9 @@ def _report(
         from cornersmooth.page import verified_page
         from cornersmooth.verify import verify
 
-        how = {"tolerance": given.tolerance, "axis_length": given.axis_length, **reading_back_of(given)}
+        how = {"tolerance": given.tolerance, "axis_length": given.axis_length, **given.reading_back()}
         checked = verify(program, written, **how)
-        name, control = written if isinstance(written, str) else "", control_of(given).name
+        name, control = written if isinstance(written, str) else "", given.load_control().name
         yield verified_page(program, nc, checked, name=name, control=control, source=source, surface=found)
     else:
         yield draw_surface(found, form[1:])

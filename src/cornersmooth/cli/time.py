@@ -11,18 +11,9 @@ import click
 from cornersmooth.cli.command import new_command
 from cornersmooth.cli.files import check_inputs, check_path, read_head, target_of
 from cornersmooth.cli.headings import EXIT_CODES_OF_READERS
-from cornersmooth.cli.options import CURVES, FEED_OF_ALL, LIMITS, READING, Options
+from cornersmooth.cli.options import CURVES, FEED_OF_ALL, LIMITS, READING
 from cornersmooth.cli.show import print_message, progress_bar, say_json, say_line
-from cornersmooth.cli.values import (
-    control_of,
-    form_of,
-    limits_of,
-    machine_of,
-    read_source,
-    reading_back_of,
-    reading_of,
-    settings_of,
-)
+from cornersmooth.cli.values import Given
 from cornersmooth.errors import message
 from cornersmooth.methods import METHODS
 from cornersmooth.output import open_output
@@ -52,7 +43,7 @@ LAWS = tuple(_TITLES)
     csv="Write the motion, a row every period.",
     reports="Write a page to look at: .html. May be repeated.",
 )
-def command(given: Options) -> int:
+def command(given: Given) -> int:
     """Plan the CL file IN as it is and the program that the options write, under the same limits.
 
     The path of the CL file is planned twice: with a stop at the end of every move, and without. At corners, the
@@ -80,12 +71,12 @@ def command(given: Options) -> int:
     check_inputs(*inputs)
     for path in filter(None, (given.csv, *given.reports)):
         check_path(path, inputs, force=given.force)
-    data, name, is_program = read_source(given)
+    data, name, is_program = given.read()
     if is_program:
         if given.csv or given.reports:
             raise click.UsageError("--csv and --report: of an NC program only the times are told")
         return time_of_program(data, name, given)
-    control = control_of(given)
+    control = given.load_control()
     if control.lines.planner:
         if given.csv or given.reports:
             raise click.UsageError(
@@ -114,7 +105,7 @@ def command(given: Options) -> int:
     return 0
 
 
-def _compare(data: bytes, name: str, given: Options) -> Comparison:
+def _compare(data: bytes, name: str, given: Given) -> Comparison:
     from cornersmooth.cl import read
     from cornersmooth.feedrate import BlockLimits, compare, plan_text
     from cornersmooth.nc import fit_settings
@@ -122,15 +113,15 @@ def _compare(data: bytes, name: str, given: Options) -> Comparison:
     from cornersmooth.pipeline import read_back
     from cornersmooth.saving import with_feed, without_holes, written_text
 
-    machine, axes = machine_of(given.machine), machine_of(given.limits)
+    machine, axes = given.load_machine(), given.load_limits()
     axes = machine if axes is None else axes
-    limits, settings = limits_of(given), settings_of(given)
-    program = read(data, name=name, **reading_of(given))
+    limits, settings = given.path_limits(), given.settings()
+    program = read(data, name=name, **given.reading())
     if given.text:  # before anything that takes long
-        how = reading_back_of(_as_text_was_made(given))
+        how = _as_text_was_made(given).reading_back()
         nc = read_nc(given.text, **how, tolerance=settings.tolerance, axis_length=settings.axis_scale)
     else:
-        form = form_of(given)
+        form = given.choose_form()
         fitted = fit_settings(settings, form, program.units)
         nc = read_back(written_text(without_holes(with_feed(program, given.feed)), fitted, form), form, fitted)
     if not given.quiet:
@@ -144,17 +135,17 @@ def _compare(data: bytes, name: str, given: Options) -> Comparison:
         return compared.with_text(law)
 
 
-def _by_own_law(data: bytes, name: str, given: Options) -> int:
+def _by_own_law(data: bytes, name: str, given: Given) -> int:
     """Times of a control that plans lines by a law of its own."""
     from cornersmooth.cl import read
     from cornersmooth.comparing import law_of_lines
     from cornersmooth.nc import fit_settings
     from cornersmooth.saving import Timing, with_feed, without_holes, written_text
 
-    program = without_holes(with_feed(read(data, name=name, **reading_of(given)), given.feed))
-    form = form_of(given)
-    settings = fit_settings(settings_of(given), form, program.units)
-    timing = Timing.of(form, settings, axes=machine_of(given.limits))
+    program = without_holes(with_feed(read(data, name=name, **given.reading()), given.feed))
+    form = given.choose_form()
+    settings = fit_settings(given.settings(), form, program.units)
+    timing = Timing.of(form, settings, axes=given.load_limits())
     if timing is None:
         raise click.UsageError("name the machine with --machine; its table has to have [dynamics]")
     if given.text:
@@ -174,7 +165,7 @@ def _by_own_law(data: bytes, name: str, given: Options) -> int:
     return 0
 
 
-def _as_text_was_made(given: Options) -> Options:
+def _as_text_was_made(given: Given) -> Given:
     """Options to read the text by: the machine of its own option, else of its head, else the one planned for."""
     from cornersmooth.kinematics import machine_names
     from cornersmooth.provenance import read_provenance

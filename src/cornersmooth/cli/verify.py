@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from cornersmooth.cli.command import new_command, typed
+from cornersmooth.cli.command import new_command
 from cornersmooth.cli.files import (
     STANDARD,
     check_inputs,
@@ -21,16 +21,10 @@ from cornersmooth.cli.files import (
     suffix_of,
     write_report,
 )
-from cornersmooth.cli.options import READING, Options
-from cornersmooth.cli.shop import command_line, loosened
+from cornersmooth.cli.options import READING
+from cornersmooth.cli.shop import command_line, loosened, typed
 from cornersmooth.cli.show import more, print_line, print_message, say_json, say_line, show_findings, warn
-from cornersmooth.cli.values import (
-    check_one_of_axis,
-    control_of,
-    read_source,
-    reading_back_of,
-    reading_of,
-)
+from cornersmooth.cli.values import Given
 from cornersmooth.errors import SettingsError
 from cornersmooth.memory import return_large_arrays
 from cornersmooth.verdict import Verdict
@@ -61,7 +55,7 @@ _ALIKE = 1e-9
     "repeated.",
     verbose="More: every problem, and how large deviations are and where along the path.",
 )
-def command(given: Options) -> int:
+def command(given: Given) -> int:
     """Measure the NC program NC against the CL file IN, whoever wrote it.
 
     Tip and axis point must stay within the tolerance of their paths, in order; rapids, statements, feeds and exact
@@ -98,17 +92,17 @@ def command(given: Options) -> int:
     return_large_arrays()
     check_inputs(source, text)
     check_reports(given.reports, ".json, .csv or .html", [source, text], force=given.force)
-    data, name, is_program = read_source(given)
+    data, name, is_program = given.read()
     if is_program:
         return verify_with_program(name, data, given)
     nc: bytes | str | os.PathLike[str] = read_input(text)[0] if text == STANDARD else text
     head = _take_over(given, nc, data)
     given = head.given
-    check_one_of_axis(given)
-    control, reader = control_of(given), reading_back_of(given)
+    given.check_axis()
+    control, reader = given.load_control(), given.reading_back()
     machine = reader["machine"]
     measures = {name: getattr(given, name) for name in ("tolerance", "axis_length", "axis_tolerance")}
-    program = read(data, name=name, **reading_of(given))
+    program = read(data, name=name, **given.reading())
     if given.verbose or given.reports or given.as_json:  # it is looked at more than once
         nc = readable_twice(nc)
     trusted = [line for path in given.trusted for line in read_lines(path)]
@@ -200,7 +194,7 @@ def command(given: Options) -> int:
 class _Head:
     """What was taken from the head of a program."""
 
-    given: Options  #: with what took the place of options that were not typed
+    given: Given  #: with what took the place of options that were not typed
     taken: tuple[str, ...] = ()  #: the words of it
     loose: tuple[str, ...] = ()  #: what is not verified because the program itself loosens the check
     weights: tuple[float, ...] | None = None  #: Weights of its curves; None for any.
@@ -209,7 +203,7 @@ class _Head:
     problem: Problem | None = None
 
 
-def _take_over(given: Options, nc: bytes | str | os.PathLike[str], source: bytes) -> _Head:
+def _take_over(given: Given, nc: bytes | str | os.PathLike[str], source: bytes) -> _Head:
     """Take what the head of a program says of how it was made for options that were not typed."""
     from cornersmooth.kinematics import machine_names
     from cornersmooth.nc import control_names
@@ -247,11 +241,11 @@ def _take_over(given: Options, nc: bytes | str | os.PathLike[str], source: bytes
     return _Head(now, tuple(taken), tuple(_loose(given, now, set(words))), made.weights, made.form, problem=problem)
 
 
-def _loose(before: Options, given: Options, taken: set[str]) -> Iterator[str]:
+def _loose(before: Given, given: Given, taken: set[str]) -> Iterator[str]:
     """Say where words of the head make the check looser than the options and settings do without them."""
     from cornersmooth.verify.task import length_of
 
-    def lever(options: Options) -> float:
+    def lever(options: Given) -> float:
         """Distance from the tip at which the axis is off by the tolerance where it is off by what it may."""
         own = options.axis_tolerance
         return float(options.axis_length if own is None else length_of(options.tolerance, own))
@@ -269,14 +263,14 @@ def _loose(before: Options, given: Options, taken: set[str]) -> Iterator[str]:
         yield "feeds: that they may be lower is the program's own word: name it with --planned-feeds"
 
 
-def _recognised(given: Options, head: bytes) -> _Head:
+def _recognised(given: Given, head: bytes) -> _Head:
     """Take the control that a program looks like, where none was named, and say so."""
     from cornersmooth.nc_reader.recognition import recognise_control
 
     looks = recognise_control(head)
     source = click.get_current_context().get_parameter_source("control")
     named = source != click.core.ParameterSource.DEFAULT
-    if looks in ("", control_of(given).dialect) or (named and looks == "fanuc"):  # others say its words, too
+    if looks in ("", given.load_control().dialect) or (named and looks == "fanuc"):  # others say its words, too
         return _Head(given)
     advice = f"it looks like {looks.capitalize()}: --control {looks}"
     return _Head(given, remark=advice) if named else _Head(replace(given, control=looks), remark=f"{advice} is taken")
