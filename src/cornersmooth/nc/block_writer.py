@@ -245,8 +245,7 @@ class BlockWriter:
 
     def ticks(self, tip: Floats, other: Floats) -> Ints:
         """Numbers of rows in steps of their last digit, (r, c), from `Rows.tip` and `Rows.other`."""
-        ticks: Ints = to_ticks(self._numbers(tip, other), self._format.decimals)
-        return ticks
+        return to_ticks(self._numbers(tip, other), self._format.decimals)
 
     def bezier(self, tip: Floats, other: Floats, curve: NDArray[np.int8], spline: Floats | None) -> Floats | None:
         """`Run.bezier` where the form writes polynomials."""

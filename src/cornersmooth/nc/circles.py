@@ -157,5 +157,4 @@ def _deviation(
 
 def _local(vectors: Floats, frames: Floats) -> Floats:
     """(k, 3) vectors in the coordinates of (k, 3, 3) frames."""
-    local: Floats = np.einsum("ki,kij->kj", vectors, frames)
-    return local
+    return np.einsum("ki,kij->kj", vectors, frames)

@@ -108,8 +108,7 @@ class FirstBlock:
         ends = np.array([(x, y) for x in travel.get("X", nowhere) for y in travel.get("Y", nowhere)])
         places = np.vstack((ends, ends.mean(axis=0), over)) if place is None else place[None]
         starts = np.column_stack((places, np.full(len(places), top)))
-        known: Floats = starts[~np.isnan(starts).any(axis=1)]
-        return known
+        return starts[~np.isnan(starts).any(axis=1)]
 
     def _rise(self) -> float:
         """How far the block comes down along Z of the part for each mm of Z of the machine, at the least."""

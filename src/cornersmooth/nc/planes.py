@@ -174,8 +174,7 @@ def turned_part(machine: Machine, angles: Floats) -> Floats:
     """(3, 3) directions X Y Z of the machine, as columns, in a part that tables have turned by (2,) degrees."""
     places = np.vstack((np.eye(3), np.zeros((1, 3))))
     moved = machine_position(machine, places, np.tile(angles, (4, 1)))
-    frame: Floats = moved[:3] - moved[3]
-    return frame
+    return moved[:3] - moved[3]
 
 
 def _rotary_angles(machine: Machine, axis: Floats) -> Floats | None:
@@ -196,8 +195,7 @@ def _rotary_angles(machine: Machine, axis: Floats) -> Floats | None:
     if machine.preferred is not None:
         name, sign = machine.preferred
         turned = turned + np.where(sign * angles[:, machine.names.index(name)] >= 0.0, 0.0, 1e6)
-    chosen: Floats = angles[int(np.argmin(turned))]
-    return chosen
+    return angles[int(np.argmin(turned))]
 
 
 _UNIT: Final = {"x": np.array([1.0, 0.0, 0.0]), "y": np.array([0.0, 1.0, 0.0]), "z": np.array([0.0, 0.0, 1.0])}

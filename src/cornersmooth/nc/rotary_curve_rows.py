@@ -115,8 +115,7 @@ def rotary_curve_rows(smoothed: SmoothProgram, form: Form, findings: Findings) -
 def _left_to_axes(settings: Settings, form: Form, taken: Floats) -> Floats:
     """What ε leaves to rotary axes where so much of it, mm, is taken at the axis point: degrees."""
     left = settings.tolerance - math.sqrt(3.0) / 2.0 * settings.tip_resolution - taken
-    degrees: Floats = _SHARE * np.degrees(left / settings.axis_scale) - form.angle_rounding
-    return degrees
+    return _SHARE * np.degrees(left / settings.axis_scale) - form.angle_rounding
 
 
 def _curves(smoothed: SmoothProgram, form: Form) -> tuple[Curves, Ints]:
@@ -162,8 +161,7 @@ def _followed(smoothed: SmoothProgram, way: RotaryWay, curves: Curves, places: _
     control = curves.points[curves.splines.control_first[:-1]]
     off = norm(way.tip[begin] - control[:, :3]) + norm(unit(way.axis[begin]) - unit(control[:, 3:6]))
     near = off <= max(smoothed.settings.shortest_line, smoothed.settings.duplicate_distance)
-    kept: Bools = (begin >= 0) & near & (turns[end + 1] == turns[begin + 1])
-    return kept
+    return (begin >= 0) & near & (turns[end + 1] == turns[begin + 1])
 
 
 @dataclass(frozen=True)
@@ -288,8 +286,7 @@ def _line_rates(smoothed: SmoothProgram, machine: Machine, way: RotaryWay, legs:
     found = np.isin(row, more.segment)
     share[found], other[found] = more.fraction[nearest[found]], more.angles[nearest[found]]
     place = legs.entry + share * (legs.leave - legs.entry)
-    rates: Floats = (other - way.angles[legs.joint]) / (place - np.where(legs.inward, legs.leave, legs.entry))[:, None]
-    return rates
+    return (other - way.angles[legs.joint]) / (place - np.where(legs.inward, legs.leave, legs.entry))[:, None]
 
 
 def _sections(fitted: CurveAngles, kept: Bools, smoothed: SmoothProgram, machine: Machine) -> _Sections:
@@ -336,8 +333,7 @@ def _written_weights(weight: Floats, owner: Ints, count: int) -> Floats:
         if not inexact.any():
             break
         factor[np.unique(owner[inexact])] *= 2.0
-    rounded: Floats = np.round(weight * factor[owner], WEIGHT_DECIMALS)
-    return rounded
+    return np.round(weight * factor[owner], WEIGHT_DECIMALS)
 
 
 def _with_sections(path: RotaryWay, curves: Curves, rows: _Places, sections: _Sections) -> tuple[RotaryWay, Ints]:

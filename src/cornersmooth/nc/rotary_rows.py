@@ -235,14 +235,12 @@ def _beside_far_corners(rows: Vertices, at_pose: Bools, limits: LineLimits) -> B
     off_tip, off_axis_point = norm(rows.tip - rows.original_tip), norm(axis_point - rows.original_axis_point)
     far = at_pose & ((off_tip > limits.tip) | (off_axis_point > limits.axis_point))
     move = np.concatenate(([0], np.cumsum(at_pose)[:-1]))
-    beside: Bools = np.isin(move, move[far]) | np.isin(move, move[far] + 1)
-    return beside
+    return np.isin(move, move[far]) | np.isin(move, move[far] + 1)
 
 
 def _cuts(move: Ints, program: Program) -> Bools:
     """(n,) rows of cuts with a feed per minute."""
-    cuts: Bools = ~rapid_moves(program.kind)[move] & (program.feed_mode[move] == FeedMode.PER_MINUTE)
-    return cuts
+    return ~rapid_moves(program.kind)[move] & (program.feed_mode[move] == FeedMode.PER_MINUTE)
 
 
 def _timed_cuts(angles: Floats, move: Ints, program: Program) -> Bools:
@@ -253,8 +251,7 @@ def _timed_cuts(angles: Floats, move: Ints, program: Program) -> Bools:
     turning = np.zeros(max(int(begins.sum()), 1), np.bool_)
     turns = cut & (np.abs(np.diff(angles, axis=0, prepend=angles[:1])).max(axis=1) > _NO_TURN)
     turning[run[turns]] = True
-    timed: Bools = cut & turning[np.maximum(run, 0)]
-    return timed
+    return cut & turning[np.maximum(run, 0)]
 
 
 def _rates(path: FilledPath, chunk: _Chunk, program: Program, settings: Settings, form: Form) -> Floats | None:

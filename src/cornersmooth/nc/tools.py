@@ -85,8 +85,7 @@ class ToolTravel:
         loads = tool_loads(self.program) if self.machine.tool_lengths else []
         begins = np.array([pose for pose, _ in loads], np.int64)
         numbers = np.array([-1, *(number for _, (number, _) in loads)], np.int64)
-        found: Ints = numbers[np.searchsorted(begins, np.arange(len(self.program)), side="right")]
-        return found
+        return numbers[np.searchsorted(begins, np.arange(len(self.program)), side="right")]
 
     def check(self, tip: Floats, angles: Floats, move: Ints) -> None:
         """Refuse rows (r,) of poses, tips in mm and angles in degrees, that the linear axes cannot reach (CS374)."""

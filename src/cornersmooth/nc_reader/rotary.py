@@ -112,8 +112,7 @@ class Rotary:
             axis = machine.axes[index]
             if axis.carrier == "table":
                 tip = axis.point + _turned(axis, angles[:, index], tip - axis.point)
-        result: Floats = tip - machine.part_zero
-        return result
+        return tip - machine.part_zero
 
     def levers(self, position: Floats) -> Floats:
         """(n,) mm: sum of the distances at which the two axes may move the tip; zero under tip control."""
@@ -216,8 +215,7 @@ class Rotary:
         for share in np.linspace(0.0, 1.0, 16)[1:-1].tolist():
             between = self.directions(angles[rows] + share * (angles[rows + 1] - angles[rows]))
             longest = np.maximum(longest, _apart(begin, between) + _apart(between, end))
-        found: Ints = rows[longest - _apart(begin, end) > LONGEST_DETOUR]
-        return found
+        return rows[longest - _apart(begin, end) > LONGEST_DETOUR]
 
     @property
     def sagitta(self) -> float:
@@ -403,8 +401,7 @@ class _Moved:
 
 def _apart(a: Floats, b: Floats) -> Floats:
     """Degrees between unit vectors, row by row."""
-    degrees: Floats = np.degrees(2.0 * np.arcsin(np.minimum(np.linalg.norm(a - b, axis=1) / 2.0, 1.0)))
-    return degrees
+    return np.degrees(2.0 * np.arcsin(np.minimum(np.linalg.norm(a - b, axis=1) / 2.0, 1.0)))
 
 
 def _bernstein(t: Floats) -> Floats:
@@ -412,8 +409,7 @@ def _bernstein(t: Floats) -> Floats:
     degree = _ORDER - 1
     i = np.arange(_ORDER)
     binomial = np.cumprod(np.concatenate(([1.0], (degree - i[:-1]) / (i[:-1] + 1))))
-    values: Floats = binomial * t[:, None] ** i * (1 - t[:, None]) ** (degree - i)
-    return values
+    return binomial * t[:, None] ** i * (1 - t[:, None]) ** (degree - i)
 
 
 def _turned(axis: RotaryAxis, degrees: Floats, vectors: Floats) -> Floats:
@@ -423,5 +419,4 @@ def _turned(axis: RotaryAxis, degrees: Floats, vectors: Floats) -> Floats:
     angle = sense * np.radians(degrees)
     cosine, sine = np.cos(angle)[:, None], np.sin(angle)[:, None]
     along = (vectors @ direction)[:, None] * direction
-    turned: Floats = along + cosine * (vectors - along) + sine * np.cross(direction, vectors)
-    return turned
+    return along + cosine * (vectors - along) + sine * np.cross(direction, vectors)

@@ -156,8 +156,7 @@ def rapid_moves(kind: NDArray[np.uint8]) -> Bools:
 def still_poses(kind: NDArray[np.uint8]) -> Bools:
     """Poses of a program through which nothing is cut: holes, and rapids with no cut after them; (n,) bool."""
     rapid = rapid_moves(kind)
-    still: Bools = rapid & np.append(rapid[1:], True) | (kind == Move.HOLE)
-    return still
+    return rapid & np.append(rapid[1:], True) | (kind == Move.HOLE)
 
 
 @dataclass(frozen=True)
@@ -334,8 +333,7 @@ def _lengths(tip: Floats) -> Floats:
     step = np.zeros(len(tip))
     for here in _chunks(len(tip) - 1):
         step[here.start + 1 : here.stop + 1] = np.linalg.norm(np.diff(tip[here.start : here.stop + 1], axis=0), axis=1)
-    length: Floats = np.cumsum(step)
-    return length
+    return np.cumsum(step)
 
 
 def _chunks(n: int) -> Iterator[slice]:

@@ -18,8 +18,6 @@ REWIND_COST = 1e9
 PREFERENCE_COST = 1e3
 #: What each turn costs by which a path starts away from zero: it only breaks ties.
 START_TURN_COST = 1e-3
-#: What a stretch costs that leaves the limits in every turn.
-OUTSIDE_COST = 1e12
 #: Words may pass their limits by so much (degrees): rounding of the solution, far below the last digit of a word.
 LIMIT_SLACK = 1e-9
 #: An axis with room for more turns is taken as endless first; only where that fails its turns are searched.
@@ -65,37 +63,14 @@ def choose(stretches: Stretches, limits: Floats) -> tuple[Ints, Floats]:
 
     The limits (2, 2), degrees, are the lowest and highest word of each axis, infinite where there is none.
     """
-    branch = _cheapest_branches(stretches, limits)
-    turns = _nearest_turns(stretches, branch)
-    if _start_inside(stretches, branch, turns, limits):
-        return branch, turns
     finite = np.isfinite(limits[:, 0]) & np.isfinite(limits[:, 1])
     narrow = finite & (limits[:, 1] - limits[:, 0] <= 360 * MANY_TURNS)
-    if narrow.any() and (narrow != finite).any():
-        branch, fixed = search(stretches, np.where(narrow[:, None], limits, [[-np.inf, np.inf]]))
-        turns = _nearest_turns(stretches, branch, fixed, narrow)
-        if _start_inside(stretches, branch, turns, limits):
-            return branch, turns
+    branch, fixed = search(stretches, np.where(narrow[:, None], limits, [[-np.inf, np.inf]]))
+    turns = _nearest_turns(stretches, branch, fixed, narrow)
+    if _start_inside(stretches, branch, turns, limits):
+        return branch, turns
     branch, fixed = search(stretches, limits)
     return branch, _nearest_turns(stretches, branch, fixed, finite)
-
-
-def _cheapest_branches(stretches: Stretches, limits: Floats) -> Ints:
-    """Branches with the least rotation between stretches that fit into the limits, each in some turn."""
-    fewest, most = turns_inside(stretches.low, stretches.high, limits)
-    outside = np.where((fewest > most).any(axis=2), OUTSIDE_COST, 0.0)
-    step = stretches.first[1:, None, :, :] - stretches.last[:-1, :, None, :]  # [edge, from, to, axis]
-    cost = np.abs(step - 360 * np.round(step / 360)).sum(axis=3) + outside[1:, None, :]
-    start = (stretches.dislike + np.abs(stretches.first[0]).sum(axis=1) + outside[0]).tolist()
-    best, origins = [start[0], start[1]], []
-    for (stay0, swap01), (swap10, stay1) in cost.tolist():
-        into0, into1 = (best[0] + stay0, best[1] + swap10), (best[0] + swap01, best[1] + stay1)
-        origins.append((int(into0[1] < into0[0]), int(into1[0] >= into1[1])))
-        best = [min(into0), min(into1)]
-    branch = [int(best[1] < best[0])]
-    for origin in reversed(origins):
-        branch.append(origin[branch[-1]])
-    return np.array(branch[::-1], dtype=np.int64)
 
 
 def turns_inside(low: Floats, high: Floats, limits: Floats) -> tuple[Floats, Floats]:
@@ -105,15 +80,13 @@ def turns_inside(low: Floats, high: Floats, limits: Floats) -> tuple[Floats, Flo
     return fewest, most
 
 
-def _nearest_turns(
-    stretches: Stretches, branch: Ints, fixed: Floats | None = None, known: Bools | None = None
-) -> Floats:
+def _nearest_turns(stretches: Stretches, branch: Ints, fixed: Floats, known: Bools) -> Floats:
     """Count the turns without a rewind; those of axes that are `known` are taken as they are."""
     index = np.arange(len(stretches))
     first, last = stretches.first[index, branch], stretches.last[index, branch]
     turns = np.zeros((len(stretches), 2))
     turns[1:] = -np.cumsum(np.round((first[1:] - last[:-1]) / 360), axis=0)
-    return turns if fixed is None or known is None else np.where(known, fixed, turns)
+    return np.where(known, fixed, turns)
 
 
 def _start_inside(stretches: Stretches, branch: Ints, turns: Floats, limits: Floats) -> bool:

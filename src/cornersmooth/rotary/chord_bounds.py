@@ -140,5 +140,4 @@ def _sine(machine: Machine, axis: Floats) -> Floats:
 def _along(point: Floats, way: Floats) -> Floats:
     """Speed with which a point that runs along `way` leaves the origin."""
     length = np.linalg.norm(point, axis=1)
-    share: Floats = np.abs(dot(point, way)) / np.where(length > 0, length, 1.0)
-    return share
+    return np.abs(dot(point, way)) / np.where(length > 0, length, 1.0)

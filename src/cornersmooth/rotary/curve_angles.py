@@ -138,8 +138,7 @@ def _replaced(old: CurveAngles, which: Bools, new: CurveAngles) -> CurveAngles:
         owner = np.repeat(np.arange(len(which)), one.count + extra)
         kept = ~which[owner]
         order = np.argsort(np.concatenate((owner[kept], np.repeat(number, other.count + extra))), kind="stable")
-        values: Floats = np.concatenate((ours[kept], theirs))[order]
-        return values
+        return np.concatenate((ours[kept], theirs))[order]
 
     splines = Splines(merged(one.knot, other.knot, 0), count)
     curves = replace(old.curves, splines=splines, points=merged(old.curves.points, new.curves.points, 2))
@@ -228,5 +227,4 @@ def _off(machine: Machine, hull: Floats, samples: int) -> Floats:
     share = np.stack(((1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3), axis=1)
     points = (share @ hull).reshape(-1, 6)
     apart = angle_between(tool_axis(machine, points[:, 4:] / points[:, 3:4]), unit(points[:, :3]))
-    largest: Floats = apart.reshape(-1, samples + 1).max(axis=1)
-    return largest
+    return apart.reshape(-1, samples + 1).max(axis=1)

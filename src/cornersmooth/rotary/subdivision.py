@@ -123,8 +123,7 @@ def runs_evenly(
     )
     moving = np.repeat(np.arange(len(axis), dtype=np.float64)[:, None], 3, axis=1)
     motion = RuledMotion(machine, moving, axis, np.repeat(tolerance, 2), None, None)
-    even: Bools = motion.parts(motion.segments(angles, np.arange(0, len(axis), 2), branches=False)) == 1
-    return even
+    return motion.parts(motion.segments(angles, np.arange(0, len(axis), 2), branches=False)) == 1
 
 
 def fill(tip: Floats, axis: Floats, angles: Floats, more: Insertions) -> FilledPath:
@@ -260,8 +259,7 @@ class RuledMotion:
     def _lever(self, segment: Ints, fraction: Floats) -> Floats:
         """Axis of the ruled motion, not of unit length."""
         share = fraction[:, None]
-        lever: Floats = self.axis[segment] * (1 - share) + self.axis[segment + 1] * share
-        return lever
+        return self.axis[segment] * (1 - share) + self.axis[segment + 1] * share
 
     def _ends(self, part: Intervals) -> list[Floats]:
         """Tip and linear words at both ends of each interval: four times (p, 3), mm; nothing where the tip is kept."""
