@@ -74,6 +74,11 @@ class Splines:
         begin = self.span_control[span] + 4 * self.span_run[span]
         return self._extended[begin[:, None] + np.arange(1, 7)]
 
+    @property
+    def first_knots(self) -> Floats:
+        """(controls,) the knot at which each control point begins to count."""
+        return self._extended[np.arange(len(self.control_run)) + 4 * self.control_run]
+
     @cached_property
     def inner_knots(self) -> Floats:
         """(controls, 3) the knots whose blossom each control point is."""

@@ -13,17 +13,19 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.geometry import nurbs
 from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.geometry.ragged import ranges, search, spread, starts
 from cornersmooth.kinematics import Machine
-from cornersmooth.kinematics.poses import continued
+from cornersmooth.kinematics.poses import angle_between, continued, pole_distance
 from cornersmooth.methods import DEFAULT_METHOD, METHODS
-from cornersmooth.model import Bools, Floats, Ints, Move, SmoothProgram
+from cornersmooth.model import Bools, Corners, Floats, Ints, Move, Runs, SmoothProgram
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.rotary_rows import largest_turn, rotary_rows
@@ -36,7 +38,7 @@ from cornersmooth.settings import WEIGHT_DECIMALS, Settings
 from cornersmooth.slices import some_rows, some_runs
 from cornersmooth.smoothing.runs.rows import STEPS_PER_UNIT, clamped, moves_at, section_ends
 from cornersmooth.smoothing.sampling import Rows, dense_rows
-from cornersmooth.smoothing.segments import segments_of
+from cornersmooth.smoothing.segments import Segments, lines_per_half, segments_of
 from cornersmooth.vectors import norm, unit
 
 #: share of what rotary axes may take of ε that a curve may use: the rest is for the digits of its control points
@@ -48,21 +50,33 @@ _EVEN_SHARE = 0.9
 #: steps of the parameter of a corner, and those that three decimals hold as the parameter 1 / 8
 _STEPS = float(1 << 15)
 
+#: the first rotary axis may turn fast where the pole is nearer than so many times the axis step, and so many degrees
+_NEAR_POLE, _NEAR_POLE_DEGREES = 5.0, 1.0
+
+#: corners that are worked on at a time
+_TOGETHER = 1 << 13
+
 
 @dataclass(frozen=True)
 class _Sections:
     """Sections of curves with angles: k of them, in the order of the curves; m rows."""
 
-    number: Ints  #: (m,) of each control point in its section, from 1 on
+    number: NDArray[np.int8]  #: (m,) of each control point in its section, from 1 on
     points: Floats  #: (m, 5): tip, mm, and both angles, degrees
     spline: Floats  #: (m, 3) as in `Rows`
-    first: Ints  #: (k + 1,) where the rows of each section begin
+    count: Ints  #: (k,) rows
     move: Ints  #: (k,)
     curve: Ints  #: (k,)
     #: begin, end: (k,), steps
     begin: Floats
     end: Floats
+    axis: Floats  #: (k, 2, 3) tool axes there, where no row of the way may be
     good: Bools  #: (k,) within the tolerance, and within the limits of the axes
+
+    @cached_property
+    def first(self) -> Ints:
+        """(k + 1,) where the rows of each section begin."""
+        return starts(self.count)
 
 
 @dataclass(frozen=True)
@@ -72,6 +86,12 @@ class _Places:
     curve: Ints
     row: Ints
     s: Floats
+
+    @property
+    def ends(self) -> tuple[Ints, Ints]:
+        """Rows where each curve begins and ends: (r,) each."""
+        first = np.flatnonzero(self.s == 0.0)
+        return self.row[first], self.row[np.append(first[1:], len(self.row)) - 1]
 
 
 def rotary_curve_rows(smoothed: SmoothProgram, form: Form, findings: Findings) -> Iterator[Rows]:
@@ -86,30 +106,42 @@ def rotary_curve_rows(smoothed: SmoothProgram, form: Form, findings: Findings) -
             f"method {settings.method} has no curves in rotary axes",
             f"use the method {DEFAULT_METHOD}, or write lines",
         )
-    way = rotary_way(dense_rows(smoothed, divide=False), smoothed, form, findings)
+    way, section, sections, lost = _curved_way(smoothed, form, findings)
     ToolTravel(program, machine).check(way.tip, way.angles, way.move)
-    section, sections = np.full(len(way.move), -1), None
-    curves, poses = _curves(smoothed, form)
-    if len(poses):
-        places = _places(way, curves, poses)
-        way, curves = _joined(smoothed, form, way, curves, places)
-        kept = _followed(smoothed, way, curves, places)
-        places = some_rows(places, kept[places.curve])
-        places = replace(places, curve=np.cumsum(kept)[places.curve] - 1)
-        guide = Guide(places.curve, places.s, way.angles[places.row], way.branch[places.row].astype(np.int64))
-        cone = form.rotary_tolerance(settings.tolerance, settings.axis_scale) / 2
-        fitted = curve_angles(curves.some(kept), machine, guide, cone=cone)
-        sections = _sections(fitted, kept, smoothed, machine)
-        way, section = _with_sections(way, fitted.curves, places, sections)
-        lost = np.concatenate((poses[~kept], sections.move[~sections.good]))
-        if len(lost):
-            text = "curve written in lines: on it the rotary axes would leave the tolerance or their limits"
-            findings.add("CS378", "note", int(program.line[lost.min()]), text, len(lost))
-        if sections.good.any():
-            text = f"{form.curve.upper()} with rotary axes under tool tip control is the machine builder's to allow"
-            findings.add("CS370", "warning", 0, f"{text}; ask before running it")
+    if len(lost):
+        text = "curve written in lines: on it the rotary axes would leave the tolerance or their limits"
+        findings.add("CS378", "note", int(program.line[lost.min()]), text, len(lost))
+    if sections is not None and sections.good.any():
+        text = f"{form.curve.upper()} with rotary axes under tool tip control is the machine builder's to allow"
+        findings.add("CS370", "warning", 0, f"{text}; ask before running it")
     for lines, source in rotary_rows(way, smoothed, form, findings):
         yield _with_curves(lines, np.where(source < 0, -1, section[source]), sections)
+
+
+def _curved_way(
+    smoothed: SmoothProgram, form: Form, findings: Findings
+) -> tuple[RotaryWay, Ints, _Sections | None, Ints]:
+    """The way, what `_with_sections` says of its rows, all sections, and poses of curves that are lines there.
+
+    Of the lines of a corner those are made that it will have, or just two that show where the axes go.
+    """
+    corners, halves = smoothed.corners, lines_per_half(smoothed)
+    lined = _near_pole(smoothed, machine_of(form))
+    while True:
+        notes = Findings()
+        rows = dense_rows(smoothed, halves=np.where(lined, halves, np.sign(halves)))
+        way = rotary_way(rows, smoothed, form, notes)
+        if np.isnan(way.place).all():
+            findings.add_all(notes.all())
+            return way, np.full(len(way.move), -1), None, np.zeros(0, np.int64)
+        work = _Work.of(smoothed, form, way)
+        sections, lost = work.sections()
+        lost = np.concatenate((lost, sections.move[~sections.good]))
+        more = np.isin(corners.pose, lost) & corners.smoothed & ~lined
+        if not more.any():
+            findings.add_all(notes.all())
+            return *_with_sections(work.way, work.places, sections), sections, lost
+        lined |= more
 
 
 def _left_to_axes(settings: Settings, form: Form, taken: Floats) -> Floats:
@@ -118,26 +150,7 @@ def _left_to_axes(settings: Settings, form: Form, taken: Floats) -> Floats:
     return _SHARE * np.degrees(left / settings.axis_scale) - form.angle_rounding
 
 
-def _curves(smoothed: SmoothProgram, form: Form) -> tuple[Curves, Ints]:
-    """Curves of all corners, then of all runs, and the pose of each corner, the first one of each run."""
-    runs, corners, settings = smoothed.runs, smoothed.corners, smoothed.settings
-    rows = np.flatnonzero(corners.smoothed)
-    tip, axis_point = nurbs.control_points(smoothed.program, corners, rows, settings.axis_length)
-    weight = nurbs.full_weights(corners.weights[rows])[:, :, None]
-    knot, count = np.tile((0.0, _STEPS / 2, _STEPS), len(rows)), np.full(len(rows), 3)
-    points = np.concatenate((tip * weight, (axis_point - tip) * weight, weight), axis=2).reshape(-1, 7)
-    poses, least = corners.pose[rows], _SHARE * form.rotary_tolerance(settings.tolerance, settings.axis_scale)
-    tolerance = np.maximum(_left_to_axes(settings, form, corners.axis_error[rows]), least)
-    if runs is not None:
-        own, lever = runs.control[:, :3], runs.control[:, 3:] - runs.control[:, :3]
-        points = np.concatenate((points, np.hstack((own, lever, np.ones((len(own), 1))))))
-        knot, count = np.concatenate((knot, runs.knot)), np.concatenate((count, runs.knot_count))
-        poses = np.concatenate((poses, runs.pose[starts(runs.count)[:-1]]))
-        tolerance = np.append(tolerance, np.full(len(runs), least))
-    return Curves(Splines(knot, count), points, np.full((2, len(count), 3, 2), np.nan), tolerance), poses
-
-
-def _places(way: RotaryWay, curves: Curves, poses: Ints) -> _Places:
+def _places(way: RotaryWay, poses: Ints, lengths: Floats) -> _Places:
     """Rows of all curves, which have one or more each, besides that where they start."""
     row = np.flatnonzero(~np.isnan(way.place) & ~way.left)
     begins = np.flatnonzero(np.diff(way.place[row], prepend=2.0) <= 0.0)
@@ -147,21 +160,9 @@ def _places(way: RotaryWay, curves: Curves, poses: Ints) -> _Places:
     number[order] = np.arange(len(order))
     curve, place = spread(counts[number] + 1)
     at = row[begins[number[curve]] + np.maximum(place - 1, 0)] - (place == 0)
-    last = curves.splines.knot[curves.splines.first[1:] - 1][curve]
-    s = np.where(place > 0, way.place[at] * last, 0.0)
+    s = np.where(place > 0, way.place[at] * lengths[curve], 0.0)
     whole = np.rint(s)  # as poses and knots are
     return _Places(curve, at, np.where(np.abs(s - whole) < 1e-6, whole, s))
-
-
-def _followed(smoothed: SmoothProgram, way: RotaryWay, curves: Curves, places: _Places) -> Bools:
-    """(r,) curves that begin where a row ends and in which no solution may change."""
-    first = np.flatnonzero(places.s == 0.0)
-    begin, end = places.row[first], places.row[np.append(first[1:], len(places.row)) - 1]
-    turns = np.concatenate(([0], np.cumsum(way.free)))
-    control = curves.points[curves.splines.control_first[:-1]]
-    off = norm(way.tip[begin] - control[:, :3]) + norm(unit(way.axis[begin]) - unit(control[:, 3:6]))
-    near = off <= max(smoothed.settings.shortest_line, smoothed.settings.duplicate_distance)
-    return (begin >= 0) & near & (turns[end + 1] == turns[begin + 1])
 
 
 @dataclass(frozen=True)
@@ -179,149 +180,245 @@ class _Legs:
     leave: Floats
 
     @classmethod
-    def of_corners(cls, smoothed: SmoothProgram, begin: Ints, end: Ints) -> _Legs:
-        """Legs of all corners, whose curves lie between these rows."""
-        corners, segments = some_rows(smoothed.corners, smoothed.corners.smoothed), segments_of(smoothed, dense=False)
+    def of_corners(cls, corners: Corners, segments: Segments, begin: Ints, end: Ints) -> _Legs:
+        """Legs of corners whose curves lie between these rows."""
         of, to = np.concatenate((corners.before, corners.pose)), np.concatenate((corners.pose, corners.after))
         inward, line, joint = np.arange(len(to)) < len(corners), segments.has_line[to], np.concatenate((begin, end))
         entry, leave = segments.entry[to], segments.exit[to]
         return cls(inward, of, to, joint, line, entry, leave)
 
 
-def _joined(
-    smoothed: SmoothProgram, form: Form, way: RotaryWay, curves: Curves, places: _Places
-) -> tuple[RotaryWay, Curves]:
-    """The way with the joints of even segments on their lines, and the curves with what they join."""
-    program, settings, machine = smoothed.program, smoothed.settings, machine_of(form)
-    corners = some_rows(smoothed.corners, smoothed.corners.smoothed)
-    straight = float(_left_to_axes(settings, form, np.zeros(1))[0])
-    tolerance = np.where(np.isnan(way.place) & (program.kind[way.move] == Move.LINEAR), straight, way.tolerance)
-    tolerance[places.row[places.s > 0.0]] = curves.tolerance[places.curve[places.s > 0.0]]
-    way = replace(way, angles=way.angles.copy(), axis=way.axis.copy(), tolerance=tolerance)
-    first = np.flatnonzero(places.s == 0.0)
-    begin, end = places.row[first], places.row[np.append(first[1:], len(places.row)) - 1]
-    ends = np.full((2, len(first), 3, 2), np.nan)
-    ends[:, :, 0] = way.angles[begin], way.angles[end]
-    if not len(corners):
-        return way, replace(curves, ends=ends)
-    count = len(corners)
-    legs = _Legs.of_corners(smoothed, begin[:count], end[:count])
-    from_angles, to_angles, even = _pose_angles(smoothed, form, way, legs)
-    allowed = np.full(len(program), straight)
-    np.minimum.at(allowed, legs.to, np.tile(curves.tolerance[:count], 2))
-    of, to = legs.of[even], legs.to[even]
-    even[even] = runs_evenly(
-        machine,
-        program.axis[of],
-        program.axis[to],
-        from_angles[even],
-        to_angles[even],
-        _EVEN_SHARE * allowed[to],
-    )
-    # without a line both curves meet where the first one ends; even ones differ there by less than the shortest line
-    fraction = np.where(legs.inward & (legs.line | even), legs.leave, legs.entry)
-    share, turn = fraction[:, None], to_angles - from_angles
-    angles = np.where(even[:, None], from_angles + share * turn, way.angles[legs.joint])
-    way.angles[legs.joint] = angles
-    # not of unit length: the ruled motion between these is that between the poses, at its own rate
-    way.axis[legs.joint] = program.axis[legs.of] * (1.0 - share) + program.axis[legs.to] * share
-    # rates by the fraction of the segment: that of even motion, of the line beside, of the parabola through the joint
-    before, behind = (angles - from_angles) / share, (to_angles - angles) / (1.0 - share)
-    rate, bent = before * (1.0 - share) + behind * share, 2.0 * (behind - before)
-    rate[even], bent[even | legs.line] = turn[even], 0.0
-    beside = np.flatnonzero(legs.line & ~even)
-    rate[beside] = _line_rates(smoothed, machine, way, some_rows(legs, beside))
-    # by the parameter of the curve, times its weight
-    slope, bend, weight_slope, weight_bend = (
-        np.tile(part, 2)[:, None] for part in nurbs.leg_derivatives(nurbs.full_weights(corners.weights), corners.ratio)
-    )
-    sign = np.where(legs.inward, 1.0, -1.0)[:, None]
-    way_of_leg = np.concatenate((corners.trim_in, corners.trim_out))[:, None] * slope
-    one = rate * way_of_leg
-    two = sign * one * bend / slope + bent * way_of_leg**2
-    jets = angles, sign * weight_slope * angles + one, weight_bend * angles + 2.0 * sign * weight_slope * one + two
-    for order, jet in enumerate(jets):
-        ends[:, :count, order] = jet.reshape(2, count, 2) / _STEPS**order
-    return way, replace(curves, ends=ends)
+def _near_pole(smoothed: SmoothProgram, machine: Machine) -> Bools:
+    """(k,) corners on which the first rotary axis may turn fast."""
+    axis, corners = smoothed.program.axis, smoothed.corners
+    here = axis[corners.pose]
+    step = np.maximum(angle_between(axis[corners.before], here), angle_between(here, axis[corners.after]))
+    return pole_distance(machine, here) < _NEAR_POLE * step + _NEAR_POLE_DEGREES
 
 
-def _pose_angles(smoothed: SmoothProgram, form: Form, way: RotaryWay, legs: _Legs) -> tuple[Floats, Floats, Bools]:
-    """Angles (m, 2) at both ends of legs, and whether one follows from the other in a cut."""
-    program, machine, n = smoothed.program, machine_of(form), len(smoothed.program)
-    cone = form.rotary_tolerance(smoothed.settings.tolerance, smoothed.settings.axis_scale) / 2
-    # the last row of the move to a corner is in the middle of its curve
-    known, branch, last = np.full((n, 2), np.nan), np.full(n, -1), np.zeros(n, np.int64)
-    known[way.move], branch[way.move], last[way.move] = way.angles, way.branch, np.arange(len(way.move))
-    pose = legs.to[legs.inward]
-    known[pose], _ = continued(machine, program.axis[pose], known[pose], branch[pose], cone)
-    turns = np.concatenate(([0], np.cumsum(way.free)))
-    from_angles, stated = known[legs.of], np.isnan(known[legs.of, 0])  # no row leads to a stated position
-    near = way.angles[legs.joint[stated]]
-    from_angles[stated], _ = continued(machine, program.axis[legs.of[stated]], near, np.full(len(near), -1), cone)
-    return from_angles, known[legs.to], (turns[last[legs.to] + 1] == turns[last[legs.of] + 1]) & ~stated
+@dataclass(frozen=True)
+class _Work:
+    """The way, and curves of all corners, then of all runs: r of them."""
 
+    smoothed: SmoothProgram
+    form: Form
+    way: RotaryWay  #: angles and axes at joints, and tolerances change in place
+    places: _Places
+    corners: Corners  #: that are smoothed
+    segments: Segments
+    least: float  #: degrees that rotary axes may take of ε in any case
+    #: angles, last: (n, 2), degrees, and (n,); at each pose, NaN where none is written, and the row of the way there
+    angles: Floats
+    last: Ints
+    turns: Ints  #: (rows of the way + 1,) how often solution and turn may have changed before each
+    allowed: Floats  #: (n,), degrees; on the straight motion to each pose and on curves beside it
 
-def _line_rates(smoothed: SmoothProgram, machine: Machine, way: RotaryWay, legs: _Legs) -> Floats:
-    """(m, 2) degrees by the fraction of the segment: rates of the lines beside the joints, as they will be divided."""
-    row = legs.joint - legs.inward
-    rapid = np.ones(len(way.move), np.bool_)
-    rapid[row + 1] = False
-    more = insertions(
-        machine,
-        way.tip,
-        way.axis,
-        way.angles,
-        tolerance=way.tolerance,
-        rapid=rapid,
-        max_step=largest_turn(smoothed.settings),
-        line=smoothed.program.line[way.move],
-        file=smoothed.program.source.name,
-    )
-    nearest = np.where(
-        legs.inward,
-        np.searchsorted(more.segment, row, side="right") - 1,
-        np.searchsorted(more.segment, row, side="left"),
-    )
-    share, other = 1.0 - legs.inward, way.angles[row + ~legs.inward]
-    found = np.isin(row, more.segment)
-    share[found], other[found] = more.fraction[nearest[found]], more.angles[nearest[found]]
-    place = legs.entry + share * (legs.leave - legs.entry)
-    return (other - way.angles[legs.joint]) / (place - np.where(legs.inward, legs.leave, legs.entry))[:, None]
+    @classmethod
+    def of(cls, smoothed: SmoothProgram, form: Form, way: RotaryWay) -> _Work:
+        """Work out what concerns all curves."""
+        program, settings, runs, n = smoothed.program, smoothed.settings, smoothed.runs, len(smoothed.program)
+        corners = some_rows(smoothed.corners, smoothed.corners.smoothed)
+        poses, lengths = corners.pose, np.full(len(corners), _STEPS)
+        if runs is not None:
+            poses = np.concatenate((poses, runs.pose[starts(runs.count)[:-1]]))
+            lengths = np.concatenate((lengths, runs.knot[starts(runs.knot_count)[1:] - 1]))
+        least = form.rotary_tolerance(settings.tolerance, settings.axis_scale)
+        straight = float(_left_to_axes(settings, form, np.zeros(1))[0])
+        tolerance = np.where(np.isnan(way.place) & (program.kind[way.move] == Move.LINEAR), straight, way.tolerance)
+        way = replace(way, angles=way.angles.copy(), axis=way.axis.copy(), tolerance=tolerance)
+        # the last row of the move to a corner is in the middle of its curve
+        angles, branch, last = np.full((n, 2), np.nan), np.full(n, -1), np.zeros(n, np.int64)
+        angles[way.move], branch[way.move], last[way.move] = way.angles, way.branch, np.arange(len(way.move))
+        pose = corners.pose
+        angles[pose], _ = continued(machine_of(form), program.axis[pose], angles[pose], branch[pose], least / 2)
+        allowed, own = np.full(n, straight), np.maximum(_left_to_axes(settings, form, corners.axis_error), least)
+        for beside in (pose, corners.after):
+            np.minimum.at(allowed, beside, own)
+        return cls(
+            smoothed,
+            form,
+            way,
+            _places(way, poses, lengths),
+            corners,
+            segments_of(smoothed, dense=False),
+            least,
+            angles,
+            last,
+            np.concatenate(([0], np.cumsum(way.free))),
+            allowed,
+        )
 
+    def sections(self) -> tuple[_Sections, Ints]:
+        """Sections of all curves, and poses of those that are to be lines."""
+        parts, lost, count = [], [np.zeros(0, np.int64)], len(self.corners)
+        for begin in range(0, count, _TOGETHER):
+            corners = some_rows(self.corners, slice(begin, begin + _TOGETHER))
+            rows = self._rows(begin, begin + len(corners))
+            fitted, kept = self._fitted(self._corners(corners, rows), rows)
+            parts.append(self._whole(fitted, corners.pose[kept], begin + np.flatnonzero(kept)))
+            lost.append(corners.pose[~kept])
+        if (runs := self.smoothed.runs) is not None:
+            rows = self._rows(count, count + len(runs))
+            fitted, kept = self._fitted(self._runs(runs, rows), rows)
+            parts.append(self._cut(fitted, some_runs(runs, kept), count + np.flatnonzero(kept)))
+            lost.append(runs.pose[starts(runs.count)[:-1]][~kept])
+        columns = [vars(part) for part in parts]  # given back one after the other: they are as large as the program
+        whole = {name: np.concatenate([part.pop(name) for part in columns]) for name in list(columns[0])}
+        return _Sections(**whole), np.concatenate(lost)
 
-def _sections(fitted: CurveAngles, kept: Bools, smoothed: SmoothProgram, machine: Machine) -> _Sections:
-    """Cut the curves into sections, and say which of them are good."""
-    corners, splines = smoothed.corners, fitted.curves.splines
-    pose = corners.pose[corners.smoothed]
-    kept_corners = kept[: len(pose)]
-    pose = pose[kept_corners]
-    curve, begin, end = np.arange(len(pose)), np.zeros(len(pose)), np.full(len(pose), _STEPS)
-    unit_steps = np.full(len(splines.count), STEPS_PER_UNIT)
-    if len(pose):
-        narrowest = np.minimum.reduceat(splines.width, splines.span_first[: len(pose)])
-        unit_steps[: len(pose)] = np.minimum(_STEPS, 8.0 * narrowest)
-    if smoothed.runs is not None:
-        runs = some_runs(smoothed.runs, kept[len(kept_corners) :])
-        own = Splines(splines.knot[splines.first[len(pose)] :], splines.count[len(pose) :])
-        run, low, high = section_ends(runs, own, smoothed.program)
-        pose = np.concatenate((pose, moves_at(runs, run, high)))
-        curve, begin, end = (np.concatenate(pair) for pair in ((curve, run + len(curve)), (begin, low), (end, high)))
-    control = np.hstack((fitted.curves.points[:, :3], fitted.angles, fitted.curves.points[:, 6:]))
-    owner, number, knot, points = clamped(splines, control, curve, begin, end)
-    first = starts(np.bincount(owner, minlength=len(curve)))
-    unit_of = unit_steps[curve]
-    spline = np.zeros((len(owner), 3))
-    spline[:, 0], spline[first[1:] - 1, 2] = knot / unit_of[owner], (end - begin) / unit_of
-    spline[:, 1] = _written_weights(points[:, 5], owner, len(curve))
-    points = points[:, :5] / points[:, 5:]
-    # spans that a section has a part of
-    first_span = search(splines.knot, splines.count, curve, begin, side="right") - 1 - curve
-    last_span = search(splines.knot, splines.count, curve, end) - 1 - curve
-    beyond = np.concatenate(([0], np.cumsum(~(fitted.error <= fitted.curves.tolerance[splines.span_run]))))
-    good = beyond[last_span + 1] == beyond[first_span]
-    outside = np.maximum(machine.limits[:, 0] - points[:, 3:], points[:, 3:] - machine.limits[:, 1]).max(axis=1)
-    good[owner[outside > LIMIT_SLACK]] = False
-    return _Sections(number, points, spline, first, pose, curve, begin, end, good)
+    def _rows(self, begin: int, end: int) -> _Places:
+        """Places on some curves, which are counted from 0 on."""
+        own = slice(*np.searchsorted(self.places.curve, (begin, end)).tolist())
+        rows = some_rows(self.places, own)
+        return replace(rows, curve=rows.curve - begin)
+
+    def _fitted(self, curves: Curves, rows: _Places) -> tuple[CurveAngles, Bools]:
+        """Angles of the curves that begin where a row ends and in which no solution may change, and which these are."""
+        begin, end = rows.ends
+        settings, way = self.smoothed.settings, self.way
+        control = curves.points[curves.splines.control_first[:-1]]
+        off = norm(way.tip[begin] - control[:, :3]) + norm(unit(way.axis[begin]) - unit(control[:, 3:6]))
+        near = off <= max(settings.shortest_line, settings.duplicate_distance)
+        kept = (begin >= 0) & near & (self.turns[end + 1] == self.turns[begin + 1])
+        way.tolerance[rows.row[rows.s > 0.0]] = curves.tolerance[rows.curve[rows.s > 0.0]]
+        guide = Guide(rows.curve, rows.s, way.angles[rows.row], way.branch[rows.row].astype(np.int64)).some(kept)
+        return curve_angles(curves.some(kept), machine_of(self.form), guide, cone=self.least / 2), kept
+
+    def _runs(self, runs: Runs, rows: _Places) -> Curves:
+        """Curves of runs, which end exactly where their rows do."""
+        own, lever = runs.control[:, :3], runs.control[:, 3:] - runs.control[:, :3]
+        ends = np.full((2, len(runs), 3, 2), np.nan)
+        ends[:, :, 0] = self.way.angles[np.stack(rows.ends)]
+        points = np.hstack((own, lever, np.ones((len(own), 1))))
+        return Curves(Splines(runs.knot, runs.knot_count), points, ends, np.full(len(runs), _SHARE * self.least))
+
+    def _corners(self, corners: Corners, rows: _Places) -> Curves:
+        """Curves of some corners; joints of even segments are put on their lines."""
+        program, settings, way, count = self.smoothed.program, self.smoothed.settings, self.way, len(corners)
+        legs = _Legs.of_corners(corners, self.segments, *rows.ends)
+        from_angles, to_angles, even = self._pose_angles(legs)
+        of, to = legs.of[even], legs.to[even]
+        even[even] = runs_evenly(
+            machine_of(self.form),
+            program.axis[of],
+            program.axis[to],
+            from_angles[even],
+            to_angles[even],
+            _EVEN_SHARE * self.allowed[to],
+        )
+        # without a line both curves meet where the first one ends; even ones differ by less than the shortest line
+        share = np.where(legs.inward & (legs.line | even), legs.leave, legs.entry)[:, None]
+        turn = to_angles - from_angles
+        angles = np.where(even[:, None], from_angles + share * turn, way.angles[legs.joint])
+        way.angles[legs.joint] = angles
+        # not of unit length: the ruled motion between these is that between the poses, at its own rate
+        way.axis[legs.joint] = program.axis[legs.of] * (1.0 - share) + program.axis[legs.to] * share
+        # rates by the fraction of the segment: of even motion, of the line beside, of the parabola through the joint
+        before, behind = (angles - from_angles) / share, (to_angles - angles) / (1.0 - share)
+        rate, bent = before * (1.0 - share) + behind * share, 2.0 * (behind - before)
+        rate[even], bent[even | legs.line] = turn[even], 0.0
+        beside = np.flatnonzero(legs.line & ~even)
+        rate[beside] = self._line_rates(some_rows(legs, beside))
+        # by the parameter of the curve, times its weight
+        weight = nurbs.full_weights(corners.weights)
+        slope, bend, weight_slope, weight_bend = (
+            np.tile(part, 2)[:, None] for part in nurbs.leg_derivatives(weight, corners.ratio)
+        )
+        sign = np.where(legs.inward, 1.0, -1.0)[:, None]
+        gone = np.concatenate((corners.trim_in, corners.trim_out))[:, None] * slope
+        one = rate * gone
+        two = sign * one * bend / slope + bent * gone**2
+        jets = angles, sign * weight_slope * angles + one, weight_bend * angles + 2.0 * sign * weight_slope * one + two
+        ends = np.stack([jet.reshape(2, count, 2) / _STEPS**order for order, jet in enumerate(jets)], axis=2)
+        tip, axis_point = nurbs.control_points(program, corners, slice(None), settings.axis_length)
+        points = np.concatenate((tip, axis_point - tip, np.ones_like(tip[..., :1])), axis=2) * weight[:, :, None]
+        splines = Splines(np.tile((0.0, _STEPS / 2, _STEPS), count), np.full(count, 3))
+        tolerance = np.maximum(_left_to_axes(settings, self.form, corners.axis_error), _SHARE * self.least)
+        return Curves(splines, points.reshape(-1, 7), ends, tolerance)
+
+    def _pose_angles(self, legs: _Legs) -> tuple[Floats, Floats, Bools]:
+        """Angles (m, 2) at both ends of legs, and whether one follows from the other in a cut."""
+        program, machine = self.smoothed.program, machine_of(self.form)
+        from_angles, stated = self.angles[legs.of], np.isnan(self.angles[legs.of, 0])  # no row leads to such a pose
+        near, axis = self.way.angles[legs.joint[stated]], program.axis[legs.of[stated]]
+        from_angles[stated], _ = continued(machine, axis, near, np.full(len(near), -1), self.least / 2)
+        follows = self.turns[self.last[legs.to] + 1] == self.turns[self.last[legs.of] + 1]
+        return from_angles, self.angles[legs.to], follows & ~stated
+
+    def _line_rates(self, legs: _Legs) -> Floats:
+        """(m, 2) degrees by the fraction of the segment: rates of lines beside joints, as they will be divided."""
+        row = legs.joint - legs.inward
+        if not len(row):
+            return np.zeros((0, 2))
+        first, last = int(row.min()), int(row.max())
+        way, rapid = some_rows(self.way, slice(first, last + 2)), np.ones(last + 2 - first, np.bool_)
+        rapid[row + 1 - first] = False
+        more = insertions(
+            machine_of(self.form),
+            way.tip,
+            way.axis,
+            way.angles,
+            tolerance=way.tolerance,
+            rapid=rapid,
+            max_step=largest_turn(self.smoothed.settings),
+            line=self.smoothed.program.line[way.move],
+            file=self.smoothed.program.source.name,
+        )
+        segment = more.segment + first
+        nearest = np.where(
+            legs.inward, np.searchsorted(segment, row, side="right") - 1, np.searchsorted(segment, row, side="left")
+        )
+        share, other = 1.0 - legs.inward, self.way.angles[row + ~legs.inward]
+        found = np.isin(row, segment)
+        share[found], other[found] = more.fraction[nearest[found]], more.angles[nearest[found]]
+        place = legs.entry + share * (legs.leave - legs.entry)
+        return (other - self.way.angles[legs.joint]) / (place - np.where(legs.inward, legs.leave, legs.entry))[:, None]
+
+    def _whole(self, fitted: CurveAngles, pose: Ints, number: Ints) -> _Sections:
+        """Whole curves of corners as sections; r curves at poses."""
+        splines = fitted.curves.splines
+        owner, place = spread(splines.count + 2)
+        narrowest = np.minimum.reduceat(splines.width, splines.span_first[:-1]) if len(pose) else np.zeros(0)
+        own, begin, axis = np.arange(len(pose)), np.zeros(len(pose)), np.zeros((len(pose), 2, 3))
+        rows = owner, place + 1, splines.first_knots, fitted.control
+        steps = np.minimum(_STEPS, 8.0 * narrowest)
+        return self._written(fitted, rows, steps, pose, number, own, begin, begin + _STEPS, axis)
+
+    def _cut(self, fitted: CurveAngles, runs: Runs, number: Ints) -> _Sections:
+        """Sections of runs."""
+        splines = fitted.curves.splines
+        run, begin, end = section_ends(runs, splines, self.smoothed.program)
+        rows, steps = clamped(splines, fitted.control, run, begin, end), np.full(len(run), STEPS_PER_UNIT)
+        axis = np.stack([unit(fitted.curves.lever(run, s)) for s in (begin, end)], axis=1)
+        return self._written(fitted, rows, steps, moves_at(runs, run, end), number[run], run, begin, end, axis)
+
+    def _written(
+        self,
+        fitted: CurveAngles,
+        rows: tuple[Ints, Ints, Floats, Floats],
+        steps: Floats,
+        move: Ints,
+        curve: Ints,
+        run: Ints,
+        begin: Floats,
+        end: Floats,
+        axis: Floats,
+    ) -> _Sections:
+        """Sections as they are written, so many steps as the parameter 1; `rows` are as `clamped` gives them."""
+        (owner, number, knot, points), splines, limits = rows, fitted.curves.splines, machine_of(self.form).limits
+        counts = np.bincount(owner, minlength=len(curve))
+        spline = np.zeros((len(owner), 3))
+        spline[:, 0], spline[np.cumsum(counts) - 1, 2] = knot / steps[owner], (end - begin) / steps
+        spline[:, 1] = _written_weights(points[:, 5], owner, len(curve))
+        points = points[:, :5] / points[:, 5:]
+        # spans that a section has a part of
+        first = search(splines.knot, splines.count, run, begin, side="right") - 1 - run
+        last = search(splines.knot, splines.count, run, end) - 1 - run
+        beyond = np.concatenate(([0], np.cumsum(~(fitted.error <= fitted.curves.tolerance[splines.span_run]))))
+        good = beyond[last + 1] == beyond[first]
+        outside = np.maximum(limits[:, 0] - points[:, 3:], points[:, 3:] - limits[:, 1]).max(axis=1)
+        good[owner[outside > LIMIT_SLACK]] = False
+        return _Sections(number.astype(np.int8), points, spline, counts, move, curve, begin, end, axis, good)
 
 
 def _written_weights(weight: Floats, owner: Ints, count: int) -> Floats:
@@ -336,7 +433,7 @@ def _written_weights(weight: Floats, owner: Ints, count: int) -> Floats:
     return np.round(weight * factor[owner], WEIGHT_DECIMALS)
 
 
-def _with_sections(path: RotaryWay, curves: Curves, rows: _Places, sections: _Sections) -> tuple[RotaryWay, Ints]:
+def _with_sections(path: RotaryWay, rows: _Places, sections: _Sections) -> tuple[RotaryWay, Ints]:
     """The way with good sections in the place of the rows within them, and the section that ends in each row, else -1.
 
     Rows where other lines meet sections are added.
@@ -367,13 +464,12 @@ def _with_sections(path: RotaryWay, curves: Curves, rows: _Places, sections: _Se
     section[at[ends[meets]]] = number[meets & ends]
     new = np.flatnonzero(~meets)
     before = row[known[new] - 1]
-    owner = sections.curve[number[new]]
     position = np.concatenate((np.flatnonzero(kept).astype(np.float64), before + 0.5))
     order = np.lexsort((np.concatenate((np.zeros(int(kept.sum())), place[new])), position))
     none = np.zeros(len(new), np.bool_)
     more = RotaryWay(
         tip=sections.points[point[new], :3],
-        axis=unit(curves.lever(owner, place[new] - base[owner])),
+        axis=sections.axis[number[new] + ~ends[new], ends[new].astype(np.int64)],
         move=sections.move[number[new]],
         angles=sections.points[point[new], 3:],
         branch=np.zeros(len(new), np.int8),
@@ -394,7 +490,7 @@ def _with_curves(lines: Rows, section: Ints, sections: _Sections | None) -> Rows
     if sections is None or not curved.any():
         return lines
     counts = np.ones(len(section), np.int64)
-    counts[curved] = np.diff(sections.first)[section[curved]]
+    counts[curved] = sections.count[section[curved]]
     owner, _ = spread(counts)
     rows, spline = some_rows(lines, owner), np.zeros((len(owner), 3))
     at = np.flatnonzero(curved[owner])

@@ -101,6 +101,11 @@ class CurveAngles:
     #: (spans,), degrees; bound on the angle between the tool axis of the angles and the lever in each span
     error: Floats
 
+    @property
+    def control(self) -> Floats:
+        """(c, 6) control points of tip and angles, times the weight, and the weight."""
+        return np.hstack((self.curves.points[:, :3], self.angles, self.curves.points[:, 6:]))
+
 
 def curve_angles(curves: Curves, machine: Machine, guide: Guide, *, cone: float, rounds: int = ROUNDS) -> CurveAngles:
     """Angles of curves on a machine, within their tolerances as far as halving spans brings them there.

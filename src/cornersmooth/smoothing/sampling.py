@@ -68,14 +68,14 @@ KNOTS = (0.0, 0.0, 0.0, 0.0, 0.5)
 
 
 def dense_rows(
-    smoothed: SmoothProgram, circles: Ints | None = None, poses: int = 16384, *, divide: bool = True
+    smoothed: SmoothProgram, circles: Ints | None = None, poses: int = 16384, *, halves: Ints | None = None
 ) -> Iterator[Rows]:
     """Rows of the smoothed motion as lines with tool vectors, in batches of about `poses` poses.
 
-    `circles` (k,) is the number of circular arcs that each arc of the program is written as, 0 for lines. `divide` says
-    whether straight lines in which the axis turns much are divided.
+    `circles` (k,) is the number of circular arcs that each arc of the program is written as, 0 for lines. `halves` (k,)
+    are lines for each half of the transitions in place of `lines_per_half`: straight lines are left whole then.
     """
-    return _rows(smoothed, curves=False, divide=divide, circles=circles, poses=poses)
+    return _rows(smoothed, curves=False, divide=halves is None, circles=circles, poses=poses, halves=halves)
 
 
 def curve_rows(smoothed: SmoothProgram, *, divide: bool = False, poses: int = 16384) -> Iterator[Rows]:
@@ -83,13 +83,16 @@ def curve_rows(smoothed: SmoothProgram, *, divide: bool = False, poses: int = 16
 
     `divide` says whether lines in which the axis turns much are divided: not all controls run the axis point straight.
     """
-    return _rows(smoothed, curves=True, divide=divide, circles=None, poses=poses)
+    none = np.zeros(0, np.int64)
+    return _rows(smoothed, curves=True, divide=divide, circles=None, poses=poses, halves=none)
 
 
-def _rows(smoothed: SmoothProgram, *, curves: bool, divide: bool, circles: Ints | None, poses: int) -> Iterator[Rows]:
+def _rows(
+    smoothed: SmoothProgram, *, curves: bool, divide: bool, circles: Ints | None, poses: int, halves: Ints | None
+) -> Iterator[Rows]:
     program, height = smoothed.program, smoothed.settings.axis_length
     segments = segments_of(smoothed, dense=divide)
-    halves = np.zeros(0, np.int64) if curves else lines_per_half(smoothed)
+    halves = lines_per_half(smoothed) if halves is None else halves
     runs, replaced = _of_runs(smoothed, curves=curves)
     segments.lines[replaced] = 1
     counts = np.where(segments.has_line, segments.lines, 0)
