@@ -145,27 +145,26 @@ def read_records(lines: Sequence[bytes], first: int, decode: Decode, file: str, 
 
 
 def _comment(source: _Lines, line: int, text: str) -> Record:
-    parts = [text]
-    while text.startswith("$$->") and parts[-1].endswith("$"):  # Creo's CSYS tables go on in the next line
-        more = source.peek()
-        if more is None or not _NUMERIC_LINE.match(more):
-            break
-        parts[-1] = parts[-1][:-1].rstrip()
-        parts.append(source.take()[1])
-    text = " ".join(parts)
+    if text.startswith("$$->"):  # Creo's CSYS tables go on in the next line
+        text = _continued(source, text, lambda more: _NUMERIC_LINE.match(more) is not None)
     return Record(line, "$$", (text[2:].strip(),), text)
 
 
 def _text_statement(source: _Lines, line: int, text: str, found: re.Match[str]) -> Record:
+    if found[2]:
+        text = _continued(source, text, lambda more: not _begins_statement(more))
+    return Record(line, _squeeze(found[1]), (text[found.end() :].strip(),), text)
+
+
+def _continued(source: _Lines, text: str, fits: Callable[[str], bool]) -> str:
+    """Text joined with the lines after it that fit, where its sign asks for one; else the sign is text."""
     parts = [text]
-    while found[2] and parts[-1].endswith("$") and not parts[-1].endswith("$$"):
-        more = source.peek()
-        if more is None or _begins_statement(more):
-            break  # the sign is text
+    while parts[-1].endswith("$") and not parts[-1].endswith("$$"):
+        if (more := source.peek()) is None or not fits(more):
+            break
         parts[-1] = parts[-1][:-1].rstrip()
         parts.append(source.take()[1])
-    text = " ".join(parts)
-    return Record(line, _squeeze(found[1]), (text[found.end() :].strip(),), text)
+    return " ".join(parts)
 
 
 def _statements(source: _Lines, line: int, text: str) -> Iterator[Record]:

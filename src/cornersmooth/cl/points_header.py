@@ -13,17 +13,19 @@ from cornersmooth.model import Units
 Meaning = Literal["none", "vectors", "points", "values"]
 Triple = tuple[int, int, int]
 
-_SECOND_POINTS = ("xb yb zb", "x2 y2 z2", "bx by bz", "qx qy qz", "xq yq zq", "axispointx axispointy axispointz")
 _TIPS = (
     *("x y z", "xa ya za", "x1 y1 z1", "px py pz", "xp yp zp", "posx posy posz", "tipx tipy tipz"),
     *("pointx pointy pointz", "xt yt zt", "ax ay az"),
 )
-_VECTORS = (
-    *("i j k", "nx ny nz", "ox oy oz", "ti tj tk", "vx vy vz", "axisx axisy axisz", "ax ay az", "tx ty tz"),
-    *("ux uy uz", "dx dy dz", "vi vj vk", "ai aj ak", "ii jj kk", "xv yv zv", "dirx diry dirz", "vecx vecy vecz"),
-    *("toolaxisx toolaxisy toolaxisz", "normalx normaly normalz", "toolx tooly toolz"),
-)
-_BY_VALUES = ("u v w",)
+_SECOND: dict[Meaning, tuple[str, ...]] = {
+    "vectors": (
+        *("i j k", "nx ny nz", "ox oy oz", "ti tj tk", "vx vy vz", "axisx axisy axisz", "ax ay az", "tx ty tz"),
+        *("ux uy uz", "dx dy dz", "vi vj vk", "ai aj ak", "ii jj kk", "xv yv zv", "dirx diry dirz", "vecx vecy vecz"),
+        *("toolaxisx toolaxisy toolaxisz", "normalx normaly normalz", "toolx tooly toolz"),
+    ),
+    "points": ("xb yb zb", "x2 y2 z2", "bx by bz", "qx qy qz", "xq yq zq", "axispointx axispointy axispointz"),
+    "values": ("u v w",),
+}
 _FEEDS = ("f", "feed", "feedrate", "fedrat", "vf", "feedmmmin", "feedratemmmin", "feedmmpm")
 
 #: columns that say which moves are rapid: a flag (1, true), a G code (0 is rapid), or a word
@@ -100,7 +102,8 @@ def from_header(text: str, file: str, line: int) -> Columns:
     if tip is None:
         raise error("CS156", file, line, why=f"no x, y and z in {text.strip()[:60]!r}")
     left = [name if column not in tip else "" for column, name in enumerate(plain)]
-    second, meaning = _second(left)
+    named = ((_find(spellings, left), meaning) for meaning, spellings in _SECOND.items())
+    second, meaning = next((found for found in named if found[0]), (None, "none"))
     feed = next((left.index(name) for name in _FEEDS if name in left), None)
     rapid = next((left.index(name) for name in _RAPIDS if name in left), None)
     used = {*tip, *(second or ()), feed, rapid}
@@ -159,19 +162,6 @@ def _find(spellings: tuple[str, ...], names: list[str]) -> Triple | None:
                 continue  # then it is the axis
             return names.index(x), names.index(y), names.index(z)
     return None
-
-
-def _second(names: list[str]) -> tuple[Triple | None, Meaning]:
-    choices: tuple[tuple[tuple[str, ...], Meaning], ...] = (
-        (_VECTORS, "vectors"),
-        (_SECOND_POINTS, "points"),
-        (_BY_VALUES, "values"),
-    )
-    for spellings, meaning in choices:
-        found = _find(spellings, names)
-        if found:
-            return found, meaning
-    return None, "none"
 
 
 def _units(names: list[str], lengths: tuple[int, ...], feed: int | None, file: str, line: int) -> Units | None:

@@ -57,9 +57,12 @@ def read_drive_arc(record: Record, start: Vector, direction: Direction, file: st
     plain = found[1].upper() == "CIRCLE" and not found[2]
     if len(values) != (4 if plain else 7):
         raise _refuse(record, file, f"{found[1].upper()} has {len(values)} numbers")
+    if direction is None:
+        raise _refuse(record, file, "no INDIRV or INDIRP says which way round")
+    word, vector = direction
     centre, radius = np.array(values[:3]), values[-1]
     spoke = np.array(start) - centre
-    tangent = _tangent(record, np.array(start), direction, file)
+    tangent = np.array(vector) - (start if word == "INDIRP" else 0.0)
     if plain:
         normal = np.cross(spoke, tangent)
     else:
@@ -112,13 +115,6 @@ def _arc(
     printed = max(len(token.partition(".")[2].strip()) for token in text.split(",")[:3])
     resolution = 10.0 ** -max(printed, LEAST_DECIMALS)
     return Arc(record.line, record.word, _vector(centre), _vector(normal), radius, 1, sweep, resolution, certain=True)
-
-
-def _tangent(record: Record, start: Floats, direction: Direction, file: str) -> Floats:
-    if direction is None:
-        raise _refuse(record, file, "no INDIRV or INDIRP says which way round")
-    word, vector = direction
-    return np.array(vector) - start if word == "INDIRP" else np.array(vector)
 
 
 def _end(record: Record, arc: Arc, start: Floats, check: str, file: str) -> Vector:

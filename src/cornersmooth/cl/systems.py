@@ -23,11 +23,11 @@ class System:
     origin: Floats  #: (3,)
 
     def points(self, points: Floats) -> Floats:
-        """(n, 3) points of this system, in the other one."""
+        """Points (n, 3) of this system, in the other one."""
         return points @ self.axes.T + self.origin
 
     def vectors(self, vectors: Floats) -> Floats:
-        """(n, 3) vectors of this system, in the other one."""
+        """Vectors (n, 3) of this system, in the other one."""
         return vectors @ self.axes.T
 
     def seen_from(self, other: System) -> System:
