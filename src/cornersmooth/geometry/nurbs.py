@@ -16,10 +16,6 @@ import numpy as np
 
 from cornersmooth.model import Bools, Corners, Floats, Ints, Program
 
-KNOTS = (0.0, 0.0, 0.0, 0.0, 0.5, 1.0, 1.0, 1.0, 1.0)
-
-DEGREE = 3
-
 
 def deviation_factor(weights: Floats, ratio: Floats | float) -> Floats:
     """(...,) the factor c of weights (..., 2) and ratios (...,)."""

@@ -10,11 +10,11 @@ is what this module looks after.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from cornersmooth.model import Floats, Ints
+from cornersmooth.slices import some_rows
 from cornersmooth.smoothing.long_lines import LineLimits, Vertices
 from cornersmooth.vectors import norm
 
@@ -51,15 +51,15 @@ _LEAST = 0.005
 
 @dataclass(frozen=True)
 class _Corners:
-    """Vertices between two lines, v of them, and the lines before and after (each (v, ...))."""
+    """Vertices between two lines, v of them, and the lines before and after (v, 2, ...)."""
 
     tip: Floats
     words: Floats
     parameter: Floats
-    way: tuple[Floats, Floats]  # unit tangents of the tip
-    turn: tuple[Floats, Floats]  # change of words per mm
-    rate: tuple[Floats, Floats]  # change of the parameter per mm
-    half: tuple[Floats, Floats]  # half of the lengths, mm
+    way: Floats  # unit tangents of the tip
+    turn: Floats  # change of words per mm
+    rate: Floats  # change of the parameter per mm
+    half: Floats  # half of the lengths, mm
     bend: Floats  # |Δt|
     quicker: Floats  # acceleration of the line after over that of the one before
 
@@ -74,27 +74,11 @@ class _Corners:
         slow = [np.maximum(np.maximum(most_way, most_turn / ratio), _STANDING) for ratio in _TURNS]
         quicker = np.max([of_lines[:-1] / of_lines[1:] for of_lines in slow], axis=0)
 
-        def beside(values: Floats) -> tuple[Floats, Floats]:
-            return values[:-1], values[1:]
-
-        return cls(
-            tip[1:-1],
-            words[1:-1],
-            parameter[1:-1],
-            beside(way),
-            beside(turn),
-            beside(rate),
-            beside(length / 2.0),
-            norm(np.diff(way, axis=0)),
-            quicker,
+        way, turn, rate, half = (
+            np.stack((values[:-1], values[1:]), axis=1) for values in (way, turn, rate, length / 2.0)
         )
-
-    def only(self, chosen: Ints) -> _Corners:
-        columns: dict[str, Any] = {
-            name: tuple(part[chosen] for part in values) if isinstance(values, tuple) else values[chosen]
-            for name, values in vars(self).items()
-        }
-        return _Corners(**columns)
+        bend = norm(way[:, 1] - way[:, 0])
+        return cls(tip[1:-1], words[1:-1], parameter[1:-1], way, turn, rate, half, bend, quicker)
 
 
 def largest_blends(rows: Vertices, kept: Ints, limits: LineLimits, most: float, deviation: float) -> Floats:
@@ -115,13 +99,13 @@ def largest_blends(rows: Vertices, kept: Ints, limits: LineLimits, most: float, 
     if len(kept) < 3:
         return blends
     corners = _Corners.of(rows, kept)
-    moving = np.minimum(*corners.half) > 0.0
-    enough = np.minimum(corners.half[0] * corners.bend / _REACH, most)  # more makes no difference
+    moving = corners.half.min(axis=1) > 0.0
+    enough = np.minimum(corners.half[:, 0] * corners.bend / _REACH, most)  # more makes no difference
     enough[~moving] = 0.0
     found = np.full(len(moving), most)
     asked = np.flatnonzero(moving)
     for _ in range(_ROUNDS):
-        off = _deviation(rows, limits, corners.only(asked), found[asked])
+        off = _deviation(rows, limits, some_rows(corners, asked), found[asked])
         far = off > deviation
         asked = asked[far]
         if not len(asked):
@@ -146,17 +130,17 @@ def _carried(blends: Floats, enough: Floats) -> Floats:
 def _deviation(rows: Vertices, limits: LineLimits, corners: _Corners, blend: Floats) -> Floats:
     """(v,) largest distance of tip or axis point from the original at a common parameter, within blends."""
     bend = np.maximum(corners.bend, _LEAST_BEND)
-    before = np.minimum(corners.half[0], _REACH * blend / bend)
-    behind = np.minimum(corners.half[1], corners.quicker * before)
+    before = np.minimum(corners.half[:, 0], _REACH * blend / bend)
+    behind = np.minimum(corners.half[:, 1], corners.quicker * before)
     largest = np.zeros(len(blend))
     middle = 1.0 / (1.0 + np.sqrt(behind / np.maximum(before, np.finfo(np.float64).tiny)))
     for place in _PLACES:
         part = middle + place * (middle if place < 0.0 else 1.0 - middle)
         left, gone = -before * (1.0 - part) ** 2, behind * part**2
 
-        def at(place: Floats, per_mm: tuple[Floats, Floats], left: Floats = left, gone: Floats = gone) -> Floats:
+        def at(place: Floats, per_mm: Floats, left: Floats = left, gone: Floats = gone) -> Floats:
             shape = (-1,) + (1,) * (place.ndim - 1)
-            return place + left.reshape(shape) * per_mm[0] + gone.reshape(shape) * per_mm[1]
+            return place + left.reshape(shape) * per_mm[:, 0] + gone.reshape(shape) * per_mm[:, 1]
 
         tip = at(corners.tip, corners.way)
         axis_point = tip + limits.axis_length * limits.axis_of(at(corners.words, corners.turn))

@@ -26,37 +26,27 @@ def find_neighbours(program: Program, axis_length: float, distance: float) -> Ne
 
     A run of poses that creep on by less than `distance` each but by more in total is not merged.
     """
-    n = len(program)
+    n, own = len(program), np.arange(len(program))
     chains = program.chains
-    chain_length = chains[:, 1] - chains[:, 0]
-    reached = np.zeros(n, np.bool_)  # by a linear move inside a chain
-    members = ranges(chains[:, 0] + 1, chain_length)
-    reached[members] = True
-    first = np.full(n, -1, np.int64)
-    last = np.full(n, -1, np.int64)
-    first[members] = np.repeat(chains[:, 0], chain_length)
-    last[members] = np.repeat(chains[:, 1], chain_length)
-    inner = reached & (np.arange(n) != last)
+    length = chains[:, 1] - chains[:, 0]
+    members = ranges(chains[:, 0] + 1, length)  # reached by a linear move inside a chain
+    first, last = np.full((2, n), -1, np.int64)
+    first[members], last[members] = np.repeat(chains[:, 0], length), np.repeat(chains[:, 1], length)
+    inner = (first >= 0) & (own != last)
 
-    duplicate = np.zeros(n, np.bool_)
-    if n > 1:
-        duplicate[1:] = reached[1:] & _closer(program, np.arange(1, n), np.arange(n - 1), axis_length, distance)
-        duplicate[1:] &= program.kind[:-1] != Move.HOLE  # the tool has left the hole, and comes back to its pose
-    own = np.arange(n)
-    representative = np.maximum.accumulate(np.where(duplicate, 0, own)) if n else own
+    duplicate = first >= 0
+    duplicate[1:] &= _closer(program, own[1:], own[:-1], axis_length, distance)
+    duplicate[1:] &= program.kind[:-1] != Move.HOLE  # the tool has left the hole, and comes back to its pose
+    representative = np.maximum.accumulate(np.where(duplicate, 0, own))
     repeats = np.flatnonzero(duplicate)
-    if len(repeats):
-        away = repeats[~_closer(program, repeats, representative[repeats], axis_length, distance)]
-        creeping = np.isin(representative[repeats], representative[away])
-        duplicate[repeats[creeping]] = False
-        representative = np.maximum.accumulate(np.where(duplicate, 0, own))
+    away = repeats[~_closer(program, repeats, representative[repeats], axis_length, distance)]
+    duplicate[repeats[np.isin(representative[repeats], representative[away])]] = False  # those creep
+    representative = np.maximum.accumulate(np.where(duplicate, 0, own))
 
-    previous = np.full(n, -1, np.int64)
+    previous, following = np.full((2, n), -1, np.int64)
     previous[members] = np.maximum(representative[members - 1], first[members])
-    distinct = np.minimum.accumulate(np.where(duplicate, n, own)[::-1])[::-1] if n else own
-    following = np.full(n, -1, np.int64)
-    corners = np.flatnonzero(inner)
-    following[corners] = distinct[corners + 1]
+    distinct = np.minimum.accumulate(np.where(duplicate, n, own)[::-1])[::-1]
+    following[inner] = distinct[np.flatnonzero(inner) + 1]
     following[following > last] = -1
     return Neighbours(previous, following, inner, duplicate)
 
