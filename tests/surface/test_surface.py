@@ -12,12 +12,12 @@ import cornersmooth
 from cornersmooth.errors import SettingsError
 from cornersmooth.nc import choose_form, fit_settings
 from cornersmooth.surface import (
-    RuledMotion,
     Tool,
     distance_to_motion,
     envelope_points,
     measure_surface,
     neighbouring_passes,
+    original_cuts,
     parse_tool,
     tools_of,
 )
@@ -26,9 +26,14 @@ from oracle.share import how_many, share
 UP = np.array([0.0, 0.0, 1.0])
 
 
+def through(tips, axes):
+    """Motion through poses one after another."""
+    return original_cuts(cornersmooth.Program.from_poses(tips, axes, feed=100.0))
+
+
 def straight(tips, axes=UP):
     tips = np.asarray(tips, float)
-    return RuledMotion.through(tips, np.broadcast_to(axes, tips.shape))
+    return through(tips, np.broadcast_to(axes, tips.shape))
 
 
 def off(original, written, tool, edge, **asked):
@@ -102,7 +107,7 @@ def test_a_corner_of_a_cylinder_cut_off_by_a_line_is_known_in_closed_form(turn):
 def test_an_axis_that_turns_about_the_tip_leaves_a_plane_on_both_sides():
     angles = np.radians(np.linspace(0.0, 40.0, 9))
     axes = np.stack((np.sin(angles), np.zeros(9), np.cos(angles)), axis=1)
-    turning = RuledMotion.through(np.zeros((9, 3)), axes)
+    turning = through(np.zeros((9, 3)), axes)
     tool = Tool.of(6)
     points, own, _ = off(turning, turning, tool, 12.0)
     # the sides of the swept volume are the planes y = ±R
@@ -112,7 +117,7 @@ def test_an_axis_that_turns_about_the_tip_leaves_a_plane_on_both_sides():
     # leaning over by τ about the x axis moves the flank by the sine of it
     lean = np.radians(0.05)
     over = np.array([[1, 0, 0], [0, np.cos(lean), -np.sin(lean)], [0, np.sin(lean), np.cos(lean)]])
-    leaning = RuledMotion.through(np.zeros((9, 3)), axes @ over.T)
+    leaning = through(np.zeros((9, 3)), axes @ over.T)
     got = distance_to_motion(points.point, leaning, tool, 12.0, reach=1.0)
     # in the turned frame the sides are planes at ±R again: what is left is the point's place across them
     across = points.point @ over[:, 1]
@@ -215,7 +220,7 @@ def brute_force(point, motion, tool, edge):
 )
 def test_distribution_of_real_paths_agrees_with_brute_force(name, tolerance, request):
     from cornersmooth.nc_reader import read_nc
-    from cornersmooth.surface import original_cuts, written_cuts
+    from cornersmooth.surface import written_cuts
 
     if name == "impeller":
         path, height = Path(__file__).parents[2] / "samples" / "impeller.cls", 12.0

@@ -54,25 +54,21 @@ class Checked:
 
 def places(old: Reading, new: Reading) -> tuple[list[Place], list[Problem]]:
     """Find the runs of a program in another one, between lines that must be the same."""
+    firsts = [*(run.first for run in old.runs), len(old.why)]
+    head = old.lines(0, firsts[0])
+    if not new.data.startswith(head) or (not old.runs and new.data != head):
+        return [], [_first_other(old, new)]
     found: list[Place] = []
-    at, behind = 0, 0
-    for k, run in enumerate(old.runs):
-        before = old.lines(behind, run.first)
-        if new.data[at : at + len(before)] != before:
-            return found, [_first_other(old, new, behind, at)]
-        at += len(before)
-        stop = old.runs[k + 1].first if k + 1 < len(old.runs) else len(old.why)
-        after = old.lines(run.stop, stop)
-        end = _found(new, after, at, last=k + 1 == len(old.runs))
+    at = len(head)
+    for run, following in zip(old.runs, firsts[1:], strict=True):
+        after = old.lines(run.stop, following)
+        end = _found(new, after, at, last=following == len(old.why))
         if end is None:
-            return found, [
-                _changed(_line(new, at), f"the lines after line {run.stop} of the old program are not there")
-            ]
+            what = f"the lines after line {run.stop} of the old program are not there"
+            return found, [_changed(_line(new, at), what)]
         if new.data[at:end] != old.lines(run.first, run.stop):
             found.append(Place(run, _line(new, at), _line(new, end)))
-        at, behind = end, run.stop
-    if new.data[at:] != old.lines(behind, len(old.why)):
-        return found, [_first_other(old, new, behind, at)]
+        at = end + len(after)
     return found, []
 
 
@@ -92,13 +88,12 @@ def _found(new: Reading, text: bytes, at: int, *, last: bool) -> int | None:
     return None if end < 0 else end
 
 
-def _first_other(old: Reading, new: Reading, line: int, at: int) -> Problem:
-    """Say which line outside of runs is another one."""
-    mine = _line(new, at)
-    for step in range(len(old.why) - line):
-        if mine + step >= len(new.why) or old.line(line + step) != new.line(mine + step):
-            return _changed(mine + step, f"line {line + step + 1} of the old program, outside of runs, is another one")
-    return _changed(mine, "there is more than in the old program")
+def _first_other(old: Reading, new: Reading) -> Problem:
+    """Say which of the lines before all runs is another one."""
+    for line in range(len(old.why)):
+        if line >= len(new.why) or old.line(line) != new.line(line):
+            return _changed(line, f"line {line + 1} of the old program, outside of runs, is another one")
+    return _changed(len(old.why), "there is more than in the old program")
 
 
 def _changed(line: int, text: str) -> Problem:

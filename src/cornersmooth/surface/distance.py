@@ -6,7 +6,7 @@ bounds, since no point of the tool moves farther than the ends of its axis and i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -29,16 +29,8 @@ _NEARER = 1e-9
 _SAMPLES = np.linspace(0.0, 1.0, 5)
 
 
-@dataclass(frozen=True)
-class Cutter:
-    """The cutting part of a tool: nothing above the edge cuts."""
-
-    tool: Tool
-    edge: float  #: mm: height over the tip at which it ends
-
-    def distance(self, out: Floats, up: Floats) -> Floats:
-        """Signed distance as of the tool, mm; above the edge at least the way down to it."""
-        return np.maximum(self.tool.distance(out, up), up - self.edge)
+#: signed distances, mm, of points `out` from the axis and `up` above the tip to what cuts
+Cutter = Callable[[Floats, Floats], Floats]
 
 
 def distance_to_motion(points: Floats, motion: RuledMotion, tool: Tool, edge: float, *, reach: float) -> Floats:
@@ -66,6 +58,10 @@ def distance_to_motion(points: Floats, motion: RuledMotion, tool: Tool, edge: fl
     # from the point to the tool's surface, in to the axis, up to a node, and back over half the way of a part
     far = reach + widest + 0.5 * (heights[1] - heights[0]) + 0.5 * step
     counts = tree.query_ball_point(points, far, return_length=True)
+
+    def cutter(out: Floats, up: Floats) -> Floats:
+        return np.maximum(tool.distance(out, up), up - edge)  # nothing above the edge cuts
+
     begin = 0
     while begin < len(points):
         end = begin + max(int(np.searchsorted(np.cumsum(counts[begin:]), _TOGETHER)), 1)
@@ -74,7 +70,7 @@ def distance_to_motion(points: Floats, motion: RuledMotion, tool: Tool, edge: fl
         if len(number):
             part = np.concatenate([np.asarray(rows, np.int64) for rows in near]) // len(heights)
             key = np.unique(number * len(parts) + part)
-            found[begin:end] = _least(points[begin:end], parts, Cutter(tool, edge), key // len(parts), key % len(parts))
+            found[begin:end] = _least(points[begin:end], parts, cutter, key // len(parts), key % len(parts))
         begin = end
     found[found > reach] = np.nan
     return found
@@ -120,4 +116,4 @@ def _distances(points: Floats, parts: Parts, cutter: Cutter, part: Ints, share: 
     arm = points - tip
     up = np.einsum("ij,ij->i", arm, axis)
     out = np.linalg.norm(arm - up[:, None] * axis, axis=1)
-    return cutter.distance(out, up)
+    return cutter(out, up)

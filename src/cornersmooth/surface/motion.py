@@ -33,14 +33,6 @@ class RuledMotion:
     def __len__(self) -> int:
         return len(self.line)
 
-    @classmethod
-    def through(cls, tip: Floats, axis: Floats, line: Ints | None = None) -> RuledMotion:
-        """Motion through poses (n, 3) one after another; those that repeat are left out."""
-        tip, axis = np.asarray(tip, np.float64), np.asarray(axis, np.float64)
-        axis = axis / np.linalg.norm(axis, axis=1, keepdims=True)
-        lines = np.arange(1, len(tip) + 1) if line is None else line
-        return _segments(tip, axis, lines, np.ones(len(tip), np.bool_))
-
     def at(self, segment: Ints, share: Floats) -> tuple[Floats, Floats]:
         """Tip and unit axis (k, 3) at shares (k,) of segments (k,)."""
         tip, axis = self.tip[segment], self.axis[segment]
