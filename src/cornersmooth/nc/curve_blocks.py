@@ -1,4 +1,4 @@
-"""How transitions are written as splines: rows of control points become the blocks of each control."""
+"""How curves are written: rows of control points become the blocks of each control, splines or polynomials."""
 
 from __future__ import annotations
 
@@ -10,10 +10,16 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.geometry.bsplines import Splines
+from cornersmooth.geometry.ragged import ranges
+from cornersmooth.model import Bools, Floats, Ints, Units
+from cornersmooth.nc.form import Form
 from cornersmooth.nc.run import Run
 from cornersmooth.slices import some_rows
-from cornersmooth.text import format_number
+from cornersmooth.text import RowFormat, format_number, to_ticks
+
+#: control points that a curve has more than knot intervals
+_DEGREE = 3
 
 
 class RowWriter(Protocol):
@@ -147,3 +153,168 @@ def _distinct(values: Floats) -> tuple[Floats, Ints]:
     """Distinct values, few of many, and which of them each is: faster than the inverse of `np.unique`."""
     found = np.unique(values)
     return found, np.searchsorted(found, values)
+
+
+class _Polynomials(Curves):
+    """One block for each knot interval, in the last rows of a curve: words before and after its numbers."""
+
+    begin, end = b"", b"\n"
+
+    def __init__(self, form: Form, units: Units) -> None:
+        self._line_decimals = form.decimals(units)
+
+    def prepare(self, run: Run) -> Run:
+        """Leave the rows that carry an interval; each begins and ends in printed digits, where the one before ended.
+
+        Its tangents stay: their control points move with the ends.
+        """
+        kept = some_rows(run, (run.curve == 0) | (run.curve > _DEGREE))
+        curved = np.flatnonzero(kept.curve > 0)
+        if len(curved):
+            assert kept.bezier is not None
+            scale = 10.0 ** np.array(self._line_decimals)
+            first = kept.curve[curved] == _DEGREE + 1
+            end = to_ticks(kept.bezier[curved, 3], self._line_decimals) / scale
+            start = np.concatenate((end[:1], end[:-1]))
+            start[first] = run.ticks[run.curve == 1] / scale
+            for points, place in (((0, 1), start), ((3, 2), end)):
+                shift = place - kept.bezier[curved, points[0]]
+                for point in points:
+                    kept.bezier[curved, point] += shift
+        return kept
+
+    def add_prefixes(self, run: Run, table: list[bytes], chosen: Ints) -> int:
+        """Words before the numbers."""
+        chosen[run.curve > 0] = len(table)
+        table.append(self.begin)
+        return 0
+
+    def add_suffixes(self, run: Run, table: list[bytes], chosen: Ints) -> None:
+        """Words after the numbers."""
+        chosen[run.curve > 0] = len(table)
+        table.append(self.end)
+
+
+class PolyBlocks(_Polynomials):
+    """Siemens' POLY: ``PO[X]=(end, a2, a3)`` of a parameter from 0 to 1.
+
+    The control takes a0 from where the block before ended and a1 = end − a0 − a2 − a3. Only for weights 1: the
+    denominator of POLY acts on the geometry axes alone.
+    """
+
+    begin, end = b"POLY ", b") PL=1\n"
+
+    def __init__(self, form: Form, units: Units) -> None:
+        super().__init__(form, units)
+        digits, tip = form.table.digits, form.tip_decimals(units)
+        letters = [word.rstrip("=") for word in (*form.mode.motion.coordinates, *form.other_words)]
+        words = []
+        for index, letter in enumerate(letters):
+            words += [f"{') ' if index else ''}PO[{letter}]=(".encode(), b",", b","]
+        self._decimals = (tip, digits.coefficient, digits.coefficient) * len(letters)
+        self.format = RowFormat(words=tuple(words), decimals=self._decimals)
+
+    def numbers(self, run: Run, curved: Bools) -> Ints:
+        """End point and coefficients of each interval, axis by axis."""
+        assert run.bezier is not None
+        start, first, second, end = np.moveaxis(run.bezier[curved], 1, 0)
+        square, cube = 3.0 * (start - 2.0 * first + second), end - 3.0 * second + 3.0 * first - start
+        numbers = np.stack((end, square, cube), axis=2).reshape(len(end), -1)
+        return to_ticks(numbers, self._decimals)
+
+
+class SplBlocks(_Polynomials):
+    """Heidenhain's SPL (iTNC 530): end point, then ``K3X K2X K1X K3Y ...`` of a parameter that runs from 1 to 0.
+
+    X(t) = K3·t³ + K2·t² + K1·t + X; the sum gives the start of the block again and may differ by a micrometre.
+    """
+
+    begin = b"SPL "
+
+    def __init__(self, form: Form, units: Units) -> None:
+        super().__init__(form, units)
+        letters = (*form.mode.motion.coordinates, *form.other_words)
+        self._coefficient = form.table.digits.coefficient
+        self.format = _SplFormat(letters, self._line_decimals, self._coefficient)
+
+    def numbers(self, run: Run, curved: Bools) -> Ints:
+        """End point, then K3, K2 and K1 of each axis."""
+        assert run.bezier is not None
+        start, first, second, end = np.moveaxis(run.bezier[curved], 1, 0)
+        slope, square = 3.0 * (second - end), 3.0 * (end - 2.0 * second + first)
+        cube = start - 3.0 * first + 3.0 * second - end
+        factors = np.stack((cube, square, slope), axis=2).reshape(len(end), -1)
+        return np.concatenate((to_ticks(end, self._line_decimals), to_ticks(factors, self._coefficient)), axis=1)
+
+
+class _SplFormat:
+    """Rows of SPL: coefficients of ten and more have an exponent, so rows are put together one by one."""
+
+    def __init__(self, letters: Sequence[str], decimals: Sequence[int], coefficient: int) -> None:
+        self._letters, self._decimals, self._digits = letters, decimals, coefficient
+
+    def rows(
+        self, ticks: Ints, prefix: Sequence[bytes], prefix_id: Ints, suffix: Sequence[bytes], suffix_id: Ints
+    ) -> tuple[bytes, Ints]:
+        """Text, and where each row starts in it."""
+        axes = len(self._letters)
+        texts = []
+        for row, numbers in enumerate(ticks.tolist()):
+            words = [
+                letter + format_number(number / 10.0**decimals, decimals, plus=True)
+                for letter, number, decimals in zip(self._letters, numbers[:axes], self._decimals, strict=True)
+            ]
+            words += [
+                f"K{3 - place % 3}{self._letters[place // 3]}{self._coefficient(number)}"
+                for place, number in enumerate(numbers[axes:])
+            ]
+            texts.append(prefix[int(prefix_id[row])] + " ".join(words).encode() + suffix[int(suffix_id[row])])
+        offsets = np.concatenate(([0], np.cumsum([len(text) for text in texts]))).astype(np.int64)
+        return b"".join(texts), offsets
+
+    def _coefficient(self, ticks: int) -> str:
+        value = ticks / 10.0**self._digits
+        if abs(value) < 10.0:
+            return format_number(value, self._digits, plus=True)
+        mantissa, exponent = f"{value:+.8E}".split("E")
+        return f"{mantissa}E{exponent[0]}{int(exponent[1:]):03d}"
+
+
+def bezier_points(points: Floats, curve: NDArray[np.int8], spline: Floats) -> Floats:
+    """Bézier points (r, 4, c) of the knot intervals of curves, in the last rows of each; zero elsewhere.
+
+    A curve has p control points (r, c) for p − 3 knot intervals, and all weights 1; `spline` is as in `Rows`.
+    """
+    intervals = np.zeros((len(points), 4, points.shape[1]))
+    first = np.flatnonzero(curve == 1)
+    ends = np.append(np.flatnonzero((curve[1:] <= 1) & (curve[:-1] > 0)) + 1, len(curve) if curve[-1] > 0 else [])
+    counts = (ends - first).astype(np.int64)
+    rows = ranges(first, counts)
+    own = _splines(curve[rows], spline[rows], counts)
+    low = own.knot[own.span_knot]
+    matrix = own.bernstein(np.arange(len(low)), low, low + own.width)
+    taps = rows[own.span_control[:, None] + np.arange(4)]
+    intervals[taps[:, -1]] = matrix @ points[taps]
+    return intervals
+
+
+def _splines(curve: NDArray[np.int8], spline: Floats, counts: Ints) -> Splines:
+    """Knot vectors of clamped curves: rows 1, 5, 6 and so on of each have the distinct knots but for the last."""
+    knot, last = spline[:, 0], np.cumsum(counts) - 1
+    chosen = (curve == 1) | (curve > _DEGREE + 1)
+    knots = np.insert(knot[chosen], np.cumsum(chosen)[last], spline[last, 2])
+    return Splines(knots, counts - 2)
+
+
+def curves_for(form: Form, units: Units) -> Curves:
+    """Way to write curves of a form."""
+    decimals = form.table.digits.weight
+    if form.curve == "g6.2":
+        return KnotBlocks(decimals, b" " if form.mode.motion.spaces else b"")
+    if form.curve == "bspline":
+        return SplineBlocks(decimals)
+    if form.curve == "poly":
+        return PolyBlocks(form, units)
+    if form.curve == "spl":
+        return SplBlocks(form, units)
+    return Curves()

@@ -13,7 +13,7 @@ from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program, SmoothPro
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import TIP_SHARE, Form
 from cornersmooth.nc.long_rows import LONG_CHUNK, corner_blends, line_limits
-from cornersmooth.nc.rotary_words import RotaryWay, machine_of, note_inserted
+from cornersmooth.nc.rotary_words import RotaryWay, machine_of
 from cornersmooth.nc.tools import ToolTravel
 from cornersmooth.rotary import FilledPath, fill, insertions, rapid_moves
 from cornersmooth.settings import Settings
@@ -67,8 +67,6 @@ def rotary_rows(
     max_step = largest_turn(settings)
     limits = line_limits(settings, form, max_step)
     timed = _timed_cuts(way.angles, way.move, program) if form.orientation == "machine" else None
-    times = _BlockTimes(smoothed, form, machine, limits)
-    count, first_line, unsolved = 0, 0, np.zeros(0, np.int64)
     size = LONG_CHUNK if long else _CHUNK
     for begin in range(0, max(len(way.move) - 1, 1), size):
         here = slice(begin, begin + size + 1)  # the last row of a chunk is the start of the next
@@ -86,8 +84,14 @@ def rotary_rows(
             line=line,
             file=program.source.name,
         )
-        first_line = first_line if count or not len(more) else int(line[more.segment[0] + 1])
-        count, unsolved = count + len(more), np.append(unsolved, line[more.unsolved + 1])
+        if len(more.unsolved):
+            text = (
+                "the tool axis jumps further than rotary axes can follow within the tolerance; see what it does there"
+            )
+            findings.add("CS369", "warning", int(line[more.unsolved[0] + 1]), text, len(more.unsolved))
+        if len(more):
+            text = f"point inserted so that {' and '.join(machine.names)} keep the tool within the tolerance"
+            findings.add("CS367", "note", int(line[more.segment[0] + 1]), text, len(more))
         filled = fill(way.tip[here], way.axis[here], way.angles[here], more)
         start, at_pose = segments_of_rows(way.move, here.start, here.stop)
         held = left | np.append(left[1:], False)  # both rows of a place where a cut is left
@@ -99,7 +103,7 @@ def rotary_rows(
             filled = some_rows(filled, kept)
             blend = corner_blends(found, kept, way.free[here][filled.pose], limits, settings, form)
         own = slice(1 if begin else 0, None)
-        filled, rate = times.of(filled, chunk, own)
+        filled, rate = _timed(filled, chunk, own, smoothed, form, limits, findings)
         pose, inserted = filled.pose[own], filled.inserted[own]
         tip, angles = filled.tip[own], filled.angles[own]
         seen = slice(None) if in_planes is None else ~in_planes[move[pose]]
@@ -115,8 +119,6 @@ def rotary_rows(
             left=left[pose] & ~inserted if way.left.any() else None,
         )
         yield part, np.where(inserted, -1, begin + pose)
-    times.tell(findings)
-    note_inserted(machine, count, first_line, unsolved, findings)
 
 
 def largest_turn(settings: Settings) -> float:
@@ -146,47 +148,36 @@ class _Chunk:
         return replace(found, fixed=found.fixed | (self.held[row] & own))
 
 
-@dataclass
-class _BlockTimes:
-    """Moves per minute of blocks that we time, within what the control can say; counts what became of short ones."""
-
-    smoothed: SmoothProgram
-    form: Form
-    machine: Machine
-    limits: LineLimits
-    merged: int = 0
-    slowed: int = 0
-    first_slowed: int = 0
-
-    def of(self, filled: FilledPath, chunk: _Chunk, own: slice) -> tuple[FilledPath, Floats | None]:
-        """The path without rows that are too short, and their rates; those of `own` count."""
-        program, settings, fastest = self.smoothed.program, self.smoothed.settings, self.form.mode.motion.fastest
-        rate = _rates(filled, chunk, program, settings, self.form)
-        if rate is None:
-            return filled, None
-        if fastest:
-            if self.form.orientation == "machine" and (rate > fastest).any():
-                before = len(filled.pose)
-                filled = _merged(self.smoothed, self.machine, filled, chunk, rate, self.limits, fastest)
-                self.merged += before - len(filled.pose)
-                rate = _rates(filled, chunk, program, settings, self.form)
-            assert rate is not None
-            beyond = np.flatnonzero(rate[own] > fastest)
-            if len(beyond) and not self.slowed:
-                self.first_slowed = int(program.line[chunk.move[filled.pose[own][beyond[0]]]])
-            self.slowed += len(beyond)
-            rate = np.minimum(rate, fastest)
-        return filled, np.round(rate, INVERSE_TIME_DECIMALS)
-
-    def tell(self, findings: Findings) -> None:
-        """Say what became of short blocks."""
-        if self.slowed:
-            fastest = self.form.mode.motion.fastest
+def _timed(
+    filled: FilledPath,
+    chunk: _Chunk,
+    own: slice,
+    smoothed: SmoothProgram,
+    form: Form,
+    limits: LineLimits,
+    findings: Findings,
+) -> tuple[FilledPath, Floats | None]:
+    """The path without rows that are too short to be timed by us, and moves per minute; those of `own` count."""
+    program, settings, fastest = smoothed.program, smoothed.settings, form.mode.motion.fastest
+    rate = _rates(filled, chunk, program, settings, form)
+    if rate is None:
+        return filled, None
+    if fastest:
+        if form.orientation == "machine" and (rate > fastest).any():
+            before = len(filled.pose)
+            filled = _merged(smoothed, machine_of(form).with_longest_tool(), filled, chunk, rate, limits, fastest)
+            if len(filled.pose) < before:
+                text = "block merged with its neighbour: shorter than inverse time (G93) can say"
+                findings.add("CS372", "note", 0, text, before - len(filled.pose))
+            rate = _rates(filled, chunk, program, settings, form)
+        assert rate is not None
+        beyond = np.flatnonzero(rate[own] > fastest)
+        if len(beyond):
+            line = int(program.line[chunk.move[filled.pose[own][beyond[0]]]])
             text = f"block slowed down: it is shorter than F{fastest:.10g} of inverse time (G93) can say"
-            findings.add("CS371", "warning", self.first_slowed, text, self.slowed)
-        if self.merged:
-            text = "block merged with its neighbour: shorter than inverse time (G93) can say"
-            findings.add("CS372", "note", 0, text, self.merged)
+            findings.add("CS371", "warning", line, text, len(beyond))
+        rate = np.minimum(rate, fastest)
+    return filled, np.round(rate, INVERSE_TIME_DECIMALS)
 
 
 def _merged(

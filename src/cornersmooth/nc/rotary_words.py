@@ -77,16 +77,6 @@ def machine_of(form: Form) -> Machine:
     return form.machine
 
 
-def note_inserted(machine: Machine, count: int, line: int, unsolved: Ints, findings: Findings) -> None:
-    """Say how many points lines of rotary words needed, the first at a line, and at which lines no points help."""
-    if len(unsolved):
-        text = "the tool axis jumps further than rotary axes can follow within the tolerance; see what it does there"
-        findings.add("CS369", "warning", int(unsolved[0]), text, len(unsolved))
-    if count:
-        text = f"point inserted so that {' and '.join(machine.names)} keep the tool within the tolerance"
-        findings.add("CS367", "note", line, text, count)
-
-
 def whole_rows(rows: Iterator[Rows]) -> tuple[Floats, Floats, Ints, Floats]:
     """Tip, axis, move and place of all dense rows; what they were gathered in is given back part by part."""
     columns: tuple[deque[Any], ...] = (deque(), deque(), deque(), deque())
