@@ -8,7 +8,10 @@ import numpy as np
 
 from cornersmooth.model import Floats
 from cornersmooth.verify.chain import Path, Sections
-from cornersmooth.verify.passage import CHUNK, Passage, Walk
+from cornersmooth.verify.passage import Passage, Walk
+
+#: own vertices that are looked at together
+CHUNK = 8192
 
 
 def whole_section(last: int, stop: int, *, open_end: bool = False) -> Sections:

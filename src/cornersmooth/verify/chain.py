@@ -296,16 +296,6 @@ def _places(own: Floats, gone: Floats, path: Path, radius: float, where: tuple[S
     return place, near
 
 
-def near_places(own: Floats, path: Path, radius: float, start: float, stop: float) -> list[tuple[int, float]]:
-    """The first row (3h, n) that is near the path, if any, and its place; the path was left at `start`."""
-    step = own[:, 1:] - own[:, :-1]
-    gone = np.concatenate(([0.0], np.cumsum(np.sqrt(np.einsum("ij,ij->j", step, step)))))
-    only = Sections(np.array([0]), np.array([len(gone) - 1]), np.array([start]), np.array([stop]))
-    place, near = _places(own, gone, path, radius, (only, np.zeros(len(gone), np.int64)))
-    first = np.flatnonzero(near & (place >= start) & (place <= stop))[:1].tolist()
-    return [(row, float(place[row])) for row in first]
-
-
 def passed(own: Floats, step: Floats, path: Floats, place: Floats) -> tuple[Ints, Ints, Floats]:
     """Vertices of the path that are passed on the steps of a chain, in order.
 

@@ -6,7 +6,6 @@ well: then together they have more room.
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -28,47 +27,27 @@ class Decision:
         self._task = task
         self._walks: list[tuple[Metric, Walk]] = [("both", Walk(task.path, task.radius))]
         if task.apart:
-            self._walks += [
-                (metric, Walk(_only(task.path, metric), task.tolerance + ARITHMETIC))
-                for metric in ("tip", "axis point")
-            ]
+            alone: tuple[Metric, ...] = ("tip", "axis point")
+            self._walks += [(one, Walk(_only(task.path, COLUMNS[one]), task.tolerance + ARITHMETIC)) for one in alone]
         #: place on the CL path of the last vertex
         self.reached = 0.0
 
     def take(
-        self,
-        nc: Elements,
-        motion: Motion,
-        rows: tuple[Ints, Ints],
-        stretches: NDArray[Any],
-        *,
-        goes_on: bool,
+        self, nc: Elements, motion: Motion, rows: tuple[Ints, Ints], stretches: NDArray[Any], *, goes_on: bool
     ) -> tuple[Floats, tuple[tuple[Metric, Break], ...], bool]:
-        """Go on.
+        """Go on with the motion of some elements, of which stretches begin and end at rows: place, breaks and whole.
 
-        Parameters
-        ----------
-        nc : Elements
-            Those that the motion is of.
-        rows : (k,) int64, (k,) int64
-            The first and the last vertex of each stretch.
-        stretches : (k,) STRETCH
-            Where they are on the CL path.
-        goes_on : bool
-            Whether the last of them does so in the next batch.
-
-        Returns
-        -------
-        place, breaks, whole
-            As in `Batch`.
+        They are those of `Batch`, and so is `goes_on`.
         """
         start, stop = stretches["start"] + stretches["fraction"], stretches["stop"].astype(np.float64)
         place, breaks, whole = np.zeros(0), [], True
         for metric, walk in self._walks:
             columns = COLUMNS[metric]
-            sections = Sections(*rows, start, stop, goes_on)
-            inner = partial(_inner, nc, motion, self._task, columns)
-            passed = walk.take(motion.six[:, columns], motion.bend, sections, inner)
+
+            def inner(number: Floats, columns: slice = columns) -> Floats:
+                return inner_points(nc, motion, self._task, number)[:, columns]
+
+            passed = walk.take(motion.six[:, columns], motion.bend, Sections(*rows, start, stop, goes_on), inner)
             place = passed.place if metric == "both" else place
             breaks += [(metric, one) for one in passed.breaks]
             whole &= passed.whole
@@ -76,13 +55,6 @@ class Decision:
         return place, tuple(breaks), whole
 
 
-def _only(path: Path, metric: Metric) -> Path:
+def _only(path: Path, columns: slice) -> Path:
     """Tips or axis points alone."""
-    columns, exact = COLUMNS[metric], path.exact
-    points = np.ascontiguousarray(path.points[:, columns])
-    alone = None if exact is None else lambda place: exact(place)[:, columns]
-    return Path.of(points, path.bend, alone)
-
-
-def _inner(nc: Elements, motion: Motion, task: Task, columns: slice, number: Floats) -> Floats:
-    return inner_points(nc, motion, task, number)[:, columns]
+    return Path.of(np.ascontiguousarray(path.points[:, columns]), path.bend, lambda place: path.at(place)[:, columns])

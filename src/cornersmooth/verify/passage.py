@@ -16,7 +16,7 @@ import numpy as np
 
 from cornersmooth.model import Floats, Ints
 from cornersmooth.verify.around import Around, Inner, Rows
-from cornersmooth.verify.chain import Path, Sections, chain, near_places, points_at
+from cornersmooth.verify.chain import Path, Sections, chain, points_at
 from cornersmooth.verify.free_space import free_interval, is_all, largest_square, lowest
 
 #: rows before one that is not proved from which on it is worked out exactly, one after the other; farther back nothing
@@ -37,14 +37,14 @@ _TINY: Final = 1e-4
 #: how many times longer than some rows the path beside them may be; where it is longer, the answer may be NOT VERIFIED
 LONGER: Final = 4.0
 
-#: segments around a break among which it is looked for where to go on, at most (which faults are named after it)
+#: vertices after a break, ever farther apart, that are tried to go on with (which faults are named after it)
+_TRIED: Final = 48
+
+#: segments around a break among which it is looked for where to go on, at most (as above)
 _WIDEST: Final = 1 << 16
 
 #: breaks after which nothing more is looked at
 MOST_BREAKS: Final = 100
-
-#: vertices of the own polyline that are looked at together (speed only: they fit the cache)
-CHUNK: Final = 8192
 
 
 @dataclass(frozen=True)
@@ -317,33 +317,27 @@ class _Part:
         return self._resume(section, found.row)
 
     def _resume(self, section: int, row: int) -> int:
-        """Go on with the first vertex from one on that is near the path again, or with the next section.
+        """Go on with a vertex from one on that is near the path again, or with the next section.
 
         It gets a place: the nearest to where the path was left.
         """
-        path, end = self.path, int(self.ends[section])
+        path, end, left = self.path, int(self.ends[section]), self.path.length_at(self.left)
         bottom, top = int(np.nan_to_num(self.begin[section])), int(self.stop[section])
-        left = path.length_at(self.left)
-        for width, rows in ((AROUND, 64), (AROUND * AROUND, 4)):
+        tried = row + np.unique(np.geomspace(1, max(end - row, 1), _TRIED).astype(np.int64)) - 1
+        for width, rows in ((AROUND, tried), (AROUND * AROUND, tried[::6])):
             low, high = np.searchsorted(path.length, (left - width * self.radius, left + width * self.radius)).tolist()
             segments = slice(max(low - 1, bottom), min(high + 1, top, low + _WIDEST))
-            if segments.start >= segments.stop:
+            if segments.start >= segments.stop or row >= end:
                 continue
             start = path.points[segments].T
             way = path.points[segments.start + 1 : segments.stop + 1].T - start
-            for k in range(row, min(row + rows, end)):
+            for k in rows.tolist():
                 bend = self.bend[max(k - 1, 0) : k + 1].max(initial=0.0)
                 at, other = free_interval(self.own[k][:, None], start, way, self.radius - bend - path.bend[segments])
                 free = np.flatnonzero(at <= other)
                 if len(free):
                     place = segments.start + free + np.clip(self.left - segments.start - free, at[free], other[free])
                     return self._begin_at(section, k, float(place[np.argmin(np.abs(place - self.left))]))
-        some = np.arange(row, end)
-        some = some[self.bend[np.maximum(some - 1, 0)] + self.bend[some] < self.radius]  # none of the same wrong curve
-        if len(some):
-            columns = np.ascontiguousarray(self.own[some].T)
-            for k, place in near_places(columns, path, self.radius, self.left, top):
-                return self._begin_at(section, int(some[k]), place)
         self.place[end] = np.nan
         return section + 1
 
