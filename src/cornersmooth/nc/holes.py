@@ -68,10 +68,9 @@ class HoleWriter:
         motion.findings.add("CS316", "note", line, "hole of a cycle written as plain moves", len(poses))
         before = -1 if motion.operation.comes_first else int(poses[0]) - 1
         motion.warnings.of_holes(poses, before, *travel_of(cycle, program, poses, approach))
-        moves = hole_moves(cycle, program, poses, approach)
-        move = poses[moves.hole]
-        ticks = motion.ticks_at(rows, moves.tip, moves.hole)
-        run = replace(Run.straight(program, ticks, move), rapid=moves.rapid, dwell=moves.dwell)
+        hole, tip, rapid, dwell = hole_moves(cycle, program, poses, approach)
+        move = poses[hole]
+        run = replace(Run.straight(program, motion.ticks_at(rows, tip, hole), move), rapid=rapid, dwell=dwell)
         if not np.isnan(cycle.feed):
             run = replace(run, feed=np.full(len(move), cycle.feed), mode=np.full(len(move), int(cycle.feed_mode)))
         yield from motion.emit_above(motion.moving(run), cycle.dwell)
@@ -172,23 +171,16 @@ class HoleWriter:
             yield from motion.emit_above(motion.moving(run))
 
 
-@dataclass(frozen=True)
-class HoleMoves:
-    """Moves of a run of holes, m of them: end points, whether rapid, the hole each belongs to, dwells after them."""
-
-    tip: Floats
-    rapid: Bools
-    hole: Ints
-    dwell: Bools
-
-
 def approaches(program: Program) -> Ints:
     """(n,) pose from which the run of holes is approached that each pose belongs to, -1 for none."""
     return np.maximum.accumulate(np.where(program.kind == Move.HOLE, -1, np.arange(len(program))))
 
 
-def hole_moves(cycle: Cycle, program: Program, poses: Ints, approach: Ints) -> HoleMoves:
-    """Plain moves for holes of one cycle; `approach` (h,) is what `approaches` says of their poses."""
+def hole_moves(cycle: Cycle, program: Program, poses: Ints, approach: Ints) -> tuple[Ints, Floats, Bools, Bools]:
+    """Plain moves for holes of one cycle, m of them: the hole of each, its end (m, 3) mm, rapids, dwells after it.
+
+    `approach` (h,) is what `approaches` says of the poses.
+    """
     travel, clearance = travel_of(cycle, program, poses, approach)
     heights, rapid, dwell = [travel, clearance], [True, True], [False, False]
 
@@ -214,12 +206,8 @@ def hole_moves(cycle: Cycle, program: Program, poses: Ints, approach: Ints) -> H
     height = np.stack(heights, axis=1)
     tip = program.tip[poses][:, None, :] + height[..., None] * program.axis[poses][:, None, :]
     count = len(poses)
-    return HoleMoves(
-        tip=tip.reshape(-1, 3),
-        rapid=np.tile(rapid, count),
-        hole=np.repeat(np.arange(count), len(rapid)),
-        dwell=np.tile(dwell, count),
-    )
+    hole = np.repeat(np.arange(count), len(rapid))
+    return hole, tip.reshape(-1, 3), np.tile(rapid, count), np.tile(dwell, count)
 
 
 def travel_of(cycle: Cycle, program: Program, poses: Ints, approach: Ints) -> tuple[Floats, Floats]:

@@ -155,6 +155,7 @@ def _places(way: RotaryWay, poses: Ints, lengths: Floats) -> _Places:
     row = np.flatnonzero(~np.isnan(way.place) & ~way.left)
     begins = np.flatnonzero(np.diff(way.place[row], prepend=2.0) <= 0.0)
     counts = np.diff(begins, append=len(row))
+    assert len(begins) == len(poses)
     order = np.argsort(poses)
     number = np.empty_like(order)  # of each curve, in path order
     number[order] = np.arange(len(order))

@@ -75,28 +75,28 @@ def rotary_angles(
     cone = np.full(n, tolerance / 2)
     if still is not None:
         cone[still] = still_tolerance / 2
-    poses, both = _sorted_poses(machine, axis, tolerance, cone, line, file)
+    at_pole, steady, beyond, both = _sorted_poses(machine, axis, tolerance, cone, line, file)
     del cone  # with millions of poses every array counts
     run = np.cumsum(rapid | left, dtype=np.int32)
     branch, swaps = np.full(n, -1, np.int8), np.zeros(0, np.int64)
-    if len(poses.steady):
-        steady_poses = _Steady(machine, axis, poses.steady, both, run, line, file)
-        angles, branch[poses.steady], swaps = steady_poses.angles(tolerance, divide=divide)
+    if len(steady):
+        steady_poses = _Steady(machine, axis, steady, both, run, line, file)
+        angles, branch[steady], swaps = steady_poses.angles(tolerance, divide=divide)
         del both, steady_poses
-        if len(poses.cone):
-            steady, angles = angles, np.full((n, 2), np.nan)
-            angles[poses.steady] = steady
+        if len(at_pole):
+            known, angles = angles, np.full((n, 2), np.nan)
+            angles[steady] = known
             length = _lengths(tip)
-            for here in _chunks(len(poses.cone)):
-                _fill_cone(machine, length, axis, angles, poses.cone[here], poses.steady, run)
+            for here in _chunks(len(at_pole)):
+                _fill_cone(machine, length, axis, angles, at_pole[here], steady, run)
     else:
         angles = np.zeros((n, 2))
         angles[:, 0] = np.clip(0.0, *machine.limits[0])
         for here in _chunks(n):
             angles[here, 1] = closest_second(machine, axis[here], angles[here, 0])
-    angles[poses.cone] = np.clip(angles[poses.cone], *machine.limits.T)  # at the pole the axis hardly notices
+    angles[at_pole] = np.clip(angles[at_pole], *machine.limits.T)  # at the pole the axis hardly notices
     deviation = np.zeros(n)
-    for off in (poses.cone, poses.beyond):
+    for off in (at_pole, beyond):
         for here in _chunks(len(off)):
             deviation[off[here]] = angle_between(tool_axis(machine, angles[off[here]]), axis[off[here]])
             if (over := deviation[off[here]] > tolerance).any():
@@ -159,19 +159,10 @@ def still_poses(kind: NDArray[np.uint8]) -> Bools:
     return rapid & np.append(rapid[1:], True) | (kind == Move.HOLE)
 
 
-@dataclass(frozen=True)
-class _Poses:
-    """Poses by what their axes are."""
-
-    cone: Ints  # in the cone of the pole
-    steady: Ints  # outside of it
-    beyond: Ints  # just out of reach of the machine
-
-
 def _sorted_poses(
     machine: Machine, axis: Floats, tolerance: float, cones: Floats, line: Ints, file: str | None
-) -> tuple[_Poses, Floats]:
-    """Poses by their cones of the pole, degrees, and both solutions of those outside.
+) -> tuple[Ints, Ints, Ints, Floats]:
+    """Poses in their cones of the pole, degrees, those outside and their solutions, and those just out of reach.
 
     Solutions are (s, 2, 2) degrees ``[pose, branch, axis]`` in (-180, 180].
     """
@@ -190,7 +181,7 @@ def _sorted_poses(
         count += len(own)
         cone.append(here.start + np.flatnonzero(inside))
         beyond.append(here.start + np.flatnonzero(found.beyond > 0))
-    return _Poses(np.concatenate(cone), steady[:count], np.concatenate(beyond)), angles[:count]
+    return np.concatenate(cone), steady[:count], np.concatenate(beyond), angles[:count]
 
 
 @dataclass(frozen=True)
