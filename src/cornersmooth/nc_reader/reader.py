@@ -257,10 +257,10 @@ class Reader:
         """Complain of motion behind a plane where no word has said since how the rotary axes stand."""
         assert self.rotary is not None
         if self._left_turned:
-            unknown = np.any(np.isnan(run.second[:, : len(self.rotary.names)]), axis=1)
+            unsaid = np.any(np.isnan(run.second[:, : len(self.rotary.names)]), axis=1)
             self._left_turned = False
             text = "motion after a tilted plane, and no word says where the rotary axes are"
-            self.problems += first_wrong("CS506", unknown, run.line, text)
+            self.problems += first_wrong("CS506", unsaid, run.line, text)
 
     def _above(self, line: Line, text: str) -> None:
         """Complain where the tool is not above a retract."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NoReturn
 
@@ -87,6 +87,14 @@ class Dialect:
     def words(self, line: Line, state: Reader) -> None:
         """Interpret a line that is no motion block."""
         raise NotImplementedError
+
+    def machine_axes(self, line: Line, state: Reader, beside: Set[tuple[str, float]]) -> str:
+        """Axes that a block sends to positions of the machine; refuses words beside them but for some."""
+        axes = ("X", "Y", "Z", *self.rotary)
+        for name, value, text, *_ in line.words:
+            if name not in (*axes, "N") and (name, value) not in beside:
+                state.refuse(line, f"{text} beside a position of the machine", "give it a block of its own")
+        return "".join(word.name for word in line.words if word.name in axes)
 
     @staticmethod
     def refuse(line: Line, name: str, text: str, state: Reader) -> NoReturn:

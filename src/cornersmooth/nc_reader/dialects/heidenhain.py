@@ -142,15 +142,12 @@ class Heidenhain(Dialect):
 
     def _to_machine(self, line: Line, state: Reader) -> None:
         """M91: a rapid in machine coordinates."""
-        axes, names = "", {word[0] for word in line.words}
-        for name, value, text, *_ in line.words:
-            if name in ("X", "Y", "Z", *self.rotary):
-                axes += name
-            elif name == "side":
-                state.event(line, "G", value, text)
-            elif name not in ("L", "PATH", "RAPID") and (name, value) != ("M", 91.0):
-                state.refuse(line, f"{text} beside a position of the machine", "give it a block of its own")
-        if "RAPID" not in names:
+        sides = {word for word in line.words if word.name == "side"}
+        for word in sides:
+            state.event(line, "G", word.value, word.text)
+        beside = {("L", 0.0), ("RAPID", 1.0), ("M", 91.0), *(word[:2] for word in sides)}
+        axes = self.machine_axes(line, state, beside)
+        if all(word.name != "RAPID" for word in line.words):
             state.refuse(line, "M91 without FMAX", "positions of the machine are read in rapids only")
         state.leave(axes)
 

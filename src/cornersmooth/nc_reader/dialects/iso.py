@@ -211,15 +211,10 @@ class Iso(Dialect):
         """G91 G28 Z0. and the like: to the reference position without a detour; G53: in machine coordinates."""
         incremental = state.memory.incremental
         incremental = 91.0 in codes or (incremental and 90.0 not in codes)
-        known = {*_TO_REFERENCE, _IN_MACHINE, 0.0, 90.0, 91.0}
-        axes = ""
-        for letter, value, text, *_ in line.words:
-            if letter in ("X", "Y", "Z", *self.rotary):
-                axes += letter
-                if _IN_MACHINE not in codes and not (incremental and value == 0.0):
-                    state.refuse(line, f"{text} on the way to the reference position", "write G91 and zero")
-            elif (letter, value) != ("G", 0.0) and (letter != "G" or value not in known) and letter != "N":
-                state.refuse(line, f"{text} beside a position of the machine", "give it a block of its own")
+        axes = self.machine_axes(line, state, {("G", code) for code in (*_TO_REFERENCE, _IN_MACHINE, 0.0, 90.0, 91.0)})
+        for word in line.words:
+            if word.name in axes and _IN_MACHINE not in codes and not (incremental and word.value == 0.0):
+                state.refuse(line, f"{word.text} on the way to the reference position", "write G91 and zero")
         if _IN_MACHINE in codes and (incremental or 0.0 not in codes):
             state.refuse(line, "G53 without G90 and G0", "write G90 before it, and G0")
         state.memory.incremental = incremental

@@ -178,12 +178,7 @@ class Siemens(Dialect):
 
     def _to_machine(self, line: Line, state: Reader) -> None:
         """SUPA: a rapid in machine coordinates, without frames."""
-        axes = ""
-        for name, value, text, *_ in line.words:
-            if name in ("X", "Y", "Z", *self.rotary):
-                axes += name
-            elif (name, value) not in (("SUPA", 0.0), ("G", 0.0), ("D", 0.0)) and name != "N":
-                state.refuse(line, f"{text} beside a position of the machine", "give it a block of its own")
+        axes = self.machine_axes(line, state, {("SUPA", 0.0), ("G", 0.0), ("D", 0.0)})
         if not any(word[:2] == ("G", 0.0) for word in line.words):
             state.refuse(line, "SUPA without G0", "positions of the machine are read in rapids only")
         state.move(line, {"G": 0.0})
