@@ -26,7 +26,7 @@ from cornersmooth.kinematics import load_machine
 from cornersmooth.model import Floats
 from cornersmooth.nc import choose_form, fit_settings, load_control
 from cornersmooth.pipeline import read_back
-from cornersmooth.saving import with_feed, written_text
+from cornersmooth.saving import written_text
 from cornersmooth.slices import some_poses
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -65,7 +65,7 @@ def place(name: str) -> re.Pattern[str]:
 
 def compared(part: Path) -> tuple[int, Table]:
     """Poses of a part, and its programs as they are written by default: short lines corner by corner, global curves."""
-    program = with_feed(cornersmooth.read(part), FEED)
+    program = cornersmooth.read(part).with_feed(FEED)
     default = {("g1", "proportional", "fine"), ("g6.2", "global", "")}
     tried = candidates(load_control(CONTROL), Settings(), None)
     tried = [one for one in tried if (one.form.name, one.settings.method, one.lines) in default]
@@ -164,7 +164,7 @@ def main(folder: Path) -> None:
     for name, what in made.items():
         text = place(name).sub(lambda found, what=what: what, text)
     readme.write_text(text, encoding="utf-8")
-    program = with_feed(cornersmooth.read(folder / PICTURE), FEED)
+    program = cornersmooth.read(folder / PICTURE).with_feed(FEED)
     (ROOT / "docs" / "speeds.svg").write_text(draw(*speeds(some_poses(program, 0, FIRST))), encoding="utf-8")
 
 

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import pytest
 
-from cornersmooth import Settings, __version__, choose_form
+from cornersmooth import Settings, __version__, choose_form, output
 from cornersmooth.cli.cluster import _proof_of_sharing, do
 from cornersmooth.cli.job import Job
 from cornersmooth.cli.values import Given
@@ -149,14 +149,15 @@ def test_what_a_killed_run_has_left_goes_with_the_next(tmp_path: Path) -> None:
     done = subprocess.Popen(["true"])
     done.wait()
     name = f"cluster-{socket.gethostname()}"
+    end = f"0badcafe-{output._machine()}.part"
     for process, host in ((done.pid, name), (os.getpid(), name), (done.pid, "cluster-elsewhere")):
-        (tmp_path / f".{host}.{process}-0badcafe.part").touch()
+        (tmp_path / f".{host}.{process}-{end}").touch()
     target = str(tmp_path / "one.nc")
     job = Job("one.cls", target, (), Given(directory="out"), Settings(), choose_form(), Frame())
     with _proof_of_sharing([job]) as proof:
         assert Path(proof).exists()
         left = {path.name for path in tmp_path.iterdir()} - {Path(proof).name}
-    assert left == {f".{name}.{os.getpid()}-0badcafe.part", f".cluster-elsewhere.{done.pid}-0badcafe.part"}
+    assert left == {f".{name}.{os.getpid()}-{end}", f".cluster-elsewhere.{done.pid}-{end}"}
 
 
 @pytest.mark.parametrize(

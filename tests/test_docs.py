@@ -222,7 +222,7 @@ def test_the_readme_is_short_and_its_pictures_are_light() -> None:
 
 def test_the_picture_of_speeds_is_drawn_from_a_part() -> None:
     numbers = load("make_numbers")
-    program = numbers.some_poses(numbers.with_feed(read(ROOT / "samples" / "impeller.cls"), numbers.FEED), 4, 30)
+    program = numbers.some_poses(read(ROOT / "samples" / "impeller.cls").with_feed(numbers.FEED), 4, 30)
     before, after = numbers.speeds(program)
     assert after[0][-1] < before[0][-1]
     assert numbers.draw(before, after).count("<polyline") == 2

@@ -9,7 +9,7 @@ and what the NC text will speak.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Flag, IntEnum, auto
 from functools import cached_property
 from typing import Any, Literal
@@ -199,6 +199,10 @@ class Program:
             keep=rest.pop("keep", np.zeros(n, np.uint8)),
             **rest,
         )
+
+    def with_feed(self, feed: float | None) -> Program:
+        """Return the program with a feed, mm/min, for moves that have none; as it is where none is given."""
+        return self if feed is None else replace(self, feed=np.where(np.isnan(self.feed), feed, self.feed))
 
     def feed_at(self, pose: Ints) -> Floats:
         """Feeds of the moves into some poses, mm/min; NaN for none, and per revolution."""

@@ -231,13 +231,6 @@ def remove_leftovers(path: str, process: int | None = None) -> None:
             os.unlink(left)
 
 
-def processes_of_leftovers(folder: str, name: str) -> list[int]:
-    """Numbers of the processes whose temporary files of this name are in a folder."""
-    start = f".{name}."
-    found = (left.removeprefix(start).partition("-")[0] for left in os.listdir(folder) if left.startswith(start))
-    return sorted({int(word) for word in found if word.isdigit()})
-
-
 def make_folder(path: str) -> None:
     """Make the folder for outputs.
 
@@ -328,12 +321,12 @@ def _remove_abandoned(folder: str, name: str) -> None:
     """Remove what killed runs on this computer have left of an output; those of others may still be at work."""
     for left in glob.glob(os.path.join(glob.escape(folder), glob.escape(f".{name}.") + f"*-{_machine()}.part")):
         process = os.path.basename(left).removeprefix(f".{name}.").partition("-")[0]
-        if process.isdigit() and not is_running(int(process)):
+        if process.isdigit() and not _is_running(int(process)):
             with contextlib.suppress(OSError):
                 os.unlink(left)
 
 
-def is_running(process: int) -> bool:
+def _is_running(process: int) -> bool:
     """Whether a process of this number runs on this computer, as far as that can be told."""
     if os.name == "nt":  # there, signal 0 is Ctrl-C
         return True

@@ -226,9 +226,7 @@ def postprocess(
         unverified = "nothing was measured: the control is like none whose programs can be read"
     seconds: dict[str, float] = {}
     with _timed(seconds, "read"):
-        program = source if isinstance(source, Program) else read(source, **(reading or {}))
-        if feed is not None:
-            program = replace(program, feed=np.where(np.isnan(program.feed), feed, program.feed))
+        program = (source if isinstance(source, Program) else read(source, **(reading or {}))).with_feed(feed)
     with _timed(seconds, "smooth"):
         told = _stage(progress, "smoothing")
         smoothed = smooth(program, settings, form=form, progress=told, processes=processes)

@@ -177,11 +177,6 @@ def written_text(program: Program, settings: Settings, form: Form) -> bytes:
     return stream.getvalue()
 
 
-def with_feed(program: Program, feed: float | None) -> Program:
-    """Return the program with a feed, mm/min, for moves that have none; as it is where none is given."""
-    return program if feed is None else replace(program, feed=np.where(np.isnan(program.feed), feed, program.feed))
-
-
 def without_holes(program: Program) -> Program:
     """Return the program with rapids to its holes, which nothing drills."""
     holes = program.kind == Move.HOLE

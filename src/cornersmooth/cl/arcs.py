@@ -8,8 +8,8 @@ leaves them by a cusp but would join them smoothly the other way round is a cont
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Final, Literal
 
 import numpy as np
@@ -66,6 +66,8 @@ class Arc:
     sweep: float = math.nan  #: rad, NaN where not written
     resolution: float = 1e-4  #: step of the printed coordinates
     certain: bool = False  #: the sense of rotation is written out, and no matter of dialect
+    passes: tuple[tuple[float, float, float], ...] = ()  #: points on its way
+    pose: int = -1  #: that ends it
 
 
 def read_arc(record: Record, file: str, rule: ArcRule | None, decimals: int) -> Arc:
@@ -123,28 +125,6 @@ def read_arc(record: Record, file: str, rule: ArcRule | None, decimals: int) -> 
     )
 
 
-@dataclass
-class ArcTable:
-    """The arcs of one file, in the order of their end poses."""
-
-    pose: list[int] = field(default_factory=list)
-    arc: list[Arc] = field(default_factory=list)
-    inner: list[tuple[int, tuple[float, float, float]]] = field(default_factory=list)
-
-    def add(self, pose: int, arc: Arc) -> None:
-        """Note that this pose ends this arc."""
-        self.pose.append(pose)
-        self.arc.append(arc)
-
-    def pass_through(self, points: list[tuple[float, float, float]]) -> None:
-        """Note that the next arc that is added passes these points."""
-        self.inner += [(len(self.arc), point) for point in points]
-
-    def column(self, get: Callable[[Arc], object]) -> Floats:
-        """One attribute of all arcs."""
-        return np.array([get(arc) for arc in self.arc], np.float64)
-
-
 @dataclass(frozen=True)
 class ResolvedArcs:
     """Arcs with both ends, and what became of the rest."""
@@ -155,7 +135,9 @@ class ResolvedArcs:
     findings: tuple[Finding, ...]
 
 
-def resolve(table: ArcTable, tip: Floats, kind: NDArray[np.uint8], file: str, rule: ArcRule | None) -> ResolvedArcs:
+def resolve(
+    table: Sequence[Arc], tip: Floats, kind: NDArray[np.uint8], file: str, rule: ArcRule | None
+) -> ResolvedArcs:
     """Find sweep and sense of all arcs from the poses around them.
 
     Parameters
@@ -171,16 +153,15 @@ def resolve(table: ArcTable, tip: Floats, kind: NDArray[np.uint8], file: str, ru
     InputError
         CS123 where an end is not on the circle, CS126 where a stated angle is not the arc's.
     """
-    if not table.arc:
+    if not table:
         none = np.zeros(0, np.int64)
         return ResolvedArcs(Arcs(), none, none, ())
-    pose = np.array(table.pose, np.int64)
-    centre = table.column(lambda arc: arc.centre)
-    normal = table.column(lambda arc: arc.normal)
-    radius = table.column(lambda arc: arc.radius)
-    resolution = table.column(lambda arc: arc.resolution)
-    full_turns = table.column(lambda arc: arc.turns) - 1
-    stated = table.column(lambda arc: arc.sweep)
+    pose = np.array([arc.pose for arc in table], np.int64)
+    centre, normal, radius, resolution, full_turns, stated = (
+        np.array([getattr(arc, name) for arc in table], np.float64)
+        for name in ("centre", "normal", "radius", "resolution", "turns", "sweep")
+    )
+    full_turns -= 1
     start, end = tip[pose - 1] - centre, tip[pose] - centre
     start_height, end_height = dot(start, normal), dot(end, normal)
     start = start - start_height[:, None] * normal
@@ -194,9 +175,9 @@ def resolve(table: ArcTable, tip: Floats, kind: NDArray[np.uint8], file: str, ru
         if off.any():
             first = int(off.argmax())
             if radius[first] == 0:
-                raise error("CS125", file, table.arc[first].line, word=table.arc[first].word, radius=0.0)
+                raise error("CS125", file, table[first].line, word=table[first].word, radius=0.0)
             values = {"which": which, "distance": distance[first], "radius": radius[first]}
-            raise error("CS123", file, table.arc[first].line, **values)
+            raise error("CS123", file, table[first].line, **values)
 
     chord = norm(end - start)
     rise = np.abs(end_height - start_height)
@@ -209,21 +190,22 @@ def resolve(table: ArcTable, tip: Floats, kind: NDArray[np.uint8], file: str, ru
     turn, full_turns = _as_stated(table, turn, full_turns, stated, resolution / radius, short, file)
 
     agree, against = _votes(tip, kind, pose, start, end, normal, resolution)
-    if table.inner:
-        row = np.array([row for row, _ in table.inner], np.int64)
-        spoke = np.array([point for _, point in table.inner]) - centre[row]
+    inner = [(row, point) for row, arc in enumerate(table) for point in arc.passes]
+    if inner:
+        row = np.array([row for row, _ in inner], np.int64)
+        spoke = np.array([point for _, point in inner]) - centre[row]
         spoke = spoke - dot(spoke, normal[row])[:, None] * normal[row]
         off = ~(np.abs(norm(spoke) - radius[row]) <= allowed[row])
         if off.any():
             first = int(off.argmax())
             values = {"which": "point", "distance": norm(spoke)[first], "radius": radius[row[first]]}
-            raise error("CS123", file, table.arc[row[first]].line, **values)
+            raise error("CS123", file, table[row[first]].line, **values)
         passed = np.arctan2(dot(np.cross(start[row], spoke), normal[row]), dot(start[row], spoke)) % (2 * np.pi)
         clear = np.minimum(passed, 2 * np.pi - passed) * radius[row] > VOTING_DIGITS * resolution[row]
         beyond = passed > turn[row] + allowed[row] / radius[row]
         np.add.at(agree, row, clear & ~beyond)
         np.add.at(against, row, clear & beyond)
-    certain = table.column(lambda arc: arc.certain) > 0
+    certain = np.array([arc.certain for arc in table])
     contrary = (against > 0) & (agree == 0) & ~short & np.isnan(stated) & ~certain
     findings = []
     if rule == "tangent":
@@ -233,16 +215,16 @@ def resolve(table: ArcTable, tip: Floats, kind: NDArray[np.uint8], file: str, ru
     if contrary.any():
         how = "as the neighbours ask" if rule == "tangent" else "as written"
         first = int(contrary.argmax())
-        findings.append(finding("CS142", table.arc[first].line, int(contrary.sum()), how=how))
+        findings.append(finding("CS142", table[first].line, int(contrary.sum()), how=how))
     if short.any():
-        findings.append(finding("CS141", table.arc[int(short.argmax())].line, int(short.sum())))
+        findings.append(finding("CS141", table[int(short.argmax())].line, int(short.sum())))
     good = ~short
     arcs = Arcs(pose[good], centre[good], normal[good], (turn + 2 * np.pi * full_turns)[good])
     return ResolvedArcs(arcs, pose[short], pose[contrary], tuple(findings))
 
 
 def _as_stated(
-    table: ArcTable, turn: Floats, full_turns: Floats, stated: Floats, noise: Floats, short: Bools, file: str
+    table: Sequence[Arc], turn: Floats, full_turns: Floats, stated: Floats, noise: Floats, short: Bools, file: str
 ) -> tuple[Floats, Floats]:
     """Turns of arcs that say their angle: it decides between nothing and a full circle, and adds whole turns."""
     given = ~np.isnan(stated) & ~short
@@ -253,7 +235,7 @@ def _as_stated(
     wrong = given & ~(miss <= RADIUS_DIGITS * noise + RADIUS_SHARE * np.maximum(stated, 1))
     if wrong.any():
         first = int(wrong.argmax())
-        arc = table.arc[first]
+        arc = table[first]
         written, found = math.degrees(arc.sweep), math.degrees(turn[first])
         why = f"its angle is {written:g} degrees, its end stands at {found:g}"
         raise error("CS126", file, arc.line, word=arc.word, why=why)

@@ -48,7 +48,7 @@ def _goto(state: ReaderState, record: Record) -> None:
         state.note("CS195", record.points[0][0])
     poses = [(line, *_pose(state, record, args, line)) for line, args in ((record.line, record.args), *record.points)]
     if state.arc is not None:  # more points of one GOTO lie on the arc; the last one ends it
-        state.arcs.pass_through([state.system.point(tip) for _, tip, _ in poses[:-1]])
+        state.arc = replace(state.arc, passes=tuple(state.system.point(tip) for _, tip, _ in poses[:-1]))
         poses = poses[-1:]
     for line, tip, axis in poses:
         if record.cut_short:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from cornersmooth.cl.arcs import Arc, ArcRule, ArcTable
+from cornersmooth.cl.arcs import Arc, ArcRule
 from cornersmooth.cl.dialects import Dialect
 from cornersmooth.cl.grammar import Argument, Record, joined, number
 from cornersmooth.cl.messages import error, finding
@@ -25,7 +25,7 @@ class ReaderState(Poses):
 
     dialect: Dialect
     arc_rule: ArcRule | None = None  #: overrides the dialect's sense of rotation
-    arcs: ArcTable = field(default_factory=ArcTable)
+    arcs: list[Arc] = field(default_factory=list)  #: in the order of their end poses
     statements: list[Statement] = field(default_factory=list)
     stated_units: list[tuple[int, Units, int]] = field(default_factory=list)  #: line, units, pose
     unitless_feeds: set[int] = field(default_factory=set)  #: rows of `Poses.feed` in units of the file
@@ -107,7 +107,7 @@ class ReaderState(Poses):
         """Settle how the last pose was reached."""
         pose = self.n - 1
         if self.arc is not None:
-            self.arcs.add(pose, self.arc)
+            self.arcs.append(replace(self.arc, pose=pose))
             self.special[pose] = Move.ARC
             self.arc = None
         elif self.rapid and not self.hole:

@@ -20,7 +20,7 @@ from cornersmooth.cli.files import STANDARD
 from cornersmooth.cli.job import Job, Outcome, run_job
 from cornersmooth.errors import SettingsError, message
 from cornersmooth.optional_packages import install_hint
-from cornersmooth.output import is_running, make_folder, processes_of_leftovers, remove_leftovers, temporary_name
+from cornersmooth.output import make_folder, remove_leftovers, temporary_name
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -120,11 +120,7 @@ def _proof_of_sharing(jobs: list[Job]) -> Iterator[str]:
     """Yield a file among the outputs that exists as long as the batch runs."""
     folder = os.path.dirname(jobs[0].target)
     make_folder(folder)
-    name = f"cluster-{socket.gethostname()}"
-    for process in processes_of_leftovers(folder, name):
-        if not is_running(process):  # a run of this machine that was killed
-            remove_leftovers(os.path.join(folder, name), process)
-    with temporary_name(folder, name) as path:
+    with temporary_name(folder, f"cluster-{socket.gethostname()}") as path:
         with open(path, "xb"):
             pass
         yield path

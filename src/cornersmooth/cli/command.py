@@ -11,7 +11,7 @@ from typing import Annotated, Any, Final, Literal, get_args, get_origin, get_typ
 import click
 
 from cornersmooth.cli.headings import EXIT_CODES, HeadedOption
-from cornersmooth.cli.options import Options
+from cornersmooth.cli.options import FLAGS, Options
 from cornersmooth.cli.parameters import ControlName, MachineName, Path
 from cornersmooth.cli.shop import ShopCommand
 from cornersmooth.cli.values import Given
@@ -76,12 +76,9 @@ def _option(name: str, changes: Mapping[str, Any]) -> click.Option:
     """Option of a field: its type says what it may be."""
     item = next(item for item in fields(Options) if item.name == name)
     given = dict(item.metadata) | dict(changes)
-    words = given.pop("spelled").split()
-    flags = [word for word in words if word.startswith("-")]
-    if not any(flag.startswith("--") for flag in flags):
-        flags.append(f"--{name.replace('_', '-')}")
-    if metavar := next((word for word in words if not word.startswith("-")), None):
-        given["metavar"] = metavar
+    for word in given.pop("spelled").split():
+        if not word.startswith("-"):
+            given["metavar"] = word
     hint: Any = _types()[name]
     if NoneType in get_args(hint):
         hint = get_args(hint)[0]
@@ -93,7 +90,7 @@ def _option(name: str, changes: Mapping[str, Any]) -> click.Option:
         given["type"] = _click_type(hint)
     if item.default not in (None, False, (), "") and not given.get("count"):
         given |= {"default": item.default, "show_default": "[default" not in given["help"]}
-    return HeadedOption([*flags, name], **given)
+    return HeadedOption([*FLAGS[name], name], **given)
 
 
 def _click_type(hint: Any) -> Any:

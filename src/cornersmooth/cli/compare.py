@@ -53,7 +53,6 @@ def command(given: Given) -> int:
     from cornersmooth.comparing import candidates, compare_programs
     from cornersmooth.feedrate import BlockLimits
     from cornersmooth.filter.compared import compare_filtered
-    from cornersmooth.saving import with_feed
 
     source = given.source
     check_inputs(source)
@@ -69,7 +68,7 @@ def command(given: Given) -> int:
             tried = [one for one in candidates(control, settings, machine) if one.form.rotary == (machine is not None)]
             table = compare_filtered(data, tried, axes, **how_read(given), progress=step)
         else:
-            program = with_feed(read(data, name=name, **given.reading()), given.feed)
+            program = read(data, name=name, **given.reading()).with_feed(given.feed)
             tried = candidates(control, settings, limits if machine is None else machine)
             blocks = BlockLimits(look_ahead=given.look_ahead)
             table = compare_programs(program, tried, axes, blocks, progress=step)

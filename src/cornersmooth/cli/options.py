@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import partial
 from typing import Annotated, Any, Literal
 
@@ -301,6 +301,14 @@ class Options:
         "Have a Dask cluster do the files of a batch: tcp://HOST:8786, or the scheduler's file. See docs/batch.md.",
     )
 
+
+#: of each option, the long one last
+FLAGS = {
+    item.name: [*flags, *([] if any(flag.startswith("--") for flag in flags) else [f"--{item.name.replace('_', '-')}"])]
+    for item in fields(Options)
+    if item.metadata
+    for flags in [[word for word in item.metadata["spelled"].split() if word.startswith("-")]]
+}
 
 #: options that several commands have, in the order of their helps
 CURVES = "weights reversal_angle"

@@ -47,7 +47,7 @@ _OWN_TABLES = {"controls": ("control",), "machines": ("machine", "limits")}
 
 #: options that belong to one run
 _ONE_RUN = frozenset(
-    "output directory force reports csv summary scheduler as_json law no_verify operation help".split()
+    "output directory force reports csv summary scheduler as_json law no_verify operation help table pose".split()
 )
 
 
@@ -245,30 +245,25 @@ def keys(option: click.Option) -> list[str]:
 
 def _all_keys() -> set[str]:
     """Keys of the options of all commands."""
-    from cornersmooth.cli.group import COMMANDS, cli
+    from cornersmooth.cli.options import FLAGS
 
-    found = set()
-    for name in COMMANDS:
-        command = cli.get_command(click.Context(cli), name)
-        if isinstance(command, ShopCommand):
-            found |= {key for option in settable(command) for key in keys(option)}
-    return found
+    flags = [flags[-1].lstrip("-") for name, flags in FLAGS.items() if name not in _ONE_RUN]
+    return {key for flag in flags for key in (flag, flag.replace("-", "_"))}
 
 
 def _checked(option: click.Option, value: Any, file: str, where: str) -> Any:
     """Value as the option takes it."""
     if option.is_flag:
-        if not isinstance(value, bool):
-            raise SettingsError("CS242", f"{where} is {value!r}", "give true or false", file=file)
+        good, hint = isinstance(value, bool), "give true or false"
+    elif option.multiple:
+        good, hint = isinstance(value, list) and all(isinstance(one, str) for one in value), "give a list of strings"
+    else:
+        value = ",".join(map(str, value)) if isinstance(value, list) else value
+        good, hint = isinstance(value, str | int | float) and not isinstance(value, bool), "give a number or a string"
+    if not good:
+        raise SettingsError("CS242", f"{where} is {value!r}", hint, file=file)
+    if option.is_flag or option.multiple:
         return value
-    if option.multiple:
-        if not (isinstance(value, list) and all(isinstance(item, str) for item in value)):
-            raise SettingsError("CS242", f"{where} is {value!r}", "give a list of strings", file=file)
-        return value
-    if isinstance(value, list):
-        value = ",".join(map(str, value))
-    if isinstance(value, bool) or not isinstance(value, (str, int, float)):
-        raise SettingsError("CS242", f"{where} is {value!r}", "give a number or a string", file=file)
     try:
         return option.type.convert(value if isinstance(value, float) else str(value), option, None)
     except click.BadParameter as wrong:

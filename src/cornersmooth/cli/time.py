@@ -111,7 +111,7 @@ def _compare(data: bytes, name: str, given: Given) -> Comparison:
     from cornersmooth.nc import fit_settings
     from cornersmooth.nc_reader import read_nc
     from cornersmooth.pipeline import read_back
-    from cornersmooth.saving import with_feed, without_holes, written_text
+    from cornersmooth.saving import without_holes, written_text
 
     machine, axes = given.load_machine(), given.load_limits()
     axes = machine if axes is None else axes
@@ -123,7 +123,7 @@ def _compare(data: bytes, name: str, given: Given) -> Comparison:
     else:
         form = given.choose_form()
         fitted = fit_settings(settings, form, program.units)
-        nc = read_back(written_text(without_holes(with_feed(program, given.feed)), fitted, form), form, fitted)
+        nc = read_back(written_text(without_holes(program.with_feed(given.feed)), fitted, form), form, fitted)
     if not given.quiet:
         _tell_feeds(program, given.feed)
     everything = given.verbose or given.reports
@@ -140,9 +140,9 @@ def _by_own_law(data: bytes, name: str, given: Given) -> int:
     from cornersmooth.cl import read
     from cornersmooth.comparing import law_of_lines
     from cornersmooth.nc import fit_settings
-    from cornersmooth.saving import Timing, with_feed, without_holes, written_text
+    from cornersmooth.saving import Timing, without_holes, written_text
 
-    program = without_holes(with_feed(read(data, name=name, **given.reading()), given.feed))
+    program = without_holes(read(data, name=name, **given.reading()).with_feed(given.feed))
     form = given.choose_form()
     settings = fit_settings(given.settings(), form, program.units)
     timing = Timing.of(form, settings, axes=given.load_limits())
