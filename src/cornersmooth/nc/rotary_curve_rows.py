@@ -226,7 +226,7 @@ class _Work:
         least = form.rotary_tolerance(settings.tolerance, settings.axis_scale)
         straight = float(_left_to_axes(settings, form, np.zeros(1))[0])
         tolerance = np.where(np.isnan(way.place) & (program.kind[way.move] == Move.LINEAR), straight, way.tolerance)
-        way = replace(way, angles=way.angles.copy(), axis=way.axis.copy(), tolerance=tolerance)
+        way = replace(way, tolerance=tolerance)
         # the last row of the move to a corner is in the middle of its curve
         angles, branch, last = np.full((n, 2), np.nan), np.full(n, -1), np.zeros(n, np.int64)
         angles[way.move], branch[way.move], last[way.move] = way.angles, way.branch, np.arange(len(way.move))
@@ -437,7 +437,7 @@ def _written_weights(weight: Floats, owner: Ints, count: int) -> Floats:
 def _with_sections(path: RotaryWay, rows: _Places, sections: _Sections) -> tuple[RotaryWay, Ints]:
     """The way with good sections in the place of the rows within them, and the section that ends in each row, else -1.
 
-    Rows where other lines meet sections are added.
+    Rows where other lines meet sections are added. The angles of the path given change in place.
     """
     row = rows.row
     counts = np.bincount(rows.curve)
@@ -459,14 +459,12 @@ def _with_sections(path: RotaryWay, rows: _Places, sections: _Sections) -> tuple
     number, point, ends = number[once], point[once], once < len(chosen)
     known = np.searchsorted(keys, place)
     meets = keys[known] == place
-    angles, section = path.angles.copy(), np.full(len(path.move), -1)
+    section = np.full(len(path.move), -1)
     at = row[known[meets]]
-    angles[at] = sections.points[point[meets], 3:]
+    path.angles[at] = sections.points[point[meets], 3:]
     section[at[ends[meets]]] = number[meets & ends]
     new = np.flatnonzero(~meets)
     before = row[known[new] - 1]
-    position = np.concatenate((np.flatnonzero(kept).astype(np.float64), before + 0.5))
-    order = np.lexsort((np.concatenate((np.zeros(int(kept.sum())), place[new])), position))
     none = np.zeros(len(new), np.bool_)
     more = RotaryWay(
         tip=sections.points[point[new], :3],
@@ -479,9 +477,9 @@ def _with_sections(path: RotaryWay, rows: _Places, sections: _Sections) -> tuple
         place=np.zeros(len(new)),
         tolerance=path.tolerance[before + 1],
     )
-    old = some_rows(replace(path, angles=angles), kept)
-    found = RotaryWay(**{name: np.concatenate((vars(old)[name], vars(more)[name]))[order] for name in vars(more)})
-    whole = np.concatenate((section[kept], np.where(ends[new], number[new], -1)))[order]
+    at = np.cumsum(kept)[before]
+    found = RotaryWay(**{name: np.insert(column[kept], at, vars(more)[name], 0) for name, column in vars(path).items()})
+    whole = np.insert(section[kept], at, np.where(ends[new], number[new], -1))
     return replace(found, free=found.free | (whole >= 0)), whole
 
 
