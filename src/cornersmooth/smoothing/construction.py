@@ -21,6 +21,9 @@ from cornersmooth.settings import Settings
 from cornersmooth.smoothing.neighbours import find_neighbours
 from cornersmooth.vectors import dot, norm
 
+#: called with what is done, and with what there is in all: corners, or poses of runs
+Progress = Callable[[int, int], None]
+
 #: corners worked on at once: their intermediate arrays fit the processor's cache
 BATCH = 16384
 
@@ -110,11 +113,7 @@ class Construction(ABC):
     extra: ClassVar[tuple[str, ...]] = ()
 
     def smooth(
-        self,
-        program: Program,
-        settings: Settings,
-        progress: Callable[[int, int], None] | None = None,
-        processes: int = 1,
+        self, program: Program, settings: Settings, progress: Progress | None = None, processes: int = 1
     ) -> SmoothProgram:
         """Smooth a whole program, corner by corner; parameters are those of `cornersmooth.smooth`."""
         corners = place_corners(program, settings, self, progress)
@@ -170,12 +169,9 @@ def construction_of(method: str) -> Construction:
 
 
 def place_corners(
-    program: Program,
-    settings: Settings,
-    construction: Construction,
-    progress: Callable[[int, int], None] | None = None,
+    program: Program, settings: Settings, construction: Construction, progress: Progress | None = None
 ) -> Corners:
-    """Round every corner of the program that can be rounded; `progress` takes (corners done, corners in all)."""
+    """Round every corner of the program that can be rounded."""
     around = find_neighbours(program, settings.axis_length, settings.duplicate_distance)
     pose = np.flatnonzero(around.inner)
     before, after = around.previous[pose], around.following[pose]

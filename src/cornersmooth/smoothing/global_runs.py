@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cornersmooth.errors import Finding
-from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.geometry.ragged import batches, ranges, spread, starts
 from cornersmooth.model import Bools, Corners, Floats, Ints, LimitedBy, Program, Runs, SmoothProgram, Status, Trait
 from cornersmooth.processes import map_in_processes
 from cornersmooth.settings import Settings
 from cornersmooth.slices import joined_rows, some_runs
-from cornersmooth.smoothing.construction import RUN_CURVATURE, place_corners, with_rows
+from cornersmooth.smoothing.construction import RUN_CURVATURE, Progress, place_corners, with_rows
 from cornersmooth.smoothing.neighbours import find_neighbours
 from cornersmooth.smoothing.proportional import Proportional
 from cornersmooth.smoothing.runs.polylines import Polylines
 from cornersmooth.smoothing.runs.rows import TURNING
-from cornersmooth.smoothing.runs.solving import STEP, RunCurves, measured, solve_runs
+from cornersmooth.smoothing.runs.solving import STEP, measured, solve_runs
 from cornersmooth.vectors import angle_between
 
 #: poses of runs that are solved together, about
@@ -36,11 +34,7 @@ class GlobalRuns(Proportional):
     extra = (RUN_CURVATURE,)
 
     def smooth(
-        self,
-        program: Program,
-        settings: Settings,
-        progress: Callable[[int, int], None] | None = None,
-        processes: int = 1,
+        self, program: Program, settings: Settings, progress: Progress | None = None, processes: int = 1
     ) -> SmoothProgram:
         """Round every corner by itself, then replace whole runs by one pair of curves.
 
@@ -89,7 +83,7 @@ def _solve(
     settings: Settings,
     pose: Ints,
     count: Ints,
-    progress: Callable[[int, int], None] | None,
+    progress: Progress | None,
     processes: int,
 ) -> _Solved:
     point = np.hstack((program.tip[pose], program.tip[pose] + settings.axis_length * program.axis[pose]))
@@ -98,15 +92,21 @@ def _solve(
     tolerances = settings.tip_tolerance, settings.axis_point_tolerance - turning
     back = _backwards(point, count)
     lines = Polylines.through(point[_turned(count, back)], count, STEP * min(tolerances))
-    curves = _turned_curves(solve_runs(lines, tolerances, settings.axis_length, progress, processes=processes), back)
-    lines, splines, kept = curves.lines, curves.splines, curves.kept
+    curves = solve_runs(lines, tolerances, settings.axis_length, progress, processes=processes)
+    splines, kept, whole, order = curves.splines, curves.kept, lines.s[lines.first[1:] - 1], _turned(count, back)
+
+    def ahead(s: Floats, counts: Ints) -> Floats:
+        owner, own = spread(counts)[0], _turned(counts, back)
+        return np.where(back[owner], whole[owner] - s[own], s[own])
+
+    knot, control = ahead(splines.knot, splines.count), curves.control[_turned(splines.count + 2, back)]
     bounds = curves.tip_bound, curves.axis_bound
-    runs = Runs(pose, count, lines.s, lines.step, splines.knot, splines.count, curves.control, *bounds)
+    runs = Runs(pose, count, ahead(lines.s, count), lines.step, knot, splines.count, control, *bounds)
     run, place = spread(count)
     inner = (place > 0) & (place < count[run] - 1)
     known = inner & kept[run]
     names = ("tip_error", "axis_error", "orientation_error", RUN_CURVATURE)
-    columns = {name: values[known] for name, values in zip(names, measured(curves), strict=True)}
+    columns = {name: values[order][known] for name, values in zip(names, measured(curves), strict=True)}
     return _Solved(some_runs(runs, kept), pose[known], columns, pose[inner & ~kept[run]])
 
 
@@ -153,24 +153,6 @@ def _turned(count: Ints, back: Bools) -> Ints:
     """Rows of runs with those of some of them in reverse: its own inverse."""
     run, place = spread(count)
     return starts(count)[run] + np.where(back[run], count[run] - 1 - place, place)
-
-
-def _turned_curves(curves: RunCurves, back: Bools) -> RunCurves:
-    """The same curves, some of them from their other end."""
-    lines, splines = curves.lines, curves.splines
-    whole = lines.s[lines.first[1:] - 1]
-
-    def turned(s: Floats, count: Ints) -> Floats:
-        run, order = spread(count)[0], _turned(count, back)
-        return np.where(back[run], whole[run] - s[order], s[order])
-
-    poses = _turned(lines.count, back)
-    return replace(
-        curves,
-        lines=Polylines(lines.point[poses], lines.count, turned(lines.s, lines.count), lines.step),
-        splines=Splines(turned(splines.knot, splines.count), splines.count),
-        control=curves.control[_turned(splines.count + 2, back)],
-    )
 
 
 def find_runs(program: Program, settings: Settings, corners: Corners) -> tuple[Ints, Ints, Ints]:

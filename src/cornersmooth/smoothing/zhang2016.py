@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import fields, replace
 from typing import Any, Final
 
@@ -15,6 +15,7 @@ from cornersmooth.smoothing.construction import (
     Construction,
     Legs,
     Placed,
+    Progress,
     Remainders,
     divide,
     half_cosine,
@@ -39,11 +40,7 @@ class Zhang2016(Construction):
     extra = EXTRA
 
     def smooth(
-        self,
-        program: Program,
-        settings: Settings,
-        progress: Callable[[int, int], None] | None = None,
-        processes: int = 1,
+        self, program: Program, settings: Settings, progress: Progress | None = None, processes: int = 1
     ) -> SmoothProgram:
         """Smooth a whole program; corners whose motion leaves the tolerance get a smaller one, or stay sharp."""
         smoothed = super().smooth(program, settings, progress, processes)
