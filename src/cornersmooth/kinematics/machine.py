@@ -228,16 +228,13 @@ class Machine:
         """Whether a rotary axis in the head moves the tip by the length of the tool."""
         return any(axis.carrier == "head" for axis in self.axes)
 
-    @property
-    def _places(self) -> tuple[str, ...]:
-        return (", nearest to the part", ", nearest to the tool") if len(self.names) == 2 else ("",) * len(self.names)
-
     def describe(self) -> str:
         """Text of a few lines for people."""
         lines = [f"{self.name}: {self.description}" if self.description else self.name]
         if not self.names:
             lines.append("  no rotary axis: the tool is along Z")
-        for axis, place in zip(self.axes[: len(self.names)], self._places, strict=True):
+        places = (", nearest to the part", ", nearest to the tool") if len(self.names) == 2 else ("",)
+        for axis, place in zip(self.axes[: len(self.names)], places, strict=False):
             direction = ", ".join(f"{number:.6g}" for number in axis.unit)
             point = ", ".join(f"{number:g}" for number in axis.point)
             span = "without end" if axis.limits is None else f"from {axis.low:g} to {axis.high:g} deg"

@@ -139,7 +139,8 @@ def verified_page(
     `name`, `control` and `form` are those of the program, as far as they are known. What was filtered has a `judgement`
     of its own, and an old program as its `origin`.
     """
-    settings = Settings(tolerance=found.tolerance, **_second_of(found))
+    settings = Settings(tolerance=found.tolerance, axis_tolerance=found.axis_tolerance)
+    settings = settings if found.axis_tolerance is not None else settings.but(axis_length=found.axis_length)
     limits = Limits() if limits is None else limits
     subject = Subject(
         program=program,
@@ -252,12 +253,6 @@ def _settings_facts(settings: Settings) -> list[tuple[str, str]]:
         ("method", settings.method),
         ("reversals", f"sharp above {settings.reversal_angle:g}°"),
     ]
-
-
-def _second_of(found: Verification) -> dict[str, Any]:
-    """What the axis had to keep, as `Settings` take it."""
-    own = found.axis_tolerance
-    return {"axis_length": found.axis_length} if own is None else {"axis_tolerance": own}
 
 
 def _measured_facts(found: Verification, whose: str) -> list[tuple[str, str]]:

@@ -119,7 +119,9 @@ def scene(subject: Subject, story: Story) -> tuple[dict[str, Any], Pack]:
     timed = seconds is not None
     if seconds is None:
         seconds = feed_seconds(written, subject.limits.rapid)
-    places = _place_of_poses(written, program)
+    # the point of the written path that is the last on the move into each pose
+    places = np.searchsorted(np.maximum.accumulate(written.pose), np.arange(len(program)), side="right") - 1
+    places = np.maximum(places, 0)
     if subject.verification is not None:
         # what is measured from the original poses belongs to the points that are reached there
         found = subject.verification
@@ -163,13 +165,6 @@ def _corners(subject: Subject) -> CornerList | None:
     if subject.smoothed is not None:
         return smoothed_corners(subject.smoothed, subject.verification, dense=subject.dense)
     return None if subject.verification is None else measured_corners(subject.program, subject.verification)
-
-
-def _place_of_poses(written: WrittenPath, program: Program) -> Ints:
-    """(n,) point of the written path that is the last on the move into each pose."""
-    return np.clip(
-        np.searchsorted(np.maximum.accumulate(written.pose), np.arange(len(program)), side="right") - 1, 0, None
-    )
 
 
 def _add_original(

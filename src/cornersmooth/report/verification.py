@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.model import Floats, Program
+from cornersmooth.model import Program
 from cornersmooth.report.csv_text import csv_text
 from cornersmooth.report.deviation_profile import Distribution
 from cornersmooth.verify import Verification
@@ -70,18 +70,11 @@ def along_lines(found: Distribution, tolerance: float) -> list[str]:
         if not len(rows):
             continue
         worst = rows[int(np.argmax(np.maximum(found.tip[rows], found.axis_point[rows])))]
-        bar = "#" * round(_BAR / 2 * _share(found.tip[worst], found.axis_point[worst], tolerance))
+        larger = max(float(found.tip[worst]), float(found.axis_point[worst]))
+        bar = "#" * round(_BAR / 2 * min(larger / tolerance, 1.0))
         lines.append(
             f"{edges[k]:>10.3f}-{edges[k + 1]:>10.3f} {found.tip[rows].max():>10.6f} "
-            f"{found.axis_point[rows].max():>10.6f} {_largest(found.angle[rows]):>9.5f} "
+            f"{found.axis_point[rows].max():>10.6f} {found.angle[rows].max():>9.5f} "
             f"{found.cl_line[worst]:>8} {found.nc_line[worst]:>8} {bar}".rstrip()
         )
     return lines
-
-
-def _share(tip: float, axis_point: float, tolerance: float) -> float:
-    return min(max(float(tip), float(axis_point)) / tolerance, 1.0)
-
-
-def _largest(values: Floats) -> float:
-    return float(values.max())
