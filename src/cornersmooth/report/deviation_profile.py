@@ -9,6 +9,7 @@ import numpy as np
 from cornersmooth.model import Floats, Ints, Program
 from cornersmooth.nc_reader.elements import NcProgram
 from cornersmooth.nc_reader.tool import written_at
+from cornersmooth.slices import joined_rows, some_rows
 from cornersmooth.verify.batches import Batches
 from cornersmooth.verify.distances import Gap, of_original
 from cornersmooth.verify.match import Match
@@ -17,9 +18,6 @@ from cornersmooth.verify.task import Task
 
 #: segments on either side in which the common pose is looked for
 _REACH = 2
-
-#: fields of a distribution
-_COLUMNS = 10
 
 
 @dataclass(frozen=True)
@@ -67,32 +65,28 @@ def deviation_along(
         At the poses of the original that come nearest to tip and axis point together.
     """
     task = Task.of(program, tolerance, axis_length, axis_tolerance)
-    parts = [np.zeros((0, _COLUMNS))]
+    parts = [Distribution(*np.zeros((6, 0)), *np.zeros((4, 0), np.int64))]
     for batch in Batches(task, nc.events).of([nc]):
         matched = Match(task=task, **vars(batch))
         parts += [_of_elements(matched, batch.offset, samples), _of_poses(matched)]
-    rows = np.concatenate(parts)
-    parts.clear()
-    order = np.argsort(rows[:, 0], kind="stable")
-    columns = [column[order] for column in rows.T]
-    return Distribution(*columns[:6], *(column.astype(np.int64) for column in columns[6:]))
+    found = joined_rows(parts)
+    return some_rows(found, np.argsort(found.way, kind="stable"))
 
 
-def _of_poses(match: Match) -> Floats:
-    """Columns (k, 10) of the distribution at the original poses of one match."""
+def _of_poses(match: Match) -> Distribution:
+    """Deviations at the original poses of one match."""
     reached = of_original(match)
     original = match.original
     pose = original.pose[original.trail.owner[reached.vertex]]
     nc_line = match.nc_lines(np.minimum(reached.place.astype(np.int64) + 1, len(match.six) - 1))
     gap, way = reached.gap, match.path.length[reached.vertex]
     share, none = original.trail.fraction[reached.vertex], np.zeros(len(pose))
-    places = (share, none, pose, none - 1.0, original.program.line[pose], nc_line)
-    columns = (way, gap.tip, gap.axis_point, np.degrees(gap.angle), *places)
-    return np.stack([column.astype(np.float64) for column in columns], axis=1)
+    places = pose, np.full(len(pose), -1), original.program.line[pose], nc_line
+    return Distribution(way, gap.tip, gap.axis_point, np.degrees(gap.angle), share, none, *places)
 
 
-def _of_elements(match: Match, offset: int, samples: int) -> Floats:
-    """Columns (k, 10) of the distribution at written poses of one match."""
+def _of_elements(match: Match, offset: int, samples: int) -> Distribution:
+    """Deviations at written poses of one match."""
     last = match.motion.last
     start, end = last[:-1], last[1:]
     feeding = np.flatnonzero((match.section[start] == match.section[end]) & (match.section[end] >= 0))
@@ -115,6 +109,5 @@ def _of_elements(match: Match, offset: int, samples: int) -> Floats:
     gap = Gap.of(match.task, six - match.task.six(*original.at(owner, fraction)))
     way = match.path.lengths_at(place)
     pose = original.pose[owner]
-    places = (fraction, share, pose, element + offset, original.program.line[pose], match.nc.line[element])
-    columns = (way, gap.tip, gap.axis_point, np.degrees(gap.angle), *places)
-    return np.stack([column.astype(np.float64) for column in columns], axis=1)
+    places = pose, element + offset, original.program.line[pose], match.nc.line[element]
+    return Distribution(way, gap.tip, gap.axis_point, np.degrees(gap.angle), fraction, share, *places)
