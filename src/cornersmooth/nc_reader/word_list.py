@@ -13,7 +13,7 @@ The lists are data, one TOML file for each control in `word_lists`, with the man
 ``orders``
     What a comment begins with that the control would obey.
 ``[grammar]``
-    How words of letters and numbers are read: attributes of `dialects.iso.Iso`.
+    How the words are read: attributes of the control's class in `dialects`.
 ``[[word]]``
     ``is``: the word, blanks left out. ``says``: what it means, for the documentation.
 

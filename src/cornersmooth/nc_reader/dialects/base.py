@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Set
+from collections.abc import Callable, Mapping, Set
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from cornersmooth.nc_reader.lexer import Lexer
+from cornersmooth.nc_reader.word_list import word_list
 from cornersmooth.nc_reader.words import Columns, Line
 
 if TYPE_CHECKING:
@@ -42,6 +43,15 @@ class Memory:
     orientation: str = ""  #: how the tool axis is interpolated
 
 
+#: how the values of a table `WordList.grammar` are read, where not as they are
+_READ: Mapping[str, Callable[[Any], Any]] = {
+    "tip_control": lambda table: {float(code): name for code, name in table.items()},
+    "controls": lambda table: {kind: tuple(names) for kind, names in table.items()},
+    "silent": lambda codes: frozenset(map(float, codes)),
+    "unsaid": lambda kinds: frozenset(tuple(kind) if isinstance(kind, list) else kind for kind in kinds),
+}
+
+
 class Dialect:
     """A control's way to say things; nothing in it changes while a text is read.
 
@@ -51,6 +61,7 @@ class Dialect:
         Addresses of the rotary axes; empty without a machine.
     """
 
+    lexer: Lexer
     #: decimals of F are worth so much
     feed_step = 1e-4
     #: inches per minute that F counts in, in a text in inches
@@ -72,8 +83,11 @@ class Dialect:
     #: the first letter, or letters, of tip and second triple in the lexer, with their decimals
     digits: re.Pattern[bytes] = re.compile(rb"(?:([XYZ])|([IJUVW]))[-+]?\d*\.(\d*)")
 
-    def __init__(self, lexer: Lexer, rotary: str = "") -> None:
-        self.lexer, self.rotary = lexer, rotary
+    def __init__(self, control: str, rotary: str = "") -> None:
+        listed = word_list(control)
+        for key, value in listed.grammar.items():
+            setattr(self, key, _READ[key](value) if key in _READ else value)
+        self.switches, self.rotary = listed.switches, rotary
         if rotary:
             self.digits = re.compile(
                 rb"(?<!K\d)(?:([XYZ])|(?<![A-Z0-9])([%b])(?:=DC\()?)[-+]?\d*\.(\d*)" % rotary.encode()

@@ -58,15 +58,11 @@ class Heidenhain(Dialect):
     """
 
     lexer: _KlartextLexer
-    shorter_way = "M126"
-    feed_step = 1e-3
-    inch_feed = 0.1
-    unsaid = frozenset(("offset", "compensation", "register", ("spindle", 19.0), ("coolant", 7.0), ("coolant", 88.0)))
-    controls = {"vector": ("TCPM VECTOR", "M128"), "angles": ("TCPM AXIS", "M128"), "machine": ("",)}  # noqa: RUF012
     digits = re.compile(rb"(?<!K\d)(?:(?<!T)([XYZ])|(T[XYZ]))[-+]?\d*\.(\d*)")
 
     def __init__(self, rotary: str = "") -> None:
-        super().__init__(_KlartextLexer(rotary), rotary)
+        super().__init__("heidenhain", rotary)
+        self.lexer = _KlartextLexer(rotary)
 
     def words(self, line: Line, state: Reader) -> None:
         """Interpret a line that is no motion block."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Set
+from collections.abc import Mapping, Set
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from cornersmooth.nc_reader.dialects.base import AFTER_MOTION, Dialect
 from cornersmooth.nc_reader.hole_cycles import HoleCycle, drill
@@ -39,17 +39,8 @@ _PLANE_WORDS: Mapping[str, frozenset[float]] = {
 _NO_CYCLE = 80.0
 
 
-#: how the values of a table `WordList.grammar` are read, where not as they are
-_READ: Mapping[str, Callable[[Any], Any]] = {
-    "tip_control": lambda table: {float(code): name for code, name in table.items()},
-    "controls": lambda table: {kind: tuple(names) for kind, names in table.items()},
-    "silent": lambda codes: frozenset(map(float, codes)),
-    "unsaid": lambda kinds: frozenset(tuple(kind) if isinstance(kind, list) else kind for kind in kinds),
-}
-
-
 class Iso(Dialect):
-    """Words of one letter and a number; what differs between these controls is in the table `WordList.grammar`.
+    """Words of one letter and a number; what differs between these controls is in `WordList.grammar`.
 
     Parameters
     ----------
@@ -78,11 +69,8 @@ class Iso(Dialect):
     planes: str = ""
 
     def __init__(self, name: str, rotary: str = "") -> None:
-        listed = word_list(name)
-        for key, value in listed.grammar.items():
-            setattr(self, key, _READ[key](value) if key in _READ else value)
-        self.switches = listed.switches
-        super().__init__((_LinuxLexer if self.semicolon else _IsoLexer)(rotary, listed.points), rotary)
+        super().__init__(name, rotary)
+        self.lexer = (_LinuxLexer if self.semicolon else _IsoLexer)(rotary, word_list(name).points)
 
     def decimals(self, text: bytes) -> tuple[int, int | None]:
         """As `Dialect.decimals`: the angles of a tilted plane are no vectors."""

@@ -68,19 +68,11 @@ class Siemens(Dialect):
         Addresses of the rotary axes; empty without a machine.
     """
 
-    shorter_way = BY_WORD
-    names_spline_axes = True
-    unsaid = frozenset(("offset", "register", ("coolant", 88.0)))
-    controls = {  # noqa: RUF012
-        "vector": ("TRAORI ORIVECT", "TRAORI ORIPLANE", "TRAORI"),
-        "point": ("TRAORI ORICURVE",),
-        "angles": ("TRAORI ORIAXES", "TRAORI"),
-        "machine": ("",),
-    }
     digits = re.compile(rb"(?:([XYZ])|([ABC]3=|[XYZ]H=))[-+]?\d*\.(\d*)")
 
     def __init__(self, rotary: str = "") -> None:
-        super().__init__(_SiemensLexer(rotary), rotary)
+        super().__init__("siemens", rotary)
+        self.lexer = _SiemensLexer(rotary)
 
     def words(self, line: Line, state: Reader) -> None:
         """Interpret a line that is no motion block."""
