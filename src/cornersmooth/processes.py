@@ -74,18 +74,21 @@ class Helper:
         _end([self._process])
 
 
-def map_in_processes(work: Callable[[Item], Result], items: Iterable[Item], processes: int) -> Iterator[Result]:
+def map_in_processes(
+    work: Callable[[Item], Result], items: Iterable[Item], processes: int, *, busy: bool = False
+) -> Iterator[Result]:
     """Give out what `work` makes of each item, in order, as `processes` processes find it.
 
     Items are taken as they are needed, a fixed number ahead; none before the processes have been forked, which would
     keep copies of them. Nothing leaves this process where there is to be only one or the system cannot fork safely.
+    `busy`: to take an item is more than to work on it, so this process keeps up with one other and no more.
 
     Raises
     ------
     MemoryError
         A process has been ended from outside, which is what a system short of memory does.
     """
-    crew = _Crew(work, processes) if processes > 1 and can_fork() else None
+    crew = _Crew(work, 1 if busy else processes) if processes > 1 and can_fork() else None
     waiting: deque[Callable[[], Result]] = deque()
 
     def start(item: Item) -> Callable[[], Result]:

@@ -114,7 +114,7 @@ def original_motion(program: Program, tolerance: float, axis_length: float) -> O
     bend[program.kind[chosen] == Move.RAPID] = 0.0  # the way of a rapid is the machine's
     cuts = parts_of(bend, CL_SHARE * tolerance, _MOST_PARTS)
     index = np.arange(len(pose))
-    bare = Original(program, pose, Trail(tip, axis, index, np.ones(len(pose)), index, bend[1:]))
+    bare = Original(program, pose, Trail(tip, axis, index, np.broadcast_to(1.0, len(pose)), index, bend[1:]))
     if not len(pose) or cuts.max() == 1:
         return bare
     owner, fraction, last = divided(cuts)

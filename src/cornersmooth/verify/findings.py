@@ -109,7 +109,7 @@ class Continuity(Peaks):
 class Poses:
     """Distances of original poses from the nearest written pose."""
 
-    pose: Ints  #: (k,): Poses of the CL program, and for each of them:
+    pose: Ints  #: (k,): poses of the CL program; none where the rows are all of them, in order
     tip: Floats  #: (k,) mm
     axis_point: Floats  #: (k,) mm
     angle: Floats  #: (k,) rad
@@ -119,7 +119,7 @@ class Poses:
     def nowhere(cls, count: int) -> Poses:
         """All poses of a program, none of them passed: NaN."""
         nan = np.full(count, np.nan)
-        return cls(np.arange(count), nan, nan.copy(), nan.copy(), np.zeros(count, np.int64))
+        return cls(np.zeros(0, np.int64), nan, nan.copy(), nan.copy(), np.zeros(count, np.int64))
 
     def put(self, part: Poses) -> None:
         """Put the poses of a part in their places among all."""

@@ -260,7 +260,7 @@ class Verifier:
         def work(item: tuple[Batch, Ints, Largest]) -> Examined:
             return examine(task, *item)
 
-        for examined in map_in_processes(work, items(), self._processes):
+        for examined in map_in_processes(work, items(), self._processes, busy=True):
             for poses in examined.findings.poses:
                 found.poses.put(poses)
             examined.findings.poses = []
