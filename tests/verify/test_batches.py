@@ -34,9 +34,9 @@ def used(monkeypatch):
     found = []
     work = verifier.map_in_processes
 
-    def noted(function, items, processes):
+    def noted(function, items, processes, **how):
         count = 0
-        for result in work(function, items, processes):
+        for result in work(function, items, processes, **how):
             count += 1
             yield result
         found.append(count)

@@ -44,6 +44,14 @@ def test_large_items_and_results_do_not_stand_still():
     assert [len(item) for item in found] == [6_000_000] * 12
 
 
+@pytest.mark.parametrize("processes", [2, 4])
+def test_a_busy_process_keeps_up_with_one_other(processes):
+    found = list(crews.map_in_processes(lambda item: (item, os.getpid()), range(9), processes, busy=True))
+    assert [item for item, _ in found] == list(range(9))
+    assert {process for _, process in found} != {os.getpid()}
+    assert len({process for _, process in found}) == 1
+
+
 def test_items_are_taken_a_fixed_number_ahead():
     seen = []
     for processes in (1, 2, 3):
