@@ -27,8 +27,7 @@ from cornersmooth.nc.long_rows import coarse_rows, long_rows
 from cornersmooth.nc.motion_writer import MotionWriter
 from cornersmooth.nc.operation import Operation
 from cornersmooth.nc.own_words import own_words
-from cornersmooth.nc.plane_travel import check_travel_in_planes, check_travel_without_axes
-from cornersmooth.nc.planes import Planes, plan_planes
+from cornersmooth.nc.planes import Planes, check_travel_in_planes, check_travel_without_axes, plan_planes
 from cornersmooth.nc.program_frame import POINT_APPROACH, Frame, Stream
 from cornersmooth.nc.rotary_curve_rows import rotary_curve_rows
 from cornersmooth.nc.rotary_rows import rotary_rows

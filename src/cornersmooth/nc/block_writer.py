@@ -17,14 +17,13 @@ from cornersmooth.kinematics import machine_position, tool_axis
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program
 from cornersmooth.nc.circles import FIRST_PLANE, Circles
 from cornersmooth.nc.control import INVERSE_TIME
-from cornersmooth.nc.curve_blocks import Curves, RowWriter, bezier_points, curves_for
+from cornersmooth.nc.curve_blocks import Curves, RowWriter, SplineShare, bezier_points, curves_for
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.first_block import UPRIGHT
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.planes import Plane
 from cornersmooth.nc.program_frame import BLEND_STEP, blend_word
 from cornersmooth.nc.run import Run
-from cornersmooth.nc.spline_share import SplineShare
 from cornersmooth.nc.statement_writer import StatementWriter
 from cornersmooth.text import RowFormat, format_number, interleave, to_ticks
 from cornersmooth.vectors import unit

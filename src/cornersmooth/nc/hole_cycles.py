@@ -26,8 +26,7 @@ from dataclasses import dataclass, replace
 from cornersmooth.errors import InputError
 from cornersmooth.model import FeedMode, Program, Statement
 from cornersmooth.nc.findings import Findings
-from cornersmooth.nc.spindle import milliseconds
-from cornersmooth.nc.statement_args import words_of
+from cornersmooth.nc.statement_args import milliseconds, words_of
 
 #: more pecks in one hole are a misunderstanding
 _MOST_PECKS = 1000

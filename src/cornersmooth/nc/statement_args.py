@@ -1,10 +1,18 @@
-"""Arguments of CL statements: their words and numbers; statements that stand for poses."""
+"""Arguments of CL statements: words, numbers, revolutions of the spindle as time; statements that stand for poses."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
 from cornersmooth.model import Move, Program, Statement
+
+#: longest dwell that is written, ms: one day
+_LONGEST = 86_400_000
+
+#: cutting speeds in mm per minute
+_MM_PER_MINUTE = {"SMM": 1000.0, "SFM": 12.0 * 25.4}
 
 
 def numbers_of(statement: Statement) -> list[float]:
@@ -48,3 +56,22 @@ def with_starts(program: Program) -> tuple[Statement, ...]:
         for pose in starts
     ]
     return tuple(sorted((*program.statements, *said), key=lambda statement: (statement.pose, statement.word == "FROM")))
+
+
+def milliseconds(amount: float, in_revolutions: bool, speed: float | None) -> int | None:
+    """Return a dwell of seconds, or of revolutions at a speed per minute, in whole ms; None where none is known."""
+    if in_revolutions:
+        if not speed:
+            return None
+        amount *= 60.0 / speed
+    time = 1000.0 * amount
+    if not (math.isfinite(time) and 0.0 <= time <= _LONGEST):
+        return None
+    return max(1, round(time)) if time > 0.0 else 0
+
+
+def revolutions(cutting_speed: float, unit: str, diameter: float) -> float | None:
+    """Revolutions per minute that give a cutting speed (SFM, SMM) at a diameter in mm; None without a diameter."""
+    if not diameter > 0.0:
+        return None
+    return cutting_speed * _MM_PER_MINUTE[unit] / (math.pi * diameter)

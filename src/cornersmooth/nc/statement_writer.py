@@ -20,8 +20,15 @@ from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.hole_cycles import HoleCycles
 from cornersmooth.nc.operation import Operation
-from cornersmooth.nc.spindle import milliseconds, revolutions
-from cornersmooth.nc.statement_args import number_after, numbers_of, spoken_text, whole_number, words_of
+from cornersmooth.nc.statement_args import (
+    milliseconds,
+    number_after,
+    numbers_of,
+    revolutions,
+    spoken_text,
+    whole_number,
+    words_of,
+)
 from cornersmooth.nc.tools import TOOL_WORDS, ahead_of_tools, loaded_tool
 from cornersmooth.text import format_number
 

@@ -20,8 +20,16 @@ from cornersmooth.kinematics.poses import (
 )
 from cornersmooth.model import Bools, Floats, Ints, Move
 from cornersmooth.rotary.axis_findings import limit_error, pole_finding, reach_error, rewind_finding, swap_finding
-from cornersmooth.rotary.branch_choice import LIMIT_SLACK, PREFERENCE_COST, NoChoiceError, Stretches, choose
-from cornersmooth.rotary.rewinds import CutTooFarError, parts_of_cut, too_far
+from cornersmooth.rotary.branch_choice import (
+    LIMIT_SLACK,
+    PREFERENCE_COST,
+    CutTooFarError,
+    NoChoiceError,
+    Stretches,
+    choose,
+    parts_of_cut,
+    too_far,
+)
 from cornersmooth.rotary.unwrapping import WideSteps, meet_at_pole, unwrap
 
 #: Poses worked on at a time, so that memory is needed for their angles and little else.
