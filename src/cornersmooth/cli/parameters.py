@@ -1,4 +1,4 @@
-"""What a value on the command line may look like, and how it is read.
+"""What a value on the command line may look like, how it is read, and what a shell offers for it.
 
 Lengths are millimetres; the suffixes ``mm`` and ``in`` are accepted.
 """
@@ -8,12 +8,11 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
+from functools import partial
 from typing import Annotated, Any
 
 import click
 from click.shell_completion import CompletionItem
-
-from cornersmooth.cli import completing
 
 _LENGTH = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(mm|in|inch|\")?")
 
@@ -109,6 +108,59 @@ def _tool(text: str) -> Any:
     return parse_tool(text)
 
 
+#: folders of the tables in the package
+_FOLDERS = {"controls": ("nc", "controls"), "machines": ("kinematics", "machines")}
+
+
+def _forms(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+    """Names of the forms of the control that is chosen, or of all of them."""
+    tables = _tables("controls", ctx)
+    chosen = ctx.params.get("control")
+    name = chosen if isinstance(chosen, str) else getattr(chosen, "name", "")
+    called = {alias: own for own, table in tables.items() for alias in table.get("aliases", ())}
+    one = called.get(name, name)
+    found = _forms_of(one, tables) if one in tables else {form for each in tables for form in _forms_of(each, tables)}
+    return [CompletionItem(form) for form in sorted(found) if form.startswith(incomplete)]
+
+
+def _offer(kind: str, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+    tables = _tables(kind, ctx)
+    items = [
+        CompletionItem(name, help=str(table.get("description", "")) or None)
+        for name, table in sorted(tables.items())
+        if name.startswith(incomplete)
+    ]
+    aliases = sorted(alias for table in tables.values() for alias in table.get("aliases", ()))
+    items += [CompletionItem(alias) for alias in aliases if incomplete and alias.startswith(incomplete)]
+    return items or [CompletionItem(incomplete, type="file")]
+
+
+def _tables(kind: str, ctx: click.Context) -> dict[str, dict[str, Any]]:
+    """Tables of the package, read as text so that the shell need not wait for arrays, and of the shop settings here."""
+    import tomllib
+    from importlib import resources
+
+    from cornersmooth.cli import shop
+
+    found: dict[str, dict[str, Any]] = {
+        item.name.removesuffix(".toml"): tomllib.loads(item.read_text(encoding="utf-8"))
+        for item in resources.files("cornersmooth").joinpath(*_FOLDERS[kind]).iterdir()
+        if item.name.endswith(".toml")
+    }
+    for file in ctx.meta.get(shop.__name__, shop.Shop()).files:
+        found |= {name: table for name, table in file.tables.get(kind, {}).items() if isinstance(table, dict)}
+    return found
+
+
+def _forms_of(name: str, tables: dict[str, dict[str, Any]]) -> set[str]:
+    """Forms of a control and of that which it is like."""
+    table = tables[name]
+    like = table.get("like", "")
+    inherited = _forms_of(like, tables) if like in tables and like != name else set()
+    own = table.get("forms", {})
+    return (inherited | set(own)) - {form for form, entry in own.items() if entry is False}
+
+
 Length = Annotated[float, Value("mm", _length)]
 Duration = Annotated[float, Value("time", _duration)]
 Weights = Annotated[tuple[float, float], Value("w1,w2", _weights)]
@@ -116,8 +168,8 @@ Processes = Annotated[int, Value("n", _processes)]
 Spindle = Annotated[tuple[float, str], Value("RPM[,CCLW]", _spindle)]
 ToolShape = Annotated[Any, Value("tool", _tool)]
 #: names; what they name is loaded when it is needed
-ControlName = Annotated[Any, Value("text", str, completing.controls)]
-MachineName = Annotated[Any, Value("text", str, completing.machines)]
-FormName = Annotated[str, Value("text", str, completing.forms)]
+ControlName = Annotated[Any, Value("text", str, partial(_offer, "controls"))]
+MachineName = Annotated[Any, Value("text", str, partial(_offer, "machines"))]
+FormName = Annotated[str, Value("text", str, _forms)]
 #: whether a file can be read is said where it is read, with the exit code of inputs
 Path = Annotated[str, click.Path(readable=False)]
