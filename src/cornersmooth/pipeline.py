@@ -228,7 +228,7 @@ def postprocess(
     with _timed(seconds, "read"):
         program = (source if isinstance(source, Program) else read(source, **(reading or {}))).with_feed(feed)
     with _timed(seconds, "smooth"):
-        told = _stage(progress, "smoothing")
+        told = stage_of(progress, "smoothing")
         smoothed = smooth(program, settings, form=form, progress=told, processes=processes)
     return_free_memory()  # before processes share what there is
     frame = frame or Frame()
@@ -258,7 +258,7 @@ def postprocess(
             )
             stack.enter_context(verifier)
         with _timed(seconds, "write"):
-            told = _stage(progress, "writing")
+            told = stage_of(progress, "writing")
             if plan_feeds is None:
                 written = nc.write(smoothed, output.stream, form=form, frame=frame, progress=told)
             else:
@@ -295,7 +295,10 @@ def postprocess(
         if mark:
             output.mark = {**mark, "verdict": judgement.text}
     if output.failed:
-        raise _failure(replace(result, path=None if path is None else path + FAILED))
+        where = "nothing was written" if path is None else f"the program is in {path}{FAILED}"
+        failure = VerdictError("CS508", f"the verdict is {result.verdict}; {where}", file=program.source.name)
+        failure.result = replace(result, path=None if path is None else path + FAILED)
+        raise failure
     return result
 
 
@@ -387,14 +390,8 @@ def _verified(verifier: Verifier, form: Form, frame: Frame) -> tuple[Verificatio
     return found, found.unverified
 
 
-def _failure(result: Result) -> VerdictError:
-    where = "nothing was written" if result.path is None else f"the program is in {result.path}"
-    failure = VerdictError("CS508", f"the verdict is {result.verdict}; {where}", file=result.program.source.name)
-    failure.result = result
-    return failure
-
-
-def _stage(progress: Progress | None, stage: str) -> Callable[[int, int], None] | None:
+def stage_of(progress: Progress | None, stage: str) -> Callable[[int, int], None] | None:
+    """Give what to call of a stage with what is done and all."""
     return None if progress is None else lambda done, total: progress(stage, done, total)
 
 

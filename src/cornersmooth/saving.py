@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +15,7 @@ from cornersmooth.feedrate.linuxcnc_program import axis_limits, program_lines
 from cornersmooth.kinematics import Machine, endless, tool_axis, with_dynamics
 from cornersmooth.model import Floats, Ints, Move, Program
 from cornersmooth.nc import Form
-from cornersmooth.pipeline import Progress, read_back
+from cornersmooth.pipeline import Progress, read_back, stage_of
 from cornersmooth.report.verdict import Saving
 from cornersmooth.settings import BOUNDS, Settings
 
@@ -75,7 +74,7 @@ class Timing:
             settings=self.settings,
             machine=self.machine,
             blocks=self.blocks,
-            progress=_stage(progress, "planning as written"),
+            progress=stage_of(progress, "planning as written"),
         )
         moves = law.path.program
         begin, end = _from_to(program, moves.tip, moves.axis)
@@ -97,7 +96,7 @@ class Timing:
                 "velocity_jump",
                 settings=self.settings,
                 machine=self.machine,
-                progress=_stage(progress, "planning unsmoothed"),
+                progress=stage_of(progress, "planning unsmoothed"),
             )
             return law.total, ""
         blend, loosest = self.settings.tolerance, BOUNDS["tolerance"][1]
@@ -184,10 +183,6 @@ def without_holes(program: Program) -> Program:
         return program
     kept = tuple(statement for statement in program.statements if statement.word != "CYCLE")
     return replace(program, kind=np.where(holes, np.uint8(Move.RAPID), program.kind), statements=kept)
-
-
-def _stage(progress: Progress | None, stage: str) -> Callable[[int, int], None] | None:
-    return None if progress is None else lambda done, total: progress(stage, done, total)
 
 
 def _from_to(program: Program, tip: Floats, axis: Floats) -> tuple[int, int]:

@@ -91,7 +91,10 @@ def read(
             raise SettingsError("CS230", f"unknown {what} {value!r}", f"use one of {', '.join(choices)}")
     data, name = load(source, name, size_limit=size_limit)
     if format is None:
-        format = _recognise(data)
+        from cornersmooth.cl.points import looks_like_points
+
+        head = data[:HEAD]
+        format = "points" if not _CL_STATEMENT.search(head) and looks_like_points(head) else "apt"
     if format == "points":
         from cornersmooth.cl.points import read_points
 
@@ -108,11 +111,3 @@ def read(
         program = program if operation is None else one_operation(program, operation)
         program = with_tool(program, tool_number, spindle)
     return program
-
-
-def _recognise(data: bytes) -> str:
-    if _CL_STATEMENT.search(data[:HEAD]):
-        return "apt"
-    from cornersmooth.cl.points import looks_like_points
-
-    return "points" if looks_like_points(data[:HEAD]) else "apt"

@@ -176,7 +176,9 @@ def _fed_from_elsewhere(tip: Floats, kind: NDArray[np.uint8]) -> Ints:
 def _units(state: ReaderState, asked: Units | None) -> tuple[Units, list[Finding]]:
     """Units of the file: as asked for, as stated, as the feeds suggest, or as the dialect has them."""
     stated = state.stated_units
-    guess, why = _usual_units(state)
+    guess, why = state.dialect.units, f"as usual for {state.dialect.name} files"
+    if state.feed_units:
+        guess, why = state.feed_units[0], "as in its feeds"
     before = stated[0][1] if stated and not stated[0][2] else guess
     for line, now, pose in stated:
         if pose and now != before and not asked:
@@ -193,9 +195,3 @@ def _units(state: ReaderState, asked: Units | None) -> tuple[Units, list[Finding
     if stated:
         return stated[-1][1], []
     return guess, [finding("CS132", 0, units=guess, why=why)]
-
-
-def _usual_units(state: ReaderState) -> tuple[Units, str]:
-    if state.feed_units:
-        return state.feed_units[0], "as in its feeds"
-    return state.dialect.units, f"as usual for {state.dialect.name} files"

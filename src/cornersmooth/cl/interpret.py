@@ -70,7 +70,10 @@ def obey(state: ReaderState, record: Record) -> None:
     if state.curve is not None and word not in _WITHIN_CURVE:
         motion_statements.finish_curve(state)
     if state.finished:
-        _after_end(state, record, word)
+        if (word in MOTION_WORDS or _refused(record, word)) and not state.lenient:
+            raise state.fail("CS118", record, word=word)
+        if word != "$$":
+            state.note("CS144", record.line, what="statements after FINI")
         return
     if state.arc is not None and word not in _WITHIN_ARC:
         raise state.fail("CS121", state.arc)
@@ -102,13 +105,6 @@ def end(state: ReaderState) -> None:
         motion_statements.finish_curve(state)
     if state.arc is not None:
         raise state.fail("CS121", state.arc)
-
-
-def _after_end(state: ReaderState, record: Record, word: str) -> None:
-    if (word in MOTION_WORDS or _refused(record, word)) and not state.lenient:
-        raise state.fail("CS118", record, word=word)
-    if word != "$$":
-        state.note("CS144", record.line, what="statements after FINI")
 
 
 def _refused(record: Record, word: str) -> str | None:

@@ -101,10 +101,6 @@ def _multax(state: ReaderState, record: Record) -> None:
     state.lock_axis(record.args[:1] in (("OFF",), ("NOMORE",)))
 
 
-def _tlaxis(state: ReaderState, record: Record) -> None:
-    _set_axis(state, record, state.vector(record))
-
-
 def _set_axis(state: ReaderState, record: Record, axis: Vector) -> None:
     length = math.hypot(*axis)
     if length == 0:
@@ -116,10 +112,6 @@ def _set_axis(state: ReaderState, record: Record, axis: Vector) -> None:
     state.set_axis((axis[0] / length, axis[1] / length, axis[2] / length))
 
 
-def _tool_path(state: ReaderState, record: Record) -> None:
-    state.set_axis(UP)  # NX repeats i,j,k on the first point of a path that is tilted
-
-
 def _csys(state: ReaderState, record: Record) -> None:
     if len(record.args) == 12:  # SolidWorks CAM: rows of [R|t]; positions stay in the world, R's z is the axis
         values = state.numbers(record)
@@ -128,7 +120,9 @@ def _csys(state: ReaderState, record: Record) -> None:
 
 def _msys(state: ReaderState, record: Record) -> None:
     """MSYS/origin,x,y of NX, also misspelt SYS: positions are in this system; those of all go into the first one."""
-    args, system = record.args, _system(record)
+    args, values = record.args, record.values
+    plain = len(values) == len(args) == 9 and max(map(abs, values)) <= FARTHEST
+    system = from_numbers(values) if plain else None
     if state.n and state.first_system is None:  # positions before it are in no system that is known
         state.first_system = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0), None
     if state.first_system is None:
@@ -140,11 +134,6 @@ def _msys(state: ReaderState, record: Record) -> None:
     else:
         _enter(state, system.seen_from(state.first_system[1]))
         state.note("CS146", record.line, word=record.word)
-
-
-def _system(record: Record) -> System | None:
-    values = record.values
-    return from_numbers(values) if len(values) == len(record.args) == 9 and max(map(abs, values)) <= FARTHEST else None
 
 
 def _enter(state: ReaderState, system: System) -> None:
@@ -279,8 +268,8 @@ KEPT: Final[dict[str, Handler]] = {
     "UNITS": _units,
     "UNIT": _units,
     "MULTAX": _multax,
-    "TLAXIS": _tlaxis,
-    "TOOL PATH": _tool_path,
+    "TLAXIS": lambda state, record: _set_axis(state, record, state.vector(record)),
+    "TOOL PATH": lambda state, _: state.set_axis(UP),  # NX repeats i,j,k on the first point of a path that is tilted
     "CSYS": _csys,
     "MSYS": _msys,
     "MCS": _mcs,

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import fields
 from functools import cache
 from types import NoneType
-from typing import Annotated, Any, Final, Literal, get_args, get_origin, get_type_hints
+from typing import Any, Final, Literal, get_args, get_origin, get_type_hints
 
 import click
 
@@ -87,13 +87,8 @@ def _option(name: str, changes: Mapping[str, Any]) -> click.Option:
     if hint is bool:
         given["is_flag"] = True
     elif not given.get("count"):
-        given["type"] = _click_type(hint)
+        choice = get_origin(hint) is Literal
+        given["type"] = click.Choice(get_args(hint)) if choice else next(iter(get_args(hint)[1:]), hint)
     if item.default not in (None, False, (), "") and not given.get("count"):
         given |= {"default": item.default, "show_default": "[default" not in given["help"]}
     return HeadedOption([*FLAGS[name], name], **given)
-
-
-def _click_type(hint: Any) -> Any:
-    if get_origin(hint) is Annotated:
-        return get_args(hint)[1]
-    return click.Choice(get_args(hint)) if get_origin(hint) is Literal else hint

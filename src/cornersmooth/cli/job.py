@@ -139,7 +139,10 @@ def run_job(job: Job, progress: Progress | None = None) -> Outcome:
     return_large_arrays()
     outcome = Outcome(job)
     try:
-        if not (job.given.skip_existing and _exists(job, outcome)):
+        mine = job.run and (read_mark(job.target) or {}).get("run") == job.run
+        if job.given.skip_existing and os.path.exists(job.target) and not mine:
+            outcome.skipped = "its output exists"
+        else:
             outcome.contents = _smooth_file(job, outcome, progress)
     except CornersmoothError as failure:
         outcome.exit_code = failure.exit_code
@@ -161,12 +164,6 @@ def internal_error(failure: Exception, source: str = "") -> str:
     place = f"{os.path.basename(last.filename)}:{last.lineno}"
     what = f"internal error, {type(failure).__name__} at {place}: {failure}"
     return message("error", what, place=source, hint="please report it with the input file")
-
-
-def _exists(job: Job, outcome: Outcome) -> bool:
-    if os.path.exists(job.target) and not (job.run and (read_mark(job.target) or {}).get("run") == job.run):
-        outcome.skipped = "its output exists"
-    return bool(outcome.skipped)
 
 
 def _made_of(job: Job, source: bytes) -> str:
