@@ -9,7 +9,7 @@ from cornersmooth.model import Move, Program, Source, Statement
 from cornersmooth.nc_reader import block_tables, reader
 from cornersmooth.nc_reader.ahead import Ahead
 from cornersmooth.statements import comparison
-from cornersmooth.verify import drilling, hole_search, verify
+from cornersmooth.verify import stops, verify
 
 from .writing import HEAD, TAIL, encode
 
@@ -153,7 +153,7 @@ def test_holes():
         ({"n1": ("G0", 0, 0, -1)}, "CS563"),
         ({"n3": None}, "CS563"),
         ({"n6": ("G1", 15.001, 0, -8)}, "CS561"),
-        ({"n8": ("G0", 15, 0, 31)}, "CS534"),
+        ({"n8": ("G0", 15, 0, 31)}, "CS532"),
     ],
 )
 def test_wrong_holes(changes, code):
@@ -226,8 +226,7 @@ def test_path_before_holes_is_measured_as_it_is_read(monkeypatch):
     lines = [("G0", 0, 0, 20), *(("G1", x, 3, 5) for x in range(400)), *DRILLED]
     monkeypatch.setattr(reader, "GIVEN_OUT", 4)
     monkeypatch.setattr(block_tables, "CHUNK", 60)
-    for name, value in (("_WINDOW", 2), ("_TOGETHER", 4), ("_UNDECIDED", 8)):
-        monkeypatch.setattr(hole_search, name, value)
+    monkeypatch.setattr(stops, "TOGETHER", 4)
     held = []
     part = Ahead.part
     monkeypatch.setattr(Ahead, "part", lambda ahead, *rows: (held.append(len(ahead.nc)), part(ahead, *rows))[1])
@@ -252,8 +251,7 @@ def test_a_long_run_of_holes_is_measured_as_it_is_read(monkeypatch):
     program, lines = many_holes(400)
     monkeypatch.setattr(reader, "GIVEN_OUT", 4)
     monkeypatch.setattr(block_tables, "CHUNK", 60)
-    monkeypatch.setattr(hole_search, "_WINDOW", 2)
-    monkeypatch.setattr(drilling, "_TOGETHER", 8)
+    monkeypatch.setattr(stops, "TOGETHER", 8)
     held = []
     part = Ahead.part
     monkeypatch.setattr(Ahead, "part", lambda ahead, *rows: (held.append(len(ahead.nc)), part(ahead, *rows))[1])

@@ -17,21 +17,17 @@ from numpy.typing import NDArray
 from cornersmooth.model import Floats, Move
 from cornersmooth.nc_reader.ahead import Ahead
 from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem
-from cornersmooth.nc_reader.tool import directions, moving_rapids
+from cornersmooth.nc_reader.tool import directions
 from cornersmooth.statements.tool_changes import ToolChanges
 from cornersmooth.verify.decision import Decision
-from cornersmooth.verify.drilling import Holes
 from cornersmooth.verify.motions import Motion, written_motion
-from cornersmooth.verify.nearest import COLUMNS, Metric, on_segments
+from cornersmooth.verify.nearest import Metric
 from cornersmooth.verify.passage import Break
-from cornersmooth.verify.rapids import Rapids
+from cornersmooth.verify.stops import Step, Stops, out_of_hole
 from cornersmooth.verify.task import Task
 
 #: elements in a batch
 BATCH: Final = 1 << 14
-
-#: batches that are held back while stops of the text fit nothing
-_HELD: Final = 4
 
 #: a stretch in a batch: it begins at the end of one element and ends with another; where it begins on the CL path
 #: (segment and fraction), and its last segment plus one
@@ -68,7 +64,7 @@ class Batch:
 
 
 @dataclass
-class Stops:
+class Reached:
     """What is known of stops: elements of the text, and the CL path length where they are, and where they begin."""
 
     element: array[int] = field(default_factory=lambda: array("q"))
@@ -89,7 +85,7 @@ class Batches:
         self.task, self._events = task, events
         self.decision = Decision(task)
         self.problems: list[Problem] = []
-        self.stops = Stops()
+        self.stops = Reached()
         #: elements of holes, as of `Holes`
         self.holes = array("q")
         #: moves of holes at whose bottom the tool waits, and ms
@@ -100,56 +96,26 @@ class Batches:
 
     def of(self, chunks: Iterable[Elements]) -> Iterator[Batch]:
         """Give out all batches of a text."""
-        original = self.task.original
-        moves = len(original.pose)
-        if (original.program.kind[original.pose] == Move.HOLE).any():
-            yield from self._between_holes(chunks)
-            return
-        part: _Part | None = None
-        for nc in chunks:
-            if not len(nc):
-                continue
-            self.elements += len(nc)
-            if part is None:
-                if not moves:
-                    self._lacking(0, -1, int(nc.line[0]))
-                    return
-                part = _Part(self, nc, 0, moves - 1, 0)
-            yield from part.take(nc)
-        if part is not None:
-            yield from part.end()
-        elif moves:
-            self._lacking(0, moves - 1)
-
-    def _between_holes(self, chunks: Iterable[Elements]) -> Iterator[Batch]:
-        """Give out the batches of what lies between the holes."""
-        original = self.task.original
+        task = self.task
+        moves = len(task.original.pose)
         ahead = Ahead(nc for nc in chunks if len(nc))
-        if not ahead.has(0):
-            self._lacking(0, len(original.pose) - 1)
+        if not ahead.has(0) or not moves:
+            if ahead.count or moves:
+                self._lacking(0, moves - 1, int(ahead.nc.line[0]) if ahead.count else None)
+            while ahead.has(ahead.count):
+                ahead.forget(ahead.count - 1)
+            self.elements = ahead.count
             return
-        task, changes = self.task, ToolChanges(original.program, self._events)
-        holes = Holes(original, ahead, task.axis_length, task.tolerance, changes)
-        self.holes, self.dwells = holes.elements, holes.dwells
-        self.taps, self.left_out = holes.taps, holes.left_out
-        part: _Part | None = None
-        surplus: int | None = None
-        for between in holes.between():
-            if between.stop > between.first:
-                nc = ahead.part(between.first, between.stop)
-                if between.move_last >= between.move_first:
-                    part = part or _Part(self, nc, between.move_first, between.move_last, between.first)
-                    yield from part.take(nc)
-                elif surplus is None:
-                    surplus = int(nc.line[0])
-            if between.final:
-                if part is not None:
-                    yield from part.end()
-                elif surplus is not None or between.move_last >= between.move_first:
-                    self._lacking(between.move_first, between.move_last, surplus)
-                part = surplus = None
+        stops = Stops(task, ahead, ToolChanges(task.original.program, self._events))
+        self.holes, self.dwells = stops.elements, stops.dwells
+        self.taps, self.left_out = stops.taps, stops.left_out
+        part, first = _Part(self, ahead.nc), 0
+        for sure in stops.parts():
+            yield from part.take(ahead.part(first, sure.stop), sure.steps)
+            first = sure.stop
+        yield from part.end()
         self.elements = ahead.count
-        self.problems += holes.problems
+        self.problems += stops.problems
 
     def _lacking(self, move_first: int, move_last: int, surplus: int | None = None) -> None:
         """Say that only one of the two motions has anything; `surplus` is the NC line of motion without any."""
@@ -165,16 +131,12 @@ class _Part:
     Element numbers are those of the whole text; `self.held` begins with number `self.base`.
     """
 
-    def __init__(self, batches: Batches, nc: Elements, move_first: int, move_last: int, first: int) -> None:
+    def __init__(self, batches: Batches, nc: Elements) -> None:
         self.batches, self.task = batches, batches.task
-        self.move_last = move_last
-        original = self.task.original
-        self.rapids = Rapids(original, self.task.axis_length, nc, move_first, move_last)
-        self.held, self.base = nc.part(0, 0), first
-        self.waiting = np.zeros(0, np.int64)
-        self.looked = first
-        #: the stretch that has no end yet: where it begins, as a move and in the text, and on the CL path
-        self.move, self.element = -1, first
+        self.held, self.base = nc.part(0, 0), 0
+        #: the stretch that has no end yet: where it begins, as a move and in the text, and on the CL path; and the last
+        #: move that it may have
+        self.move, self.element, self.move_last = -1, 0, -1
         self.start, self.fraction, self.share = 0, 0.0, 0.0
         self.continued = False
         #: whether a lack of motion between its stops has been said, and where the tool was at the end of it if not
@@ -182,39 +144,28 @@ class _Part:
         self.origin: tuple[Floats, Floats] | None = None
         self.pending: list[tuple[int, int, int, int, float]] = []
 
-    def take(self, nc: Elements) -> Iterator[Batch]:
-        """Take more elements."""
+    def take(self, nc: Elements, steps: list[Step]) -> Iterator[Batch]:
+        """Take more elements, and the stops among them."""
         self.held = Elements.joined([self.held, nc])
-        yield from self._go_on(final=False)
+        for move, element, opens, last in steps:
+            yield from self._close(move - 1, element - 1)
+            if opens:
+                self._open(move, element)
+                self.move_last = last
+            else:
+                yield from self._flush()
+                self.move = -1
+        stop = self.base + len(self.held)
+        if self.move >= 0 and stop - 1 - self.element > BATCH + BATCH // 2:
+            yield from self._cut_open(stop - 1)
+        first = min(self.pending[0][0] if self.pending else stop, self.element if self.move >= 0 else stop) - 2
+        if first > self.base:
+            self.held, self.base = self.held.part(first - self.base, len(self.held)), first
 
     def end(self) -> Iterator[Batch]:
         """Give out the rest."""
-        yield from self._go_on(final=True)
-        self.batches.problems += self.rapids.problems
-
-    def _go_on(self, *, final: bool) -> Iterator[Batch]:
-        held, base = self.held, self.base
-        stop = base + len(held)
-        begin = [self.looked] if self.move < 0 and self.looked == self.element and not len(self.waiting) else []
-        found = moving_rapids(held, max(self.looked - base, 1), len(held)) + base
-        self.waiting = np.concatenate((self.waiting, np.array(begin, np.int64), found))
-        self.looked = stop
-        urgent = len(held) > _HELD * BATCH
-        moves, elements = self.rapids.pair(held, self.waiting - base, final=final, urgent=urgent)
-        elements = elements + base
-        settled = self.rapids.settled
-        self.waiting = self.waiting[settled:]
-        for move, element in zip(moves.tolist(), elements.tolist(), strict=True):
-            yield from self._close(move - 1, element - 1)
-            self._open(move, element)
-        if final:
-            yield from self._close(self.move_last, stop - 1)
-            yield from self._flush()
-        elif not len(self.waiting) and stop - 1 - self.element > BATCH + BATCH // 2:
-            yield from self._cut_open(stop - 1)
-        first = min(self.pending[0][0] if self.pending else self.element, self.element) - 1
-        if first > self.base:
-            self.held, self.base = self.held.part(first - self.base, len(self.held)), first
+        yield from self._close(len(self.task.original.pose) - 1, self.base + len(self.held) - 1)
+        yield from self._flush()
 
     def _open(self, move: int, element: int) -> None:
         """Begin a stretch at a stop."""
@@ -231,11 +182,7 @@ class _Part:
                 line = int(original.program.line[original.pose[move]])
                 self.batches.problems.append(Problem("CS532", line, int(self.held.line[at]), text))
             if kind == Move.HOLE:  # out of it the way begins anywhere
-                tip = self.held.tip[at : at + 1]
-                six = task.six(tip, directions(self.held, tip, self.held.second[at : at + 1]))[0]
-                segment = np.arange(start, int(last_vertex[move + 1]))
-                share, square = on_segments(six[None, None], path.points, segment[None], COLUMNS["both"])
-                there = path.length_at(float((segment + share[0])[np.argmin(square)]))
+                there = path.length_at(out_of_hole(task, self.held, at, move)[0])
         self.move, self.element, self.continued, self.told, self.origin = move, element, False, False, None
         self.start, self.fraction, self.share = start, 0.0, 0.0
         if there > begin:
@@ -267,11 +214,9 @@ class _Part:
 
     def _cut_open(self, last: int) -> Iterator[Batch]:
         """Give out what is held of a stretch whose end is not known yet, but its last element."""
-        rapids = self.rapids
-        move_last = int(rapids.stops[rapids.next]) - 1 if rapids.next < len(rapids.stops) else self.move_last
-        if self.move < move_last:
+        if self.move < self.move_last:
             while last - self.element > BATCH + BATCH // 2:
-                yield from self._cut(self.element + BATCH, int(self.task.original.trail.last[move_last]))
+                yield from self._cut(self.element + BATCH, int(self.task.original.trail.last[self.move_last]))
             return
         # nothing of the CL path is left for what is held: it may only stay where it is
         yield from self._flush()

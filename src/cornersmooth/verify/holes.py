@@ -1,0 +1,183 @@
+"""A hole is a line through its pose along the tool: what is on it, and whether it is drilled as its cycle says."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from cornersmooth.model import Bools, Floats, Ints, Move
+from cornersmooth.nc_reader.ahead import Ahead
+from cornersmooth.nc_reader.elements import Element, Problem
+from cornersmooth.nc_reader.tool import directions, leads_somewhere
+from cornersmooth.statements.cycles import Drilling
+from cornersmooth.verify.cl_motion import Original
+from cornersmooth.verify.rapids import digit_errors
+from cornersmooth.verify.task import ARITHMETIC
+
+#: elements that are compared with a pose together, as the next ones will be wanted, too
+_WINDOW = 16
+
+
+class HoleLines:
+    """Compares ends of elements with poses and holes of the CL file.
+
+    Parameters
+    ----------
+    axis_length, tolerance : float, mm
+    """
+
+    def __init__(self, original: Original, ahead: Ahead, axis_length: float, tolerance: float) -> None:
+        self.ahead, self.axis_length = ahead, axis_length
+        program, nc = original.program, ahead.nc
+        self.tip, self.axis = program.tip[original.pose], program.axis[original.pose]
+        self.line, self.kind = program.line[original.pose], program.kind[original.pose]
+        axis_step = nc.second_step * (axis_length if nc.second_is == "vector" else 1.0)
+        #: distance that the printed digits account for, mm
+        self.room = min(nc.tip_step + axis_step, tolerance)
+        #: by what and move: first element, and what is known of it and of those after it
+        self._known: dict[tuple[str, int], tuple[int, list[float]]] = {}
+
+    def exact(self, moves: Ints, elements: Ints) -> Bools:
+        """(k,) whether elements end exactly at the poses of moves."""
+        own = elements - self.ahead.base
+        return digit_errors(self.ahead.nc, own, self.tip[moves], self.axis[moves], self.axis_length)[0]
+
+    def heights(self, moves: Ints, elements: Ints) -> Floats:
+        """(k,) mm above the poses of holes at the ends of elements; NaN beside the hole or with another axis."""
+        nc, own, axis = self.ahead.nc, elements - self.ahead.base, self.axis[moves]
+        away = nc.tip[own] - self.tip[moves]
+        height = np.einsum("ij,ij->i", away, axis)
+        beside = np.linalg.norm(away - height[:, None] * axis, axis=1)
+        turned = np.linalg.norm(directions(nc, nc.tip[own], nc.second[own]) - axis, axis=1)
+        # what the printed angles of a tilted plane leave open
+        lean = np.where(nc.tip_room[own] > 0.0, nc.second_room[own], 0.0)
+        on = beside <= self.room + lean * np.abs(height)
+        on &= turned * self.axis_length <= 2 * self.room + lean * self.axis_length
+        return np.where(on, height, np.nan)
+
+    def at(self, move: int, element: int) -> bool:
+        """Whether an element ends exactly at the pose of a move."""
+        return element >= 0 and bool(self._of("exact", move, element))
+
+    def height(self, move: int, element: int) -> float:
+        """Height of one element, as of `heights`."""
+        return self._of("heights", move, element) if element >= 0 else math.nan
+
+    def over(self, move: int, element: int) -> bool:
+        """Whether an element ends in the line of a hole."""
+        return not math.isnan(self.height(move, element))
+
+    def _of(self, what: str, move: int, element: int) -> float:
+        """What holds for an element; that of those after it is worked out along with it."""
+        first, values = self._known.get((what, move), (0, []))
+        if not 0 <= element - first < len(values):
+            window = np.arange(element, min(element + _WINDOW, self.ahead.count))
+            first, values = element, getattr(self, what)(np.full(len(window), move), window).tolist()
+            if len(self._known) > _WINDOW:
+                self._known.clear()
+            self._known[what, move] = first, values
+        return values[element - first]
+
+    def feeds(self, element: int) -> bool:
+        """Whether an element is no rapid."""
+        return int(self.ahead.nc.kind[element - self.ahead.base]) != Element.RAPID
+
+    def stands(self, element: int) -> bool:
+        """Whether an element leads nowhere."""
+        return bool(self._of("standing", -1, element))
+
+    def standing(self, _: Ints, elements: Ints) -> Bools:
+        """(k,) whether elements lead nowhere."""
+        nc, own = self.ahead.nc, elements - self.ahead.base
+        ways = (values[own] - values[np.maximum(own - 1, 0)] for values in (nc.tip, nc.second))
+        return (own > 0) & ~leads_somewhere(nc, *ways)
+
+    def in_line(self, move: int, other: int) -> bool:
+        """Whether the pose of another move is in the line of a hole, as far as the digits show."""
+        away, turned = (values[other] - values[move] for values in (self.tip, self.axis))
+        beside = np.linalg.norm(away - (away @ self.axis[move]) * self.axis[move])
+        return bool(beside <= self.room and np.linalg.norm(turned) * self.axis_length <= 2 * self.room)
+
+    def nc_line(self, element: int) -> int:
+        """NC line of an element."""
+        return int(self.ahead.nc.line[element - self.ahead.base])
+
+    def tapped(self, feeds: list[int], cycle: Drilling) -> bool:
+        """Whether the first of the feed moves in a hole is that of its thread."""
+        if not feeds:
+            return False
+        nc, own = self.ahead.nc, feeds[0] - self.ahead.base
+        return bool(nc.per_revolution[own] and abs(nc.feed[own] - cycle.feed) <= 2 * nc.feed_room[own])
+
+    def wrong_feed(self, element: int, cycle: Drilling) -> bool:
+        """Whether the feed of an element is not that of a cycle."""
+        nc, own = self.ahead.nc, element - self.ahead.base
+        if math.isnan(cycle.feed):
+            return False
+        off = nc.feed[own] - cycle.feed
+        least = nc.least_feed[own]  # of a plan, which may lower it
+        fits = off <= ARITHMETIC if least else abs(off) <= 2 * nc.feed_room[own]
+        return bool(not fits or nc.per_revolution[own] != cycle.per_revolution)
+
+    def check(self, move: int, elements: range, cycle: Drilling) -> tuple[list[Problem], bool]:
+        """What is wrong with a hole that has some elements, and whether it is left out as it may be.
+
+        CS541 a wrong feed, CS561 a hole is missing, CS562 a wrong depth, CS563 a rapid inside or beside a hole, CS564 a
+        feed that is not a hole's.
+        """
+        height = {k: h for k in elements if not (math.isnan(h := self.height(move, k)) or self.stands(k))}
+        feeds = [k for k in height if self.feeds(k)]
+        found: list[Problem] = []
+
+        def say(code: str, element: int, text: str, amount: float = math.nan) -> None:
+            line = self.nc_line(element) if element >= 0 else 0
+            found.append(Problem(code, int(self.line[move]), line, text, amount))
+
+        if math.isnan(cycle.depth) or (cycle.tap and not self.tapped(feeds, cycle)):
+            if feeds:
+                say("CS564", feeds[0], "the cycle does not say what is fed here")
+            return found, cycle.tap or not feeds
+        if not feeds:
+            if cycle.depth > self.room:
+                say("CS561", next(iter(height), -1), "a hole of the CL file is not drilled")
+            return found, False
+        first, last = next(iter(height)), next(reversed(height))
+        deepest = min(feeds, key=lambda k: height[k])
+        off = height[deepest] + cycle.depth
+        if abs(off) > self.room:
+            text = f"a hole is {abs(off):.4f} mm too {'shallow' if off > 0 else 'deep'}"
+            say("CS562", deepest, text, abs(off))
+        behind = next((k for k in height if k > deepest), None)
+        if cycle.feed_out and behind is not None and not self.feeds(behind):
+            say("CS563", behind, "a rapid leaves a hole that the tool is to leave at feed")
+        before = self.height(move, max(first - 1, 0))
+        low = [(last, cycle.level)] if move + 1 < len(self.tip) and not self.in_line(move, move + 1) else []
+        if move and self.kind[move - 1] == Move.HOLE and math.isnan(before) and not self.feeds(first):
+            turned = float(np.linalg.norm(self.axis[move] - self.axis[move - 1]))
+            if turned * self.axis_length <= 2 * self.room:
+                step = min(float((self.tip[move - 1] - self.tip[move]) @ self.axis[move]), 0.0)
+                low.append((first, cycle.level + step))
+        for k, level in low:  # what is in the hole is said as such
+            if self.room < (amount := level - height[k]) < cycle.level + self.room:
+                text = f"a rapid beside a hole runs {amount:.4f} mm below the height of its cycle (RTRCTO, RAPTO)"
+                say("CS563", k, text, amount)
+        free = 0.0 if math.isnan(cycle.clearance) else cycle.clearance  # height down to which rapids may go
+        drilled = 0.0
+        for k in height:
+            if self.feeds(k):
+                if k == first and math.isnan(before):
+                    say("CS563", k, "a feed move enters a hole from the side")
+                if self.wrong_feed(k, cycle):
+                    feed = self.ahead.nc.feed[k - self.ahead.base]
+                    say("CS541", k, f"the feed is {feed:g}, the cycle says {cycle.feed:g}")
+                down = height.get(k - 1, math.inf) > height[k]
+                if down and drilled > self.room and self.room < -height[k] <= drilled + ARITHMETIC:
+                    say("CS562", k, "a hole is drilled again")
+                drilled, free = max(drilled, -height[k]), min(free, height[k])
+            elif height[k] < free - self.room:
+                where = "into the uncut hole" if free <= 0.0 else "below the height where the feed begins (RAPTO)"
+                say("CS563", k, f"a rapid goes {free - height[k]:.4f} mm {where}", free - height[k])
+        if height[last] < -self.room:
+            say("CS563", last, "the tool leaves a hole sideways", -height[last])
+        return found, False

@@ -1,0 +1,471 @@
+"""Stops of the CL file, and which elements of the program reach them: a small automaton.
+
+A *stop* is a pose that divides the motion: the end of a rapid, a hole, the very first pose. The program reaches them in
+order. A *trace* says which stop it has reached, and whether it is in a hole or after a stop. Each element leads from
+the traces that are possible to those that are possible after it, and only these are carried on: a trace with which an
+element does not agree ends there. Where one is left, all before it is certain.
+
+A program without a trace is wrong. Then the traces that lived longest go on with each fault that explains the element:
+a stop is missing, the element is one too many, it ends elsewhere. What they say of faults are the problems.
+"""
+
+from __future__ import annotations
+
+import math
+from array import array
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from cornersmooth.model import Ints, Move
+from cornersmooth.nc_reader.ahead import Ahead
+from cornersmooth.nc_reader.elements import Elements, Problem
+from cornersmooth.nc_reader.tool import beyond_digits, directions, moving_rapids
+from cornersmooth.statements.cycles import Drilling, drillings
+from cornersmooth.statements.tool_changes import ToolChanges
+from cornersmooth.verify.holes import HoleLines
+from cornersmooth.verify.nearest import COLUMNS, on_segments
+from cornersmooth.verify.rapids import digit_errors
+from cornersmooth.verify.task import Task
+
+#: elements that are given out together
+TOGETHER: Final = 1 << 14
+
+#: stops after a fault among which that of an element is looked for, and traces that are carried on after one: they
+#: decide what is named, and never whether a program passes
+_AFTER_FAULT: Final = 64
+
+#: elements looked through at a time where only one thing can happen, at first
+_FIRST_LOOK: Final = 16
+
+_SURPLUS: Final = "a rapid that the CL file does not have, or a feed move written as one"
+
+
+class Step(NamedTuple):
+    """A stop that is reached.
+
+    Parameters
+    ----------
+    move : int
+        The move that ends there.
+    element : int
+        The element that ends there; the first one of a hole; the first feed move out of a hole.
+    opens : bool
+        Whether feed moves may follow, rather than a hole.
+    last : int
+        Last move before the next stop.
+    """
+
+    move: int
+    element: int
+    opens: bool
+    last: int
+
+
+class Part(NamedTuple):
+    """Elements that are certain: up to `stop`, that excluded."""
+
+    stop: int
+    steps: list[Step]
+
+
+@dataclass(slots=True, eq=False)
+class _Trace:
+    """What the program may have reached."""
+
+    stop: int  #: number of the last stop
+    begin: int  #: the first element in a hole, or the first that is after a stop, as of `Step`
+    inside: bool  #: whether it is in a hole
+    back: _Trace | None  #: what it was before
+    end: int = 0  #: first element that does not belong to the hole before
+    problems: tuple[Problem, ...] = ()  #: what is wrong on the way from there
+    cost: tuple[int, int] = (0, 0)  #: faults so far, and holes left out
+
+    @property
+    def key(self) -> tuple[int, int]:
+        """Traces with the same go on alike."""
+        return self.stop, self.begin if self.inside else -1
+
+    def since(self, alive: list[_Trace]) -> float:
+        """Of two that are as good that with more goes on: one that stays, or comes from a hole that began later."""
+        return math.inf if self in alive or self.back is None else self.back.begin
+
+
+class Stops:
+    """Finds the elements that reach the stops of the CL file, and checks them and the holes.
+
+    Parameters
+    ----------
+    ahead : Ahead
+        At least one element.
+    """
+
+    def __init__(self, task: Task, ahead: Ahead, changes: ToolChanges) -> None:
+        self._task, self._ahead, self._changes = task, ahead, changes
+        self.lines = HoleLines(task.original, ahead, task.axis_length, task.tolerance)
+        #: elements that belong to holes, ascending, three numbers for each: its own, the first move that it may belong
+        #: to, and the last: over holes that are not drilled the tool may be there for the next
+        self.elements = array("q")
+        #: moves of the holes at whose bottom the tool waits, and for how many ms
+        self.dwells: list[tuple[int, float]] = []
+        #: moves of the holes to be tapped in which something is fed
+        self.taps: list[int] = []
+        #: CS561 for holes that the program leaves out and may leave out if asked
+        self.left_out: list[Problem] = []
+        #: CS531 a rapid goes elsewhere, CS532 one is missing, CS533 one too many; CS536 a feed move too many; of holes
+        self.problems: list[Problem] = []
+        self._steps: list[Step] = []
+        self._find_stops()
+
+    def _find_stops(self) -> None:
+        original, lines = self._task.original, self.lines
+        kind, pose, step = lines.kind, original.pose, self._ahead.nc.tip_step
+        rapid, hole = kind == Move.RAPID, kind == Move.HOLE
+        moved = np.append(True, hole[:-1])  # out of a hole a rapid comes from anywhere
+        for values, length in ((lines.tip, 1.0), (lines.axis, lines.axis_length)):
+            moved[1:] |= (np.diff(np.round(length * values / step), axis=0) != 0).any(axis=1)
+        chosen = hole | (rapid & moved)
+        chosen[:1] = True
+        self.moves: Ints = np.flatnonzero(chosen)
+        before = self.moves - 1
+        self._move: list[int] = [*self.moves.tolist(), len(kind)]
+        self._hole: list[bool] = [*hole[self.moves].tolist(), False]
+        #: whether each stop moves the tool by no more than digits show
+        slack = ~(beyond_digits(self._ahead.nc, lines.tip[self.moves] - lines.tip[before]))
+        slack &= np.linalg.norm(lines.axis[self.moves] - lines.axis[before], axis=1) * lines.axis_length <= lines.room
+        slack &= ~hole[self.moves] & ~hole[before]
+        slack[0] = False
+        self._slack: list[bool] = slack.tolist()
+        away = np.linalg.norm(lines.tip - np.repeat(lines.tip[self.moves], np.diff(self._move), axis=0), axis=1)
+        turn = np.linalg.norm(lines.axis - np.repeat(lines.axis[self.moves], np.diff(self._move), axis=0), axis=1)
+        leads = np.maximum(away, lines.axis_length * turn) > lines.room
+        #: whether feed moves follow each stop, and whether they lead anywhere from it
+        self._fed: list[bool] = (np.add.reduceat(~rapid & ~chosen, self.moves) > 0).tolist()
+        self._leads: list[bool] = np.logical_or.reduceat(leads, self.moves).tolist()
+        cycles = drillings(original.program, pose[hole].tolist())
+        self._cycles: dict[int, Drilling] = dict(zip(np.flatnonzero(hole).tolist(), cycles, strict=True))
+        self._holes = np.flatnonzero(hole[self.moves])  # among the stops
+
+    # ------------------------------------------------------------------ reading
+
+    def parts(self) -> Iterator[Part]:
+        """Give out what is certain as it is read."""
+        ahead = self._ahead
+        alive, element, given = [_Trace(-1, -1, False, None)], 0, 0
+        while ahead.has(element):
+            stop = self._pass(alive[0], element) if len(alive) == 1 else element
+            if stop == element:
+                alive = self._after(alive, element)
+                stop += 1
+            element = stop
+            if element - given >= TOGETHER and (sure := self._settle(alive, element)) > given:
+                yield Part(sure, self._steps)
+                given, self._steps = sure, []
+                ahead.forget(sure - _FIRST_LOOK)
+        self._end(alive, element)
+        yield Part(element, self._steps)
+
+    def _settle(self, alive: list[_Trace], element: int) -> int:
+        """Take down what all traces have in common; return the first element that is not certain."""
+        best = min(alive, key=lambda one: one.cost)
+        if best.cost[0]:  # after a fault that will do
+            alive[:] = [best]
+        if len(alive) > 1:
+            return 0
+        self._take(alive[0])
+        return min(element, alive[0].begin) if alive[0].inside else element
+
+    def _pass(self, trace: _Trace, element: int) -> int:
+        """First element from one on with which anything but going on along feed moves or the next rapids can happen."""
+        ahead, lines, k = self._ahead, self.lines, trace.stop
+        if trace.inside or k < 0:
+            return element
+        last = k + 1 == len(self.moves)
+        hole = self._hole[k + 1]
+        if hole and not self._fed[k]:
+            return element
+        size = _FIRST_LOOK if hole else TOGETHER
+        begin = element
+        while ahead.has(element) and element - begin < TOGETHER:
+            stop = min(ahead.count, element + size)
+            rapids = moving_rapids(ahead.nc, max(element - ahead.base, 1), stop - ahead.base) + ahead.base
+            if hole:
+                window = np.arange(element - 1, stop)
+                there = lines.exact(np.full(len(window), self._move[k + 1] - 1), window)
+                rapids = np.concatenate((rapids, window[there] + 1))
+            elif len(rapids) and not last:
+                stops = self.moves[k + 1 : min(k + 1 + len(rapids), self._next_hole(k + 1))]
+                exact = lines.exact(stops, rapids[: len(stops)])
+                count = len(stops) if exact.all() else int(np.argmin(exact))
+                if count:
+                    self._take(trace)
+                    for one in rapids[:count].tolist():
+                        trace.stop, trace.begin = trace.stop + 1, one
+                        self._open(trace)
+                    return int(rapids[count - 1]) + 1
+            if len(rapids):
+                return max(int(rapids.min()), element)
+            element, size = stop, 2 * size
+        return element
+
+    def _next_hole(self, stop: int) -> int:
+        """The first stop from one on that is a hole."""
+        at = int(np.searchsorted(self._holes, stop))
+        return int(self._holes[at]) if at < len(self._holes) else len(self.moves)
+
+    # ------------------------------------------------------------------ the automaton
+
+    def _after(self, alive: list[_Trace], element: int) -> list[_Trace]:
+        """Traces after an element, from those before it."""
+        if self.lines.stands(element):
+            return alive
+        found: dict[tuple[int, int], _Trace] = {}
+
+        def put(one: _Trace) -> None:
+            known = found.setdefault(one.key, one)
+            if (one.cost, -one.since(alive)) < (known.cost, -known.since(alive)):
+                found[one.key] = one
+
+        for trace in alive:
+            for one in self._from(trace, element):
+                put(one)
+        if found:
+            return list(found.values())
+        for trace in alive:
+            for one in self._with_fault(trace, element):
+                put(one)
+        return sorted(found.values(), key=lambda one: one.cost)[:_AFTER_FAULT]
+
+    def _from(self, trace: _Trace, element: int) -> Iterator[_Trace]:
+        """Traces to which an element leads from one without a fault."""
+        here: _Trace | None = trace
+        taken = False
+        while here is not None:
+            for one in self._takes(here, element):
+                taken = True
+                yield one
+            # of holes that may be left out the first that the element may belong to
+            if taken and here is not trace and not (here.inside and self._over(here.stop, element)):
+                return
+            here = self._goes_on(here, element)
+
+    def _takes(self, trace: _Trace, element: int) -> Iterator[_Trace]:
+        """Traces after an element that stays at a stop, reaches the next, or leads out of a hole."""
+        lines, k = self.lines, trace.stop
+        move, following, feeds = self._move[k], self._move[k + 1], lines.feeds(element)
+        rapid = k + 1 < len(self.moves) and not self._hole[k + 1] and (not feeds or k < 0)
+        if not trace.inside:
+            if rapid and lines.at(following, element):
+                yield _Trace(k + 1, element, False, trace, cost=trace.cost)
+            elif k >= 0 and (self._is_fed(k, element) if feeds else self._negligible(element)):
+                yield trace
+            return
+        if self._over(k, element) and (not feeds or element > trace.begin or lines.over(move, max(element - 1, 0))):
+            yield trace
+        if feeds and self._fed[k]:
+            out = element - 1 if lines.at(move + 1, element - 1) else element
+            if out < element or out_of_hole(self._task, self._ahead.nc, element - self._ahead.base, move)[1]:
+                yield self._finished(trace, _Trace(k, out, False, trace), element)
+        elif rapid and lines.at(following, element) and self._done(k, element):
+            yield self._finished(trace, _Trace(k + 1, element, False, trace), element)
+
+    def _goes_on(self, trace: _Trace, element: int) -> _Trace | None:
+        """Trace at the next stop before an element: it begins a hole, or nothing need be there in the program."""
+        lines, k = self.lines, trace.stop
+        following, t = self._move[k + 1], k + 1
+        if t == len(self.moves):
+            return None
+        if trace.inside:
+            passes = self._done(k, element)
+        else:
+            begin = trace.begin - (k >= 0 and self._hole[k])  # out of a hole the first feed move may be the last, too
+            passes = k < 0 or not self._leads[k] or (element - 1 > begin and lines.at(following - 1, element - 1))
+        if not passes:
+            return None
+        if self._hole[t]:
+            if not (self._over(t, element) or self._may_be_left_out(t)):
+                return None
+            there = _Trace(t, element, True, trace, cost=trace.cost)
+        elif trace.inside and lines.at(following, element - 1):
+            there = _Trace(t, element - 1, False, trace)
+        elif not trace.inside and self._slack[t]:
+            there = _Trace(t, trace.begin, False, trace, cost=trace.cost)
+        else:
+            return None
+        if trace.inside:
+            there = self._finished(trace, there, element)
+        return there if not (there.inside and there.problems) else None
+
+    def _with_fault(self, trace: _Trace, element: int) -> Iterator[_Trace]:
+        """Traces to which an element leads from one with a fault."""
+        lines, nc, own = self.lines, self._ahead.nc, element - self._ahead.base
+        feeds = lines.feeds(element)
+        if trace.stop >= 0:
+            code, text = ("CS536", "feed moves that the CL file does not have") if feeds else ("CS533", _SURPLUS)
+            line = int(lines.line[min(self._move[trace.stop + 1], len(lines.line) - 1)])
+            problem = Problem(code, line, int(nc.line[own]), text)
+            yield replace(trace, problems=(*trace.problems, problem), cost=_more(trace.cost, 1))
+        stop = min(trace.stop + 1 + _AFTER_FAULT, len(self.moves))
+        moves = self.moves[trace.stop + 1 : stop]
+        elements = np.full(len(moves), element)
+        hole = lines.kind[moves] == Move.HOLE
+        fits = np.where(hole, ~np.isnan(lines.heights(moves, elements)), lines.exact(moves, elements) & (not feeds))
+        here = trace
+        for t, fit in zip(range(trace.stop + 1, stop), fits.tolist(), strict=True):
+            if here.inside and feeds and self._fed[here.stop]:
+                yield self._finished(here, _Trace(here.stop, element, False, here), element)
+            if fit:
+                there = self._finished(here, _Trace(t, element, self._hole[t], here), element)
+                yield replace(there, cost=_more(here.cost, max(there.cost[0] - here.cost[0], 1)))
+            if t == trace.stop + 1 and not self._hole[t] and (not feeds or t == 0):
+                move = self._move[t]
+                own_amount = digit_errors(nc, np.array([own]), lines.tip[[move]], lines.axis[[move]], lines.axis_length)
+                there = self._finished(here, _Trace(t, element, False, here), element)
+                text, amount = "a rapid does not end at its pose", float(own_amount[1][0])
+                problem = Problem("CS531", int(lines.line[move]), int(nc.line[own]), text, amount)
+                yield replace(there, problems=(*there.problems, problem), cost=_more(there.cost, 1))
+            here = self._without(here, t, element)
+
+    def _without(self, trace: _Trace, stop: int, element: int) -> _Trace:
+        """Trace at the next stop, which is missing before an element; of a hole that is said when it is left."""
+        if self._hole[stop]:
+            return self._finished(trace, _Trace(stop, element, True, trace), element)
+        there = self._finished(trace, _Trace(stop, element - 1 if trace.inside else trace.begin, False, trace), element)
+        if stop == 0 or self._slack[stop]:
+            return there
+        lines, move, ahead = self.lines, self._move[stop], self._ahead
+        first = max(min(trace.begin, element - 1), ahead.base)
+        away = ahead.nc.tip[first - ahead.base : max(element, first + 1) - ahead.base] - lines.tip[move]
+        near = first + int(np.argmin(np.linalg.norm(away, axis=1)))
+        text = "a rapid of the CL file is missing, or is written as a feed move"
+        problem = Problem("CS532", int(lines.line[move]), lines.nc_line(near), text)
+        return replace(there, problems=(*there.problems, problem), cost=_more(there.cost, 1))
+
+    def _finished(self, trace: _Trace, there: _Trace, element: int) -> _Trace:
+        """The trace out of another before an element, with what is wrong with the hole that it comes from."""
+        there.cost = trace.cost
+        if not trace.inside:
+            return there
+        lines, k = self.lines, trace.stop
+        move = self._move[k]
+        there.end = element
+        before = lines.height(move, element - 1) if element > trace.begin else math.inf
+        if (before < -lines.room or not there.inside) and self._ahead.has(element) and not lines.feeds(element):
+            there.end += lines.height(move, element) > before  # the way up is the hole's, wherever else it leads
+        found, left = lines.check(move, range(trace.begin, there.end), self._cycles[move])
+        if there.stop > k and not self._done(k, element):
+            line = int(lines.line[move + 1])
+            found.append(Problem("CS535", line, lines.nc_line(element - 1), "feed moves of the CL file are missing"))
+        there.problems, there.cost = tuple(found), (trace.cost[0] + len(found), trace.cost[1] + left)
+        return there
+
+    # ------------------------------------------------------------------ what an element may be
+
+    def _over(self, stop: int, element: int) -> bool:
+        """Whether an element ends in the line of a hole, and no tool change parts it from that."""
+        if not self._ahead.has(element):
+            return False
+        first, behind = self._changes.elements_of(int(self._task.original.pose[self._move[stop]]))
+        return first <= element < behind and self.lines.over(self._move[stop], element)
+
+    def _may_be_left_out(self, stop: int) -> bool:
+        cycle = self._cycles[self._move[stop]]
+        return cycle.tap or not cycle.depth > self.lines.room
+
+    def _done(self, stop: int, element: int) -> bool:
+        """Whether no move between a hole and the next stop leads away from where the tool is before an element."""
+        return all(self.lines.at(move, element - 1) for move in range(self._move[stop] + 1, self._move[stop + 1]))
+
+    def _is_fed(self, stop: int, element: int) -> bool:
+        """Whether a feed move may follow a stop; it is only asked for before holes, else the decision says it."""
+        return self._fed[stop] or not self._hole[stop + 1] or self.lines.at(self._move[stop + 1] - 1, element)
+
+    def _negligible(self, element: int) -> bool:
+        """Whether an element moves the tool by no more than digits show."""
+        nc, at = self._ahead.nc, element - self._ahead.base
+        both = slice(at - 1, at + 1)
+        turn = self.lines.axis_length * np.ptp(directions(nc, nc.tip[both], nc.second[both]), axis=0)
+        return at > 0 and not beyond_digits(nc, np.diff(nc.tip[both], axis=0))[0] and max(turn) <= self.lines.room
+
+    # ------------------------------------------------------------------ what is certain
+
+    def _end(self, alive: list[_Trace], element: int) -> None:
+        """Take down the rest at the end of the program."""
+        last = len(self.moves) - 1
+        ends = []
+        for trace in alive:
+            here: _Trace | None = trace
+            while here is not None:
+                if here.stop == last:
+                    ends.append(self._finished(here, _Trace(last + 1, element, True, here), element))
+                here = self._goes_on(here, element)
+        if not ends or min(ends, key=lambda one: one.cost).cost[0] > min(alive, key=lambda one: one.cost).cost[0]:
+            here = min(alive, key=lambda one: one.cost)
+            for t in range(here.stop + 1, last + 1):
+                here = self._without(here, t, element)
+            ends.append(self._finished(here, _Trace(last + 1, element, True, here), element))
+        self._take(min(ends, key=lambda one: one.cost))
+
+    def _take(self, trace: _Trace) -> None:
+        """Take down what has happened up to a trace."""
+        chain = []
+        one = trace
+        while one.back is not None:
+            chain.append(one)
+            one = one.back
+        for one in reversed(chain):
+            before = one.back
+            assert before is not None
+            self.problems += one.problems
+            if before.inside:
+                self._drilled(before, one.end, left=one.cost[1] > before.cost[1])
+            if not one.inside and (before.inside or one.begin > before.begin):
+                self._open(one)
+            elif one.inside and not before.inside and one.stop < len(self.moves):
+                self._steps.append(Step(self._move[one.stop], one.begin, False, -1))
+        trace.back, trace.problems = None, ()
+
+    def _open(self, trace: _Trace) -> None:
+        last = self._move[trace.stop + 1] - 1
+        self._steps.append(Step(self._move[trace.stop], trace.begin, True, last))
+
+    def _drilled(self, trace: _Trace, end: int, *, left: bool) -> None:
+        """Take down a hole."""
+        lines, k = self.lines, trace.stop
+        move = self._move[k]
+        cycle = self._cycles[move]
+        group = [one for one in range(trace.begin, end) if lines.over(move, one)]
+        fed = any(lines.feeds(one) for one in group)
+        for one in group:  # of several in one hole the first: what follows may leave nothing in the program
+            if one > (self.elements[-3] if self.elements else -1) and not lines.stands(one):
+                last = k
+                while not fed and self._hole[last + 1] and (last == k or self._may_be_left_out(last)):
+                    if not self._over(last + 1, one):
+                        break
+                    last += 1
+                self.elements.extend((one, move, self._move[last]))
+        if left:
+            near = lines.nc_line(group[0]) if group else 0
+            text = f"a hole of the CL file is not {'tapped' if cycle.tap else 'drilled'}"
+            self.left_out.append(Problem("CS561", int(lines.line[move]), near, text))
+            return
+        if group and cycle.dwell:
+            self.dwells.append((move, cycle.dwell))
+        if cycle.tap:
+            self.taps.append(move)
+
+
+def _more(cost: tuple[int, int], faults: int) -> tuple[int, int]:
+    return cost[0] + faults, cost[1]
+
+
+def out_of_hole(task: Task, nc: Elements, element: int, move: int) -> tuple[float, bool]:
+    """Place on the move after a hole that is nearest to the end of an element, and whether that is within ε."""
+    tip, last = nc.tip[element : element + 1], task.original.trail.last
+    six = task.six(tip, directions(nc, tip, nc.second[element : element + 1]))
+    segment = np.arange(int(last[move]), int(last[move + 1]))
+    share, square = on_segments(six[None], task.path.points, segment[None], COLUMNS["both"])
+    nearest = int(np.argmin(square))
+    return float(segment[nearest] + share[0, nearest]), bool(square[0, nearest] <= task.radius**2)
