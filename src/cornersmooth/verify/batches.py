@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from cornersmooth.model import Floats, Move
 from cornersmooth.nc_reader.ahead import Ahead
 from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem
-from cornersmooth.nc_reader.tool import directions
 from cornersmooth.statements.tool_changes import ToolChanges
 from cornersmooth.verify.decision import Decision
 from cornersmooth.verify.motions import Motion, written_motion

@@ -75,7 +75,7 @@ class HoleLines:
             window = np.arange(element, min(element + _WINDOW, self.ahead.count))
             first, values = element, getattr(self, what)(np.full(len(window), move), window).tolist()
             if len(self._known) > _WINDOW:
-                self._known.clear()
+                self._known.pop(next(iter(self._known)))
             self._known[what, move] = first, values
         return values[element - first]
 

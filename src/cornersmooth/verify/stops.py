@@ -159,6 +159,8 @@ class Stops:
             if stop == element:
                 alive = self._after(alive, element)
                 stop += 1
+            if len(alive) == 1:
+                self._take(alive[0])
             element = stop
             if element - given >= TOGETHER and (sure := self._settle(alive, element)) > given:
                 yield Part(sure, self._steps)
@@ -174,7 +176,7 @@ class Stops:
             alive[:] = [best]
         if len(alive) > 1:
             return 0
-        self._take(alive[0])
+        self._take(best)
         return min(element, alive[0].begin) if alive[0].inside else element
 
     def _pass(self, trace: _Trace, element: int) -> int:
