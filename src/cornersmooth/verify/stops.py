@@ -40,6 +40,7 @@ _AFTER_FAULT: Final = 64
 #: elements looked through at a time where only one thing can happen, at first
 _FIRST_LOOK: Final = 16
 
+_ELSEWHERE: Final = "motion that the CL file does not have"
 _SURPLUS: Final = "a rapid that the CL file does not have, or a feed move written as one"
 
 
@@ -308,7 +309,7 @@ class Stops:
             code, text = ("CS536", "feed moves that the CL file does not have") if feeds else ("CS533", _SURPLUS)
             line = int(lines.line[min(self._move[trace.stop + 1], len(lines.line) - 1)])
             problem = Problem(code, line, int(nc.line[own]), text)
-            yield replace(trace, problems=(*trace.problems, problem), cost=_more(trace.cost, 1))
+            yield self._wrong(replace(trace), problem)
         stop = min(trace.stop + 1 + _AFTER_FAULT, len(self.moves))
         moves = self.moves[trace.stop + 1 : stop]
         elements = np.full(len(moves), element)
@@ -320,22 +321,30 @@ class Stops:
                 yield self._finished(here, _Trace(here.stop, element, False, here), element)
             if fit:
                 there = self._finished(here, _Trace(t, element, self._hole[t], here), element)
-                yield replace(there, cost=_more(here.cost, max(there.cost[0] - here.cost[0], 1)))
+                problem = Problem("CS534", int(lines.line[moves[0]]), int(nc.line[own]), _ELSEWHERE)
+                yield there if there.cost[0] > trace.cost[0] else self._wrong(there, problem)
             if t == trace.stop + 1 and not self._hole[t] and (not feeds or t == 0):
                 move = self._move[t]
                 own_amount = digit_errors(nc, np.array([own]), lines.tip[[move]], lines.axis[[move]], lines.axis_length)
                 there = self._finished(here, _Trace(t, element, False, here), element)
                 text, amount = "a rapid does not end at its pose", float(own_amount[1][0])
                 problem = Problem("CS531", int(lines.line[move]), int(nc.line[own]), text, amount)
-                yield replace(there, problems=(*there.problems, problem), cost=_more(there.cost, 1))
+                yield self._wrong(there, problem)
             here = self._without(here, t, element)
+
+    @staticmethod
+    def _wrong(trace: _Trace, problem: Problem) -> _Trace:
+        """The trace with one more problem."""
+        trace.problems += (problem,)
+        trace.cost = trace.cost[0] + 1, trace.cost[1]
+        return trace
 
     def _without(self, trace: _Trace, stop: int, element: int) -> _Trace:
         """Trace at the next stop, which is missing before an element; of a hole that is said when it is left."""
         if self._hole[stop]:
             return self._finished(trace, _Trace(stop, element, True, trace), element)
         there = self._finished(trace, _Trace(stop, element - 1 if trace.inside else trace.begin, False, trace), element)
-        if stop == 0 or self._slack[stop]:
+        if self._slack[stop]:
             return there
         lines, move, ahead = self.lines, self._move[stop], self._ahead
         first = max(min(trace.begin, element - 1), ahead.base)
@@ -343,7 +352,7 @@ class Stops:
         near = first + int(np.argmin(np.linalg.norm(away, axis=1)))
         text = "a rapid of the CL file is missing, or is written as a feed move"
         problem = Problem("CS532", int(lines.line[move]), lines.nc_line(near), text)
-        return replace(there, problems=(*there.problems, problem), cost=_more(there.cost, 1))
+        return self._wrong(there, problem)
 
     def _finished(self, trace: _Trace, there: _Trace, element: int) -> _Trace:
         """The trace out of another before an element, with what is wrong with the hole that it comes from."""
@@ -417,6 +426,7 @@ class Stops:
         while one.back is not None:
             chain.append(one)
             one = one.back
+        self.problems += one.problems
         for one in reversed(chain):
             before = one.back
             assert before is not None
@@ -457,10 +467,6 @@ class Stops:
             self.dwells.append((move, cycle.dwell))
         if cycle.tap:
             self.taps.append(move)
-
-
-def _more(cost: tuple[int, int], faults: int) -> tuple[int, int]:
-    return cost[0] + faults, cost[1]
 
 
 def out_of_hole(task: Task, nc: Elements, element: int, move: int) -> tuple[float, bool]:
