@@ -137,6 +137,9 @@ class HoleLines:
         if math.isnan(cycle.depth) or (cycle.tap and not self.tapped(feeds, cycle)):
             if feeds:
                 say("CS564", feeds[0], "the cycle does not say what is fed here")
+            elif height and (lowest := min(height.values())) < -self.room:
+                element = next(k for k in height if height[k] == lowest)
+                say("CS563", element, f"a rapid goes {-lowest:.4f} mm into the uncut hole", -lowest)
             return found, cycle.tap or not feeds
         if not feeds:
             if cycle.depth > self.room:
@@ -168,6 +171,10 @@ class HoleLines:
             if self.feeds(k):
                 if k == first and math.isnan(before):
                     say("CS563", k, "a feed move enters a hole from the side")
+                if k == first and before < -self.room and self.kind[move - 1] == Move.HOLE:
+                    say("CS563", k, f"a rapid goes {-before:.4f} mm into the uncut hole", -before)
+                if height[k] > max(cycle.clearance, cycle.level) + self.room:
+                    say("CS564", k, "a feed move ends above the heights of the cycle")
                 if self.wrong_feed(k, cycle):
                     feed = self.ahead.nc.feed[k - self.ahead.base]
                     say("CS541", k, f"the feed is {feed:g}, the cycle says {cycle.feed:g}")

@@ -305,11 +305,9 @@ class Stops:
         """Traces to which an element leads from one with a fault."""
         lines, nc, own = self.lines, self._ahead.nc, element - self._ahead.base
         feeds = lines.feeds(element)
-        if trace.stop >= 0:
-            code, text = ("CS536", "feed moves that the CL file does not have") if feeds else ("CS533", _SURPLUS)
-            line = int(lines.line[min(self._move[trace.stop + 1], len(lines.line) - 1)])
-            problem = Problem(code, line, int(nc.line[own]), text)
-            yield self._wrong(replace(trace), problem)
+        code, text = ("CS536", "feed moves that the CL file does not have") if feeds else ("CS533", _SURPLUS)
+        line = int(lines.line[min(self._move[trace.stop + 1], len(lines.line) - 1)])
+        yield self._wrong(replace(trace), Problem(code, line, int(nc.line[own]), text))
         stop = min(trace.stop + 1 + _AFTER_FAULT, len(self.moves))
         moves = self.moves[trace.stop + 1 : stop]
         elements = np.full(len(moves), element)
