@@ -168,20 +168,18 @@ class _Part:
 
     def _open(self, move: int, element: int) -> None:
         """Begin a stretch at a stop."""
-        task, first = self.task, self.move < 0
+        task, at = self.task, element - self.base
         original = task.original
         kind = original.program.kind[original.pose[move]]
         path, last_vertex = task.path, original.trail.last
         start = int(last_vertex[move])
         there = begin = float(path.length[start])
-        if first:
-            at = element - self.base
-            if kind == Move.RAPID and self.held.kind[at] != Element.RAPID:
-                text = "the first rapid is written as a feed move"
-                line = int(original.program.line[original.pose[move]])
-                self.batches.problems.append(Problem("CS532", line, int(self.held.line[at]), text))
-            if kind == Move.HOLE:  # out of it the way begins anywhere
-                there = path.length_at(out_of_hole(task, self.held, at, move)[0])
+        if move == 0 and kind == Move.RAPID and self.held.kind[at] != Element.RAPID:
+            text = "the first rapid is written as a feed move"
+            line = int(original.program.line[original.pose[move]])
+            self.batches.problems.append(Problem("CS532", line, int(self.held.line[at]), text))
+        if kind == Move.HOLE:  # out of it the way begins anywhere
+            there = path.length_at(out_of_hole(task, self.held, at, move)[0])
         self.move, self.element, self.continued, self.told, self.origin = move, element, False, False, None
         self.start, self.fraction, self.share = start, 0.0, 0.0
         if there > begin:

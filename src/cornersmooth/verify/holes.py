@@ -57,7 +57,9 @@ class HoleLines:
         return np.where(on, height, np.nan)
 
     def at(self, move: int, element: int) -> bool:
-        """Whether an element ends exactly at the pose of a move."""
+        """Whether an element ends exactly at the pose of a move, or stands after one that does."""
+        while element > self.ahead.base and not self._of("exact", move, element) and self.stands(element):
+            element -= 1
         return element >= 0 and bool(self._of("exact", move, element))
 
     def height(self, move: int, element: int) -> float:
@@ -120,6 +122,11 @@ class HoleLines:
         fits = off <= ARITHMETIC if least else abs(off) <= 2 * nc.feed_room[own]
         return bool(not fits or nc.per_revolution[own] != cycle.per_revolution)
 
+    def fed_above(self, move: int, element: int, cycle: Drilling) -> bool:
+        """Whether a feed move ends above a hole, where no cycle feeds."""
+        highest = max(cycle.clearance, cycle.level) + self.room
+        return self.feeds(element) and self.height(move, element) > highest
+
     def check(self, move: int, elements: range, cycle: Drilling) -> tuple[list[Problem], bool]:
         """What is wrong with a hole that has some elements, and whether it is left out as it may be.
 
@@ -173,12 +180,12 @@ class HoleLines:
                     say("CS563", k, "a feed move enters a hole from the side")
                 if k == first and before < -self.room and self.kind[move - 1] == Move.HOLE:
                     say("CS563", k, f"a rapid goes {-before:.4f} mm into the uncut hole", -before)
-                if height[k] > max(cycle.clearance, cycle.level) + self.room:
-                    say("CS564", k, "a feed move ends above the heights of the cycle")
                 if self.wrong_feed(k, cycle):
                     feed = self.ahead.nc.feed[k - self.ahead.base]
                     say("CS541", k, f"the feed is {feed:g}, the cycle says {cycle.feed:g}")
                 down = height.get(k - 1, math.inf) > height[k]
+                if down and self.fed_above(move, k, cycle):
+                    say("CS564", k, "a feed move ends above the heights of the cycle")
                 if down and drilled > self.room and self.room < -height[k] <= drilled + ARITHMETIC:
                     say("CS562", k, "a hole is drilled again")
                 drilled, free = max(drilled, -height[k]), min(free, height[k])

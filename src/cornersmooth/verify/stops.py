@@ -187,7 +187,7 @@ class Stops:
             return element
         last = k + 1 == len(self.moves)
         hole = self._hole[k + 1]
-        if hole and not self._fed[k]:
+        if hole and (not self._fed[k] or lines.at(self._move[k + 1] - 1, element - 1)):
             return element
         size = _FIRST_LOOK if hole else TOGETHER
         begin = element
@@ -195,7 +195,7 @@ class Stops:
             stop = min(ahead.count, element + size)
             rapids = moving_rapids(ahead.nc, max(element - ahead.base, 1), stop - ahead.base) + ahead.base
             if hole:
-                window = np.arange(element - 1, stop)
+                window = np.arange(element, stop)
                 there = lines.exact(np.full(len(window), self._move[k + 1] - 1), window)
                 rapids = np.concatenate((rapids, window[there] + 1))
             elif len(rapids) and not last:
@@ -292,6 +292,9 @@ class Stops:
                 return None
             there = _Trace(t, element, True, trace, cost=trace.cost)
         elif trace.inside and lines.at(following, element - 1):
+            move = self._move[k]
+            if lines.fed_above(move, element - 1, self._cycles[move]):  # a rapid written as a feed move
+                return None
             there = _Trace(t, element - 1, False, trace)
         elif not trace.inside and self._slack[t]:
             there = _Trace(t, trace.begin, False, trace, cost=trace.cost)
@@ -404,7 +407,7 @@ class Stops:
         """Take down the rest at the end of the program."""
         last = len(self.moves) - 1
         ends = []
-        for trace in alive:
+        for trace in sorted(alive, key=lambda one: -one.stop):
             here: _Trace | None = trace
             while here is not None:
                 if here.stop == last:
