@@ -127,8 +127,10 @@ class HoleLines:
         highest = max(cycle.clearance, cycle.level) + self.room
         return self.feeds(element) and self.height(move, element) > highest
 
-    def check(self, move: int, elements: range, cycle: Drilling) -> tuple[list[Problem], bool]:
+    def check(self, move: int, elements: range, cycle: Drilling, *, left: bool = True) -> tuple[list[Problem], bool]:
         """What is wrong with a hole that has some elements, and whether it is left out as it may be.
+
+        Where it is not `left` yet, only what nothing can mend that follows.
 
         CS541 a wrong feed, CS561 a hole is missing, CS562 a wrong depth, CS563 a rapid inside or beside a hole, CS564 a
         feed that is not a hole's.
@@ -149,20 +151,20 @@ class HoleLines:
                 say("CS563", element, f"a rapid goes {-lowest:.4f} mm into the uncut hole", -lowest)
             return found, cycle.tap or not feeds
         if not feeds:
-            if cycle.depth > self.room:
+            if left and cycle.depth > self.room:
                 say("CS561", next(iter(height), -1), "a hole of the CL file is not drilled")
             return found, False
         first, last = next(iter(height)), next(reversed(height))
         deepest = min(feeds, key=lambda k: height[k])
         off = height[deepest] + cycle.depth
-        if abs(off) > self.room:
+        if abs(off) > self.room and (left or off < 0):
             text = f"a hole is {abs(off):.4f} mm too {'shallow' if off > 0 else 'deep'}"
             say("CS562", deepest, text, abs(off))
         behind = next((k for k in height if k > deepest), None)
-        if cycle.feed_out and behind is not None and not self.feeds(behind):
+        if cycle.feed_out and behind is not None and not self.feeds(behind) and (left or off <= self.room):
             say("CS563", behind, "a rapid leaves a hole that the tool is to leave at feed")
         before = self.height(move, max(first - 1, 0))
-        low = [(last, cycle.level)] if move + 1 < len(self.tip) and not self.in_line(move, move + 1) else []
+        low = [(last, cycle.level)] if left and move + 1 < len(self.tip) and not self.in_line(move, move + 1) else []
         if move and self.kind[move - 1] == Move.HOLE and math.isnan(before) and not self.feeds(first):
             turned = float(np.linalg.norm(self.axis[move] - self.axis[move - 1]))
             if turned * self.axis_length <= 2 * self.room:
@@ -192,6 +194,6 @@ class HoleLines:
             elif height[k] < free - self.room:
                 where = "into the uncut hole" if free <= 0.0 else "below the height where the feed begins (RAPTO)"
                 say("CS563", k, f"a rapid goes {free - height[k]:.4f} mm {where}", free - height[k])
-        if height[last] < -self.room:
+        if left and height[last] < -self.room:
             say("CS563", last, "the tool leaves a hole sideways", -height[last])
         return found, False

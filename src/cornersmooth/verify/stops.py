@@ -235,7 +235,12 @@ class Stops:
             for one in self._from(trace, element):
                 put(one)
         if found:
-            return list(found.values())
+            after = list(found.values())
+            if len(after) > 1:  # what is wrong with a hole whatever follows ends where another trace is as good
+                good = [one for one in after if not self._is_spoiled(one, element)]
+                best = min(one.cost for one in after)
+                after = good if any(one.cost == best for one in good) else after
+            return after
         for trace in alive:
             for one in self._with_fault(trace, element):
                 put(one)
@@ -389,6 +394,13 @@ class Stops:
     def _done(self, stop: int, element: int) -> bool:
         """Whether no move between a hole and the next stop leads away from where the tool is before an element."""
         return all(self.lines.at(move, element - 1) for move in range(self._move[stop] + 1, self._move[stop + 1]))
+
+    def _is_spoiled(self, trace: _Trace, element: int) -> bool:
+        """Whether something is wrong with the hole that a trace is in, up to an element, whatever follows."""
+        if not trace.inside:
+            return False
+        move = self._move[trace.stop]
+        return bool(self.lines.check(move, range(trace.begin, element + 1), self._cycles[move], left=False)[0])
 
     def _is_fed(self, stop: int, element: int) -> bool:
         """Whether a feed move may follow a stop; it is only asked for before holes, else the decision says it."""
