@@ -170,7 +170,7 @@ class _Part:
         """Begin a stretch at a stop."""
         task, at = self.task, element - self.base
         original = task.original
-        kind = original.program.kind[original.pose[move]]
+        kind = int(original.program.kind[original.pose[move]])
         path, last_vertex = task.path, original.trail.last
         start = int(last_vertex[move])
         there = begin = float(path.length[start])
