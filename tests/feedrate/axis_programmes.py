@@ -12,9 +12,9 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from linear_programmes import NARROWEST, WIDEST, _crawl, _differences, _duration, after_step, node_caps
+from linear_programmes import NARROWEST, WIDEST, _crawl, _duration, after_step, node_caps
 from scipy.optimize import linprog
-from scipy.sparse import csr_array, diags_array, vstack
+from scipy.sparse import csr_array, diags_array, eye_array, hstack, vstack
 
 from cornersmooth.feedrate.intervals import path_limits
 from cornersmooth.feedrate.limits import Limits
@@ -47,7 +47,7 @@ def reference_time(law: TimeLaw, limits: Limits, step: float) -> float:
     sides = [orders(x[1:-1] + away) for away in (BESIDE, -BESIDE)]
     speed, accel, jerk = axes.limits
     h, n = np.diff(x), len(x) - 2
-    speed_limits = path_limits(path, limits).whole
+    speed_limits = path_limits(path, limits)
     upper = node_caps(x, speed_limits.edge, speed_limits.cap)[1:-1].copy()
     for one, _, _ in sides:
         upper = np.minimum(upper, ((speed / np.maximum(np.abs(one), 1e-12)) ** 2).min(axis=1))
@@ -55,41 +55,46 @@ def reference_time(law: TimeLaw, limits: Limits, step: float) -> float:
         rate = np.maximum(np.abs(sides[0][0][at]), np.abs(orders(end)[0][0]))
         slowest = min(limits.jerk, float((jerk / np.maximum(rate, 1e-12)).min()))
         upper[at] = min(upper[at], (4.5 * slowest * length**2) ** (2.0 / 3.0))
-    slopes, middle, bend = _operators(x, h, n)
-
-    def rows(order: int) -> list[Any]:
-        found = []
-        for one, two, three in sides:
-            for k in range(axes.limits.shape[1]):
-                if order == 2:
-                    found.append(_scaled(two[:, k] / accel[k], None) + _scaled(0.5 * one[:, k] / accel[k], middle))
-                else:
-                    cross = _scaled(1.5 * two[:, k] / jerk[k], middle) + _scaled(one[:, k] / jerk[k], bend)
-                    found.append(_scaled(three[:, k] / jerk[k], None) + cross)
-        return found
-
-    straight = [slopes / (2.0 * limits.accel), *rows(2)]
-    curved = [bend / limits.jerk, *rows(3)]
+    # unknowns are z and z′ at the inner nodes; z″ is constant in a step and may jump from one to the next
+    eye, none = eye_array(n, format="csr"), csr_array((n, n))
+    z_at, slope_at = hstack([eye, none], format="csr"), hstack([none, eye], format="csr")
+    inner = h[1:-1]
+    bend = diags_array(0.5 / inner) @ (slope_at[1:] - slope_at[:-1])
+    joined = z_at[1:] - z_at[:-1] - diags_array(0.5 * inner) @ (slope_at[1:] + slope_at[:-1])
+    rest = vstack([slope_at[[at]] - side * 4.0 / 3.0 / h[at] * z_at[[at]] for at, side in ((0, 1.0), (-1, -1.0))])
+    equal = vstack([joined, rest])
+    straight, curved = [slope_at / (2.0 * limits.accel)], [(bend / limits.jerk, slice(0, -1))]
+    curved.append((bend / limits.jerk, slice(1, None)))
+    for (one, two, three), nodes in zip(sides, (slice(0, -1), slice(1, None)), strict=True):
+        for k in range(axes.limits.shape[1]):
+            straight.append(_scaled(two[:, k] / accel[k], z_at) + _scaled(0.5 * one[:, k] / accel[k], slope_at))
+            parts = [(values[nodes, k] / jerk[k]) for values in (one, 1.5 * two, three)]
+            forms = (bend, slope_at[nodes], z_at[nodes])
+            curved.append((sum(_scaled(part, form) for part, form in zip(parts, forms, strict=True)), nodes))
     z = 0.1 * _crawl(upper, h)
     time, reach = _duration(z, h), WIDEST
     for _ in range(ROUNDS):
-        scale, root = diags_array(z), diags_array(z**0.5)
-        tangent = diags_array(np.full(n, 0.5))
+        scale = diags_array(np.concatenate((z, np.full(n, 2.0 * limits.accel))))
+        tangent = hstack([diags_array(np.full(n, 0.5)), none], format="csr")
         matrices, right = [], []
-        for row in curved:
-            own = root @ row @ scale
-            matrices += [own + tangent, -own + tangent]
-            right += [np.full(n, 1.5)] * 2
+        for row, nodes in curved:
+            own = diags_array(z[nodes] ** 0.5) @ row @ scale
+            matrices += [own + tangent[nodes], -own + tangent[nodes]]
+            right += [np.full(own.shape[0], 1.5)] * 2
         for row in straight:
             own = row @ scale
             matrices += [own, -own]
             right += [np.ones(own.shape[0])] * 2
         gain = 0.5 * (h[1:] + h[:-1]) * z**-0.5
-        bounds = np.stack((np.full(n, 1.0 / reach), np.minimum(upper / z, reach)), axis=1)
+        bounds = np.concatenate(
+            (np.stack((np.full(n, 1.0 / reach), np.minimum(upper / z, reach)), axis=1), np.tile([-2.0, 2.0], (n, 1)))
+        )
         problem: dict[str, Any] = {
-            "c": -gain / gain.mean(),
+            "c": np.concatenate((-gain / gain.mean(), np.zeros(n))),
             "A_ub": vstack(matrices, format="csr"),
             "b_ub": np.concatenate(right),
+            "A_eq": equal @ scale,
+            "b_eq": np.zeros(n + 1),
             "bounds": bounds,
         }
         # the interior-point method is the faster one; it may give up on a programme that the simplex method solves
@@ -97,21 +102,11 @@ def reference_time(law: TimeLaw, limits: Limits, step: float) -> float:
         found: Any = next((result.x for result in results if result.x is not None), None)
         if found is None:
             raise ArithmeticError("the linear programme has no solution")
-        z, time, reach = after_step(z, found * z, h, time, reach)
+        z, time, reach = after_step(z, found[:n] * z, h, time, reach)
         if reach < NARROWEST:
             break
     return time
 
 
 def _scaled(factor: Floats, matrix: Any) -> Any:
-    return diags_array(factor) if matrix is None else diags_array(factor) @ matrix
-
-
-def _operators(x: Floats, h: Floats, n: int) -> tuple[Any, Any, Any]:
-    """z′ in the middle of every step (n + 1, n), z′ and z″/2 at the nodes (n, n), from z at the inner nodes."""
-    ends = csr_array(([4.0 / 3.0 / h[0], -4.0 / 3.0 / h[-1]], ([0, 1], [0, n - 1])), shape=(2, n))
-    slopes = vstack([ends[[0]], _differences(1.0 / h[1:-1]), ends[[1]]], format="csr")
-    places = np.concatenate((x[1:2], 0.5 * (x[1:-2] + x[2:-1]), x[-2:-1]))
-    rows = np.arange(n)
-    halves = np.full(2 * n, 0.5), (np.tile(rows, 2), np.concatenate((rows, rows + 1)))
-    return slopes, csr_array(halves, shape=(n, n + 1)) @ slopes, _differences(0.5 / np.diff(places)) @ slopes
+    return diags_array(factor) @ matrix

@@ -50,7 +50,7 @@ def reference_time(path: Path, limits: Limits, resolution: Resolution = FINE) ->
     resolution : Resolution
         How close the nodes are.
     """
-    speed_limits, stops = path_limits(path, limits).whole, np.flatnonzero(path.junction_speed == 0.0)
+    speed_limits, stops = path_limits(path, limits), np.flatnonzero(path.junction_speed == 0.0)
     total = 0.0
     for run, lead in enumerate(stops[:-1]):
         accel, jerk = limits.accel, limits.jerk

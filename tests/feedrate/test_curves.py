@@ -78,7 +78,7 @@ def test_curvature_bounds_the_speed(turn: float, weights: tuple[float, float]) -
     tip = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [4.0 + 3.0 * np.cos(bend), 3.0 * np.sin(bend), 0.0]])
     smoothed = smooth(Program.from_poses(tip, [[0.0, 0.0, 1.0]] * 3), Settings(tolerance=0.05, weights=weights))
     path = build_path(smoothed.program, smoothed.corners, smoothed.settings, limits)
-    found = path_limits(path, limits).whole
+    found = path_limits(path, limits)
     x = np.linspace(0.0, found.edge[-1], 20_001)[1:-1]
     element = np.searchsorted(np.cumsum(path.length), x)
     kappa = poses(path, element, x - np.append(0.0, np.cumsum(path.length))[element])[2]

@@ -12,7 +12,7 @@ import pytest
 
 from cornersmooth.cl import read
 from cornersmooth.errors import InputError, SettingsError
-from cornersmooth.feedrate import Limits, direct, plan, planner, signed_limits
+from cornersmooth.feedrate import Limits, direct, plan, planner
 from cornersmooth.feedrate.machine_axes import MachineAxes, follow
 from cornersmooth.feedrate.motion import poses, shares_at
 from cornersmooth.feedrate.path import Path, build_path
@@ -295,8 +295,8 @@ def test_refusals() -> None:
         plan(smoothed, machine=replace(load_machine("table-ac"), dynamics=()))
 
 
-def test_a_place_where_sums_are_kept_costs_the_rest_of_its_run_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Beside the pole of the machine signs do not help; away from it they make the plan 7 % faster."""
+def test_limits_hold_on_a_run_past_the_pole() -> None:
+    """At every moment, from the exact derivatives, and one of them is used all but whole."""
     rng = np.random.default_rng(3)
     number = np.arange(1560, 1590)
     heading = np.cumsum(0.15 * rng.normal(size=len(number)))
@@ -305,13 +305,11 @@ def test_a_place_where_sums_are_kept_costs_the_rest_of_its_run_nothing(monkeypat
     axis = np.stack((0.3 * np.sin(0.02 * number), 0.2 * np.cos(0.013 * number), np.ones(len(number))), axis=1)
     smoothed = smooth(Program.from_poses(tip, axis, feed=3000.0), Settings(tolerance=0.01))
     machine = load_machine("table-ac")
-    with_signs = plan(smoothed, Limits(), machine=machine)
-    _, *rates = with_signs.axes_at(np.linspace(0.0, with_signs.total, 40_001)[1:-1])
-    assert with_signs.machine_axes is not None
-    for rate, most in zip(rates, with_signs.machine_axes.limits, strict=True):
-        assert (np.abs(rate) <= most).all()
-    monkeypatch.setattr(signed_limits, "ROUNDS", 0)
-    assert with_signs.total < 0.95 * plan(smoothed, Limits(), machine=machine).total
+    law = plan(smoothed, Limits(), machine=machine)
+    _, *rates = law.axes_at(np.linspace(0.0, law.total, 40_001)[1:-1])
+    assert law.machine_axes is not None
+    used = [(np.abs(rate) / most).max() for rate, most in zip(rates, law.machine_axes.limits, strict=True)]
+    assert 0.98 < max(used) <= 1.0
 
 
 def test_at_a_stop_the_jerk_is_that_of_the_move_that_ends() -> None:

@@ -67,11 +67,11 @@ def test_text_of_the_poses_keeps_the_limits_of_a_machine() -> None:
 def test_no_block_is_passed_sooner_than_its_time() -> None:
     program = zigzag()
     text = text_of(kept(program), tolerance=0.01)
-    law = planned(text, BlockLimits(block_time=0.08))
+    law = planned(text, BlockLimits(block_time=0.1))
     took = np.diff(law.times_at(law.edge))
-    assert took.min() >= 0.08 * (1 - 1e-6)
+    assert took.min() >= 0.1 * (1 - 1e-6)
     assert law.total > planned(text).total
-    assert law.total >= 0.08 * (len(program) - 1) * (1 - 1e-6)
+    assert law.total >= 0.1 * (len(program) - 1) * (1 - 1e-6)
 
 
 @pytest.mark.parametrize("known", [1, 3, 10])

@@ -23,10 +23,14 @@ SMALLEST = 1e-12
 class Resolution:
     """How fine the cells are."""
 
-    part: float = 0.1  #: length of a cell at a change of the speed limit, over v·√(v/J)
-    growth: float = 0.06  #: growth of the cells per length
+    part: float = 0.07  #: length of a cell at a change of the speed limit, over v·√(v/J)
+    growth: float = 0.12  #: growth of the cells per length
     end: float = 0.7  #: length of the cell next to a stop, over the way covered while the jerk is constant there
     fewest: int = 40  #: cells in a run at least
+
+
+#: where more is limited than the way itself
+FINER = Resolution(part=0.05, growth=0.06)
 
 
 @dataclass(frozen=True)
@@ -36,7 +40,9 @@ class Grid:
     start: Floats  #: (n,) mm
     width: Floats  #: (n,) mm
     cap: Floats  #: (n,): bound of v² over the whole cell
-    rows: Floats  #: (5, n): largest rows of `Intervals` in the cell
+    #: (n,): limits along the path
+    accel: Floats
+    jerk: Floats
     first: Ints  #: (r,): first cell of each run
 
     @property
@@ -54,7 +60,10 @@ class Grid:
         size = self.last - self.first + 1
         cells = np.repeat(runs, size)
         first = np.cumsum(size[runs]) - size[runs]
-        return Grid(self.start[cells], self.width[cells], self.cap[cells], self.rows[:, cells], first)
+        start, width, cap, accel, jerk = (
+            part[cells] for part in (self.start, self.width, self.cap, self.accel, self.jerk)
+        )
+        return Grid(start, width, cap, accel, jerk, first)
 
 
 def make_grid(limits: Intervals, runs: Ints, resolution: Resolution | None = None) -> Grid:
@@ -65,7 +74,8 @@ def make_grid(limits: Intervals, runs: Ints, resolution: Resolution | None = Non
     runs : (r,) int64
         Which runs, ascending.
     """
-    resolution = Resolution() if resolution is None else resolution
+    if resolution is None:
+        resolution = FINER if limits.aligned else Resolution()
     begin, end = limits.edge[limits.run[runs]], limits.edge[limits.run[runs + 1]]
     accel, jerk = limits.accel[runs], limits.jerk[runs]
     # intervals of all runs, and the bound of the one before
@@ -81,19 +91,23 @@ def make_grid(limits: Intervals, runs: Ints, resolution: Resolution | None = Non
 
     # the cells next to the stops
     front, back = _end_cells(half_speed, run, low, change, begin, end, accel, jerk)
+    if limits.aligned:
+        front = np.minimum(front, limits.edge[limits.run[runs] + 1] - begin)
+        back = np.minimum(back, end - limits.edge[limits.run[runs + 1] - 1])
     smallest = SMALLEST * limits.edge[-1]
     least = np.minimum(smallest, (end - begin) / 12.0)  # else a cell far along the path may have no length at all
     front, back = np.maximum(resolution.end * front, least), np.maximum(resolution.end * back, least)
 
     # knots where the size of the cells is given: where the limit changes, and next to the end cells
     slow = np.sqrt(np.minimum(cap, before))
-    size = (resolution.part * slow**1.5 / np.sqrt(jerk[run]))[change]
-    inner = np.clip(low, (begin + front)[run], (end - back)[run])[change]
+    inside = np.ones(len(run), np.bool_) if limits.aligned else change
+    size = np.where(change, resolution.part * slow**1.5 / np.sqrt(jerk[run]), np.inf)[inside]
+    inner = np.clip(low, (begin + front)[run], (end - back)[run])[inside]
     knot = np.concatenate((begin + front, inner, end - back))
     size = np.concatenate((resolution.growth * front, size, resolution.growth * back))
     # in order along the path; the ends of a run enclose its changes
     rank = np.repeat([0, 1, 2], (len(runs), len(inner), len(runs)))
-    run = np.concatenate((np.arange(len(runs)), run[change], np.arange(len(runs))))
+    run = np.concatenate((np.arange(len(runs)), run[inside], np.arange(len(runs))))
     order = np.lexsort((knot, rank, run))
     knot, size, run = knot[order], size[order], run[order]
 
@@ -101,21 +115,22 @@ def make_grid(limits: Intervals, runs: Ints, resolution: Resolution | None = Non
     size = np.maximum(size, smallest)
     size = g * knot + np.minimum.accumulate(size - g * knot)
     size = -g * knot + np.minimum.accumulate((size + g * knot)[::-1])[::-1]
-    left, right = np.flatnonzero(run[1:] == run[:-1]), np.flatnonzero(run[1:] == run[:-1]) + 1
+    left = np.flatnonzero((run[1:] == run[:-1]) & (np.diff(knot) > (smallest if limits.aligned else -1.0)))
+    right = left + 1
     gap = knot[right] - knot[left]
     peak = 0.5 * (size[left] + size[right] + g * gap)
     up, down = (np.log(np.maximum(peak / size[side], 1.0)) / g for side in (left, right))
+    # cells of one size, over the gaps that no cell lies across
+    of_gap = np.arange(len(gap)) if limits.aligned else run[left]
+    low_at, high_at = (np.searchsorted(of_gap, np.arange(of_gap[-1] + 1), side=side) for side in ("left", "right"))
     summed = np.concatenate(([0.0], np.cumsum(up + down)))
-    of_knot = run[left]
-    low_at = np.searchsorted(of_knot, np.arange(len(runs)), side="left")
-    high_at = np.searchsorted(of_knot, np.arange(len(runs)), side="right")
-    amount = summed[high_at] - summed[low_at]
-    cells = np.maximum(np.ceil(amount).astype(np.int64), resolution.fewest)
+    amount, owner = summed[high_at] - summed[low_at], run[left[low_at]]
+    share = amount / np.bincount(owner, amount)[owner]
+    cells = np.ceil(np.maximum(amount, resolution.fewest * share)).astype(np.int64)
 
     # borders at equal parts of ∫ds/size, found in closed form between two knots
-    borders = cells + 1
-    of_border = np.repeat(np.arange(len(runs)), borders)
-    number = np.arange(len(of_border)) - np.repeat(np.cumsum(borders) - borders, borders)
+    of_border = np.repeat(np.arange(len(cells)), cells)
+    number = np.arange(len(of_border)) - np.repeat(np.cumsum(cells) - cells, cells)
     target = summed[low_at][of_border] + amount[of_border] * number / cells[of_border]
     at = np.clip(np.searchsorted(summed, target, side="right") - 1, low_at[of_border], high_at[of_border] - 1)
     rest = target - summed[at]
@@ -124,25 +139,21 @@ def make_grid(limits: Intervals, runs: Ints, resolution: Resolution | None = Non
     border = np.where(rest <= up[at], knot[left][at] + forth, knot[right][at] - back_way)
 
     # two more cells per run, next to the stops
-    first = np.cumsum(cells + 2) - (cells + 2)
-    edge = np.insert(border, np.cumsum(borders) - borders, begin)
-    edge = np.insert(edge, np.cumsum(borders + 1), end)
-    starts = np.ones(len(edge), np.bool_)
-    starts[np.cumsum(borders + 2) - 1] = False
-    at_start = np.flatnonzero(starts)
-    start, stop = edge[at_start], edge[at_start + 1]
-    grid = Grid(start, stop - start, np.full(len(start), np.inf), np.zeros((5, len(start))), first)
-    return in_cells(limits, grid, runs)
+    count = np.bincount(owner, cells).astype(np.int64)
+    after = np.cumsum(count)
+    start = np.insert(border, np.append(after, after - count), np.append(end - back, begin))
+    first = np.cumsum(count + 2) - (count + 2)
+    stop = np.append(start[1:], 0.0)
+    stop[first + count + 1] = end
+    accel, jerk = (np.repeat(limit, count + 2) for limit in (accel, jerk))
+    return in_cells(limits, Grid(start, stop - start, np.full(len(start), np.inf), accel, jerk, first), runs)
 
 
 def in_cells(limits: Intervals, grid: Grid, runs: Ints) -> Grid:
     """Cells with the strictest limits of all intervals that each meets."""
     met = cell_intervals(limits, grid, runs)
     cap = np.minimum.reduceat(np.append(limits.cap, np.inf), met)[::2]
-    rows = [
-        np.maximum.reduceat(np.append(row, 0.0), met)[::2] if row.any() else np.zeros(len(cap)) for row in limits.rows
-    ]
-    return replace(grid, cap=cap, rows=np.stack(rows))
+    return replace(grid, cap=cap)
 
 
 def _end_cells(

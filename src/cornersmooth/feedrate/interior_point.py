@@ -30,8 +30,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from cornersmooth.feedrate.normal_equations import Equations
-from cornersmooth.feedrate.speed_problem import Batch, weight_of_z
+from cornersmooth.feedrate.speed_problem import Batch, ahead, around, behind
+from cornersmooth.lapack import dpbtrf, dpbtrs
 from cornersmooth.model import Floats
 
 #: the remaining duality gap over the time, at which the profile is taken
@@ -39,7 +39,9 @@ GAP = 2e-4
 #: change of the time in one step, over what may remain, below which the dual variables are taken to have arrived too
 SETTLED = 5.0
 #: duality gap over the time that multipliers begin with, and where a plan that keeps most of the limits is known
-COLD, WARM = 5.0, 1.0
+COLD, WARM = 5.0, 0.3
+#: steps that together have to bring more than that
+PATIENCE = 10
 #: least part of the gap that a step aims at
 LEAST_FALL = 1e-3
 #: Newton steps after which the profile is taken as it is; it is feasible at every step
@@ -48,6 +50,11 @@ MAX_STEPS = 500
 TO_LIMIT = 0.95
 #: part of a step below which the next one goes back to the middle, and by what the barrier rises there
 SHORT, RAISED = 0.1, 2.0
+
+#: what is added to the main diagonal of the normal equations, relative to it, where they cannot be solved without
+_RIDGES = (0.0, 1e-12, 1e-9, 1e-6, 1e-3)
+#: stiffness of what ties coefficients, over that of the limits
+_STIFF = 1e8
 
 
 def solve(batch: Batch, c: Floats, gap: float = GAP, most: int = MAX_STEPS, begin: float = COLD) -> Floats:
@@ -72,25 +79,24 @@ def solve(batch: Batch, c: Floats, gap: float = GAP, most: int = MAX_STEPS, begi
     slack, z = batch.slacks(c)
     time = float((batch.weight / np.sqrt(c)).sum())
     dual = begin * time / slack.size / slack
-    worst = 1.0
+    worst, fall, times = 1.0, time, [np.inf]
     for _ in range(most):
         bites = [0.5 * values**-1.5 for values in z]  # −d(z^(−1/2))/dz
-        equations = Equations.of(batch, c, dual / slack, bites)
-        change, toward = np.zeros_like(slack), np.zeros_like(dual)
-        mean, aim = float((dual * slack).sum()) / slack.size, 0.0
-        for trial in (True, False):
-            pressure = (aim + change * toward) / slack
-            step = equations.step(pressure)
-            change = _change(batch, step, bites)
-            relative = change / slack
-            toward = pressure - dual + dual * relative
-            dual_length = min(1.0, TO_LIMIT / max(float((-toward / dual).max()), TO_LIMIT))
-            length = min(1.0, TO_LIMIT / max(float(relative.max()), float((-step / c).max()), TO_LIMIT))
-            if trial:
-                left = float(((dual + dual_length * toward) * (slack - length * change)).sum()) / slack.size
-                aim = mean * max((left / mean) ** 3, LEAST_FALL)
-                if worst < SHORT:
-                    aim, change = mean * RAISED, np.zeros_like(slack)
+        inverse, product = 1.0 / slack, dual * slack
+        mean = float(product.sum()) / slack.size
+        factors = _factors(_normal_matrix(batch, c, dual * inverse, bites))
+        step = _step(batch, c, factors, None, bites)
+        used = _change(batch, step, bites) * inverse  # part of the way to each limit
+        length, dual_length = (_length(float(most_used)) for most_used in (used.max(), 1.0 - used.min()))
+        left = float((product * (1.0 + dual_length * (used - 1.0)) * (1.0 - length * used)).sum()) / slack.size
+        # while the time falls the forces are not in balance, and limits that are too near hold it up
+        aim = max(mean * max((left / mean) ** 3, LEAST_FALL), min(fall / slack.size, mean))
+        forces = np.full_like(slack, mean * RAISED) if worst < SHORT else aim + product * used * (used - 1.0)
+        step = _step(batch, c, factors, forces * inverse, bites)
+        used = _change(batch, step, bites) * inverse
+        toward = forces + product * (used - 1.0)
+        dual_length = _length(float((-toward / product).max()))
+        length = _length(max(float(used.max()), float((-step / c).max())))
         while True:
             new_c = c + length * step
             new_slack, new_z = batch.slacks(new_c)
@@ -98,24 +104,101 @@ def solve(batch: Batch, c: Floats, gap: float = GAP, most: int = MAX_STEPS, begi
                 break
             length *= 0.7
         c, slack, z = new_c, new_slack, new_z
-        dual += dual_length * toward
+        dual = (product + dual_length * toward) * inverse
         remaining = float((dual * slack).sum())
         before, time = time, float((batch.weight / np.sqrt(c)).sum())
+        fall = abs(before - time)
         # the gap says how far the time is from the smallest only once the duals balance the forces
         worst = min(length, dual_length)
-        if worst > 0.5 and remaining < gap * time and abs(before - time) < SETTLED * gap * time:
+        if worst > 0.5 and remaining < gap * time and fall < SETTLED * gap * time:
+            break
+        # tangents of jerk limits may turn from step to step without end
+        times.append(time)
+        if times[-PATIENCE:][0] - time < SETTLED * gap * time and remaining < PATIENCE * SETTLED * gap * time:
             break
     return c
 
 
+def _length(most_used: float) -> float:
+    """Part of a step that keeps `TO_LIMIT` of the way to what it meets first."""
+    return min(1.0, TO_LIMIT / max(most_used, TO_LIMIT))
+
+
 def _change(batch: Batch, step: Floats, bites: list[Floats]) -> Floats:
-    """(rows, n) linear change of the limits' left minus right sides with a step of the coefficients."""
-    z, slope, bend = batch.seen_by_rows(step, 0.0)
-    change = np.empty((len(batch.rows), len(step)))
-    for row, into in zip(batch.rows, change, strict=True):
-        np.multiply(weight_of_z(row, bites), z[row.at], out=into)
-        if row.slope is not None:
-            into += row.slope * slope[row.at]
-        if row.bend is not None:
-            into += row.bend * bend
+    """(2, R, n) linear change of the limits' left minus right sides with a step of the coefficients."""
+    near, change = around(step), batch.of_limits()
+    for rows, into, bite in zip(batch.rows, batch.by_rows(change), bites, strict=True):
+        left, z = rows.values(near)
+        into[0] = left
+        np.negative(left, out=into[1])
+        into += bite * z
     return change
+
+
+def _normal_matrix(batch: Batch, c: Floats, stiffness: Floats, bites: list[Floats]) -> Floats:
+    """(3, n) diagonals of the normal equations, from the stiffness (2, R, n) of all limits."""
+    pairs = [(i, j) for i in range(3) for j in range(i, 3)]
+    found = {pair: np.zeros(len(c)) for pair in pairs}
+    found[1, 1] += 0.75 * batch.weight * c**-2.5
+    for rows, both, bite in zip(batch.rows, batch.by_rows(stiffness), bites, strict=True):
+        whole = both[0] + both[1]
+        weighted = whole * rows.left
+        for i, j in pairs:
+            found[i, j] += (weighted[i] * rows.left[j]).sum(axis=0)
+        cross = bite * ((both[0] - both[1]) * rows.left).sum(axis=1)
+        own = bite * bite * whole.sum(axis=0) * rows.right
+        for i, j in pairs:
+            found[i, j] += cross[i] * rows.right[j] + rows.right[i] * (cross[j] + own[j])
+    bands = np.stack(
+        (
+            behind(found[0, 2]),
+            found[0, 1] + behind(found[1, 2]),
+            found[1, 1] + ahead(found[0, 0]) + behind(found[2, 2]),
+        )
+    )
+    _tie(batch, bands)
+    return bands
+
+
+def _step(batch: Batch, c: Floats, factors: Floats | None, pressure: Floats | None, bites: list[Floats]) -> Floats:
+    """Change of the coefficients (n,) under the forces (2, R, n) of the limits."""
+    force = np.zeros((3, len(c)))
+    force[1] = -0.5 * batch.weight * c**-1.5
+    if pressure is not None:
+        for rows, both, bite in zip(batch.rows, batch.by_rows(pressure), bites, strict=True):
+            force += ((both[0] - both[1]) * rows.left).sum(axis=1)
+            force += bite * both.sum(axis=(0, 1)) * rows.right
+    gradient = force[1] + ahead(force[0]) + behind(force[2])
+    step = np.zeros(len(c)) if factors is None else np.asarray(dpbtrs(factors, -gradient)[0], np.float64)
+    if not np.isfinite(step).all():
+        step = np.zeros(len(c))
+    step[batch.frozen] = 0.0
+    batch.follow(step)
+    return step
+
+
+def _factors(bands: Floats) -> Floats | None:
+    """Factors of the matrix; where rounding leaves no positive pivot it is stiffened.
+
+    A stiffened step is shorter or points a little aside: it costs rounds, never a limit.
+    """
+    for ridge in _RIDGES:
+        matrix = np.array(bands, order="F")
+        matrix[-1] *= 1.0 + ridge
+        factors, info = dpbtrf(matrix, overwrite_ab=1)
+        if info == 0 and np.isfinite(factors).all():
+            return np.asarray(factors)
+    return None
+
+
+def _tie(batch: Batch, bands: Floats) -> None:
+    """Tie coefficients next to a rest to their neighbours, and those that stay to their values, by stiff springs."""
+    _, beside, diagonal = bands
+    for end, ratio, inward in ((batch.first, batch.first_ratio, 1), (batch.last, batch.last_ratio, -1)):
+        at, part = end[~np.isnan(ratio)], ratio[~np.isnan(ratio)]
+        to = at + inward
+        spring = _STIFF * (diagonal[at] + diagonal[to])
+        diagonal[at] += spring
+        diagonal[to] += part**2 * spring
+        beside[np.maximum(at, to)] -= part * spring
+    diagonal[batch.frozen] *= _STIFF

@@ -11,15 +11,14 @@ from typing import Literal
 import numpy as np
 
 from cornersmooth.feedrate import scurve
-from cornersmooth.feedrate.grid import in_cells, make_grid
-from cornersmooth.feedrate.intervals import Intervals, PathLimits, path_limits
+from cornersmooth.feedrate.between import fastest
+from cornersmooth.feedrate.grid import make_grid
+from cornersmooth.feedrate.intervals import Intervals, path_limits
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.machine_axes import MachineAxes, follow
 from cornersmooth.feedrate.path import Path, build_path
-from cornersmooth.feedrate.signed_limits import ROUGH, Places, faster
-from cornersmooth.feedrate.speed_problem import problem_of
+from cornersmooth.feedrate.speed_problem import around
 from cornersmooth.feedrate.timelaw import TimeLaw, crossing_time
-from cornersmooth.feedrate.windows import solve_runs
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import Floats, Ints, Program, SmoothProgram
 from cornersmooth.settings import Settings
@@ -171,8 +170,8 @@ def _plan_part(
         path = replace(path, junction_speed=np.minimum(path.junction_speed, machine_axes.jump_speeds(limits.period)))
     path = replace(path, junction_speed=_not_crowded(path, limits.period))
     found = path_limits(path, limits, machine_axes)
-    level = found.whole.level
-    parts = [_level_runs(found.whole, np.flatnonzero(level))]
+    level = found.level
+    parts = [_level_runs(found, np.flatnonzero(level))]
     if not level.all():
         parts.append(_uneven_runs(found, np.flatnonzero(~level), progress))
     run, *phases = (np.concatenate([part[i] for part in parts]) for i in range(7))
@@ -206,29 +205,19 @@ def _level_runs(limits: Intervals, runs: Ints) -> tuple[Floats | Ints, ...]:
     )
 
 
-def _uneven_runs(limits: PathLimits, runs: Ints, progress: Progress | None) -> tuple[Floats | Ints, ...]:
+def _uneven_runs(limits: Intervals, runs: Ints, progress: Progress | None) -> tuple[Floats | Ints, ...]:
     """Phases of runs whose speed limit changes on the way: one per cell."""
-    grid = make_grid(limits.whole, runs)
-    batch = problem_of(grid)
-    if limits.samples is None:
-        c = solve_runs(batch, grid, progress)
-    else:
-        free = in_cells(limits.vectors, grid, runs)
-        c = faster(grid, free, Places.of(grid, runs, limits), batch, solve_runs(batch, grid, progress, gap=ROUGH))
-    z, slope, bend = batch.forms(c)
-    v, a = np.sqrt(z), 0.5 * slope  # at the end of each cell
-    before_v = np.concatenate(([0.0], v[:-1]))
-    before_a = np.concatenate(([0.0], a[:-1]))
-    rate = np.concatenate(([0.0], bend[:-1]))  # of the cell itself
+    grid = make_grid(limits, runs)
+    batch, c = fastest(grid, limits, progress)
+    z, slope, bend = (batch.forms * around(c)).sum(axis=1)
+    v, a = np.sqrt(z), 0.5 * slope  # at the start of each cell
     first, last = grid.first, grid.last
-    moving = np.where(np.isin(np.arange(len(v)), np.concatenate((first, last))), 1.0, before_v + v)
-    duration = crossing_time(grid.width, moving, rate)
+    after_v = np.append(v[1:], 0.0)
+    ends = np.zeros(len(v), np.bool_)
+    ends[first] = ends[last] = True
+    duration = crossing_time(grid.width, np.where(ends, 1.0, v + after_v), np.where(ends, 0.0, bend))
     constant = np.zeros(len(v))
-    duration[first] = 3.0 * grid.width[first] / v[first]
-    duration[last] = 3.0 * grid.width[last] / before_v[last]
-    for end in (first, last):
+    for end, speed in ((first, after_v), (last, v)):
+        duration[end] = 3.0 * grid.width[end] / speed[end]
         constant[end] = 6.0 * grid.width[end] / duration[end] ** 3
-        rate[end] = 0.0
-    before_v[first] = 0.0
-    before_a[first] = 0.0
-    return runs[grid.run], duration, grid.start, before_v, before_a, rate, constant
+    return runs[grid.run], duration, grid.start, v, a, bend, constant

@@ -17,8 +17,8 @@ from cornersmooth.feedrate.scurve import stopping_distance
 from cornersmooth.feedrate.speed_problem import CRAWLING, Batch
 from cornersmooth.model import Floats
 
-#: cells solved together: the arrays of one window stay in the processor's cache
-WINDOW = 8192
+#: limits solved together, cells times rows: the arrays of one window stay in the processor's cache
+WINDOW = 50_000
 
 
 def solve_runs(
@@ -44,23 +44,24 @@ def solve_runs(
     """
     c, begin_with = (batch.start(), COLD) if start is None else (start.copy(), WARM)
     n = len(c)
+    size = WINDOW // batch.ends[-1]
     run = 0
     while run < len(batch.first):
         begin = int(batch.first[run])
-        end_run = int(np.searchsorted(batch.last, begin + WINDOW, side="left"))
+        end_run = int(np.searchsorted(batch.last, begin + size, side="left"))
         end_run = max(end_run, run + 1)
         end = int(batch.last[end_run - 1]) + 1
-        if end - begin <= WINDOW:
+        if end - begin <= size:
             c[begin:end] = solve(batch.window(begin, end), c[begin:end], gap, most, begin_with)
         else:
             at, brake = begin, _braking_distance(batch, grid, begin, end)
             while True:
-                stop = min(at + WINDOW, end)
+                stop = min(at + size, end)
                 c[at:stop] = solve(batch.window(at, stop), c[at:stop], gap, most, begin_with)
                 if stop == end:
                     break
                 keep = int(np.searchsorted(grid.start, grid.start[stop - CRAWLING] - brake))
-                at = min(max(keep, at + WINDOW // 2), stop - CRAWLING - 2)
+                at = min(max(keep, at + size // 2), stop - CRAWLING - 2)
                 if progress is not None:
                     progress(at, n)
         run = end_run
@@ -70,8 +71,7 @@ def solve_runs(
 
 
 def _braking_distance(batch: Batch, grid: Grid, begin: int, end: int) -> float:
-    """Distance in which the fastest motion in some slots can stop under the strictest limits there."""
+    """Distance in which the fastest motion in some cells can stop under the strictest limits there."""
     speed = np.sqrt(grid.cap[begin + 1 : end - 1].max())
-    bends = [np.abs(row.bend[begin:end]).max() for row in batch.rows if row.bend is not None]
-    slopes = [np.abs(row.slope[begin:end]).max() for row in batch.rows if row.bend is None and row.slope is not None]
-    return 1.1 * float(stopping_distance(speed, 0.5 / max(slopes), 1.0 / max(bends)))
+    slope, bend = batch.steepest[:, begin:end].max(axis=1)
+    return 1.1 * float(stopping_distance(speed, 0.5 / slope, 1.0 / bend))

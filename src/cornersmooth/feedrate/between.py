@@ -1,0 +1,130 @@
+"""The fastest profiles under the limits of quantities, and which of these are held where.
+
+Rows of the problem hold the limits of some quantities at the ends and the middle of each cell: those that come nearest
+to their limits there. All quantities are then measured, at the quarters of cells too; where a plan is beyond a limit,
+one more quantity is held, and limits of that cell are made stricter by as much (an exchange method for semi-infinite
+programmes: Hettich and Kortanek 1993). What is still beyond after the last round is slowed down run by run, so that
+every plan keeps every limit. The first profile is that of a problem of the way alone, under limits that let quantities
+all but keep theirs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d
+
+from cornersmooth.feedrate.grid import Grid
+from cornersmooth.feedrate.intervals import Intervals
+from cornersmooth.feedrate.speed_problem import PLACES, Batch, around, problem_of
+from cornersmooth.feedrate.windows import solve_runs
+from cornersmooth.model import Floats
+
+#: quantities that are held in the first round, and cells around that count when they are chosen
+_HELD, _NEAR = 2, 5
+#: most rounds, and how much stricter than seen limits are made
+_ROUNDS, _STRICTER = 6, 1.003
+#: share of the limits that plans keep at all places, and of it that rows keep: the rest is for what lies in between
+_USED = 0.998
+#: share of the limits that one term of a quantity's acceleration or jerk may use of the first profile, and its gap
+_EASE, _ROUGH = 0.5, 0.05
+#: Newton steps of one round: most take 15 to 30; where terms are huge and cancel, hundreds gain next to nothing
+_STEPS = 50
+#: how much slower than the plan before the next one begins, so that it keeps its limits with room to spare
+_SLOWER = 0.97
+#: times that a profile is slowed down until it can be begun with
+_MOST_TRIES = 200
+
+
+def fastest(grid: Grid, limits: Intervals, progress: Callable[[int, int], None] | None) -> tuple[Batch, Floats]:
+    """The problem of a grid, and coefficients (n,) of the fastest profiles that keep all limits."""
+    derivatives = limits.derivatives(grid.start, grid.width, PLACES)
+    bounds = np.repeat(_USED * limits.quantities.bounds[..., None], len(grid.start), axis=2)
+    grid = _from_rest(grid, derivatives, bounds)
+    if not limits.aligned:
+        batch = problem_of(grid, derivatives, bounds)
+        return batch, solve_runs(batch, grid, progress)
+    batch = problem_of(_eased(grid, derivatives, bounds), derivatives[:, :0], bounds[:, :0])
+    c = solve_runs(batch, grid, gap=_ROUGH, most=_STEPS)
+    going, run = np.ones(len(grid.first), np.bool_), grid.run
+    most, stricter = _used(batch, c, grid, derivatives, bounds), np.ones(len(c))
+    for number in range(_ROUNDS):
+        held = np.argsort(-maximum_filter1d(most, _NEAR, axis=1), axis=0)[: _HELD + number]
+        own = (
+            np.take_along_axis(part, held[index], axis=1)
+            for part, index in ((derivatives, np.s_[None, ..., None]), (bounds, np.s_[None]))
+        )
+        batch = problem_of(grid, next(own), _USED * next(own)).tightened(stricter)
+        cells, part = going[run], batch.cells(going[run], going)
+        c[cells] = solve_runs(part, grid.of(going), progress, start=_within(part, c[cells]), most=_STEPS)
+        used = _used(batch, c, grid, derivatives, bounds)
+        of_run = np.maximum.reduceat(used.max(axis=0), grid.first)
+        going = of_run > 1.0
+        if not going.any():
+            break
+        most = np.maximum(most, used)
+        of_held = np.take_along_axis(used, held, axis=0).max(axis=0) / _USED
+        stricter = stricter * np.where(of_held > 1.0, _STRICTER * of_held, 1.0)
+    return batch, c / np.maximum(of_run, 1.0)[run]
+
+
+def _from_rest(grid: Grid, derivatives: Floats, bounds: Floats) -> Grid:
+    """The grid with bounds of z where the cells next to stops end, under which constant jerk keeps all limits there.
+
+    At the part τ of the time of a cell of length e, v = v₁·τ², a = 2·v₁²·τ/(3·e) and the jerk is 2·v₁³/(9·e²).
+    """
+    cap = grid.cap.copy()
+    for cells, sign, tau in ((grid.first, 1.0, np.cbrt(PLACES)), (grid.last, -1.0, np.cbrt(1.0 - PLACES))):
+        e = grid.width[cells]
+        used = np.maximum(2.0 / 3.0 / e / grid.accel[cells], np.cbrt(2.0 / 9.0 / e**2 / grid.jerk[cells]) ** 2)
+        one, two, three = derivatives[:, :, cells]
+        _, accel, jerk = bounds[:, :, cells, None]
+        e = e[:, None]
+        shares = (
+            np.abs(two * tau**4 + sign * one * (2.0 / 3.0) * tau / e) / accel,
+            np.cbrt(np.abs(three * tau**6 + sign * two * 2.0 * tau**3 / e + one * (2.0 / 9.0) / e**2) / jerk) ** 2,
+        )
+        used = np.maximum(used, np.max(shares, axis=(0, 1, 3), initial=0.0))
+        cap[cells] = np.minimum(cap[cells], 1.0 / used)
+    return replace(grid, cap=cap)
+
+
+def _eased(grid: Grid, derivatives: Floats, bounds: Floats) -> Grid:
+    """The grid with limits along the way under which each term of a quantity uses `_EASE` of its limits at most."""
+    one, two, three = np.abs(derivatives).max(axis=-1)
+    _, accel, jerk = _EASE * bounds
+    with np.errstate(divide="ignore"):
+        return replace(
+            grid,
+            cap=np.min((grid.cap, (accel / two).min(axis=0), np.cbrt(jerk / three).min(axis=0) ** 2), axis=0),
+            accel=np.minimum(grid.accel, (accel / one).min(axis=0)),
+            jerk=np.minimum(grid.jerk, (jerk / one).min(axis=0)),
+        )
+
+
+def _used(batch: Batch, c: Floats, grid: Grid, derivatives: Floats, bounds: Floats) -> Floats:
+    """(d, n) largest shares of limits of acceleration and jerk that quantities use at `PLACES` of each cell."""
+    z, slope, bend = (batch.forms * around(c)).sum(axis=1)
+    most = np.zeros(bounds.shape[1:])
+    for place, part in enumerate(PLACES):
+        one, two, three = derivatives[..., place]
+        x = part * grid.width
+        here, steep = np.maximum(z + x * (slope + x * bend), 0.0), slope + 2.0 * x * bend
+        accel = np.abs(two * here + 0.5 * one * steep) / bounds[1]
+        jerk = np.abs(three * here + 1.5 * two * steep + one * bend) * np.sqrt(here) / bounds[2]
+        np.maximum(most, np.maximum(accel, jerk), out=most)
+    most[:, np.concatenate((grid.first, grid.last))] = 0.0  # see `_from_rest`
+    return most
+
+
+def _within(batch: Batch, c: Floats) -> Floats:
+    """Profiles that are slower than the given ones and keep all limits with room to spare."""
+    slower = c * _SLOWER
+    for _ in range(_MOST_TRIES):
+        beyond = np.logical_or.reduceat((batch.slacks(slower)[0] <= 0.0).any(axis=(0, 1)), batch.first)
+        if not beyond.any():
+            break
+        slower = np.where(np.repeat(beyond, batch.last - batch.first + 1), _SLOWER * slower, slower)
+    return slower
