@@ -212,11 +212,12 @@ def test_generous_limits_cost_nothing(chain: Callable[[int], Program]) -> None:
     for seed in (1, 2, 3):
         program = chain(seed)
         smoothed = smooth(program, Settings(tolerance=0.05))
-        assert plan(smoothed, machine=generous).total == pytest.approx(plan(smoothed).total, rel=2e-3)
+        # cells are finer with a machine, which may bring a little
+        assert 0.995 <= plan(smoothed, machine=generous).total / plan(smoothed).total <= 1.002
         for baseline in ("exact_stop", "velocity_jump"):
             free = direct(program, None, baseline)  # type: ignore[arg-type]
             bound = direct(program, None, baseline, machine=generous)  # type: ignore[arg-type]
-            assert bound.total == pytest.approx(free.total, rel=2e-3)
+            assert 0.995 <= bound.total / free.total <= 1.002
 
 
 def test_a_linear_axis_alone() -> None:
