@@ -414,7 +414,7 @@ def test_memory_grows_by_the_curves_and_corners_alone(monkeypatch: pytest.Monkey
 
 
 @pytest.mark.corpus
-def test_a_written_path_has_at_most_a_block_a_pose_and_takes_two_thirds_of_the_time(corpus: Path) -> None:
+def test_a_written_path_has_at_most_a_block_a_pose_and_takes_three_quarters_of_the_time(corpus: Path) -> None:
     """By the planner of finished programs, head and tail of the program among the blocks."""
     whole, times = read(corpus / "hecc_point_zigzag.csv"), []
     program = Program.from_poses(whole.tip[:120], whole.axis[:120], feed=1800.0)
@@ -425,4 +425,4 @@ def test_a_written_path_has_at_most_a_block_a_pose_and_takes_two_thirds_of_the_t
         law = plan_text(back, Limits(feed=1800.0), settings=chosen, machine=load_machine("table-ac"))
         times.append(law.total)
     assert written.blocks <= len(program)
-    assert times[1] <= 0.69 * times[0]
+    assert times[1] <= 0.75 * times[0]

@@ -29,7 +29,7 @@ SMALLEST_RADIUS = 1e-6
 #: intervals looked at together
 _TOGETHER = 8192
 #: an interval is halved where the middle of a derivative misses the mean of its ends by more than this part of a limit
-_EVEN = 0.03
+_EVEN = 0.02
 #: and where the part of a limit of speed that is used at one speed varies so much
 _VARIED = 0.05
 #: and where the curvature, which limits the speed there, varies so much, down to intervals of those of curves alone
@@ -178,7 +178,7 @@ def _divided(quantities: Quantities, asked: Bools, fastest: Floats, centripetal:
     path, start = quantities.path, []
     for bent in (False, True):
         element = np.flatnonzero(asked & (path.bent == bent))
-        borders = np.tile(np.linspace(0.0, 1.0, INTERVALS + 1), (len(element), 1))
+        borders = np.tile(np.linspace(0.0, 1.0, (INTERVALS if bent else 1) + 1), (len(element), 1))
         if bent and not len(quantities):
             borders = rational_curves.interval_borders(path.curves.half[path.row[element]])
         start.append((np.repeat(element, borders.shape[1] - 1), borders[:, :-1].ravel(), borders[:, 1:].ravel()))
