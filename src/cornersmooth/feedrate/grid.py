@@ -30,7 +30,7 @@ class Resolution:
 
 
 #: where more is limited than the way itself
-FINER = Resolution(part=0.05, growth=0.08)
+FINER = Resolution(part=0.05, growth=0.06)
 
 
 @dataclass(frozen=True)

@@ -20,8 +20,8 @@ from cornersmooth.feedrate.path import Kind, Path
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.vectors import norm
 
-#: intervals of a line or arc to begin with
-INTERVALS = 4
+#: intervals of a curve to begin with, and of a line or arc
+INTERVALS, FEW = 4, 2
 #: the cone at the pole in which derivatives are cut off here, over the cone of the machine: smaller, to be safe
 WITHIN = 0.5
 #: a radius of curvature below this is a cusp and is passed with the speed for this radius, mm
@@ -178,7 +178,7 @@ def _divided(quantities: Quantities, asked: Bools, fastest: Floats, centripetal:
     path, start = quantities.path, []
     for bent in (False, True):
         element = np.flatnonzero(asked & (path.bent == bent))
-        borders = np.tile(np.linspace(0.0, 1.0, (INTERVALS if bent else 1) + 1), (len(element), 1))
+        borders = np.tile(np.linspace(0.0, 1.0, (INTERVALS if bent else FEW) + 1), (len(element), 1))
         if bent and not len(quantities):
             borders = rational_curves.interval_borders(path.curves.half[path.row[element]])
         start.append((np.repeat(element, borders.shape[1] - 1), borders[:, :-1].ravel(), borders[:, 1:].ravel()))
