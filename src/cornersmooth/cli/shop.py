@@ -254,16 +254,17 @@ def _all_keys() -> set[str]:
 def _checked(option: click.Option, value: Any, file: str, where: str) -> Any:
     """Value as the option takes it."""
     if option.is_flag:
-        good, hint = isinstance(value, bool), "give true or false"
-    elif option.multiple:
-        good, hint = isinstance(value, list) and all(isinstance(one, str) for one in value), "give a list of strings"
-    else:
-        value = ",".join(map(str, value)) if isinstance(value, list) else value
-        good, hint = isinstance(value, str | int | float) and not isinstance(value, bool), "give a number or a string"
-    if not good:
-        raise SettingsError("CS242", f"{where} is {value!r}", hint, file=file)
-    if option.is_flag or option.multiple:
+        if not isinstance(value, bool):
+            raise SettingsError("CS242", f"{where} is {value!r}", "give true or false", file=file)
         return value
+    if option.multiple:
+        if not (isinstance(value, list) and all(isinstance(item, str) for item in value)):
+            raise SettingsError("CS242", f"{where} is {value!r}", "give a list of strings", file=file)
+        return value
+    if isinstance(value, list):
+        value = ",".join(map(str, value))
+    if isinstance(value, bool) or not isinstance(value, (str, int, float)):
+        raise SettingsError("CS242", f"{where} is {value!r}", "give a number or a string", file=file)
     try:
         return option.type.convert(value if isinstance(value, float) else str(value), option, None)
     except click.BadParameter as wrong:
