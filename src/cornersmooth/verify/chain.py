@@ -33,9 +33,6 @@ _BLOCKS = 64, 512, 8192
 #: how far a row may be from where it is expected, as a share of the way and in radii (speed only)
 _SLACK, _RADII = 0.05, 100.0
 
-#: radii up to which a place is near enough: none on the segment beside it is tried (speed only)
-_NEAR = 0.1
-
 
 @dataclass(frozen=True)
 class Path:
@@ -150,7 +147,7 @@ class Window:
         at, square, farthest = self._on(points, k)
         place = at + self.number.take(k)
         nearer_end = np.where(at < 0.5, -1, 1)
-        for beyond, limit in ((nearer_end, _NEAR * radius), (-nearer_end, radius)):
+        for beyond, limit in ((nearer_end, 0.0), (-nearer_end, radius)):
             rows = np.flatnonzero(farthest > limit * limit)
             j = np.clip(k.take(rows) + beyond.take(rows), 0, self.way.shape[1] - 1)
             at, other, other_farthest = self._on(points.take(rows, axis=1), j)

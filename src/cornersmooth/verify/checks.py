@@ -15,6 +15,7 @@ from cornersmooth.verify.deviation import check_breaks, measure_original, measur
 from cornersmooth.verify.feeds import check_feeds
 from cornersmooth.verify.findings import Findings, Largest
 from cornersmooth.verify.match import Match
+from cornersmooth.verify.passage import AROUND
 from cornersmooth.verify.task import Task
 
 #: what every batch goes through, in this order
@@ -66,7 +67,7 @@ def _places(match: Match, asked: Ints, offset: int) -> tuple[Ints, Floats, dict[
         named = path[_named(match, here)]
         if not len(named):
             continue
-        # a word belongs to the pose that the vertex names, not to the place beside it that is as near
+        # a word belongs to the pose that the vertex names, not to the place beside it that is as near: both within ε
         close = np.abs(named - length[k]) <= 2.0 * match.tolerance + match.margin
         if close.any():
             length[k] = named[close][np.argmin(np.abs(named[close] - length[k]))]
@@ -82,7 +83,7 @@ def _places(match: Match, asked: Ints, offset: int) -> tuple[Ints, Floats, dict[
 def _named(match: Match, vertex: int) -> Ints:
     """Vertices of the CL path around its place that a written vertex names, up to the printed digits."""
     path = match.path
-    here, around = path.length_at(float(match.place[vertex])), 64.0 * match.tolerance
+    here, around = path.length_at(float(match.place[vertex])), AROUND * match.tolerance
     low, high = np.searchsorted(path.length, (here - around, here + around)).tolist()
     away = (path.points[low:high] - match.six[vertex]).reshape(-1, 2, 3)
     found: Ints = low + np.flatnonzero((np.linalg.norm(away, axis=2) <= match.margin).all(axis=1))

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from functools import partial
-
 import numpy as np
 
-from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program
+from cornersmooth.model import Bools, FeedMode, Ints, Program
 from cornersmooth.nc_reader.elements import Element, Elements, Problem
-from cornersmooth.verify.cl_motion import Original
 from cornersmooth.verify.findings import Findings, Runs
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.nearest import COLUMNS, on_segments
@@ -33,22 +28,17 @@ def check_feeds(match: Match, found: Findings) -> None:
         return
     start, end = start[feeding], end[feeding]
     low, high = _touched(match, start, end)
-    said = _Said(nc, element)
     rapid = nc.kind[element] == Element.RAPID
-
-    def fits(k: int, moves: Ints) -> Bools:
-        """(m,) whether row k carries the feed of moves."""
-        return _Said(nc, int(element[k])).same(original, moves)
 
     # a planned feed of what does not move the tool, as a table that turns about it, tells nothing but a time
     still = nc.least_feed[element] & (np.linalg.norm(match.six[end] - match.six[start], axis=1) <= ARITHMETIC)
-    good = said.same(original, low) | rapid | still
+    good = _fits(match, element, low) | rapid | still
     other = np.flatnonzero(~good)
     if len(other):
-        good[other] = _Said(nc, element[other]).same(original, high[other])
+        good[other] = _fits(match, element[other], high[other])
         several = np.flatnonzero(~good & (high > low + 1))
         for k in several.tolist():
-            good[k] = fits(k, np.arange(low[k], high[k] + 1)).any()
+            good[k] = _fits(match, int(element[k]), np.arange(low[k], high[k] + 1)).any()
     wrong = np.flatnonzero(~good)
     follows = np.diff(wrong, prepend=-2) == 1
     in_a_row = 0
@@ -56,7 +46,7 @@ def check_feeds(match: Match, found: Findings) -> None:
         in_a_row = in_a_row + 1 if joined and not good[k - 1] else 0
         if in_a_row >= _MOST_SINGLE:
             continue
-        good[k] = _joined(partial(fits, k), _beside(match, int(start[k])), _beside(match, int(end[k])))
+        good[k] = _joined(match, int(element[k]), _beside(match, int(start[k])), _beside(match, int(end[k])))
     wrong = np.flatnonzero(~good)
     if len(wrong):
         runs = np.split(wrong, np.flatnonzero(np.diff(wrong) > 1) + 1)
@@ -78,28 +68,16 @@ def _touched(match: Match, start: Ints, end: Ints) -> tuple[Ints, Ints]:
     return owner[segment + 1], owner[last + 1]
 
 
-@dataclass(frozen=True)
-class _Said:
-    """What elements say of their feed."""
-
-    nc: Elements
-    element: Ints | int
-
-    def near(self, asked: Floats) -> Bools:
-        """Whether they may be feeds that are asked for; the unit is not looked at."""
-        nc, own = self.nc, self.element
-        feed, slack = nc.feed[own], ARITHMETIC * np.maximum(np.abs(asked), 1.0)
-        room = nc.feed_room[own] + slack
-        near: Bools = (np.abs(feed - asked) <= room) | (np.abs(nc.other_feed[own] - asked) <= room)
-        near |= nc.least_feed[own] & (feed > 0.0) & (feed <= asked + slack)
-        return near
-
-    def same(self, original: Original, move: Ints) -> Bools:
-        """Whether they are the feeds of moves, in their unit."""
-        pose = original.pose[move]
-        asked, mode = original.program.feed[pose], original.program.feed_mode[pose] == FeedMode.PER_REVOLUTION
-        same: Bools = np.isnan(asked) | (self.near(asked) & (self.nc.per_revolution[self.element] == mode))
-        return same
+def _fits(match: Match, element: Ints | int, move: Ints) -> Bools:
+    """Whether elements carry the feeds of moves, in their unit."""
+    nc, program, pose = match.nc, match.original.program, match.original.pose[move]
+    asked, mode = program.feed[pose], program.feed_mode[pose] == FeedMode.PER_REVOLUTION
+    feed, slack = nc.feed[element], ARITHMETIC * np.maximum(np.abs(asked), 1.0)
+    room = nc.feed_room[element] + slack
+    near = (np.abs(feed - asked) <= room) | (np.abs(nc.other_feed[element] - asked) <= room)
+    near |= nc.least_feed[element] & (feed > 0.0) & (feed <= asked + slack)
+    fits: Bools = np.isnan(asked) | (near & (nc.per_revolution[element] == mode))
+    return fits
 
 
 def _beside(match: Match, vertex: int) -> Ints:
@@ -118,10 +96,10 @@ def _beside(match: Match, vertex: int) -> Ints:
         size *= 4
 
 
-def _joined(fits: Callable[[Ints], Bools], first: Ints, last: Ints) -> bool:
-    """Whether a move of the first leads to one of the last along moves that all fit."""
+def _joined(match: Match, element: int, first: Ints, last: Ints) -> bool:
+    """Whether a move of the first leads to one of the last along moves whose feed an element carries."""
     moves = np.arange(min(first[0], last[0]), max(first[-1], last[-1]) + 1)
-    good = fits(moves)
+    good = _fits(match, element, moves)
     run = np.cumsum(np.diff(good, prepend=False))
     one, other = (set(run[good & np.isin(moves, part)].tolist()) for part in (first, last))
     return not one.isdisjoint(other)
