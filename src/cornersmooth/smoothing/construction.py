@@ -19,7 +19,7 @@ from cornersmooth.methods import AUTO, DEFAULT_METHOD, METHODS
 from cornersmooth.model import Corners, FeedMode, Floats, Ints, Move, Program, SmoothProgram, Status
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.neighbours import find_neighbours
-from cornersmooth.vectors import dot, norm
+from cornersmooth.vectors import norm
 
 #: called with what is done, and with what there is in all: corners, or poses of runs
 Progress = Callable[[int, int], None]
@@ -63,12 +63,9 @@ def half_cosine(legs: Legs, axis_length: float) -> Floats:
     return np.sqrt(np.maximum(0.0, 1.0 - sine * sine))
 
 
-def refuse_turns(status: NDArray[np.uint8], legs: Legs, half_cosines: Floats, settings: Settings) -> None:
-    """Mark the corners at which the path turns back, by its six-dimensional turn, or the axis turns too far."""
-    axis_in, axis_out = legs.tip_in + legs.turn_in, legs.tip_out + legs.turn_out
-    along = dot(legs.tip_in, legs.tip_out) + dot(axis_in, axis_out)
-    sizes = np.hypot(norm(legs.tip_in), norm(axis_in)) * np.hypot(norm(legs.tip_out), norm(axis_out))
-    status[along < np.cos(np.radians(settings.reversal_angle)) * sizes] = Status.REVERSAL
+def refuse_turns(status: NDArray[np.uint8], cosine: Floats, half_cosines: Floats, settings: Settings) -> None:
+    """Mark the corners at which the path turns back (by its cosine in six dimensions), or the axis turns too far."""
+    status[cosine < np.cos(np.radians(settings.reversal_angle))] = Status.REVERSAL
     status[half_cosines < np.cos(np.radians(settings.max_axis_step / 2.0)) - 1e-12] = Status.AXIS_STEP
 
 

@@ -129,7 +129,8 @@ def wanted(legs: Legs, settings: Settings) -> Wanted:
     flat_tip = per_tip * halves <= settings.tip_resolution / 2.0
     flat_axis = per_axis * halves <= max(settings.tip_resolution, settings.axis_point_resolution) / 2.0
     status[flat_tip & flat_axis] = Status.STRAIGHT
-    refuse_turns(status, legs, cosines, settings)
+    cosine = (dot(legs.tip_in, legs.tip_out) + dot(axis_in, axis_out)) / (2.0 * length_in * length_out)
+    refuse_turns(status, cosine, cosines, settings)
     lengths = length_in, length_out, by_tolerance
     return Wanted(legs, settings, status, *lengths, bend_tip, bend_turn, factor, cosines, (per_tip, per_axis, per_turn))
 

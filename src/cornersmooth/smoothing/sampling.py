@@ -162,6 +162,8 @@ def _fill_arcs(smoothed: SmoothProgram, batch: _Batch, counts: Ints) -> None:
     """Points of the arcs in the batch with their axes."""
     pose = smoothed.program.arcs.pose
     inside = np.flatnonzero((pose >= batch.poses[0]) & (pose <= batch.poses[-1]))
+    if not len(inside):
+        return
     local, share = divided(counts[pose[inside]])
     at = np.flatnonzero(np.isin(batch.rows.move, pose[inside]))
     batch.rows.tip[at], batch.rows.other[at] = arc_points(smoothed.program, inside[local], share)

@@ -24,7 +24,7 @@ from cornersmooth.smoothing.construction import (
 )
 from cornersmooth.smoothing.self_check import straying_remainders, straying_transitions
 from cornersmooth.smoothing.synchronise import REPORT_PARAMETERS, matching_parameters, synchronisation_report
-from cornersmooth.vectors import angle_between, norm, unit
+from cornersmooth.vectors import angle_between, dot, norm, unit
 
 #: what `Corners.extra` holds: the largest ``||Q−P|−H|`` that the synchronisation leaves (mm), and the jumps of the axis
 #: at both ends of the transition (rad)
@@ -76,7 +76,9 @@ class Zhang2016(Construction):
 
         status = np.full(g, Status.SMOOTHED, np.uint8)
         status[(tip_sine == 0.0) & (axis_sine == 0.0)] = Status.STRAIGHT
-        refuse_turns(status, legs, half_cosine(legs, settings.axis_length), settings)
+        sizes = np.hypot(tip_sizes[0], axis_sizes[0]) * np.hypot(tip_sizes[1], axis_sizes[1])
+        cosine = (dot(*tip) + dot(*axis)) / sizes
+        refuse_turns(status, cosine, half_cosine(legs, settings.axis_length), settings)
         short = np.maximum(tip_length, axis_length) <= 4.0 * settings.tip_resolution
         status[(status == Status.SMOOTHED) & short] = Status.TOO_SHORT
         smoothed = status == Status.SMOOTHED
