@@ -99,7 +99,7 @@ def rotary_curve_rows(smoothed: SmoothProgram, form: Form, findings: Findings) -
 
     Raises InputError where the machine cannot follow the path, SettingsError for a method with more than one parameter.
     """
-    program, settings, machine = smoothed.program, smoothed.settings, machine_of(form)
+    program, settings = smoothed.program, smoothed.settings
     if not METHODS[settings.method].one_parameter:
         raise SettingsError(
             "CS254",
@@ -107,7 +107,6 @@ def rotary_curve_rows(smoothed: SmoothProgram, form: Form, findings: Findings) -
             f"use the method {DEFAULT_METHOD}, or write lines",
         )
     way, section, sections, lost = _curved_way(smoothed, form, findings)
-    ToolTravel(program, machine).check(way.tip, way.angles, way.move)
     if len(lost):
         text = "curve written in lines: on it the rotary axes would leave the tolerance or their limits"
         findings.add("CS378", "note", int(program.line[lost.min()]), text, len(lost))
@@ -131,6 +130,7 @@ def _curved_way(
         notes = Findings()
         rows = dense_rows(smoothed, halves=np.where(lined, halves, np.sign(halves)))
         way = rotary_way(rows, smoothed, form, notes)
+        ToolTravel(smoothed.program, machine_of(form)).check(way.tip, way.angles, way.move)
         if np.isnan(way.place).all():
             findings.add_all(notes.all())
             return way, np.full(len(way.move), -1), None, np.zeros(0, np.int64)
