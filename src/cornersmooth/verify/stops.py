@@ -41,7 +41,6 @@ _AFTER_FAULT: Final = 64
 _FIRST_LOOK: Final = 16
 
 _ELSEWHERE: Final = "motion that the CL file does not have"
-_SURPLUS: Final = "a rapid that the CL file does not have, or a feed move written as one"
 
 
 class Step(NamedTuple):
@@ -313,7 +312,8 @@ class Stops:
         """Traces to which an element leads from one with a fault."""
         lines, nc, own = self.lines, self._ahead.nc, element - self._ahead.base
         feeds = lines.feeds(element)
-        code, text = ("CS536", "feed moves that the CL file does not have") if feeds else ("CS533", _SURPLUS)
+        surplus = ("CS533", "a rapid that the CL file does not have, or a feed move written as one")
+        code, text = ("CS536", "feed moves that the CL file does not have") if feeds else surplus
         line = int(lines.line[min(self._move[trace.stop + 1], len(lines.line) - 1)])
         yield self._wrong(replace(trace), Problem(code, line, int(nc.line[own]), text))
         stop = min(trace.stop + 1 + _AFTER_FAULT, len(self.moves))
