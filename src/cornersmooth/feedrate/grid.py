@@ -146,14 +146,18 @@ def make_grid(limits: Intervals, runs: Ints, resolution: Resolution | None = Non
     stop = np.append(start[1:], 0.0)
     stop[first + count + 1] = end
     accel, jerk = (np.repeat(limit, count + 2) for limit in (accel, jerk))
-    return in_cells(limits, Grid(start, stop - start, np.full(len(start), np.inf), accel, jerk, first), runs)
+    return _in_cells(limits, Grid(start, stop - start, np.full(len(start), np.inf), accel, jerk, first), runs)
 
 
-def in_cells(limits: Intervals, grid: Grid, runs: Ints) -> Grid:
-    """Cells with the strictest limits of all intervals that each meets."""
-    met = cell_intervals(limits, grid, runs)
-    cap = np.minimum.reduceat(np.append(limits.cap, np.inf), met)[::2]
-    return replace(grid, cap=cap)
+def _in_cells(limits: Intervals, grid: Grid, runs: Ints) -> Grid:
+    """Cells with the lowest limit of all intervals that each meets."""
+    owner = runs[grid.run]
+    begin, end, stop = limits.run[owner], limits.run[owner + 1], grid.start + grid.width
+    slack = 1e-9 * (stop - grid.start)  # so that a junction on a border counts for both cells
+    low = np.clip(np.searchsorted(limits.edge, grid.start - slack, side="right") - 1, begin, end - 1)
+    high = np.clip(np.searchsorted(limits.edge, stop + slack, side="left"), low + 1, end)
+    met = np.stack((low, high), axis=1).ravel()
+    return replace(grid, cap=np.minimum.reduceat(np.append(limits.cap, np.inf), met)[::2])
 
 
 def _end_cells(
@@ -183,13 +187,3 @@ def _end_cells(
     last = np.append(run[1:] != run[:-1], True)
     np.minimum.at(outermost[1], run[last], half_speed[last])
     return np.minimum(cells[0], outermost[0]), np.minimum(cells[1], outermost[1])
-
-
-def cell_intervals(limits: Intervals, grid: Grid, runs: Ints) -> Ints:
-    """(2n,) pairs of the first interval met in each cell and the one after the last, for ``ufunc.reduceat``."""
-    owner = runs[grid.run]
-    begin, end, stop = limits.run[owner], limits.run[owner + 1], grid.start + grid.width
-    slack = 1e-9 * (stop - grid.start)  # so that a junction on a border counts for both cells
-    low = np.clip(np.searchsorted(limits.edge, grid.start - slack, side="right") - 1, begin, end - 1)
-    high = np.clip(np.searchsorted(limits.edge, stop + slack, side="left"), low + 1, end)
-    return np.stack((low, high), axis=1).ravel()
