@@ -333,8 +333,8 @@ class Stops:
                 move = self._move[t]
                 own_amount = digit_errors(nc, np.array([own]), lines.tip[[move]], lines.axis[[move]], lines.axis_length)
                 there = self._finished(here, _Trace(t, element, False, here), element)
-                text, amount = "a rapid does not end at its pose", float(own_amount[1][0])
-                problem = Problem("CS531", int(lines.line[move]), int(nc.line[own]), text, amount)
+                where, amount = (int(lines.line[move]), int(nc.line[own])), float(own_amount[1][0])
+                problem = Problem("CS531", *where, "a rapid does not end at its pose", amount)
                 yield self._wrong(there, problem)
             here = self._without(here, t, element)
 
