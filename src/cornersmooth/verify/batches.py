@@ -1,6 +1,6 @@
 """The written motion in batches, each with its stretches and the place of every vertex on the CL path.
 
-A *stretch* is the run of feed moves between two stops (see `rapids`). Many short stretches make a batch; a long one is
+A *stretch* is the run of feed moves between two stops (see `stops`). Many short stretches make a batch; a long one is
 cut anywhere, as the decision (`passage`) goes on from where the motion has been reached.
 """
 
