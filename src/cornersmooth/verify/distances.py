@@ -20,7 +20,7 @@ from cornersmooth.verify.task import Task
 #: segments on either side of a place among which a nearer one is looked for
 _REACH: Final = 2
 
-#: fractions of a bent step on either side of a place through which parabolas are laid, one after the other
+#: distances from a place, in steps, through which parabolas are laid, one after the other
 _WIDTHS: Final = (1 / 8, 1 / 64, 1 / 512)
 
 
@@ -83,26 +83,22 @@ def nearest(match: Match, reached: Reached, rows: Ints, metric: Metric) -> Float
         first, last = match.runs
         low, high = first[middle], last[middle] - 1
     point, columns = own[vertex], COLUMNS[metric]
-    place = nearest_places(point, other, middle, _REACH, low, high, metric)
-    step = np.minimum(place.astype(np.int64), len(other) - 2)
+    best = nearest_places(point, other, middle, _REACH, low, high, metric)
+    first_place, last_place = low.astype(np.float64), high + 1.0
 
-    def square(share: Floats) -> Floats:
-        place = step + share
+    def square(place: Floats) -> Floats:
         away = ((match.path.at(place) if reached.mine else _written(match, place)) - point)[:, columns]
-        found: Floats = np.einsum("ij,ij->i", away, away)
-        return found
+        return np.einsum("ij,ij->i", away, away)
 
-    best = place - step
     least = square(best)
     for width in _WIDTHS:
-        middle_share = np.clip(best, width, 1.0 - width)
-        before, here, after = (square(middle_share + side) for side in (-width, 0.0, width))
+        centre = np.clip(best, first_place + width, last_place - width)  # a bent step may go on in the next one
+        before, here, after = (square(centre + side) for side in (-width, 0.0, width))
         bend = before - 2.0 * here + after
         shift = np.divide(width * (before - after), 2.0 * bend, out=np.zeros_like(bend), where=bend > 0.0)
-        best = np.clip(middle_share + shift, 0.0, 1.0)
+        best = np.clip(centre + np.clip(shift, -1.0, 1.0), first_place, last_place)
         least = np.minimum.reduce((least, before, here, after))
-    found: Floats = np.sqrt(np.minimum(least, square(best)))
-    return found
+    return np.sqrt(np.minimum(least, square(best)))
 
 
 def _written(match: Match, place: Floats) -> Floats:
