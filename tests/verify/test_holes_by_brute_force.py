@@ -63,7 +63,7 @@ def is_drilled(holes: list[Hole], i: int, group: list[Element], before: Element)
     last = np.inf
     for (code, *_), height in zip(group, heights, strict=True):
         if code == "G1":
-            if height < last and (height > RETRACT or 0.0 < -height <= drilled):
+            if height < last and (height > RETRACT or drilled == DEPTH or 0.0 < -height <= drilled):
                 return False
             drilled, free = max(drilled, -height), min(free, height)
         elif height < free:

@@ -175,7 +175,7 @@ class HoleLines:
                 text = f"a rapid beside a hole runs {amount:.4f} mm below the height of its cycle (RTRCTO, RAPTO)"
                 say("CS563", k, text, amount)
         free = 0.0 if math.isnan(cycle.clearance) else cycle.clearance  # height down to which rapids may go
-        drilled = 0.0
+        drilled, deep, above = 0.0, False, math.inf
         for k in height:
             if self.feeds(k):
                 if k == first and math.isnan(before):
@@ -185,15 +185,18 @@ class HoleLines:
                 if self.wrong_feed(k, cycle):
                     feed = self.ahead.nc.feed[k - self.ahead.base]
                     say("CS541", k, f"the feed is {feed:g}, the cycle says {cycle.feed:g}")
-                down = height.get(k - 1, math.inf) > height[k]
+                down = above > height[k]
                 if down and self.fed_above(move, k, cycle):
                     say("CS564", k, "a feed move ends above the heights of the cycle")
-                if down and drilled > self.room and self.room < -height[k] <= drilled + ARITHMETIC:
+                cut = deep or (drilled > self.room and self.room < -height[k])
+                if down and cut and -height[k] <= drilled + ARITHMETIC:
                     say("CS562", k, "a hole is drilled again")
+                deep = deep or height[k] <= self.room - cycle.depth
                 drilled, free = max(drilled, -height[k]), min(free, height[k])
             elif height[k] < free - self.room:
                 where = "into the uncut hole" if free <= 0.0 else "below the height where the feed begins (RAPTO)"
                 say("CS563", k, f"a rapid goes {free - height[k]:.4f} mm {where}", free - height[k])
+            above = height[k]
         if left and height[last] < -self.room:
             say("CS563", last, "the tool leaves a hole sideways", -height[last])
         return found, False
