@@ -13,27 +13,15 @@ from types import MappingProxyType
 
 @dataclass(frozen=True)
 class Method:
-    """A way to make the pair of curves.
+    """A way to make the pair of curves."""
 
-    Parameters
-    ----------
-    name : str
-        As on the command line and in reports.
-    summary : str
-        A few words for the help.
-    module : str
-        Where its `CONSTRUCTION` is.
-    one_parameter : bool
-        Whether one parameter drives both curves. Only then do the errors at a common parameter bound the distances of
-        the paths, and can rotary words follow the curves.
-    prescribed : mapping of str to object
-        Settings that the method does not leave open.
-    """
-
-    name: str
-    summary: str
-    module: str
+    name: str  #: As on the command line and in reports
+    summary: str  #: A few words for the help
+    module: str  #: Where its `CONSTRUCTION` is
+    #: Whether one parameter drives both curves. Only then do the errors at a common parameter bound the distances of
+    #: the paths, and can rotary words follow the curves.
     one_parameter: bool = True
+    #: Settings that the method does not leave open.
     prescribed: Mapping[str, object] = field(default_factory=lambda: MappingProxyType({}))
 
 

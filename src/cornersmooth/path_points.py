@@ -14,23 +14,12 @@ from cornersmooth.smoothing.sampling import dense_rows
 
 @dataclass(frozen=True)
 class PathPoints:
-    """Points in path order, m rows; between them the tool moves straight within the chord tolerance.
+    """Points in path order, m rows; between them the tool moves straight within the chord tolerance."""
 
-    Parameters
-    ----------
-    tip : (m, 3) float64, mm
-    axis : (m, 3) float64
-        Unit tool axis vectors.
-    pose : (m,) int64
-        Pose of the program whose move the point belongs to.
-    kind : (m,) uint8
-        `Move`: how the point is reached.
-    """
-
-    tip: Floats
-    axis: Floats
-    pose: Ints
-    kind: NDArray[np.uint8]
+    tip: Floats  #: (m, 3), mm
+    axis: Floats  #: (m, 3): Unit tool axis vectors
+    pose: Ints  #: (m,): Pose of the program whose move the point belongs to
+    kind: NDArray[np.uint8]  #: (m,): `Move`: how the point is reached
 
     def __len__(self) -> int:
         return len(self.tip)

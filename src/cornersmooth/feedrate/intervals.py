@@ -124,8 +124,7 @@ class Intervals:
         begin = self.run[:-1]
         if not len(begin) or self.aligned:
             return np.zeros(len(begin), np.bool_)
-        level: Bools = np.minimum.reduceat(self.cap, begin) == np.maximum.reduceat(self.cap, begin)
-        return level
+        return np.minimum.reduceat(self.cap, begin) == np.maximum.reduceat(self.cap, begin)
 
     def derivatives(self, start: Floats, width: Floats, parts: Floats) -> Floats:
         """Derivatives (3, d, p, q) at `parts` (q,) of cells (p,), none of which lies across a border."""
@@ -248,8 +247,7 @@ def _curved(path: Path, most: float) -> Bools:
 
 def _turns_back(tangents: Floats) -> Bools:
     """(g, q - 1) bool: whether (g, q, 3) tangents turn by more than a right angle from one to the next."""
-    back: Bools = (tangents[:, 1:] * tangents[:, :-1]).sum(axis=-1) < 0.0
-    return back
+    return (tangents[:, 1:] * tangents[:, :-1]).sum(axis=-1) < 0.0
 
 
 def _largest(values: Floats) -> Floats:
@@ -257,5 +255,4 @@ def _largest(values: Floats) -> Floats:
 
     A smooth function leaves the range of two samples by at most an eighth of its second difference there.
     """
-    largest: Floats = np.abs(values).max(axis=-1) + np.abs(np.diff(values, n=2, axis=-1))[..., 0] / 8.0
-    return largest
+    return np.abs(values).max(axis=-1) + np.abs(np.diff(values, n=2, axis=-1))[..., 0] / 8.0

@@ -155,8 +155,7 @@ def _arc_speeds(lines: Lines, limits: AxisLimits, length: Floats, cosine: Floats
     )
     height = widest / np.maximum(1.0 - np.sin(half), np.finfo(np.float64).tiny)
     reach = np.minimum(np.minimum(length[:-1], length[1:]) / 2.0, np.cos(half) * height)
-    found: Floats = np.sqrt(_ARC_SHARE * limits.acceleration[:3].min() * np.tan(half) * reach)
-    return found
+    return np.sqrt(_ARC_SHARE * limits.acceleration[:3].min() * np.tan(half) * reach)
 
 
 def _final_speeds(length: Floats, speed: Floats, acceleration: Floats, corner: Floats) -> Floats:
@@ -164,8 +163,7 @@ def _final_speeds(length: Floats, speed: Floats, acceleration: Floats, corner: F
     cap = np.minimum(corner, np.minimum(speed, np.append(speed[1:], 0.0))) ** 2
     braking = np.concatenate(([0.0], np.cumsum(2.0 * acceleration[1:] * length[1:])))
     least = np.minimum.accumulate((cap + braking)[::-1])[::-1]
-    found: Floats = np.sqrt(np.maximum(np.minimum(least - braking, cap), 0.0))
-    return found
+    return np.sqrt(np.maximum(np.minimum(least - braking, cap), 0.0))
 
 
 def _blend_speeds(lines: Lines, length: Floats, speed: Floats, acceleration: Floats, direction: Floats) -> Floats:

@@ -199,11 +199,10 @@ def _turned(direction: Floats, waves: tuple[Floats, Floats], vectors: Floats) ->
     """Taylor series of vectors turned about a unit direction (Rodrigues) by an angle given by its cosine and sine."""
     cosine, sine = waves
     along = (vectors @ direction)[..., None] * direction
-    found: Floats = along + (
+    return along + (
         taylor.multiply(cosine[..., None], vectors - along)
         + taylor.multiply(sine[..., None], np.cross(direction, vectors))
     )
-    return found
 
 
 def _linear_series(machine: Machine, tip: Floats, angles: Floats) -> Floats:

@@ -121,5 +121,4 @@ def curvature(tip: Floats) -> Floats:
     """Curvature (m,), 1/mm, from three Taylor coefficients of the tip; 0 where it is straight up to rounding."""
     speed, bend, across = norm(tip[1]), 2.0 * norm(tip[2]), 2.0 * norm(np.cross(tip[1], tip[2]))
     straight = across <= _STRAIGHT * speed * bend
-    kappa: Floats = np.where(straight, 0.0, across / np.where(straight, 1.0, speed**3))
-    return kappa
+    return np.where(straight, 0.0, across / np.where(straight, 1.0, speed**3))

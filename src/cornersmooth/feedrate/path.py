@@ -256,8 +256,7 @@ def _feeds(program: Program, moves: Ints, limits: Limits) -> Floats:
             file=program.source.name,
             line=int(program.line[first]),
         )
-    feeds: Floats = feed / 60.0
-    return feeds
+    return feed / 60.0
 
 
 def _junction_speeds(

@@ -58,8 +58,7 @@ def polynomial(points: Floats, weights: Floats | None = None, half: Ints | None 
     w = np.ones(points.shape[:2]) if weights is None else weights
     weighted = np.concatenate((points * w[..., None], w[..., None]), axis=-1)
     convert = _to_powers(points.shape[1] - 1) if half is None else (_to_powers(3) @ _HALVES)[half]
-    powers: Floats = convert @ weighted
-    return powers
+    return convert @ weighted
 
 
 @cache
@@ -123,8 +122,7 @@ def taylor_series(powers: Floats, t: Floats, orders: int) -> Floats:
 
 def _size(vectors: Floats) -> Floats:
     """Length of vectors whose coordinates come first."""
-    size: Floats = np.sqrt(vectors[0] ** 2 + vectors[1] ** 2 + vectors[2] ** 2)
-    return size
+    return np.sqrt(vectors[0] ** 2 + vectors[1] ** 2 + vectors[2] ** 2)
 
 
 def interval_borders(half: Ints) -> Floats:
@@ -139,8 +137,7 @@ def interval_lengths(powers: Floats, borders: Floats) -> Floats:
     step = np.diff(borders, axis=1)
     t = borders[:, :-1, None] + step[..., None] * _NODES
     speed = _size(_derivatives(powers, t.reshape(len(t), -1), 1)[1]).reshape(t.shape)
-    lengths: Floats = np.einsum("gpn,n->gp", speed, _WEIGHTS) * step
-    return lengths
+    return np.einsum("gpn,n->gp", speed, _WEIGHTS) * step
 
 
 def slowest(powers: Floats) -> Floats:
@@ -151,8 +148,7 @@ def slowest(powers: Floats) -> Floats:
         speed = np.broadcast_to(_size(_derivatives(powers, t, 1)[1]), t.shape)
         at = speed.argmin(axis=1)
         low, high = t[rows, np.maximum(at - 1, 0)], t[rows, np.minimum(at + 1, _SEARCHED - 1)]
-    least: Floats = speed[rows, at]
-    return least
+    return speed[rows, at]
 
 
 def parameters_at(powers: Floats, half: Ints, which: Ints, distance: Floats) -> Floats:
@@ -169,8 +165,7 @@ def parameters_at(powers: Floats, half: Ints, which: Ints, distance: Floats) -> 
         gone = interval_lengths(curves, np.stack((low, t), axis=1))[:, 0]
         speed = _size(_derivatives(curves, t[:, None], 1)[1])[:, 0]
         t = np.clip(t + (missing - gone) / np.maximum(speed, np.finfo(np.float64).tiny), low, high)
-    found: Floats = t
-    return found
+    return t
 
 
 def turned_angle(tip: Floats, axis_point: Floats, half: Ints) -> Floats:
@@ -179,8 +174,7 @@ def turned_angle(tip: Floats, axis_point: Floats, half: Ints) -> Floats:
     lever = evaluate(axis_point, borders) - evaluate(tip, borders)
     axis = lever / norm(lever)[..., None]
     step = norm(np.diff(axis, axis=1))
-    swept: Floats = (2.0 * np.arcsin(np.minimum(0.5 * step, 1.0))).sum(axis=1)
-    return swept
+    return (2.0 * np.arcsin(np.minimum(0.5 * step, 1.0))).sum(axis=1)
 
 
 def groups(rows: Ints) -> list[Ints]:

@@ -45,8 +45,7 @@ def derivative(a: Floats) -> Floats:
 
 def dot(a: Floats, b: Floats) -> Floats:
     """Scalar product of two Taylor series of vectors along the last axis."""
-    product: Floats = multiply(a, b).sum(axis=-1)
-    return product
+    return multiply(a, b).sum(axis=-1)
 
 
 def cross(a: Floats, b: Floats) -> Floats:

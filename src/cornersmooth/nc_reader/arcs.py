@@ -74,8 +74,7 @@ def _sweep(start: Floats, end: Floats, normal: Floats, by_radius: Bools) -> Floa
     flat = start - np.einsum("ij,ij->i", start, normal)[:, None] * normal
     cosine = np.einsum("ij,ij->i", flat, end)
     angle = np.arctan2(sine, cosine) % _FULL_TURN
-    turned: Floats = np.where(~by_radius & (angle == 0), _FULL_TURN, angle)
-    return turned
+    return np.where(~by_radius & (angle == 0), _FULL_TURN, angle)
 
 
 def arc_points(start: Floats, end: Floats, centre: Floats, normal: Floats, sweep: Floats, fraction: Floats) -> Floats:
@@ -99,13 +98,11 @@ def arc_points(start: Floats, end: Floats, centre: Floats, normal: Floats, sweep
     across = np.cross(normal, radius)
 
     def turned(angle: Floats) -> Floats:
-        moved: Floats = start + (np.cos(angle) - 1)[:, None] * radius + np.sin(angle)[:, None] * across
-        return moved
+        return start + (np.cos(angle) - 1)[:, None] * radius + np.sin(angle)[:, None] * across
 
     rest = end - turned(sweep)
     return turned(fraction * sweep) + fraction[:, None] * rest
 
 
 def _dot(a: Floats, b: Floats) -> Floats:
-    product: Floats = np.einsum("ij,ij->i", a, b)
-    return product
+    return np.einsum("ij,ij->i", a, b)

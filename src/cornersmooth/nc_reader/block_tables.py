@@ -220,8 +220,7 @@ class Numbers:
         edges = np.zeros(len(self.text) + 1, np.int8)
         edges[self.start] = 1
         edges[self.stop] -= 1
-        inside: Bools = np.cumsum(edges[:-1], dtype=np.int8) > 0
-        return inside
+        return np.cumsum(edges[:-1], dtype=np.int8) > 0
 
 
 def find_numbers(text: bytes, lexer: Lexer) -> Numbers:
@@ -251,8 +250,7 @@ def _plain_numbers(raw: NDArray[np.uint8]) -> tuple[Ints, Ints]:
 
 
 def _digit(raw: NDArray[np.uint8]) -> Bools:
-    digits: Bools = raw - np.uint8(ord("0")) <= np.uint8(9)
-    return digits
+    return raw - np.uint8(ord("0")) <= np.uint8(9)
 
 
 @dataclass(frozen=True, eq=False)

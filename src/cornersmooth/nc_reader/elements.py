@@ -49,15 +49,13 @@ class Curves:
     @cached_property
     def first_point(self) -> Ints:
         """(c,) where the control points of each curve start."""
-        first: Ints = np.cumsum(self.points) - self.points
-        return first
+        return np.cumsum(self.points) - self.points
 
     @cached_property
     def first_knot(self) -> Ints:
         """(c,) where the knots of each curve start."""
         size = self.points + self.order
-        first: Ints = np.cumsum(size) - size
-        return first
+        return np.cumsum(size) - size
 
     def part(self, first: int, stop: int) -> Curves:
         """Curves that are elements from `first` to `stop`, the latter excluded."""
@@ -111,8 +109,7 @@ def slices(size: Ints, chosen: Ints) -> Ints:
     first = np.cumsum(size) - size
     count = size[chosen]
     start = np.cumsum(count) - count
-    index: Ints = np.arange(int(count.sum())) + np.repeat(first[chosen] - start, count)
-    return index
+    return np.arange(int(count.sum())) + np.repeat(first[chosen] - start, count)
 
 
 @dataclass(frozen=True)

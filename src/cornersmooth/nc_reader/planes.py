@@ -39,8 +39,7 @@ class TiltedPlane:
     @property
     def tool(self) -> Floats:
         """(3,) unit vector of the tool."""
-        axis: Floats = self.frame[:, 2]
-        return axis
+        return self.frame[:, 2]
 
     def in_part(self, run: Elements, factor: float) -> Elements:
         """Return a run in the coordinates of the part, both in mm; `factor` mm are a unit of the text."""

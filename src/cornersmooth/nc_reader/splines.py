@@ -148,8 +148,7 @@ def _crowded(knot: Floats, start: Ints, size: Ints, order: Ints) -> Bools:
     """(q,) whether a knot is equal to the one `order` knots before it in its curve: that does not meet its points."""
     before = np.arange(len(knot)) - np.repeat(order, size)
     own = (before >= np.repeat(start, size)) & (np.repeat(order, size) > 0)
-    crowded: Bools = own & (knot == knot[np.maximum(before, 0)])
-    return crowded
+    return own & (knot == knot[np.maximum(before, 0)])
 
 
 def _exactly(knot: Floats, start: Ints, size: Ints, wanted: Ints) -> Floats:
@@ -157,8 +156,7 @@ def _exactly(knot: Floats, start: Ints, size: Ints, wanted: Ints) -> Floats:
     if (size == wanted).all():
         return knot
     index = np.arange(wanted.sum()) - np.repeat(np.cumsum(wanted) - wanted, wanted)
-    filled: Floats = knot[np.repeat(start, wanted) + np.minimum(index, np.repeat(size, wanted) - 1)]
-    return filled
+    return knot[np.repeat(start, wanted) + np.minimum(index, np.repeat(size, wanted) - 1)]
 
 
 def interval_curves(table: Table, six: Floats, spline: Bools, before: Floats, problems: list[Problem]) -> Curves:
@@ -233,8 +231,7 @@ def _knots_of(interval: Floats, first: Ints, count: Ints) -> Floats:
     block = np.arange(int(used.sum())) - np.repeat(np.cumsum(used) - used, used)
     steps[np.repeat(start, used) + 3 + block] = interval[np.repeat(first, used) + block]
     total = np.cumsum(steps)
-    knots: Floats = total - np.repeat(total[start], size)
-    return knots
+    return total - np.repeat(total[start], size)
 
 
 def poly_curves(

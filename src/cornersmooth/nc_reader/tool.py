@@ -13,8 +13,7 @@ from cornersmooth.nc_reader.elements import Element, Elements
 def unit(vectors: Floats) -> Floats:
     """Vectors (k, 3) at length one; zero stays zero."""
     length = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))[:, None]
-    result: Floats = np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
-    return result
+    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
 
 
 def directions(nc: Elements, tip: Floats, second: Floats) -> Floats:
@@ -58,8 +57,7 @@ def moving_rapids(nc: Elements, first: int, stop: int) -> Ints:
     """Elements from `first` (at least 1) to `stop` (excluded) that are rapid and move the tool."""
     index = np.flatnonzero(nc.kind[first:stop] == Element.RAPID) + first
     ways = (values[index] - values[index - 1] for values in (nc.tip, nc.second))
-    found: Ints = index[leads_somewhere(nc, *ways)]
-    return found
+    return index[leads_somewhere(nc, *ways)]
 
 
 def leads_somewhere(nc: Elements, way: Floats, turn: Floats) -> Bools:
@@ -75,5 +73,4 @@ def leads_somewhere(nc: Elements, way: Floats, turn: Floats) -> Bools:
 def beyond_digits(nc: Elements, way: Floats) -> Bools:
     """Whether ways (k, 3) of the tip are longer than printed digits show, which may be those of turned axes."""
     large = np.linalg.norm(way, axis=1) / np.sqrt(3) if nc.rotary else np.abs(way).max(axis=1)
-    beyond: Bools = large > 1.01 * nc.tip_step
-    return beyond
+    return large > 1.01 * nc.tip_step

@@ -87,8 +87,7 @@ class Table:
         own = self.column("G")
         last = np.maximum.accumulate(np.where(np.isnan(own), -1, np.arange(len(own))))
         own = np.where(last < 0, code, own[last])
-        rows: Ints = np.flatnonzero(given & (own != 2) & (own != 3))
-        return rows
+        return np.flatnonzero(given & (own != 2) & (own != 3))
 
 
 @dataclass(frozen=True)

@@ -161,8 +161,7 @@ class Construction(ABC):
 def construction_of(method: str) -> Construction:
     """The construction of a method, by its name; that of lines for "auto", which paths have that are not smoothed."""
     name = DEFAULT_METHOD if method == AUTO else method
-    construction: Construction = import_module(METHODS[name].module).CONSTRUCTION
-    return construction
+    return import_module(METHODS[name].module).CONSTRUCTION
 
 
 def place_corners(

@@ -22,30 +22,16 @@ _COMMENTED = re.compile(r"->\s*CUTTER\s*/\s*(.*)", re.IGNORECASE)
 
 @dataclass(frozen=True)
 class Tool:
-    """A body of revolution about the tool axis, its tip at the origin.
+    """A body of revolution about the tool axis, its tip at the origin."""
 
-    Parameters
-    ----------
-    diameter : float, mm
-    corner_radius : float, mm
-        r; half the diameter for a ball.
-    centre_out, centre_up : float, mm
-        Distance of the centre of the corner arc from the axis (APT's e) and from the tip along the axis (f).
-    tip_angle : float, degrees
-        Rise of the bottom line from the tip outwards (APT's α).
-    taper : float, degrees
-        Angle between side line and axis, positive where the tool widens upwards (APT's β).
-    length : float, mm
-        For drawing; the side line goes on without end for measuring. 0 where it is not said.
-    """
-
-    diameter: float
-    corner_radius: float
+    diameter: float  #: mm
+    corner_radius: float  #: mm: r; half the diameter for a ball
+    #: mm: Distance of the centre of the corner arc from the axis (APT's e) and from the tip along the axis (f).
     centre_out: float
     centre_up: float
-    tip_angle: float = 0.0
-    taper: float = 0.0
-    length: float = 0.0
+    tip_angle: float = 0.0  #: degrees: Rise of the bottom line from the tip outwards (APT's α)
+    taper: float = 0.0  #: degrees: Angle between side line and axis, positive where the tool widens upwards (APT's β)
+    length: float = 0.0  #: mm: For drawing; the side line goes on without end for measuring. 0 where it is not said.
 
     def __post_init__(self) -> None:
         numbers = (self.diameter, self.corner_radius, self.centre_out, self.centre_up, self.tip_angle, self.taper)

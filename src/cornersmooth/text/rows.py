@@ -38,29 +38,17 @@ WIDEST: Final = 255 * WORD
 class RowFormat:
     """How the words of a row are written.
 
-    Parameters
-    ----------
-    words : tuple of bytes
-        What stands before each number, blanks included: ``(b"X", b" Y", b" Z")``.
-    decimals : tuple of int
-        Digits after the point of each number; 0 writes no point unless `trim`.
-    plus : bool
-        Write ``+`` before numbers that are not negative.
-    trim : bool
-        Drop trailing zeros but keep the point: ``12.``, ``0.5``.
-    leading_zero : bool
-        Write ``0.5`` rather than ``.5``. A number never is without any digit: zero is ``0.`` at least where trimmed.
-
     Raises
     ------
     ValueError
         For words and decimals that do not match, zero bytes in words, or decimals out of range.
     """
 
-    words: tuple[bytes, ...]
-    decimals: tuple[int, ...]
-    plus: bool = False
-    trim: bool = False
+    words: tuple[bytes, ...]  #: What comes before each number, blanks included: ``(b"X", b" Y", b" Z")``
+    decimals: tuple[int, ...]  #: Digits after the point of each number; 0 writes no point unless `trim`
+    plus: bool = False  #: Write ``+`` before numbers that are not negative
+    trim: bool = False  #: Drop trailing zeros but keep the point: ``12.``, ``0.5``
+    #: Write ``0.5`` rather than ``.5``. A number never is without any digit: zero is ``0.`` at least where trimmed.
     leading_zero: bool = True
 
     def __post_init__(self) -> None:

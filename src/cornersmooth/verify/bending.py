@@ -32,8 +32,7 @@ def turn_bend(start: Floats, end: Floats) -> Floats:
     foot = np.clip(-np.einsum("ij,ij->i", start, way) / np.where(size > 0.0, size, 1.0), 0.0, 1.0)
     nearest = start + foot[:, None] * way
     least = np.einsum("ij,ij->i", nearest, nearest)
-    bend: Floats = np.divide(_GOLDEN / 8.0 * size, least, out=np.where(size > 0.0, np.inf, 0.0), where=least > 0.0)
-    return bend
+    return np.divide(_GOLDEN / 8.0 * size, least, out=np.where(size > 0.0, np.inf, 0.0), where=least > 0.0)
 
 
 def wound_bend(start: Floats, slope: Floats, bend: Floats) -> Floats:
@@ -45,8 +44,7 @@ def wound_bend(start: Floats, slope: Floats, bend: Floats) -> Floats:
 
 def arc_bend(radius: Floats, sweep: Floats) -> Floats:
     """(k,) bend of arcs, and of helices, in the unit of the radius; the sweep in rad."""
-    bend: Floats = radius * sweep * sweep / 8.0
-    return bend
+    return radius * sweep * sweep / 8.0
 
 
 def curve_bend(group: CurveGroup, second: Second, axis_length: float) -> Floats:
@@ -113,5 +111,4 @@ def _derivatives(points: Floats, knots: Floats) -> tuple[Floats, Floats]:
 
 def _largest(vectors: Floats) -> Floats:
     """(k,) the largest size of vectors (d, n, k)."""
-    size: Floats = np.sqrt(np.einsum("jik,jik->jk", vectors, vectors).max(axis=0, initial=0.0))
-    return size
+    return np.sqrt(np.einsum("jik,jik->jk", vectors, vectors).max(axis=0, initial=0.0))

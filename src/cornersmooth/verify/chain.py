@@ -75,8 +75,7 @@ class Path:
         """(k,) path lengths up to places, mm."""
         k = np.minimum(place.astype(np.int64), self.segments - 1)
         start = self.length.take(k)
-        length: Floats = start + (place - k) * (self.length.take(k + 1) - start)
-        return length
+        return start + (place - k) * (self.length.take(k + 1) - start)
 
     def place_at(self, length: float) -> tuple[int, float]:
         """Return segment and fraction at a path length."""
@@ -132,8 +131,7 @@ class Window:
 
     def segment_at(self, length: Floats) -> Ints:
         """Segment, counted in the window, at path lengths."""
-        k: Ints = np.clip(np.searchsorted(self.length, length, side="right") - 1, 0, self.way.shape[1] - 1)
-        return k
+        return np.clip(np.searchsorted(self.length, length, side="right") - 1, 0, self.way.shape[1] - 1)
 
     def nearest(self, points: Floats, length: Floats, radius: float) -> tuple[Floats, Floats]:
         """Places near points (3h, k), from path lengths on: a step along the tangent, then the neighbours.

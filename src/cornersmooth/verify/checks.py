@@ -86,5 +86,4 @@ def _named(match: Match, vertex: int) -> Ints:
     here, around = path.length_at(float(match.place[vertex])), AROUND * match.tolerance
     low, high = np.searchsorted(path.length, (here - around, here + around)).tolist()
     away = (path.points[low:high] - match.six[vertex]).reshape(-1, 2, 3)
-    found: Ints = low + np.flatnonzero((np.linalg.norm(away, axis=2) <= match.margin).all(axis=1))
-    return found
+    return low + np.flatnonzero((np.linalg.norm(away, axis=2) <= match.margin).all(axis=1))

@@ -86,8 +86,7 @@ def _curvature(slope: Floats, bend: Floats) -> Floats:
     speed = np.sqrt(np.einsum("ij,ij->i", slope, slope))
     cross = np.cross(slope, bend)
     size = np.sqrt(np.einsum("ij,ij->i", cross, cross))
-    curvature: Floats = np.divide(size, speed**3, out=np.zeros_like(speed), where=speed > 0)
-    return curvature
+    return np.divide(size, speed**3, out=np.zeros_like(speed), where=speed > 0)
 
 
 def _add_curves(

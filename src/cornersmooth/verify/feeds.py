@@ -76,8 +76,7 @@ def _fits(match: Match, element: Ints | int, move: Ints) -> Bools:
     room = nc.feed_room[element] + slack
     near = (np.abs(feed - asked) <= room) | (np.abs(nc.other_feed[element] - asked) <= room)
     near |= nc.least_feed[element] & (feed > 0.0) & (feed <= asked + slack)
-    fits: Bools = np.isnan(asked) | (near & (nc.per_revolution[element] == mode))
-    return fits
+    return np.isnan(asked) | (near & (nc.per_revolution[element] == mode))
 
 
 def _beside(match: Match, vertex: int) -> Ints:

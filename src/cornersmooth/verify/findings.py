@@ -129,17 +129,10 @@ class Poses:
 
 @dataclass
 class Runs:
-    """Problems of runs of elements; a run that goes on in the next batch is one problem.
+    """Problems of runs of elements; a run that goes on in the next batch is one problem."""
 
-    Parameters
-    ----------
-    problems : list of Problem
-        One for each run.
-    begins, ends : bool
-        Whether the first, and the last element that was looked at, belong to a run.
-    """
-
-    problems: list[Problem] = field(default_factory=list)
+    problems: list[Problem] = field(default_factory=list)  #: One for each run
+    #: Whether the first, and the last element that was looked at, belong to a run.
     begins: bool = False
     ends: bool = False
 

@@ -95,8 +95,7 @@ class FreeSpace:
         rows = np.arange(row.start, row.stop)
         last = self.own.shape[1] - 2
         bend = np.maximum(self.own_bend[np.clip(rows - 1, 0, last)], self.own_bend[np.clip(rows, 0, last)])
-        radius: Floats = self.radius - bend[:, None] - self.path_bend[segments]
-        return radius
+        return self.radius - bend[:, None] - self.path_bend[segments]
 
     def along(self, row: int, place: float) -> Reached:
         """What is reached of a row from one place of it on, if it is free: that, and what is beyond without a break."""

@@ -63,16 +63,14 @@ class Match(Batch):
     @cached_property
     def step(self) -> Bools:
         """(v - 1,) whether each step is run beside the CL path."""
-        follows: Bools = self.on[1:] & self.on[:-1] & (self.section[1:] == self.section[:-1])
-        return follows
+        return self.on[1:] & self.on[:-1] & (self.section[1:] == self.section[:-1])
 
     @cached_property
     def feeding(self) -> Bools:
         """(e - 1,) whether each element but the first is run beside the CL path from end to end."""
         gone = np.concatenate(([0], np.cumsum(self.step)))
         last = self.motion.last
-        whole: Bools = gone[last[1:]] - gone[last[:-1]] == np.diff(last)
-        return whole
+        return gone[last[1:]] - gone[last[:-1]] == np.diff(last)
 
     @cached_property
     def runs(self) -> tuple[Ints, Ints]:
@@ -150,10 +148,8 @@ class Match(Batch):
         """(k,) lines of the CL file that lead to places."""
         original = self.original
         rows = np.minimum(np.ceil(np.nan_to_num(place)).astype(np.int64), len(original.trail) - 1)
-        lines: Ints = original.program.line[original.pose[original.trail.owner[rows]]]
-        return lines
+        return original.program.line[original.pose[original.trail.owner[rows]]]
 
     def nc_lines(self, row: Ints) -> Ints:
         """(k,) lines of the text that lead to written vertices."""
-        lines: Ints = self.nc.line[self.owner[row]]
-        return lines
+        return self.nc.line[self.owner[row]]

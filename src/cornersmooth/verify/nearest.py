@@ -21,8 +21,7 @@ _BLOCK: Final = 8192
 def larger_square(away: Floats) -> Floats:
     """(k,) the larger of the squares of both halves, tip and axis point, of differences (k, 6)."""
     tip, point = away[:, :3], away[:, 3:]
-    square: Floats = np.maximum(np.einsum("ij,ij->i", tip, tip), np.einsum("ij,ij->i", point, point))
-    return square
+    return np.maximum(np.einsum("ij,ij->i", tip, tip), np.einsum("ij,ij->i", point, point))
 
 
 def nearest_places(

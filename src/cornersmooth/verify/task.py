@@ -120,5 +120,4 @@ def _exact_poses(original: Original) -> Bools:
         np.add.at(steps, chains[:, 1], -1)
         exact = np.cumsum(steps[:-1]) == 0
     exact |= (program.keep != Keep.NO) | program.acted[1:]
-    chosen: Bools = exact[original.pose]
-    return chosen
+    return exact[original.pose]

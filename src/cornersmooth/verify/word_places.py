@@ -130,8 +130,7 @@ class _Places:
 
     def of_moves(self, moves: Ints) -> Floats:
         """(k,) where moves of the CL file end."""
-        ends: Floats = self._task.path.length[self._task.original.trail.last[moves]]
-        return ends
+        return self._task.path.length[self._task.original.trail.last[moves]]
 
     def of(self, event: Event) -> Place:
         """Where a word is: at the end of the element before it; that of a tap at the hole that is fed next.
@@ -162,8 +161,7 @@ def _statement_lengths(task: Task) -> list[float]:
     if not len(original.pose):
         return [_BEFORE] * len(move)
     there = task.path.length[original.trail.last[np.clip(move, 0, None)]]
-    lengths: list[float] = np.where(move >= 0, there, _BEFORE).tolist()
-    return lengths
+    return np.where(move >= 0, there, _BEFORE).tolist()
 
 
 def _of_holes(batches: Batches, places: _Places) -> list[Token]:
