@@ -48,6 +48,7 @@ RUN_BY = {
     "pip install .": ".ci/packages",
     "pip install 'cornersmooth[plot]'": "test_extras_that_are_named_exist",
     "python docs/make_codes.py": "tests/test_codes.py",
+    "python docs/make_words.py": "tests/verify/test_word_mutations.py",
     "python docs/run_examples.py docs/gallery.md docs": "tests/test_docs.py",
     "python docs/make_savings.py FOLDER": "test_savings_are_printed_as_a_table",
     "python tests/nc/planned_column.py FOLDER": "tests/nc/test_nc_planned_column.py",

@@ -325,7 +325,8 @@ def test_says_the_time_of_what_has_changed(tmp_path: Path) -> None:
     slow = filter_program(text.replace("F1000.", "F6.").encode(), form, settings, axes=axes)
     assert slow.seconds is not None
     first = 19.0 if "Z20." in text else 0.0  # from Z20 down to the first place
-    assert slow.seconds[0] == pytest.approx((length + first) / 0.1, rel=1e-3)
+    # plans are at most 0.3 % slower than the fastest where the tool stops at every corner
+    assert slow.seconds[0] == pytest.approx((length + first) / 0.1, rel=3e-3)
     # each corner is cut by less than ε
     assert slow.seconds[0] - 2 * N * EPS / 0.1 < slow.seconds[1] < slow.seconds[0]
     fast = filter_program(text.encode(), form, settings, axes=axes)
