@@ -221,8 +221,6 @@ class Stops:
 
     def _after(self, alive: list[_Trace], element: int) -> list[_Trace]:
         """Traces after an element, from those before it."""
-        if self.lines.stands(element):
-            return alive
         found: dict[tuple[int, int], _Trace] = {}
 
         def put(one: _Trace) -> None:
@@ -230,8 +228,13 @@ class Stops:
             if (one.cost, -one.since(alive)) < (known.cost, -known.since(alive)):
                 found[one.key] = one
 
+        stands = self.lines.stands(element)
+        if stands and self.lines.feeds(element):
+            return alive
+        if stands:  # a rapid for the digits of a stop alone
+            found = {one.key: one for one in alive}
         for trace in alive:
-            for one in self._from(trace, element):
+            for one in self._takes(trace, element) if stands else self._from(trace, element):
                 put(one)
         if found:
             after = list(found.values())
