@@ -13,6 +13,7 @@ import pytest
 from cornersmooth.cl import read
 from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.feedrate import Limits, direct, plan, planner
+from cornersmooth.feedrate.intervals import path_limits
 from cornersmooth.feedrate.machine_axes import MachineAxes, follow
 from cornersmooth.feedrate.motion import poses, shares_at
 from cornersmooth.feedrate.path import Path, build_path
@@ -324,3 +325,16 @@ def test_at_a_stop_the_jerk_is_that_of_the_move_that_ends() -> None:
     assert (law.kinematics(times)[0] == law.edge[1]).any()
     jerk, steady = law.axes_at(times)[3], law.axes_at([stop - 1e-4])[3]
     assert np.abs(jerk - steady).max() <= 0.05 * np.abs(steady).max()
+
+
+def test_a_tip_that_all_but_stands_is_not_divided_without_end() -> None:
+    """The axis turns far while the tip goes less than its digits: derivatives by the way are noise there."""
+    turn = np.radians(np.linspace(0.0, 40.0, 30))
+    axis = np.column_stack((np.sin(turn), 0.02 * np.cos(40.0 * turn), np.cos(turn)))
+    tip = np.column_stack((1e-7 * np.arange(30), np.zeros(30), np.full(30, 1e-8)))
+    rows = "\n".join(",".join(f"{value:.9f}" for value in row) for row in np.hstack((tip, axis)).tolist())
+    program = read(f"x,y,z,i,j,k\n{rows}\n".encode(), name="creeping.csv").with_feed(1000.0)
+    machine = load_machine("nutated-bc")
+    path = build_path(program, None, Settings(), Limits(), stop_everywhere=False)
+    intervals = path_limits(path, Limits(), follow(machine, path))
+    assert len(intervals.cap) < 200 * len(path)

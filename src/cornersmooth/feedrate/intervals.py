@@ -34,8 +34,9 @@ _EVEN = 0.02
 _VARIED = 0.05
 #: and where the curvature, which limits the speed there, varies so much, down to intervals of those of curves alone
 _BENT = 0.2
-#: most halvings
-_DEEPEST = 14
+#: most halvings, and most intervals of one element that are halved: where more are uneven halving does not help, as
+#: where the tip all but stands and its digits are lost (bounds of v² hold over whole intervals, however long they are)
+_DEEPEST, _MOST = 14, 32
 #: the length of a vector as four quantities: derivatives may point anywhere, so their lengths count with any signs
 _SIGNS = np.array(((1.0, -1.0, 1.0, -1.0), (1.0, 1.0, -1.0, -1.0), (1.0, 1.0, 1.0, 1.0)))
 
@@ -185,11 +186,12 @@ def _divided(quantities: Quantities, asked: Bools, fastest: Floats, centripetal:
     done = []
     for depth in range(_DEEPEST + 1):
         closer = []
+        may = (np.bincount(element, minlength=len(path))[element] <= _MOST) & (depth < _DEEPEST)
         for at in range(0, len(element), _TOGETHER):
             some = slice(at, at + _TOGETHER)
             own = element[some], low[some], high[some]
             width, middle, cap, uneven = _look(quantities, *own, fastest[own[0]], centripetal)
-            again = uneven & (depth < _DEEPEST)
+            again = uneven & may[some]
             done.append(np.stack((*own, width, middle, cap))[:, ~again])
             closer.append([part[again] for part in own])
         if not closer:
