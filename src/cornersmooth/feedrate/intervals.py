@@ -36,7 +36,7 @@ _VARIED = 0.05
 _BENT = 0.2
 #: most halvings, and most intervals of one element that are halved: where more are uneven halving does not help, as
 #: where the tip all but stands and its digits are lost (bounds of v² hold over whole intervals, however long they are)
-_DEEPEST, _MOST = 14, 32
+_DEEPEST, _MOST = 14, 128
 #: the length of a vector as four quantities: derivatives may point anywhere, so their lengths count with any signs
 _SIGNS = np.array(((1.0, -1.0, 1.0, -1.0), (1.0, 1.0, -1.0, -1.0), (1.0, 1.0, 1.0, 1.0)))
 
