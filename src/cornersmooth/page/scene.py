@@ -132,7 +132,7 @@ def scene(subject: Subject, story: Story) -> tuple[dict[str, Any], Pack]:
     _add_written(pack, written, planned, seconds, corners, places, settings, centre)
     charts = _add_charts(pack, original, written, planned, seconds)
     if corners is not None:
-        _add_corners(pack, corners, program, original, places, centre)
+        _add_corners(pack, corners, program, original, centre)
     meta: dict[str, Any] = {
         "schema": SCHEMA,
         "title": story.title,
@@ -261,9 +261,7 @@ def _kinds(written: WrittenPath, corners: CornerList, places: Ints) -> Ints:
     return kind
 
 
-def _add_corners(
-    pack: Pack, corners: CornerList, program: Program, original: OriginalPath, places: Ints, centre: Floats
-) -> None:
+def _add_corners(pack: Pack, corners: CornerList, program: Program, original: OriginalPath, centre: Floats) -> None:
     pack.add("c_tip", program.tip[corners.pose] - centre, "f4")
     pack.add("c_axis", program.axis[corners.pose], "f4", _FINE)
     pack.add("c_kind", corners.kind, "u1")

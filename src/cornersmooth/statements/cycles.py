@@ -50,11 +50,6 @@ class Drilling:
         known = [height for height in (self.retract, self.clearance) if not math.isnan(height)]
         return known[0] if known else 0.0
 
-    @property
-    def if_drilled(self) -> Drilling:
-        """The same, open where nothing need be drilled: a tap may be left out."""
-        return Drilling(tap=True) if self.tap else self
-
 
 def drilling(args: tuple[float | str, ...], program: Program, speed: float = 0.0) -> Drilling:
     """Interpret the arguments of a CYCLE statement.

@@ -47,11 +47,6 @@ class ToolChanges:
         stop = self._events[self._place[before]].element if before < paired else NEVER
         return NEVER if self._alike and before > paired else first, stop
 
-    def pose_of(self, pose: int) -> int:
-        """Pose that the last change before a pose stands before; 0 where there is none that is paired."""
-        before = min(bisect_right(self._asked_at, pose), len(self._place))
-        return self._asked_at[before - 1] if before else 0
-
     def _look(self) -> None:
         """Take the words that have been read since."""
         for place in range(self._read, len(self._events)):

@@ -100,7 +100,7 @@ class Batches:
         ahead = Ahead(nc for nc in chunks if len(nc))
         if not ahead.has(0) or not moves:
             if ahead.count or moves:
-                self._lacking(0, moves - 1, int(ahead.nc.line[0]) if ahead.count else None)
+                self._lacking(int(ahead.nc.line[0]) if ahead.count else None)
             while ahead.has(ahead.count):
                 ahead.forget(ahead.count - 1)
             self.elements = ahead.count
@@ -116,10 +116,10 @@ class Batches:
         self.elements = ahead.count
         self.problems += stops.problems
 
-    def _lacking(self, move_first: int, move_last: int, surplus: int | None = None) -> None:
+    def _lacking(self, surplus: int | None) -> None:
         """Say that only one of the two motions has anything; `surplus` is the NC line of motion without any."""
         original = self.task.original
-        line = 0 if surplus is not None else int(original.program.line[original.pose[move_first]])
+        line = 0 if surplus is not None else int(original.program.line[original.pose[0]])
         text = "the program lacks motion of the CL file" if surplus is None else "motion that the CL file does not have"
         self.problems.append(Problem("CS534", line, surplus or 0, text))
 

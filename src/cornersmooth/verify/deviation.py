@@ -9,11 +9,11 @@ import numpy as np
 
 from cornersmooth.model import Floats, Ints
 from cornersmooth.verify.distances import Gap, Reached, nearest, of_original, of_written
+from cornersmooth.verify.exact_poses import digit_errors
 from cornersmooth.verify.findings import AXIS_OFF, Findings, Poses, Violation, Worst
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.nearest import COLUMNS, Metric, on_segments
 from cornersmooth.verify.passage import AROUND, LONGER, MOST_BREAKS, Break
-from cornersmooth.verify.rapids import digit_errors
 from cornersmooth.verify.task import ARITHMETIC
 
 #: rows for which tip and axis point are looked at each on its own at a time: only the largest are wanted

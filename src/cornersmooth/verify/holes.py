@@ -12,7 +12,7 @@ from cornersmooth.nc_reader.elements import Element, Problem
 from cornersmooth.nc_reader.tool import directions, leads_somewhere
 from cornersmooth.statements.cycles import Drilling
 from cornersmooth.verify.cl_motion import Original
-from cornersmooth.verify.rapids import digit_errors
+from cornersmooth.verify.exact_poses import digit_errors
 from cornersmooth.verify.task import ARITHMETIC
 
 #: elements that are compared with a pose together, as the next ones will be wanted, too

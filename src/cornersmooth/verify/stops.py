@@ -25,9 +25,9 @@ from cornersmooth.nc_reader.elements import Elements, Problem
 from cornersmooth.nc_reader.tool import beyond_digits, directions, moving_rapids
 from cornersmooth.statements.cycles import Drilling, drillings
 from cornersmooth.statements.tool_changes import ToolChanges
+from cornersmooth.verify.exact_poses import digit_errors
 from cornersmooth.verify.holes import HoleLines
 from cornersmooth.verify.nearest import COLUMNS, on_segments
-from cornersmooth.verify.rapids import digit_errors
 from cornersmooth.verify.task import Task
 
 #: elements that are given out together

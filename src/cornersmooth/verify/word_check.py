@@ -115,7 +115,7 @@ class WordCheck:
         self._starts(number, "")
         self._blocks += len(table)
         self._line = int(table.line[-1])
-        self._next_block("", number)
+        self._next_block("")
         self._check_weights(table)
         states.turn(number, table.row(0).keys())
         self._positions.leave(table.columns.keys())
@@ -161,7 +161,7 @@ class WordCheck:
         before = len(self.problems)
         ruled = self._rules.of(words)
         if not self._starts(line.number, text):
-            follows = self._next_block(text, line.number)
+            follows = self._next_block(text)
             self.problems += self._rules.problems(line, words, ruled)
             for word, rule in ruled:
                 if rule is not None and rule.behind is not None and not rule.behind.fullmatch(follows):
@@ -217,7 +217,7 @@ class WordCheck:
         if moves or (not apart and LINEAR & given.keys()):
             self._states.motion(line.number, given, 1.0 if moves else self._code, moves=moves, drills=drills)
 
-    def _next_block(self, text: str, number: int) -> str:
+    def _next_block(self, text: str) -> str:
         """Look at whether the block before wanted this one; return it."""
         if self._then is not None:
             rule, line = self._then
