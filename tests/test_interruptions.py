@@ -2,20 +2,13 @@
 
 from __future__ import annotations
 
-import pickle
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 
 import pytest
 
-from cornersmooth import Settings, choose_form
-from cornersmooth.cli import worker
-from cornersmooth.cli.job import Job
-from cornersmooth.cli.values import Given
-from cornersmooth.nc import Frame
 from interruptions import HOW, LEFT, OLD, Bench, Try, cl_text, members, tries
 from oracle.command import PATIENCE, command, environment, run, wait_for
 from oracle.share import THOROUGH
@@ -44,22 +37,6 @@ def test_signals_that_a_run_was_started_to_ignore_stay_ignored(bench: Bench) -> 
 def test_a_batch_whose_parent_is_killed_leaves_no_process(bench: Bench) -> None:
     found = bench.interrupt(Try(batch=True, how="parent", moment=0.5, old=True))
     assert found.wrong == [], found.said
-
-
-def test_a_worker_that_nobody_listens_to_ends_in_silence(tmp_path: Path) -> None:
-    """Its parent was killed between two jobs, and it has not yet seen that no job will come."""
-    job = Job("none.cls", "none.nc", (), Given(directory="out"), Settings(), choose_form(), Frame())
-    command = [sys.executable, "-P", "-c", worker._COMMAND]
-    with subprocess.Popen(
-        command, cwd=tmp_path, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE
-    ) as process:
-        assert process.stdin
-        assert process.stdout
-        assert process.stderr
-        process.stdout.close()
-        pickle.dump(job, process.stdin)
-        process.stdin.flush()
-        assert (process.wait(60), process.stderr.read()) == (0, b"")
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from multiprocessing import get_context
-from multiprocessing.connection import Connection
+from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any, Final, TypeVar
 
@@ -54,8 +54,9 @@ class Helper:
     """
 
     def __init__(self, work: Callable[[], Any]) -> None:
-        self._connection, theirs = _CONTEXT.Pipe()
-        self._process = _forked(_report, work, theirs, self._connection, daemon=False)
+        self.connection, theirs = _CONTEXT.Pipe()
+        self._process = _forked(_report, work, theirs, self.connection, daemon=False)
+        self.pid = self._process.pid
         theirs.close()
 
     def result(self) -> Any:
@@ -66,12 +67,23 @@ class Helper:
         MemoryError
             The process has been ended from outside, which is what a system short of memory does.
         """
-        return _received(self._connection)
+        return _received(self.connection)
 
-    def end(self) -> None:
-        """End the process, whatever it is at."""
-        self._connection.close()
-        _end([self._process])
+    def end(self) -> int:
+        """End the process, whatever it is at; return its exit code, or the number of its signal with a minus."""
+        self.connection.close()
+        return _end([self._process])[0]
+
+    def kill(self) -> None:
+        """End the process without its consent; for signal handlers, too."""
+        self._process.kill()
+        self._process.join(1.0)
+
+
+def first_ready(helpers: Iterable[Helper]) -> list[Helper]:
+    """Wait until one or more have ended their work."""
+    by_connection = {helper.connection: helper for helper in helpers}
+    return [by_connection[ready] for ready in wait([*by_connection])]  # type: ignore[index]
 
 
 def map_in_processes(
@@ -217,13 +229,16 @@ def _forked(target: Callable[..., None], *args: Any, daemon: bool) -> BaseProces
     return process
 
 
-def _end(processes: list[BaseProcess]) -> None:
-    """Let processes go home; who is still at work is sent away."""
+def _end(processes: list[BaseProcess]) -> list[int]:
+    """Let processes go home; who is still at work is sent away. Return their exit codes."""
     for process in processes:
         process.terminate()
+    codes = []
     for process in processes:
         process.join()
+        codes.append(process.exitcode or 0)
         process.close()
+    return codes
 
 
 def _obeying(target: Callable[..., None], args: tuple[Any, ...]) -> None:

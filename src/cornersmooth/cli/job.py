@@ -134,7 +134,7 @@ def _check(job: Job, *, replace_target: bool | None = False) -> dict[str, bool |
 def run_job(job: Job, progress: Progress | None = None) -> Outcome:
     """Read, smooth, write, report; errors of the input or output become part of the outcome.
 
-    `ClosedPipe` and KeyboardInterrupt pass through.
+    KeyboardInterrupt passes through, and `ClosedPipe` where it is not one of a batch.
     """
     return_large_arrays()
     outcome = Outcome(job)
@@ -151,7 +151,10 @@ def run_job(job: Job, progress: Progress | None = None) -> Outcome:
         outcome.exit_code = 3
         outcome.message = message("error", "not enough memory for this file; cut it at a tool change", place=job.source)
     except ClosedPipe:
-        raise
+        if not job.batch:
+            raise
+        outcome.exit_code = 4
+        outcome.message = message("error", "the reader of an output has gone; run it again", place=job.source)
     except Exception as failure:
         outcome.exit_code = EXIT_INTERNAL
         outcome.message = internal_error(failure, job.source)
