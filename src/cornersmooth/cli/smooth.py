@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, NoReturn
 
 import click
 
-from cornersmooth.cli.batch import Batch
 from cornersmooth.cli.command import new_command
 from cornersmooth.cli.files import STANDARD, check_inputs, check_path, read_lines
 from cornersmooth.cli.headings import EXIT_CODES_OF_WRITERS
@@ -73,6 +72,8 @@ def command(given: Given) -> int:
     jobs = _make_jobs(given)
     if len(jobs) == 1 and not given.directory:
         return _alone(jobs[0])
+    from cornersmooth.cli.batch import Batch
+
     ending: Shutdown = click.get_current_context().obj
     worst = 0
     with progress_bar(given.quiet, rate=True) as progress:
