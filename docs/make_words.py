@@ -27,7 +27,7 @@ def roles(entry: dict[str, Any], kind: str) -> str:
     """Where a word may stand, and what must hold."""
     said = []
     if entry.get("first") == "motion":
-        said.append("**must be said before the first motion**")
+        said.append("**must come before the first motion**")
     if entry.get("state") and not entry.get("follows"):
         said.append("the same wherever the tool moves")
     if entry.get("off"):
@@ -39,7 +39,7 @@ def roles(entry: dict[str, Any], kind: str) -> str:
         ("must", "only with {}"),
         ("after", "{} before it"),
         ("then", "{} in the next block"),
-        ("behind", "only behind {}"),
+        ("behind", "only after {}"),
     ):
         if key in entry:
             said.append(text.format(shown(entry[key])))
@@ -52,11 +52,11 @@ def roles(entry: dict[str, Any], kind: str) -> str:
     if entry.get("rotary") == "zero":
         said.append("only where the rotary axes are at zero")
     if entry.get("high"):
-        said.append("only behind a retract")
+        said.append("only after a retract")
     if entry.get("retract"):
         said.append("before the first motion, before an approach or at the end")
     if entry.get("late"):
-        said.append("behind a retract as late as in the block that first moves Z")
+        said.append("after a retract, as late as in the block that first moves Z")
     if entry.get("never"):
         said.append("refused")
     return "; ".join(said) or ("anywhere" if kind == "word" else "")
@@ -73,7 +73,7 @@ def section(control: str) -> Iterator[str]:
         if key in table:
             yield f"The program {what} {', '.join(map(shown, table[key])) or 'nothing in particular'}."
     if table.get("points"):
-        yield f"Numbers behind {table['points']} need their decimal point."
+        yield f"Numbers after {table['points']} need their decimal point."
     if "orders" in table:
         yield f"Comments may not begin with {shown(table['orders'])}."
     if "like" in table:

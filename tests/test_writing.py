@@ -13,7 +13,8 @@ from cornersmooth.cli.group import COMMANDS
 from writing import FORBIDDEN, MEAN, MOST, faults, paragraphs, plain, sentences, words
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGES = [path for name in ("*.md", "docs/*.md", "samples/*.md") for path in sorted(ROOT.glob(name))]
+WRITTEN = ("*.md", "docs/*.md", "docs/dev/[!pt]*.md", "samples/*.md")
+PAGES = [path for name in WRITTEN for path in sorted(ROOT.glob(name))]
 
 
 def prose(page: Path) -> list[tuple[str, bool]]:
