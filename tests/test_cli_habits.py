@@ -12,7 +12,7 @@ import pytest
 from cornersmooth import optional_packages
 from cornersmooth.cli.files import Beginning
 from cornersmooth.cli.group import COMMANDS, GROUPS
-from cornersmooth.cli.headings import HEADINGS
+from cornersmooth.cli.options import HEADINGS
 from cornersmooth.nc import control_aliases, control_names, load_control
 from oracle.command import DONE, SMALL, USAGE, run, seen_on_a_terminal
 from oracle.messages import one_line

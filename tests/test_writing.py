@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import tomllib
-from importlib import import_module
 from pathlib import Path
 
 import click
 import pytest
 
-from cornersmooth.cli.group import COMMANDS
+from cornersmooth.cli.group import COMMANDS, cli
 from writing import FORBIDDEN, MEAN, MOST, faults, paragraphs, plain, sentences, words
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -39,7 +38,8 @@ def test_pages_are_written_by_the_rules(page: Path) -> None:
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_helps_are_written_by_the_rules(name: str) -> None:
-    command: click.Command = import_module(f"cornersmooth.cli.{name}").command
+    command = cli.get_command(click.Context(cli), name)
+    assert command
     helps = [COMMANDS[name], command.help or "", *(getattr(one, "help", None) or "" for one in command.params)]
     spoken = [
         text for one in helps for text in one.replace("\b\n", "\n").split("\n\n") if "  cornersmooth " not in text

@@ -11,13 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from cornersmooth.cli.command import new_command
-from cornersmooth.cli.files import check_inputs, check_path, target_of, told_of
-from cornersmooth.cli.headings import EXIT_CODES_OF_READERS
+from cornersmooth.cli.command import EXIT_CODES_OF_READERS, new_command
+from cornersmooth.cli.files import check_inputs, check_path, told_of, write_report
 from cornersmooth.cli.options import CURVES, READING
-from cornersmooth.cli.show import progress_bar, say_json, say_line
+from cornersmooth.cli.show import progress_bar, say
 from cornersmooth.cli.values import Given
-from cornersmooth.output import open_output
 
 if TYPE_CHECKING:
     from cornersmooth.comparing import Row, Table
@@ -76,16 +74,11 @@ def command(given: Given) -> int:
     made_by = ("filter", os.path.splitext(source)[1]) if is_program else ("smooth", control.layout.suffix)
     commands = [_command(given, row, machine_named, *made_by) for row in table.rows]
     if given.csv:
-        with open_output(target_of(given.csv)) as output:
-            output.stream.write(_csv(table, commands).encode("utf-8"))
-    if given.as_json:
-        contents = table.as_dict()
-        for row, text in zip(contents["rows"], commands, strict=True):
-            row["command"] = text
-        say_json(contents)
-    elif not given.quiet:
-        for line in _lines(table, commands, bool(given.verbose)):
-            say_line(line)
+        write_report(given.csv, [_csv(table, commands)])
+    contents = table.as_dict()
+    for row, text in zip(contents["rows"], commands, strict=True):
+        row["command"] = text
+    say(given, contents, _lines(table, commands, bool(given.verbose)))
     return 0
 
 

@@ -1,4 +1,4 @@
-"""``cornersmooth config``: every default that holds here, and where it comes from."""
+"""``cornersmooth config`` and ``completion``: every default that holds here; what makes a shell complete words."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import click
 
 from cornersmooth.cli import shop
 from cornersmooth.cli.command import new_command
-from cornersmooth.cli.show import say_json, say_line
+from cornersmooth.cli.show import say
 from cornersmooth.cli.values import Given
 from cornersmooth.errors import InputError
 
@@ -18,7 +18,7 @@ from cornersmooth.errors import InputError
 _DEFAULT: Final = re.compile(r"\[default: ([^]]+)\]")
 
 
-@new_command("config", "[IN]", "as_json", cls=click.Command)
+@new_command("config", "[IN]", "as_json")
 def command(given: Given) -> int:
     """Say which values 'cornersmooth smooth' would use for the file or folder IN, and where each comes from.
 
@@ -35,22 +35,18 @@ def command(given: Given) -> int:
     source = given.source
     if not os.path.exists(source):
         raise InputError("CS100", "cannot read it: no such file or directory", "check the path", file=source)
+    values, lines = [], []
     with smooth.make_context("smooth", [source]) as context:
-        rows, told = [], []
         for option in shop.settable(smooth):
-            value = context.params[str(option.name)]
-            value = getattr(value, "name", value)  # a control or machine of one's own
-            rows.append((shop.keys(option)[0], value, shop.origin(context, str(option.name))))
+            name = str(option.name)
+            value = getattr(context.params[name], "name", context.params[name])  # a control or machine of one's own
+            row = (shop.key(name), value, shop.origin(context, name))
+            values.append(dict(zip(("key", "value", "from"), row, strict=True)))
             instead = _DEFAULT.search(option.help or "")
-            told.append(instead[1] if instead and value in (None, "", ()) else _told(value))
-    if given.as_json:
-        values = [dict(zip(("key", "value", "from"), row, strict=True)) for row in rows]
-        say_json({"schema": "cornersmooth-config/1", "values": values})
-        return 0
-    lines = [(key, value, origin) for (key, _, origin), value in zip(rows, told, strict=True)]
+            lines.append((row[0], instead[1] if instead and value in (None, "", ()) else _told(value), row[2]))
     widths = [max(len(line[column]) for line in lines) for column in (0, 1)]
-    for key, value, origin in lines:
-        say_line(f"{key:<{widths[0]}}  {value:<{widths[1]}}  {origin}")
+    table = (f"{key:<{widths[0]}}  {value:<{widths[1]}}  {origin}" for key, value, origin in lines)
+    say(given, {"schema": "cornersmooth-config/1", "values": values}, table)
     return 0
 
 
@@ -60,3 +56,23 @@ def _told(value: object) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     return ", ".join(map(str, value)) if isinstance(value, tuple) else str(value)
+
+
+@new_command("completion", "SHELL", "")
+def completion(given: Given) -> int:
+    """Print what makes SHELL complete commands, options, names of controls, machines and forms, and files.
+
+    \b
+    Examples:
+      eval "$(cornersmooth completion bash)"    # in ~/.bashrc
+      eval "$(cornersmooth completion zsh)"     # in ~/.zshrc, behind compinit
+      cornersmooth completion fish | source     # in ~/.config/fish/config.fish
+    """
+    from click.shell_completion import get_completion_class
+
+    from cornersmooth.cli.group import cli
+
+    kind = get_completion_class(str(given.name))
+    assert kind is not None
+    click.echo(kind(cli, {}, "cornersmooth", "_CORNERSMOOTH_COMPLETE").source().rstrip())
+    return 0

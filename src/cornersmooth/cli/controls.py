@@ -1,13 +1,15 @@
-"""``cornersmooth controls``: which controls NC text can be written for."""
+"""``cornersmooth controls`` and ``machines``: what programs can be written for."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from cornersmooth.cli.command import new_command
-from cornersmooth.cli.show import say_json, say_line
+from cornersmooth.cli.show import say, say_json
 from cornersmooth.cli.values import Given
 
 if TYPE_CHECKING:
@@ -23,7 +25,7 @@ _MODES = {
 }
 
 
-@new_command("controls", "[CONTROL]", "table as_json", cls=click.Command)
+@new_command("controls", "[CONTROL]", "table as_json")
 def command(given: Given) -> int:
     """List the controls with their forms, or check and describe one.
 
@@ -38,28 +40,22 @@ def command(given: Given) -> int:
     """
     from cornersmooth.nc import control_names, control_table, load_control
 
-    name = given.name
     if given.table:
-        if name is None:
-            raise click.UsageError("--table needs the name of a control")
-        if given.as_json:
-            raise click.UsageError("--table and --json exclude each other")
-        click.echo(control_table(name), nl=False)
+        _check_table(given, "control")
+        click.echo(control_table(str(given.name)), nl=False)
         return 0
-    controls = [_values(load_control(one)) for one in ([name] if name else control_names())]
-    if given.as_json:
-        say_json({"schema": "cornersmooth-controls/1", "controls": controls})
-        return 0
-    for control in controls:
-        say_line(_told("", control))
-        if control["aliases"]:
-            say_line(f"  also called {', '.join(control['aliases'])}")
-        for form in control["forms"]:
-            say_line(_told("  -f ", form))
-            say_line(f"     with {', '.join(form['with'])}")
-        for extra in control["functions"]:
-            say_line(_told("  --with ", extra))
+    controls = [_values(load_control(one)) for one in ([given.name] if given.name else control_names())]
+    lines = (line for control in controls for line in _lines(control))
+    say(given, {"schema": "cornersmooth-controls/1", "controls": controls}, lines)
     return 0
+
+
+def _check_table(given: Given, kind: str) -> None:
+    """Refuse a table of nothing, and one beside other things."""
+    if given.name is None:
+        raise click.UsageError(f"--table needs the name of a {kind}")
+    if given.as_json or given.pose:
+        raise click.UsageError(f"--table and {'--pose' if given.pose else '--json'} exclude each other")
 
 
 def _values(control: Control) -> dict[str, Any]:
@@ -75,5 +71,56 @@ def _named(item: Any) -> dict[str, Any]:
     return {"name": item.name, "description": item.description}
 
 
+def _lines(control: dict[str, Any]) -> Iterator[str]:
+    yield _told("", control)
+    if control["aliases"]:
+        yield f"  also called {', '.join(control['aliases'])}"
+    for form in control["forms"]:
+        yield _told("  -f ", form)
+        yield f"     with {', '.join(form['with'])}"
+    for extra in control["functions"]:
+        yield _told("  --with ", extra)
+
+
 def _told(before: str, item: dict[str, Any]) -> str:
     return f"{before}{item['name']}: {item['description']}" if item["description"] else f"{before}{item['name']}"
+
+
+@new_command("machines", "[MACHINE]", "table as_json pose")
+def machines(given: Given) -> int:
+    """List the machines that come with the program, or check and describe one.
+
+    A machine has up to two rotary axes, each in a table or a head, with direction, point and limits. A TOML file
+    describes your own. It may be like one of these and hold only what is different.
+
+    \b
+    Examples:
+      cornersmooth machines
+      cornersmooth machines xyzac-trt
+      cornersmooth machines table-ac --table > mine.toml
+      cornersmooth machines mine.toml
+      cornersmooth machines mine.toml --pose A30,C45
+      cornersmooth machines mine.toml --json
+    """
+    from cornersmooth.kinematics import load_machine, machine_names, machine_table
+
+    name = given.name
+    if given.table:
+        _check_table(given, "machine")
+        click.echo(machine_table(str(name)), nl=False)
+    elif given.pose and name is None:
+        raise click.UsageError("--pose needs the name of a machine")
+    elif given.pose and name:
+        from cornersmooth.kinematics.posed import Posed, parse_pose
+
+        machine = load_machine(name)
+        posed = Posed.of(machine, parse_pose(machine, given.pose))
+        if given.as_json:
+            say_json(posed.as_dict())
+        else:
+            click.echo(posed.describe())
+    else:
+        found = [load_machine(one) for one in ([name] if name else machine_names())]
+        lines = found[0].describe().splitlines() if name else [f"{one.name}: {one.description}" for one in found]
+        say(given, {"schema": "cornersmooth-machines/1", "machines": [*map(asdict, found)]}, lines, indent=4)
+    return 0

@@ -12,7 +12,7 @@ from typing import Any, Final
 import click
 
 from cornersmooth.cli.command import new_command
-from cornersmooth.cli.show import say_json, say_line
+from cornersmooth.cli.show import say
 from cornersmooth.cli.values import Given
 
 #: what the hundreds of the codes are about
@@ -34,7 +34,7 @@ KINDS: Final = {
 _WIDTH: Final = 80
 
 
-@new_command("explain", "[CODE]", "as_json", cls=click.Command)
+@new_command("explain", "[CODE]", "as_json")
 def command(given: Given) -> int:
     """Explain the code of a message: its cause, what to do, and how it is printed. Without a code, list them all.
 
@@ -50,12 +50,9 @@ def command(given: Given) -> int:
         code = f"CS{number[1]}" if number else code
         if code not in known:
             raise click.UsageError(f"no code {code!r}; 'cornersmooth explain' lists them")
-    if given.as_json:
-        found = {name: one for name, one in known.items() if code in (None, name)}
-        say_json({"schema": "cornersmooth-codes/1", "codes": found})
-        return 0
-    for line in _all(known) if code is None else _one(code, known[code]):
-        say_line(line)
+    found = {name: one for name, one in known.items() if code in (None, name)}
+    lines = _all(known) if code is None else _one(code, known[code])
+    say(given, {"schema": "cornersmooth-codes/1", "codes": found}, lines)
     return 0
 
 

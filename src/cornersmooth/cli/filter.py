@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from cornersmooth.cli.command import new_command
+from cornersmooth.cli.command import EXIT_CODES_OF_WRITERS, new_command
 from cornersmooth.cli.files import STANDARD, check_path, read_input, suffix_of, target_of, told_of, write_report
-from cornersmooth.cli.headings import EXIT_CODES_OF_WRITERS
 from cornersmooth.cli.inputs import Input, check_together, find_inputs
 from cornersmooth.cli.options import LINES
 from cornersmooth.cli.programs import filter_form_of, how_read, show_wrong

@@ -13,10 +13,9 @@ from typing import Any
 import click
 
 from cornersmooth import __version__
-from cornersmooth.cli.headings import write_part
 from cornersmooth.cli.shutdown import Shutdown
 
-#: line in the list of commands of each, whose module has its name
+#: line in the list of commands of each, which is the `command` of the module of its name
 COMMANDS = {
     "smooth": "Round the corners of CL files and write NC programs.",
     "filter": "Smooth the cutting runs of a finished NC program.",
@@ -32,6 +31,9 @@ COMMANDS = {
     "completion": "Print what makes a shell complete commands, names and files.",
     "explain": "Explain the code of a message: cause, and what to do.",
 }
+
+#: of commands in the module of another one, by their names
+_MODULES = {"machines": "controls", "completion": "config"}
 
 #: how the list shows them
 GROUPS = {
@@ -69,7 +71,9 @@ class LazyGroup(click.Group):
         """Import the module of the command."""
         if cmd_name not in COMMANDS:
             return None
-        return import_module(f"cornersmooth.cli.{cmd_name}").command
+        module = import_module(f"cornersmooth.cli.{_MODULES.get(cmd_name, cmd_name)}")
+        command: click.Command = getattr(module, cmd_name if cmd_name in _MODULES else "command")
+        return command
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
@@ -84,6 +88,8 @@ class LazyGroup(click.Group):
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """List the commands without importing them."""
+        from cornersmooth.cli.command import write_part
+
         for heading, names in GROUPS.items():
             write_part(formatter, heading, [(name, COMMANDS[name]) for name in names.split()])
         with formatter.section("Pages that helps name"):

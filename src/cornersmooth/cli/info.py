@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from cornersmooth.cli.command import new_command
-from cornersmooth.cli.headings import EXIT_CODES_OF_READERS
+from cornersmooth.cli.command import EXIT_CODES_OF_READERS, new_command
 from cornersmooth.cli.options import READING
-from cornersmooth.cli.show import say_json, say_line, told_finding
+from cornersmooth.cli.show import say, say_line, told_finding
 from cornersmooth.cli.values import Given
 
 
@@ -32,25 +31,22 @@ def command(given: Given) -> int:
     data, name, is_program = given.read()
     if is_program:
         told = describe_program(data, name)
-        if given.as_json:
-            say_json(told)
-            return 0
         looks = f", looks like {told['looks_like']}" if told["looks_like"] else ""
-        say_line(f"file   {name}: an NC program{looks}, {told['lines']} lines")
-        say_line(f"cuts   {told['cuts']}")
-        say_line("       'cornersmooth filter' smooths them; name the control and the machine there")
+        lines = [
+            f"file   {name}: an NC program{looks}, {told['lines']} lines",
+            f"cuts   {told['cuts']}",
+            "       'cornersmooth filter' smooths them; name the control and the machine there",
+        ]
+        say(given, told, lines)
         return 0
     info = describe(read(data, name=name, **given.reading()), given.tolerance, given.axis_length)
-    if given.as_json:
-        say_json(info)
-        return 0
-    rows = [row for part in (_file(info), _motion(info), _axis(info), _corners(info)) for row in part]
+    rows = [*_file(info), *_motion(info), *_axis(info), *_corners(info)]
     width = max(len(label) for label, _ in rows)
-    for label, text in rows:
-        say_line(f"{label:<{width}}  {text}".rstrip(), indent=width + 2)
-    for finding in info["findings"]:
-        for line in told_finding(name, finding).split("\n"):
-            say_line(line)
+    say(given, info, (f"{label:<{width}}  {text}".rstrip() for label, text in rows), indent=width + 2)
+    if not given.as_json:
+        for finding in info["findings"]:
+            for line in told_finding(name, finding).split("\n"):
+                say_line(line)
     return 0
 
 

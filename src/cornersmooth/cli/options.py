@@ -32,7 +32,7 @@ def option(heading: str, spelled: str, help: str, default: Any = None, **given: 
     Parameters
     ----------
     heading : str
-        Its place in the help: one of `headings.HEADINGS`.
+        Its place in the help: one of `HEADINGS`.
     spelled : str
         Flags, and what the help shows in the place of the value. The long flag is the field's name if there is none.
     default
@@ -43,10 +43,12 @@ def option(heading: str, spelled: str, help: str, default: Any = None, **given: 
     return field(default=default, metadata={"heading": heading, "spelled": spelled, "help": help, **given})
 
 
+#: parts of the helps in their order; the first holds the options of every day
+HEADINGS = "Everyday,Output,Control,Program,Curves,Lines,Holes and planes,Limits,Reading,Verification,Batches".split(
+    ","
+)
 _everyday, _output, _control, _program, _curves, _lines, _holes, _limits, _reading, _verification, _batches = (
-    partial(option, heading)
-    for heading in "Everyday,Output,Control,Program,Curves,Lines,Holes and planes,Limits,Reading,Verification,"
-    "Batches".split(",")
+    partial(option, heading) for heading in HEADINGS
 )
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from cornersmooth.cli.files import read_input, told_of
-from cornersmooth.cli.show import more, print_line, print_message, say_json, say_line
+from cornersmooth.cli.show import more, print_line, print_message, say
 from cornersmooth.cli.values import Given
 
 if TYPE_CHECKING:
@@ -77,22 +77,22 @@ def time_of_program(data: bytes, name: str, given: Given) -> int:
     assert found.seconds is not None
     before, after = found.seconds
     whole = bool(form.table.lines.planner)
-    if given.as_json:
-        contents = {
-            "schema": "cornersmooth-time/1",
-            "seconds": {"unsmoothed": before, "as_written": after},
-            "unsmoothed": "the program as it is",
-            "counted": "program" if whole else "smoothed runs",
-            "cuts": found.cuts,
-            "smoothed": found.smoothed,
-        }
-        say_json(contents)
-    elif not given.quiet:
-        say_line(f"{before:>12.3f} s  {name} as it is")
-        share = f" ({100.0 * (after / before - 1.0):+.1f} %)" if before else ""
-        say_line(f"{after:>12.3f} s  {given.text or 'smoothed'}{share}")
-        what = "the whole program" if whole else "the runs that differ, without rapids"
-        say_line(f"of {what}; {found.smoothed:,} of {found.cuts:,} cuts differ")
+    contents = {
+        "schema": "cornersmooth-time/1",
+        "seconds": {"unsmoothed": before, "as_written": after},
+        "unsmoothed": "the program as it is",
+        "counted": "program" if whole else "smoothed runs",
+        "cuts": found.cuts,
+        "smoothed": found.smoothed,
+    }
+    share = f" ({100.0 * (after / before - 1.0):+.1f} %)" if before else ""
+    what = "the whole program" if whole else "the runs that differ, without rapids"
+    lines = (
+        f"{before:>12.3f} s  {name} as it is",
+        f"{after:>12.3f} s  {given.text or 'smoothed'}{share}",
+        f"of {what}; {found.smoothed:,} of {found.cuts:,} cuts differ",
+    )
+    say(given, contents, lines)
     return 0
 
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from cornersmooth.cli.command import new_command
+from cornersmooth.cli.command import EXIT_CODES_OF_READERS, new_command
 from cornersmooth.cli.files import read_input
-from cornersmooth.cli.headings import EXIT_CODES_OF_READERS
 from cornersmooth.cli.options import FEED_OF_ALL, LIMITS, LINES, READING
-from cornersmooth.cli.show import progress_bar, say_json, say_line
+from cornersmooth.cli.show import progress_bar, say
 from cornersmooth.cli.values import Given
 
 if TYPE_CHECKING:
@@ -67,11 +66,7 @@ def command(given: Given) -> int:
             processes=useful_processes(),
             progress=progress,
         )
-    if given.as_json:
-        say_json(found.as_dict())
-    elif not given.quiet:
-        for line in _lines(found, "the machine" if machine is None else machine.name):
-            say_line(line)
+    say(given, found.as_dict(), _lines(found, "the machine" if machine is None else machine.name))
     return 0
 
 

@@ -26,30 +26,29 @@ import contextlib
 import os
 import shlex
 import stat
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import click
 
-from cornersmooth.cli.headings import HeadedCommand
+from cornersmooth.cli.options import FLAGS
 from cornersmooth.cli.show import warn
 from cornersmooth.errors import SettingsError
 from cornersmooth.output import reason
 
 FILE = "cornersmooth.toml"
-PREFIX = "CORNERSMOOTH_"
+_PREFIX = "CORNERSMOOTH_"
 #: tables with options; the first holds for all commands
-COMMAND_TABLES = ("smooth", "filter", "verify", "compare", "time", "setup", "info", "surface")
+_COMMAND_TABLES = ("smooth", "filter", "verify", "compare", "time", "setup", "info", "surface")
 #: tables of controls and machines of one's own, and the options that name them
 _OWN_TABLES = {"controls": ("control",), "machines": ("machine", "limits")}
 
 #: options that belong to one run
-_ONE_RUN = frozenset(
+ONE_RUN = frozenset(
     "output directory force reports csv summary scheduler as_json law no_verify operation help table pose".split()
 )
-
 
 #: commands with a verdict, whose line says what settings loosen
 _WITH_VERDICT = frozenset(("smooth", "verify", "filter"))
@@ -64,7 +63,7 @@ class ShopFile:
 
     def options(self, command: str, control: str) -> Iterator[tuple[str, str, Any]]:
         """Table, key and value of every option that holds for a command and a control; what counts more comes later."""
-        for table in dict.fromkeys((COMMAND_TABLES[0], command)):
+        for table in dict.fromkeys((_COMMAND_TABLES[0], command)):
             entries = self.tables.get(table, {})
             for key, value in entries.items():
                 if not isinstance(value, dict):
@@ -90,36 +89,32 @@ class Shop:
 _TYPED = f"{__name__}.typed"
 
 
-class ShopCommand(HeadedCommand):
-    """A command whose options have defaults in shop settings."""
-
-    def __init__(self, *args: Any, **given: Any) -> None:
-        super().__init__(*args, **given)
-        for option in settable(self):
-            option.envvar = PREFIX + keys(option)[1].upper()
-
-    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Read the shop settings that go with the input, then the options."""
-        ctx.meta[_TYPED] = shlex.join(["cornersmooth", str(self.name), *args])
-        if ctx.resilient_parsing:  # a shell wants to complete what is not whole yet
-            with contextlib.suppress(SettingsError, click.UsageError):
-                ctx.meta[__name__] = Shop(find_files(_first_look(self, ctx, list(args))[0]))
-            return super().parse_args(ctx, args)
-        first, control = _first_look(self, ctx, list(args))
-        _check_environment(self)
-        shop = Shop(find_files(first))
-        for file in shop.files:
-            _name_strangers(file.path)
-        ctx.meta[__name__] = shop
-        ctx.default_map = defaults(self, shop, control)
-        rest = super().parse_args(ctx, args)
-        for kind, options in _OWN_TABLES.items():
-            for name in options:
-                if isinstance(ctx.params.get(name), str):
-                    ctx.params[name] = _own(shop, kind, ctx.params[name])
-        if self.name not in _WITH_VERDICT and (loose := loosened(ctx.params.get("tolerance"))):
-            warn(loose)
-        return rest
+def parse_args(
+    command: click.Command, ctx: click.Context, args: list[str], parse: Callable[[click.Context, list[str]], list[str]]
+) -> list[str]:
+    """Read the shop settings that go with the input, then the options."""
+    ctx.meta[_TYPED] = shlex.join(["cornersmooth", str(command.name), *args])
+    if not settable(command):
+        return parse(ctx, args)
+    if ctx.resilient_parsing:  # a shell wants to complete what is not whole yet
+        with contextlib.suppress(SettingsError, click.UsageError):
+            ctx.meta[__name__] = Shop(find_files(_first_look(command, ctx, list(args))[0]))
+        return parse(ctx, args)
+    first, control = _first_look(command, ctx, list(args))
+    _check_environment(command)
+    shop = Shop(find_files(first))
+    for file in shop.files:
+        _name_strangers(file.path)
+    ctx.meta[__name__] = shop
+    ctx.default_map = _defaults(command, shop, control)
+    rest = parse(ctx, args)
+    for kind, options in _OWN_TABLES.items():
+        for name in options:
+            if isinstance(ctx.params.get(name), str):
+                ctx.params[name] = _own(shop, kind, ctx.params[name])
+    if command.name not in _WITH_VERDICT and (loose := loosened(ctx.params.get("tolerance"))):
+        warn(loose)
+    return rest
 
 
 def _name_strangers(path: str) -> None:
@@ -163,10 +158,9 @@ def origin(ctx: click.Context, name: str) -> str:
     if source == click.core.ParameterSource.COMMANDLINE:
         return "command line"
     if source == click.core.ParameterSource.ENVIRONMENT:
-        return next(str(option.envvar) for option in settable(ctx.command) if option.name == name)
+        return variable(name)
     if source == click.core.ParameterSource.DEFAULT_MAP:
-        shop: Shop = ctx.meta[__name__]
-        return shop.origins[name]
+        return str(ctx.meta[__name__].origins[name])
     return "default"
 
 
@@ -186,40 +180,29 @@ def find_files(first: str) -> tuple[ShopFile, ...]:
     return tuple(_read(path) for path in (project, user) if path is not None and os.path.isfile(path))
 
 
-def defaults(command: click.Command, shop: Shop, control: str | None) -> dict[str, Any]:
-    """Values of options by name, as the files have them.
-
-    Raises
-    ------
-    SettingsError
-        CS241: an unknown key. CS242: a value that is none for the option.
-    """
-    by_key = {key: option for option in settable(command) for key in keys(option)}
+def _defaults(command: click.Command, shop: Shop, control: str | None) -> dict[str, Any]:
+    """Values of options by name, as the files have them (SettingsError CS241, CS242)."""
+    options = {key(str(option.name)): option for option in settable(command)}
     if control is None:
-        control = next((_control_of(file, command.name or "") for file in shop.files), None) or "fanuc"
+        named = (
+            file.tables.get(table, {}).get("control") for file in shop.files for table in (str(command.name), "smooth")
+        )
+        control = next((name for name in named if isinstance(name, str)), "fanuc")
     if shop.files and not any(file.own("controls", control) for file in shop.files):
         from cornersmooth.nc import find_control
 
         control = find_control(control) or control
     values: dict[str, Any] = {}
     for file in reversed(shop.files):
-        for table, key, value in file.options(command.name or "", control):
-            option = by_key.get(key)
-            if option is None:
-                if key not in (known := _all_keys()):
-                    raise _unknown(file.path, f"{table}.{key}", key, sorted(known))
-                continue
-            name = str(option.name)
-            values[name] = _checked(option, value, file.path, f"{table}.{key}")
-            shop.origins[name] = f"{file.path} [{table}]"
+        for table, word, value in file.options(command.name or "", control):
+            option = options.get(word.replace("_", "-"))
+            if option is not None:
+                name = str(option.name)
+                values[name] = _checked(option, value, file.path, f"{table}.{word}")
+                shop.origins[name] = f"{file.path} [{table}]"
+            elif word.replace("_", "-") not in (known := _all_keys()):
+                raise _unknown(file.path, f"{table}.{word}", word, known)
     return values
-
-
-def _control_of(file: ShopFile, command: str) -> str | None:
-    for table in (command, COMMAND_TABLES[0]):
-        if isinstance(named := file.tables.get(table, {}).get("control"), str):
-            return named
-    return None
 
 
 def _first_look(command: click.Command, ctx: click.Context, args: list[str]) -> tuple[str, str | None]:
@@ -227,28 +210,29 @@ def _first_look(command: click.Command, ctx: click.Context, args: list[str]) -> 
     given, _, _ = command.make_parser(ctx).parse_args(args)
     inputs = next((given.get(str(param.name)) for param in command.params if isinstance(param, click.Argument)), None)
     first = inputs[0] if isinstance(inputs, (tuple, list)) and inputs else inputs
-    control = given.get("control") or os.environ.get(f"{PREFIX}CONTROL")
+    control = given.get("control") or os.environ.get(variable("control"))
     here = isinstance(first, str) and first != "-"
     return (str(first) if here else "."), control if isinstance(control, str) else None
 
 
 def settable(command: click.Command) -> list[click.Option]:
     """Options of a command that shop settings may set: not those that belong to one run."""
-    return [param for param in command.params if isinstance(param, click.Option) and param.name not in _ONE_RUN]
+    return [param for param in command.params if isinstance(param, click.Option) and param.name not in ONE_RUN]
 
 
-def keys(option: click.Option) -> list[str]:
-    """Names of an option in a file: its long one, with hyphens or underscores."""
-    long = next((text for text in option.opts if text.startswith("--")), "").lstrip("-")
-    return [long, long.replace("-", "_")] if long else []
+def key(name: str) -> str:
+    """Name of an option in a file: its long one; underscores will do for the hyphens."""
+    return FLAGS[name][-1].removeprefix("--")
 
 
-def _all_keys() -> set[str]:
+def variable(name: str) -> str:
+    """Name of an option in the environment."""
+    return _PREFIX + key(name).replace("-", "_").upper()
+
+
+def _all_keys() -> list[str]:
     """Keys of the options of all commands."""
-    from cornersmooth.cli.options import FLAGS
-
-    flags = [flags[-1].lstrip("-") for name, flags in FLAGS.items() if name not in _ONE_RUN]
-    return {key for flag in flags for key in (flag, flag.replace("-", "_"))}
+    return sorted(key(name) for name in FLAGS if name not in ONE_RUN)
 
 
 def _checked(option: click.Option, value: Any, file: str, where: str) -> Any:
@@ -281,7 +265,7 @@ def _read(path: Path) -> ShopFile:
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as wrong:
         why = reason(wrong) if isinstance(wrong, OSError) else wrong
         raise SettingsError("CS240", f"cannot read it: {why}", "correct the file", file=str(path)) from wrong
-    known = (*COMMAND_TABLES, *_OWN_TABLES)
+    known = (*_COMMAND_TABLES, *_OWN_TABLES)
     for name, table in tables.items():
         if name not in known:
             raise _unknown(str(path), name, name, known)
@@ -290,41 +274,36 @@ def _read(path: Path) -> ShopFile:
     return ShopFile(str(path), tables)
 
 
-def _unknown(file: str, where: str, name: str, known: Sequence[str]) -> SettingsError:
+def _unknown(file: str, where: str, name: str, known: Iterable[str]) -> SettingsError:
     from cornersmooth.tables import closest
 
-    close = closest(name, known)
+    close = closest(name, [*known])
     hint = f"did you mean {close}?" if close else f"known are {', '.join(known)}"
     return SettingsError("CS241", f"unknown key {where}", hint, file=file)
 
 
 def _check_environment(command: click.Command) -> None:
     """Refuse names in the environment that are nearly those of an option."""
-    known = {str(option.envvar) for option in settable(command)}
-    strange = [name for name in os.environ if name.startswith(PREFIX) and name not in known]
+    known = {variable(str(option.name)) for option in settable(command)}
+    strange = [name for name in os.environ if name.startswith(_PREFIX) and name not in known]
     if not strange:
         return
     from difflib import get_close_matches
 
-    words = {key.replace("-", "_").upper() for key in _all_keys()}
+    words = [variable(name).removeprefix(_PREFIX) for name in FLAGS if name not in ONE_RUN]
     for name in strange:
-        close = get_close_matches(name.removeprefix(PREFIX), words, n=1, cutoff=0.75)
-        if close and close[0] != name.removeprefix(PREFIX):
-            raise SettingsError("CS241", f"unknown {name} in the environment", f"did you mean {PREFIX}{close[0]}?")
+        close = get_close_matches(name.removeprefix(_PREFIX), words, n=1, cutoff=0.75)
+        if close and close[0] != name.removeprefix(_PREFIX):
+            raise SettingsError("CS241", f"unknown {name} in the environment", f"did you mean {_PREFIX}{close[0]}?")
 
 
 def _own(shop: Shop, kind: str, name: str) -> Any:
     """Control or machine that the files describe; the name where they do not."""
-    for file in shop.files:
-        table = file.own(kind, name)
-        if table is None:
-            continue
-        where = f"{file.path} [{kind}.{name}]"
-        if kind == "controls":
-            from cornersmooth.nc import parse_control
+    file = next((file for file in shop.files if file.own(kind, name) is not None), None)
+    if file is None:
+        return name
+    from cornersmooth.kinematics import parse_machine
+    from cornersmooth.nc import parse_control
 
-            return parse_control(table, file=where, name=name)
-        from cornersmooth.kinematics import parse_machine
-
-        return parse_machine(table, file=where, name=name)
-    return name
+    parse: Callable[..., Any] = parse_control if kind == "controls" else parse_machine
+    return parse(file.own(kind, name), file=f"{file.path} [{kind}.{name}]", name=name)

@@ -6,7 +6,7 @@ import re
 import sys
 import textwrap
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Final, TextIO
 
@@ -15,6 +15,7 @@ from cornersmooth.errors import message, printable
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from cornersmooth.cli.options import Options
     from cornersmooth.pipeline import Progress
     from cornersmooth.report.verdict import Saving
 
@@ -194,6 +195,15 @@ def more(count: int, thing: str) -> str:
 def print_line(text: str) -> None:
     """Print a line to standard error."""
     _print(printable(text), sys.stderr)
+
+
+def say(given: Options, contents: Mapping[str, Any], lines: Iterable[str], indent: int = 2) -> None:
+    """Print a result to standard output: as one JSON object, or in lines to read; nothing where it is to be quiet."""
+    if given.as_json:
+        say_json(contents)
+    elif not given.quiet:
+        for line in lines:
+            say_line(line, indent)
 
 
 def say_json(contents: Mapping[str, Any]) -> None:

@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, NoReturn
 
 import click
 
-from cornersmooth.cli.command import new_command
+from cornersmooth.cli.command import EXIT_CODES_OF_WRITERS, new_command
 from cornersmooth.cli.files import STANDARD, check_inputs, check_path, read_lines
-from cornersmooth.cli.headings import EXIT_CODES_OF_WRITERS
 from cornersmooth.cli.inputs import Input, check_together, find_inputs
 from cornersmooth.cli.job import Job, Outcome, run_job
 from cornersmooth.cli.options import CURVES, LINES, PLANNED, READING, WRITING

@@ -10,7 +10,7 @@ import click
 from cornersmooth.cli.command import new_command
 from cornersmooth.cli.files import STANDARD, check_inputs, check_reports, read_input, suffix_of, write_report
 from cornersmooth.cli.options import READING
-from cornersmooth.cli.show import say_json, say_line
+from cornersmooth.cli.show import say
 from cornersmooth.cli.values import Given
 from cornersmooth.errors import SettingsError
 from cornersmooth.verdict import Verdict
@@ -69,14 +69,8 @@ def command(given: Given) -> int:
     )
     for path in given.reports:
         write_report(path, _report(suffix_of(path), program, data, written, nc, found, given))
-    if given.as_json:
-        say_json(found.as_dict())
-    elif not given.quiet:
-        say_line(
-            f"{Verdict.of(problems=not found.kept)}: the surface is {'' if found.kept else 'not '}within the tolerance"
-        )
-        for line in surface_lines(found):
-            say_line(line, indent=18)
+    first = f"{Verdict.of(problems=not found.kept)}: the surface is {'' if found.kept else 'not '}within the tolerance"
+    say(given, found.as_dict(), (first, *surface_lines(found)), indent=18)
     return 0 if found.kept else 1
 
 

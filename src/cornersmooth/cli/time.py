@@ -8,15 +8,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from cornersmooth.cli.command import new_command
-from cornersmooth.cli.files import check_inputs, check_path, read_head, target_of
-from cornersmooth.cli.headings import EXIT_CODES_OF_READERS
+from cornersmooth.cli.command import EXIT_CODES_OF_READERS, new_command
+from cornersmooth.cli.files import check_inputs, check_path, check_reports, read_head, write_report
 from cornersmooth.cli.options import CURVES, FEED_OF_ALL, LIMITS, READING
-from cornersmooth.cli.show import print_message, progress_bar, say_json, say_line
+from cornersmooth.cli.show import print_message, progress_bar, say
 from cornersmooth.cli.values import Given
 from cornersmooth.errors import message
 from cornersmooth.methods import METHODS
-from cornersmooth.output import open_output
 
 if TYPE_CHECKING:
     from cornersmooth.feedrate import Comparison
@@ -64,13 +62,11 @@ def command(given: Given) -> int:
     """
     from cornersmooth.cli.programs import time_of_program
 
-    for path in given.reports:
-        if not path.lower().endswith(".html"):
-            raise click.UsageError(f"--report {path}: let the name end in .html")
     inputs = [given.source, given.text] if given.text else [given.source]
     check_inputs(*inputs)
-    for path in filter(None, (given.csv, *given.reports)):
-        check_path(path, inputs, force=given.force)
+    check_reports(given.reports, ".html", inputs, force=given.force)
+    if given.csv:
+        check_path(given.csv, inputs, force=given.force)
     data, name, is_program = given.read()
     if is_program:
         if given.csv or given.reports:
@@ -87,21 +83,14 @@ def command(given: Given) -> int:
     if given.reports:
         from cornersmooth.page import times_page
 
-        page = times_page(compared, source=data, tool=given.tool).encode("utf-8")
+        page = times_page(compared, source=data, tool=given.tool)
         for path in given.reports:
-            with open_output(target_of(path)) as output:
-                output.stream.write(page)
+            write_report(path, [page])
     if given.csv:
         from cornersmooth.report.timelaw import timelaw_csv
 
-        with open_output(target_of(given.csv)) as output:
-            for text in timelaw_csv(compared.laws[given.law]):
-                output.stream.write(text.encode("utf-8"))
-    if given.as_json:
-        say_json(compared.as_dict())
-    elif not given.quiet:
-        for line in _tables(compared, bool(given.verbose)):
-            say_line(line)
+        write_report(given.csv, timelaw_csv(compared.laws[given.law]))
+    say(given, compared.as_dict(), _tables(compared, bool(given.verbose)))
     return 0
 
 
@@ -155,13 +144,10 @@ def _by_own_law(data: bytes, name: str, given: Given) -> int:
         text = written_text(program, settings, form)
     before, against = timing.unsmoothed(program)
     seconds = timing.written(text, program)[0]
-    if given.as_json:
-        contents = {"seconds": {"unsmoothed": before, "as_written": seconds}, "unsmoothed": against}
-        say_json({"schema": "cornersmooth-time/1", **contents, "law": law_of_lines(timing)})
-    elif not given.quiet:
-        say_line(f"{before:>12.3f} s  {against}")
-        say_line(f"{seconds:>12.3f} s  as written")
-        say_line(law_of_lines(timing))
+    law = law_of_lines(timing)
+    contents = {"seconds": {"unsmoothed": before, "as_written": seconds}, "unsmoothed": against, "law": law}
+    lines = (f"{before:>12.3f} s  {against}", f"{seconds:>12.3f} s  as written", law)
+    say(given, {"schema": "cornersmooth-time/1", **contents}, lines)
     return 0
 
 
