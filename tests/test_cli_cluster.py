@@ -39,7 +39,7 @@ def shown(start: str) -> list[str]:
 
 
 @contextlib.contextmanager
-def cluster(shared: Path, **settings: str) -> Iterator[Path]:
+def cluster(shared: Path) -> Iterator[Path]:
     """The scheduler file of a cluster of two processes, started by the lines of the page but for ports and number."""
     pytest.importorskip("distributed")
     changed = {"/shared/scheduler.json": str(shared / "scheduler.json"), "16": "2"}
@@ -48,7 +48,7 @@ def cluster(shared: Path, **settings: str) -> Iterator[Path]:
             process = subprocess.Popen(
                 [SCRIPT.parent / words[0], *(changed.get(word, word) for word in words[1:]), *ports, "--no-dashboard"],
                 cwd=shared,
-                env=environment(**settings),
+                env=environment(),
                 stderr=subprocess.DEVNULL,
             )
             stack.enter_context(process)
@@ -113,7 +113,7 @@ def test_the_commands_of_the_page_work(scheduler: Path, folder: Path, tmp_path: 
     assert len((tmp_path / "made.csv").read_text().splitlines()) == FILES + 1
 
 
-def certificate(folder: Path) -> dict[str, str]:
+def certificate(folder: Path) -> dict[str, str | bool]:
     """Make a certificate that is its own authority; return the settings of Dask that take it."""
     if not (openssl := shutil.which("openssl")):
         pytest.skip("openssl, which makes the certificate, is not installed")
@@ -121,21 +121,26 @@ def certificate(folder: Path) -> dict[str, str]:
     key, signed = str(folder / "key.pem"), str(folder / "certificate.pem")
     words = "req -x509 -newkey rsa:2048 -nodes -days 1 -subj /CN=cluster -keyout".split()
     subprocess.run([openssl, *words, key, "-out", signed], check=True, capture_output=True)
-    found = {"DASK_DISTRIBUTED__COMM__REQUIRE_ENCRYPTION": "True", "DASK_DISTRIBUTED__COMM__TLS__CA_FILE": signed}
-    for who in ("SCHEDULER", "WORKER", "CLIENT"):
-        found |= {f"DASK_DISTRIBUTED__COMM__TLS__{who}__{one}": file for one, file in (("KEY", key), ("CERT", signed))}
+    comm = "distributed.comm."
+    found: dict[str, str | bool] = {f"{comm}require-encryption": True, f"{comm}tls.ca-file": signed}
+    for who in ("scheduler", "worker", "client"):
+        found |= {f"{comm}tls.{who}.{one}": file for one, file in (("key", key), ("cert", signed))}
     return found
 
 
 def test_a_scheduler_with_tls_takes_those_with_its_certificate(folder: Path, tmp_path: Path) -> None:
+    distributed, config = pytest.importorskip("distributed"), pytest.importorskip("dask.config")
     ours, strange = certificate(tmp_path / "ours"), certificate(tmp_path / "strange")
-    (tmp_path / "shared").mkdir()
-    with cluster(tmp_path / "shared", **ours) as file:
-        address = json.loads(file.read_text())["address"]
+    with contextlib.ExitStack() as stack:
+        with config.set(ours):
+            security = distributed.Security()
+            here = {"n_workers": 1, "threads_per_worker": 1, "processes": False, "dashboard_address": None}
+            cluster = stack.enter_context(distributed.LocalCluster(protocol="tls", security=security, **here))
+        address = cluster.scheduler_address
         assert address.startswith("tls://")
         for settings, code in ((strange, USAGE), ({}, USAGE), (ours, DONE)):
-            words = command("smooth", folder, "-d", tmp_path / "nc", "--scheduler", address)
-            found = subprocess.run(words, env=environment(**settings), cwd=tmp_path, capture_output=True, check=False)
+            with config.set(settings):
+                found = run("smooth", folder, "-d", tmp_path / "nc", "--scheduler", address, cwd=tmp_path)
             said = found.stderr.decode().splitlines()
             assert found.returncode == code, said
             if code == USAGE:

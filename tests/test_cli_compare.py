@@ -15,7 +15,7 @@ from oracle.command import run
 #: a winding cut of a tool that turns, from a rapid
 CUT = "".join(
     f"GOTO/{2.0 * k},{(k % 2) * 1.5},{0.1 * k},0.0,{0.02 * (k % 3):.6f},{(1.0 - (0.02 * (k % 3)) ** 2) ** 0.5:.9f}\n"
-    for k in range(12)
+    for k in range(5)
 )
 PART = f"TOOL PATH/PART,TOOL,T\nFEDRAT/MMPM,1500.0\nRAPID\nGOTO/0.0,0.0,20.0,0.0,0.0,1.0\n{CUT}END-OF-PATH\n"
 
@@ -72,14 +72,15 @@ def test_linuxcnc_by_its_own_law(part: Path) -> None:
 
 
 def test_a_share_of_a_long_part_is_stated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cornersmooth.comparing.MOST_POSES", 20)
+    monkeypatch.setattr("cornersmooth.comparing.MOST_POSES", 10)
     part = tmp_path / "long.cls"
     runs = "".join(f"RAPID\nGOTO/0.0,0.0,{20 + k}.0,0.0,0.0,1.0\n{CUT}" for k in range(5))
     part.write_text(PART.replace(CUT, runs))
-    done = run("compare", part, "--control", "fanuc", "--limits", "table-ac", "--json")
+    given = ("compare", part, "--control", "linuxcnc", "--machine", "xyzac-trt")
+    done = run(*given, "--json")
     assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout)["share_of_poses"] == pytest.approx(13 / 66)  # a rapid and its cut
-    assert "from 20 % of the poses" in run("compare", part, "--limits", "table-ac").stdout.decode()
+    assert json.loads(done.stdout)["share_of_poses"] == pytest.approx(6 / 31)  # a rapid and its cut
+    assert "from 19 % of the poses" in run(*given).stdout.decode()
 
 
 def test_limits_of_axes_are_asked_for(part: Path) -> None:

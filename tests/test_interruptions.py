@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import signal
-import subprocess
 import time
 from pathlib import Path
 
 import pytest
 
 from interruptions import HOW, LEFT, OLD, Bench, Try, cl_text, members, tries
-from oracle.command import PATIENCE, command, environment, run, wait_for
-from oracle.share import THOROUGH
+from oracle.command import PATIENCE, run, started, wait_for
+from oracle.share import THOROUGH, how_many
 
 
 @pytest.fixture(scope="module")
@@ -39,14 +38,25 @@ def test_a_batch_whose_parent_is_killed_leaves_no_process(bench: Bench) -> None:
     assert found.wrong == [], found.said
 
 
+LINUXCNC = ("--control", "linuxcnc", "--machine", "xyzac-trt")
+SIGNALS = (signal.SIGTERM, signal.SIGINT)
+LONG = (
+    "verify large.cls a.ngc --report out.json",
+    f"filter a.ngc {' '.join(LINUXCNC)} -o out.nc --force",
+    "smooth in -d out -j 2",
+    "smooth large.cls -o out.nc --force",
+    "smooth line.cls -o out.nc --force",
+    "info large.cls",
+)
+
+
 @pytest.fixture(scope="module")
 def long_work(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with inputs that every command is busy with for longer than the test waits."""
     folder = tmp_path_factory.mktemp("long")
     wavy = cl_text(20_000, 0)
     (folder / "a.cls").write_text(wavy)
-    for words in ((), ("--control", "linuxcnc", "--machine", "xyzac-trt")):
-        run("smooth", "a.cls", "-q", "-o", f"a.{'ngc' if words else 'nc'}", *words, "--no-verify", cwd=folder)
+    run("smooth", "a.cls", "-q", "-o", "a.ngc", *LINUXCNC, "--no-verify", cwd=folder)
     poses = wavy.splitlines(keepends=True)[3:-1]
     (folder / "large.cls").write_text("UNITS/MM\n" + "".join(poses) * 25 + "FINI\n")
     (folder / "line.cls").write_text("UNITS/MM\nPPRINT " + "A" * 100_000_000 + "\nGOTO/0,0,0\nGOTO/1,0,0\nFINI\n")
@@ -56,26 +66,16 @@ def long_work(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 @pytest.mark.parametrize(
-    "words",
-    [
-        "verify large.cls a.nc --report out.json",
-        "filter a.ngc --control linuxcnc --machine xyzac-trt -o out.nc --force",
-        "smooth in -d out -j 2",
-        "smooth large.cls -o out.nc --force",
-        "smooth line.cls -o out.nc --force",
-        "info large.cls",
-    ],
+    ("words", "number"),
+    [(words, SIGNALS[(k + more) % 2]) for k, words in enumerate(LONG) for more in range(how_many(1, 2))],
 )
 def test_every_command_ends_within_two_seconds(words: str, number: signal.Signals, long_work: Path) -> None:
     old = long_work / "out.nc"
     old.write_bytes(OLD)
     before = set(long_work.glob("*"))
-    with subprocess.Popen(
-        command(*words.split()), cwd=long_work, stderr=subprocess.PIPE, env=environment(), start_new_session=True
-    ) as process:
-        time.sleep(1.0)
+    with started(*words.split(), session=True, cwd=long_work) as process:
+        time.sleep(0.5)
         begin = time.monotonic()
         process.send_signal(number)
         _, complaint = process.communicate(timeout=PATIENCE)

@@ -169,11 +169,11 @@ def _interruptible() -> None:
 
 
 @contextlib.contextmanager
-def started(*args: str | Path, session: bool = False) -> Iterator[subprocess.Popen[bytes]]:
+def started(*args: str | Path, session: bool = False, cwd: Path | None = None) -> Iterator[subprocess.Popen[bytes]]:
     """A process of the command with its streams in pipes; it is gone when the block ends."""
     pipe = subprocess.PIPE
     with forked(
-        *args, prepare=_interruptible, stdin=pipe, stdout=pipe, stderr=pipe, start_new_session=session
+        *args, prepare=_interruptible, stdin=pipe, stdout=pipe, stderr=pipe, start_new_session=session, cwd=cwd
     ) as process:
         try:
             yield process
