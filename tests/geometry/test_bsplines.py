@@ -37,6 +37,7 @@ def test_points_bezier_points_and_third_derivatives(seed: int) -> None:
     third = np.einsum("mk,mkd->md", splines.third[span], control[splines.taps(span)])
     low = splines.knot[splines.span_knot[span]]
     hull = splines.bezier(control, span, low, low + splines.width[span])
+    np.testing.assert_allclose(splines.hulls(control, span).swapaxes(0, 1), hull, atol=1e-12)
     t = ((s - low) / splines.width[span])[:, None]
     by_hull = sum(weight * (1 - t) ** (3 - i) * t**i * hull[:, i] for i, weight in enumerate((1.0, 3.0, 3.0, 1.0)))
     for number, other in enumerate(others):

@@ -14,6 +14,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ from numpy.typing import NDArray
 from cornersmooth.errors import SettingsError
 from cornersmooth.geometry import nurbs
 from cornersmooth.geometry.bsplines import Splines
-from cornersmooth.geometry.ragged import ranges, search, spread, starts
+from cornersmooth.geometry.ragged import batches, ranges, search, spread, starts
 from cornersmooth.kinematics import Machine
 from cornersmooth.kinematics.poses import angle_between, continued, pole_distance
 from cornersmooth.methods import DEFAULT_METHOD, METHODS
@@ -35,10 +36,11 @@ from cornersmooth.rotary.branch_choice import LIMIT_SLACK
 from cornersmooth.rotary.curve_angles import CurveAngles, Curves, Guide, curve_angles
 from cornersmooth.rotary.subdivision import insertions, runs_evenly
 from cornersmooth.settings import WEIGHT_DECIMALS, Settings
-from cornersmooth.slices import some_rows, some_runs
+from cornersmooth.slices import joined_rows, some_rows, some_runs
+from cornersmooth.smoothing.construction import construction_of
 from cornersmooth.smoothing.runs.rows import STEPS_PER_UNIT, clamped, moves_at, section_ends
-from cornersmooth.smoothing.sampling import Rows, dense_rows
-from cornersmooth.smoothing.segments import Segments, lines_per_half, segments_of
+from cornersmooth.smoothing.sampling import Rows, dense_rows, nodes
+from cornersmooth.smoothing.segments import Segments, lines_of, segments_of
 from cornersmooth.vectors import norm, unit
 
 #: share of what rotary axes may take of ε that a curve may use: the rest is for the digits of its control points
@@ -53,7 +55,7 @@ _STEPS = float(1 << 15)
 #: the first rotary axis may turn fast where the pole is nearer than so many times the axis step, and so many degrees
 _NEAR_POLE, _NEAR_POLE_DEGREES = 5.0, 1.0
 
-#: corners that are worked on at a time
+#: poses of curves that are worked on at a time
 _TOGETHER = 1 << 13
 
 
@@ -93,6 +95,22 @@ class _Places:
         first = np.flatnonzero(self.s == 0.0)
         return self.row[first], self.row[np.append(first[1:], len(self.row)) - 1]
 
+    def some(self, begin: int, end: int) -> _Places:
+        """Those on some of the curves, which are counted from 0 on."""
+        own = slice(*np.searchsorted(self.curve, (begin, end)).tolist())
+        return _Places(self.curve[own] - begin, self.row[own], self.s[own])
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Some rows of the way with sections of curves in the place of others: m of them."""
+
+    way: RotaryWay
+    section: Ints  #: (m,) the section that ends in each row, -1 for none
+    sections: _Sections
+    lost: Ints  #: poses of curves that are lines
+    end: int  #: the last row, in the whole way
+
 
 def rotary_curve_rows(smoothed: SmoothProgram, form: Form, findings: Findings) -> Iterator[Rows]:
     """Rows with the angles of the form's machine in `Rows.other`, in the order of its axes, and `Rows.spline`.
@@ -106,64 +124,50 @@ def rotary_curve_rows(smoothed: SmoothProgram, form: Form, findings: Findings) -
             f"method {settings.method} has no curves in rotary axes",
             f"use the method {DEFAULT_METHOD}, or write lines",
         )
-    way, section, sections, lost = _curved_way(smoothed, form, findings)
-    if len(lost):
-        text = "curve written in lines: on it the rotary axes would leave the tolerance or their limits"
-        findings.add("CS378", "note", int(program.line[lost.min()]), text, len(lost))
-    if sections is not None and sections.good.any():
-        text = f"{form.curve.upper()} with rotary axes under tool tip control is the machine builder's to allow"
-        findings.add("CS370", "warning", 0, f"{text}; ask before running it")
-    for lines, source in rotary_rows(way, smoothed, form, findings):
-        yield _with_curves(lines, np.where(source < 0, -1, section[source]), sections)
+    way = _way(smoothed, form, findings)
+    if np.isnan(way.place).all():
+        yield from (lines for lines, _ in rotary_rows(way, smoothed, form, findings))
+        return
+    begin, curved = 0, False
+    # a joint has its angles when the curves after it have theirs
+    for part, _ in pairwise(chain(_Work.of(smoothed, form, way).parts(), (None,))):
+        assert part is not None
+        part.way.angles[-1] = way.angles[part.end]
+        if len(part.lost):
+            text = "curve written in lines: on it the rotary axes would leave the tolerance or their limits"
+            findings.add("CS378", "note", int(program.line[part.lost.min()]), text, len(part.lost))
+        if not curved and part.sections.good.any():
+            text = f"{form.curve.upper()} with rotary axes under tool tip control is the machine builder's to allow"
+            findings.add("CS370", "warning", 0, f"{text}; ask before running it")
+            curved = True
+        for lines, source in rotary_rows(part.way, smoothed, form, findings, continued=begin > 0):
+            yield _with_curves(lines, np.where(source < 0, -1, part.section[source]), part.sections)
+        begin = part.end
 
 
-def _curved_way(
-    smoothed: SmoothProgram, form: Form, findings: Findings
-) -> tuple[RotaryWay, Ints, _Sections | None, Ints]:
-    """The way, what `_with_sections` says of its rows, all sections, and poses of curves that are lines there.
-
-    Of the lines of a corner those are made that it will have, or just two that show where the axes go.
-    """
-    corners, halves = smoothed.corners, lines_per_half(smoothed)
-    lined = _near_pole(smoothed, machine_of(form))
+def _way(smoothed: SmoothProgram, form: Form, findings: Findings) -> RotaryWay:
+    """The way with two lines for each corner, and all of its lines where these do not show where the axes go."""
+    corners, machine = smoothed.corners, machine_of(form)
+    halves, more = corners.smoothed.astype(np.int64), corners.smoothed & _near_pole(smoothed, machine)
+    lined = more
     while True:
+        halves[more] = lines_of(smoothed, np.flatnonzero(more))
         notes = Findings()
-        rows = dense_rows(smoothed, halves=np.where(lined, halves, np.sign(halves)))
-        way = rotary_way(rows, smoothed, form, notes)
-        ToolTravel(smoothed.program, machine_of(form)).check(way.tip, way.angles, way.move)
-        if np.isnan(way.place).all():
-            findings.add_all(notes.all())
-            return way, np.full(len(way.move), -1), None, np.zeros(0, np.int64)
-        work = _Work.of(smoothed, form, way)
-        sections, lost = work.sections()
-        lost = np.concatenate((lost, sections.move[~sections.good]))
-        more = np.isin(corners.pose, lost) & corners.smoothed & ~lined
+        way = rotary_way(dense_rows(smoothed, halves=halves), smoothed, form, notes)
+        moves = way.move[way.left & (way.place < 1.0)]  # a cut is left within a curve
+        more = corners.smoothed & ~lined & (np.isin(corners.pose, moves) | np.isin(corners.after, moves))
         if not more.any():
-            findings.add_all(notes.all())
-            return *_with_sections(work.way, work.places, sections), sections, lost
-        lined |= more
+            break
+        lined = lined | more
+    findings.add_all(notes.all())
+    ToolTravel(smoothed.program, machine).check(way.tip, way.angles, way.move)
+    return way
 
 
 def _left_to_axes(settings: Settings, form: Form, taken: Floats) -> Floats:
     """What ε leaves to rotary axes where so much of it, mm, is taken at the axis point: degrees."""
     left = settings.tolerance - math.sqrt(3.0) / 2.0 * settings.tip_resolution - taken
     return _SHARE * np.degrees(left / settings.axis_scale) - form.angle_rounding
-
-
-def _places(way: RotaryWay, poses: Ints, lengths: Floats) -> _Places:
-    """Rows of all curves, which have one or more each, besides that where they start."""
-    row = np.flatnonzero(~np.isnan(way.place) & ~way.left)
-    begins = np.flatnonzero(np.diff(way.place[row], prepend=2.0) <= 0.0)
-    counts = np.diff(begins, append=len(row))
-    assert len(begins) == len(poses)
-    order = np.argsort(poses)
-    number = np.empty_like(order)  # of each curve, in path order
-    number[order] = np.arange(len(order))
-    curve, place = spread(counts[number] + 1)
-    at = row[begins[number[curve]] + np.maximum(place - 1, 0)] - (place == 0)
-    s = np.where(place > 0, way.place[at] * lengths[curve], 0.0)
-    whole = np.rint(s)  # as poses and knots are
-    return _Places(curve, at, np.where(np.abs(s - whole) < 1e-6, whole, s))
 
 
 @dataclass(frozen=True)
@@ -199,13 +203,18 @@ def _near_pole(smoothed: SmoothProgram, machine: Machine) -> Bools:
 
 @dataclass(frozen=True)
 class _Work:
-    """The way, and curves of all corners, then of all runs: r of them."""
+    """The way, and its curves: those of all corners, then those of all runs."""
 
     smoothed: SmoothProgram
     form: Form
     way: RotaryWay  #: angles and axes at joints, and tolerances change in place
-    places: _Places
-    corners: Corners  #: that are smoothed
+    corner: Ints  #: rows of `Corners` that are smoothed
+    #: pose, length, order: (r,); of each curve its first, and its longest parameter, steps; the curves in path order
+    pose: Ints
+    length: Floats
+    order: Ints
+    row: Ints  #: rows of the way on curves, but for those where they start
+    first: Ints  #: (r + 1,) which of these are those of each curve, in path order
     segments: Segments
     least: float  #: degrees that rotary axes may take of ε in any case
     #: angles, last: (n, 2), degrees, and (n,); at each pose, NaN where none is written, and the row of the way there
@@ -218,29 +227,38 @@ class _Work:
     def of(cls, smoothed: SmoothProgram, form: Form, way: RotaryWay) -> _Work:
         """Work out what concerns all curves."""
         program, settings, runs, n = smoothed.program, smoothed.settings, smoothed.runs, len(smoothed.program)
-        corners = some_rows(smoothed.corners, smoothed.corners.smoothed)
-        poses, lengths = corners.pose, np.full(len(corners), _STEPS)
+        corners, corner = smoothed.corners, np.flatnonzero(smoothed.corners.smoothed)
+        poses, lengths = corners.pose[corner], np.full(len(corner), _STEPS)
         if runs is not None:
             poses = np.concatenate((poses, runs.pose[starts(runs.count)[:-1]]))
             lengths = np.concatenate((lengths, runs.knot[starts(runs.knot_count)[1:] - 1]))
+        row = np.flatnonzero(~np.isnan(way.place) & ~way.left)
+        first = np.append(np.flatnonzero(np.diff(way.place[row], prepend=2.0) <= 0.0), len(row))
+        assert len(first) == len(poses) + 1
         least = form.rotary_tolerance(settings.tolerance, settings.axis_scale)
         straight = float(_left_to_axes(settings, form, np.zeros(1))[0])
         tolerance = np.where(np.isnan(way.place) & (program.kind[way.move] == Move.LINEAR), straight, way.tolerance)
-        way = replace(way, tolerance=tolerance)
         # the last row of the move to a corner is in the middle of its curve
         angles, branch, last = np.full((n, 2), np.nan), np.full(n, -1), np.zeros(n, np.int64)
         angles[way.move], branch[way.move], last[way.move] = way.angles, way.branch, np.arange(len(way.move))
-        pose = corners.pose
-        angles[pose], _ = continued(machine_of(form), program.axis[pose], angles[pose], branch[pose], least / 2)
-        allowed, own = np.full(n, straight), np.maximum(_left_to_axes(settings, form, corners.axis_error), least)
-        for beside in (pose, corners.after):
-            np.minimum.at(allowed, beside, own)
+        allowed = np.full(n, straight)
+        for begin in range(0, len(corner), _TOGETHER):
+            own = corner[begin : begin + _TOGETHER]
+            pose = corners.pose[own]
+            angles[pose], _ = continued(machine_of(form), program.axis[pose], angles[pose], branch[pose], least / 2)
+            taken = np.maximum(_left_to_axes(settings, form, corners.axis_error[own]), least)
+            for beside in (pose, corners.after[own]):
+                np.minimum.at(allowed, beside, taken)
         return cls(
             smoothed,
             form,
-            way,
-            _places(way, poses, lengths),
-            corners,
+            replace(way, tolerance=tolerance),
+            corner,
+            poses,
+            lengths,
+            np.argsort(poses),
+            row,
+            first,
             segments_of(smoothed, dense=False),
             least,
             angles,
@@ -249,29 +267,47 @@ class _Work:
             allowed,
         )
 
-    def sections(self) -> tuple[_Sections, Ints]:
-        """Sections of all curves, and poses of those that are to be lines."""
-        parts, lost, count = [], [np.zeros(0, np.int64)], len(self.corners)
-        for begin in range(0, count, _TOGETHER):
-            corners = some_rows(self.corners, slice(begin, begin + _TOGETHER))
-            rows = self._rows(begin, begin + len(corners))
-            fitted, kept = self._fitted(self._corners(corners, rows), rows)
-            parts.append(self._whole(fitted, corners.pose[kept], begin + np.flatnonzero(kept)))
-            lost.append(corners.pose[~kept])
-        if (runs := self.smoothed.runs) is not None:
-            rows = self._rows(count, count + len(runs))
-            fitted, kept = self._fitted(self._runs(runs, rows), rows)
-            parts.append(self._cut(fitted, some_runs(runs, kept), count + np.flatnonzero(kept)))
-            lost.append(runs.pose[starts(runs.count)[:-1]][~kept])
-        columns = [vars(part) for part in parts]  # given back one after the other: they are as large as the program
-        whole = {name: np.concatenate([part.pop(name) for part in columns]) for name in list(columns[0])}
-        return _Sections(**whole), np.concatenate(lost)
+    def parts(self) -> Iterator[_Part]:
+        """All rows, from that which the part before ends with, and sections of some curves."""
+        size, runs, begin = np.ones(len(self.pose), np.int64), self.smoothed.runs, 0
+        if runs is not None:
+            size[len(self.corner) :] = runs.count
+        for one, other in pairwise(batches(size[self.order], _TOGETHER).tolist()):
+            whole = other == len(self.order)
+            end = len(self.way.move) - 1 if whole else int(self.row[self.first[other] - 1])
+            yield self._part(one, other, begin, end)
+            begin = end
 
-    def _rows(self, begin: int, end: int) -> _Places:
-        """Places on some curves, which are counted from 0 on."""
-        own = slice(*np.searchsorted(self.places.curve, (begin, end)).tolist())
-        rows = some_rows(self.places, own)
-        return replace(rows, curve=rows.curve - begin)
+    def _part(self, one: int, other: int, begin: int, end: int) -> _Part:
+        """Curves from one on, in path order, to before another, and the rows of the way that are with them."""
+        own = np.sort(self.order[one:other])
+        rows, poses, count = self._places(own, one), self.pose[own], int(np.searchsorted(own, len(self.corner)))
+        made, kept = [], np.zeros(len(own), np.bool_)
+        if count:
+            corners, some = some_rows(self.smoothed.corners, self.corner[own[:count]]), rows.some(0, count)
+            fitted, kept[:count] = self._fitted(self._corners(corners, some), some)
+            made.append(self._whole(fitted, poses[:count][kept[:count]], np.flatnonzero(kept)))
+        if count < len(own):
+            assert self.smoothed.runs is not None
+            chosen = np.isin(np.arange(len(self.smoothed.runs)), own[count:] - len(self.corner))
+            runs, some = some_runs(self.smoothed.runs, chosen), rows.some(count, len(own))
+            fitted, kept[count:] = self._fitted(self._runs(runs, some), some)
+            made.append(self._cut(fitted, some_runs(runs, kept[count:]), count + np.flatnonzero(kept[count:])))
+        sections = joined_rows(made)
+        lost = np.concatenate((poses[~kept], sections.move[~sections.good]))
+        kept[sections.curve[~sections.good]] = False
+        lines, before = self._lines(self.corner[own[:count]], np.flatnonzero(~kept[:count]), rows)
+        way, section = self._with_sections(rows, sections, lines, before, begin, end)
+        return _Part(way, section, sections, lost, end)
+
+    def _places(self, curves: Ints, one: int) -> _Places:
+        """Rows of some curves, those from one on in path order."""
+        path = one + np.argsort(np.argsort(self.pose[curves]))
+        curve, place = spread(np.diff(self.first)[path] + 1)
+        at = self.row[self.first[path[curve]] + np.maximum(place - 1, 0)] - (place == 0)
+        s = np.where(place > 0, self.way.place[at] * self.length[curves[curve]], 0.0)
+        whole = np.rint(s)  # as poses and knots are
+        return _Places(curve, at, np.where(np.abs(s - whole) < 1e-6, whole, s))
 
     def _fitted(self, curves: Curves, rows: _Places) -> tuple[CurveAngles, Bools]:
         """Angles of the curves that begin where a row ends and in which no solution may change, and which these are."""
@@ -282,8 +318,45 @@ class _Work:
         near = off <= max(settings.shortest_line, settings.duplicate_distance)
         kept = (begin >= 0) & near & (self.turns[end + 1] == self.turns[begin + 1])
         way.tolerance[rows.row[rows.s > 0.0]] = curves.tolerance[rows.curve[rows.s > 0.0]]
-        guide = Guide(rows.curve, rows.s, way.angles[rows.row], way.branch[rows.row].astype(np.int64)).some(kept)
-        return curve_angles(curves.some(kept), machine_of(self.form), guide, cone=self.least / 2), kept
+        return curve_angles(curves.some(kept), self._machine, self._guide(rows).some(kept), cone=self.least / 2), kept
+
+    @property
+    def _machine(self) -> Machine:
+        return machine_of(self.form)
+
+    def _guide(self, rows: _Places) -> Guide:
+        at = np.maximum(rows.row, 0)  # there is no row where the program begins with a curve
+        return Guide(rows.curve, rows.s, self.way.angles[at], self.way.branch[at].astype(np.int64))
+
+    def _lines(self, corner: Ints, lost: Ints, rows: _Places) -> tuple[RotaryWay, Ints]:
+        """Rows of the curves that are lost, where the way has two lines for each, and the rows that they come after."""
+        smoothed, first = self.smoothed, np.flatnonzero(rows.s == 0.0)
+        lost = lost[np.bincount(rows.curve)[lost] == 3]
+        numbers, u = lines_of(smoothed, corner[lost]), np.zeros(0)
+        curve, s = np.zeros(0, np.int64), np.zeros(0)
+        tip, axis = np.zeros((2, 0, 3))
+        for number in np.unique(numbers).tolist():
+            which, u = lost[numbers == number], nodes(number)
+            u = u[(u != 0.5) & (u != 1.0)]
+            points, levers = construction_of(smoothed.settings.method).points(smoothed, corner[which], u)
+            curve, s = np.append(curve, np.repeat(which, len(u))), np.append(s, np.tile(u * _STEPS, len(which)))
+            tip, axis = np.vstack((tip, points[:, 1:].reshape(-1, 3))), np.vstack((axis, levers[:, 1:].reshape(-1, 3)))
+        order = np.lexsort((s, curve))
+        curve, s, axis, later = curve[order], s[order], unit(axis[order]), s[order] > _STEPS / 2.0
+        angles, branch = continued(self._machine, axis, *self._guide(rows).between(curve, s), self.least / 2)
+        corners, place = some_rows(smoothed.corners, corner[curve]), first[curve] + later
+        none = np.zeros(len(s), np.bool_)
+        return RotaryWay(
+            tip=tip[order],
+            axis=axis,
+            move=np.where(later, corners.after, corners.pose),
+            angles=angles,
+            branch=branch.astype(np.int8),
+            free=none,
+            left=none,
+            place=s / _STEPS,
+            tolerance=self.way.tolerance[rows.row[place + 1]],
+        ), rows.row[place]
 
     def _runs(self, runs: Runs, rows: _Places) -> Curves:
         """Curves of runs, which end exactly where their rows do."""
@@ -300,7 +373,7 @@ class _Work:
         from_angles, to_angles, even = self._pose_angles(legs)
         of, to = legs.of[even], legs.to[even]
         even[even] = runs_evenly(
-            machine_of(self.form),
+            self._machine,
             program.axis[of],
             program.axis[to],
             from_angles[even],
@@ -339,7 +412,7 @@ class _Work:
 
     def _pose_angles(self, legs: _Legs) -> tuple[Floats, Floats, Bools]:
         """Angles (m, 2) at both ends of legs, and whether one follows from the other in a cut."""
-        program, machine = self.smoothed.program, machine_of(self.form)
+        program, machine = self.smoothed.program, self._machine
         from_angles, stated = self.angles[legs.of], np.isnan(self.angles[legs.of, 0])  # no row leads to such a pose
         near, axis = self.way.angles[legs.joint[stated]], program.axis[legs.of[stated]]
         from_angles[stated], _ = continued(machine, axis, near, np.full(len(near), -1), self.least / 2)
@@ -355,7 +428,7 @@ class _Work:
         way, rapid = some_rows(self.way, slice(first, last + 2)), np.ones(last + 2 - first, np.bool_)
         rapid[row + 1 - first] = False
         more = insertions(
-            machine_of(self.form),
+            self._machine,
             way.tip,
             way.axis,
             way.angles,
@@ -406,7 +479,7 @@ class _Work:
         axis: Floats,
     ) -> _Sections:
         """Sections as they are written, so many steps as the parameter 1; `rows` are as `clamped` gives them."""
-        (owner, number, knot, points), splines, limits = rows, fitted.curves.splines, machine_of(self.form).limits
+        (owner, number, knot, points), splines, limits = rows, fitted.curves.splines, self._machine.limits
         counts = np.bincount(owner, minlength=len(curve))
         spline = np.zeros((len(owner), 3))
         spline[:, 0], spline[np.cumsum(counts) - 1, 2] = knot / steps[owner], (end - begin) / steps
@@ -421,6 +494,60 @@ class _Work:
         good[owner[outside > LIMIT_SLACK]] = False
         return _Sections(number.astype(np.int8), points, spline, counts, move, curve, begin, end, axis, good)
 
+    def _with_sections(
+        self, rows: _Places, sections: _Sections, lines: RotaryWay, before: Ints, first: int, last: int
+    ) -> tuple[RotaryWay, Ints]:
+        """Rows of the way, good sections in the place of those within, and the section that ends in each, -1 for none.
+
+        Rows where other lines meet sections are added, and lines after the rows before them. The angles of the way
+        change in place.
+        """
+        path, row = some_rows(self.way, slice(first, last + 1)), rows.row - first
+        counts = np.bincount(rows.curve)
+        base = starts(np.floor(rows.s[starts(counts)[1:] - 1]).astype(np.int64) + 2)[:-1].astype(np.float64)
+        keys = rows.s + base[rows.curve]
+        chosen = np.flatnonzero(sections.good)
+        shift = base[sections.curve]
+        begin, end = (sections.begin + shift)[chosen], (sections.end + shift)[chosen]
+        # rows strictly within
+        of = np.searchsorted(begin, keys, side="left") - 1
+        within = (of >= 0) & (keys < end[np.maximum(of, 0)]) if len(chosen) else np.zeros(len(keys), np.bool_)
+        kept = np.ones(len(path.move), np.bool_)
+        kept[row[within]] = False
+        # where sections end and begin, and the number of the section, good or not, that ends there
+        place = np.concatenate((end, begin))
+        number = np.concatenate((chosen, chosen - 1))
+        point = np.concatenate((sections.first[chosen + 1] - 1, sections.first[chosen]))
+        place, once = np.unique(place, return_index=True)
+        number, point, ends = number[once], point[once], once < len(chosen)
+        known = np.searchsorted(keys, place)
+        meets = keys[known] == place
+        section = np.full(len(path.move), -1)
+        at = row[known[meets]]
+        path.angles[at] = sections.points[point[meets], 3:]
+        section[at[ends[meets]]] = number[meets & ends]
+        new = np.flatnonzero(~meets)
+        after = row[known[new] - 1]
+        none = np.zeros(len(new), np.bool_)
+        more = RotaryWay(
+            tip=sections.points[point[new], :3],
+            axis=sections.axis[number[new] + ~ends[new], ends[new].astype(np.int64)],
+            move=sections.move[number[new]],
+            angles=sections.points[point[new], 3:],
+            branch=np.zeros(len(new), np.int8),
+            free=none,
+            left=none,
+            place=np.zeros(len(new)),
+            tolerance=path.tolerance[after + 1],
+        )
+        more, after = joined_rows((more, lines)), np.concatenate((after, before - first))
+        at = np.append(0, np.cumsum(kept))[after + 1]
+        columns = vars(path).items()
+        found = RotaryWay(**{name: np.insert(column[kept], at, vars(more)[name], 0) for name, column in columns})
+        ended = np.concatenate((np.where(ends[new], number[new], -1), np.full(len(before), -1)))
+        whole = np.insert(section[kept], at, ended)
+        return replace(found, free=found.free | (whole >= 0)), whole
+
 
 def _written_weights(weight: Floats, owner: Ints, count: int) -> Floats:
     """Weights (m,) times the smallest power of two for each section that leaves no more decimals than controls keep."""
@@ -434,59 +561,10 @@ def _written_weights(weight: Floats, owner: Ints, count: int) -> Floats:
     return np.round(weight * factor[owner], WEIGHT_DECIMALS)
 
 
-def _with_sections(path: RotaryWay, rows: _Places, sections: _Sections) -> tuple[RotaryWay, Ints]:
-    """The way with good sections in the place of the rows within them, and the section that ends in each row, else -1.
-
-    Rows where other lines meet sections are added. The angles of the path given change in place.
-    """
-    row = rows.row
-    counts = np.bincount(rows.curve)
-    base = starts(np.floor(rows.s[starts(counts)[1:] - 1]).astype(np.int64) + 2)[:-1].astype(np.float64)
-    keys = rows.s + base[rows.curve]
-    chosen = np.flatnonzero(sections.good)
-    shift = base[sections.curve]
-    begin, end = (sections.begin + shift)[chosen], (sections.end + shift)[chosen]
-    # rows strictly within
-    of = np.searchsorted(begin, keys, side="left") - 1
-    within = (of >= 0) & (keys < end[np.maximum(of, 0)]) if len(chosen) else np.zeros(len(keys), np.bool_)
-    kept = np.ones(len(path.move), np.bool_)
-    kept[row[within]] = False
-    # where sections end and begin, and the number of the section, good or not, that ends there
-    place = np.concatenate((end, begin))
-    number = np.concatenate((chosen, chosen - 1))
-    point = np.concatenate((sections.first[chosen + 1] - 1, sections.first[chosen]))
-    place, once = np.unique(place, return_index=True)
-    number, point, ends = number[once], point[once], once < len(chosen)
-    known = np.searchsorted(keys, place)
-    meets = keys[known] == place
-    section = np.full(len(path.move), -1)
-    at = row[known[meets]]
-    path.angles[at] = sections.points[point[meets], 3:]
-    section[at[ends[meets]]] = number[meets & ends]
-    new = np.flatnonzero(~meets)
-    before = row[known[new] - 1]
-    none = np.zeros(len(new), np.bool_)
-    more = RotaryWay(
-        tip=sections.points[point[new], :3],
-        axis=sections.axis[number[new] + ~ends[new], ends[new].astype(np.int64)],
-        move=sections.move[number[new]],
-        angles=sections.points[point[new], 3:],
-        branch=np.zeros(len(new), np.int8),
-        free=none,
-        left=none,
-        place=np.zeros(len(new)),
-        tolerance=path.tolerance[before + 1],
-    )
-    at = np.cumsum(kept)[before]
-    found = RotaryWay(**{name: np.insert(column[kept], at, vars(more)[name], 0) for name, column in vars(path).items()})
-    whole = np.insert(section[kept], at, np.where(ends[new], number[new], -1))
-    return replace(found, free=found.free | (whole >= 0)), whole
-
-
-def _with_curves(lines: Rows, section: Ints, sections: _Sections | None) -> Rows:
+def _with_curves(lines: Rows, section: Ints, sections: _Sections) -> Rows:
     """Rows of lines with the control points of sections in the place of the rows that end them."""
     curved = section >= 0
-    if sections is None or not curved.any():
+    if not curved.any():
         return lines
     counts = np.ones(len(section), np.int64)
     counts[curved] = sections.count[section[curved]]

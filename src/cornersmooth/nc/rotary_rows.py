@@ -53,12 +53,14 @@ def rotary_rows(
     *,
     long: bool = False,
     in_planes: Bools | None = None,
+    continued: bool = False,
 ) -> Iterator[tuple[Rows, Ints]]:
     """Rows of lines with the words of the form's machine in `Rows.other`, and the row of the way that each is.
 
     Some thousand come at a time, with the points (row -1) that lines need. Of `long` lines only those are left that ε
-    asks for. Poses (n,) `in_planes`, whose rotary axes the control turns, are not compared with the travel. Raises
-    InputError where the machine cannot follow the path.
+    asks for. Poses (n,) `in_planes`, whose rotary axes the control turns, are not compared with the travel. The first
+    row of a way that is `continued` is where the one before has ended. Raises InputError where the machine cannot
+    follow the path.
     """
     if not len(way.move):
         return
@@ -102,7 +104,7 @@ def rotary_rows(
             kept = fewest_lines(found, limits)
             filled = some_rows(filled, kept)
             blend = corner_blends(found, kept, way.free[here][filled.pose], limits, settings, form)
-        own = slice(1 if begin else 0, None)
+        own = slice(1 if begin or continued else 0, None)
         filled, rate = _timed(filled, chunk, own, smoothed, form, limits, findings)
         pose, inserted = filled.pose[own], filled.inserted[own]
         tip, angles = filled.tip[own], filled.angles[own]

@@ -29,24 +29,24 @@ def axis_bend(machine: Machine, turn: Floats, start: Floats, end: Floats, slack:
 def axis_curve_bend(machine: Machine, words: Floats, weight: Floats) -> Floats:
     """Bound (n,) on the second derivative of the tool axis along rational cubics of the angles.
 
-    Bézier points (n, 4, 2), rad, are times their weights (n, 4).
+    Bézier points (4, n, 2), rad, are times their weights (4, n).
     """
     speed, bend = _rational(words, weight, np.abs)
-    away = _sine(machine, tool_axis(machine, np.degrees(words[:, 0] / weight[:, :1]))) + speed[:, 1]
+    away = _sine(machine, tool_axis(machine, np.degrees(words[0] / weight[0, :, None]))) + speed[:, 1]
     return _turning_bend(away, speed, bend)
 
 
 def _rational(points: Floats, weight: Floats, size: Callable[[Floats], Floats]) -> tuple[Floats, Floats]:
     """Bounds (n, e) on the sizes (..., d) -> (..., e) of the first two derivatives of rational cubics.
 
-    Bézier points (n, 4, d) are times their weights (n, 4), which are positive. With the value q = N/W less that at the
+    Bézier points (4, n, d) are times their weights (4, n), which are positive. With the value q = N/W less that at the
     start, W q′ = N′ − W′ q and W q″ = N″ − 2 W′ q′ − W″ q.
     """
-    weight = weight[:, :, None]
-    off, least = points - weight * (points[:, :1] / weight[:, :1]), weight.min(axis=1)
-    away = size(off / weight).max(axis=1)
+    weight = weight[..., None]
+    off, least = points - weight * (points[0] / weight[0]), weight.min(axis=0)
+    away = size(off / weight).max(axis=0)
     (first, second), (slope, curve) = (
-        [measure(factor * np.diff(values, order, axis=1)).max(axis=1) for factor, order in ((3.0, 1), (6.0, 2))]
+        [measure(factor * np.diff(values, order, axis=0)).max(axis=0) for factor, order in ((3.0, 1), (6.0, 2))]
         for values, measure in ((off, size), (weight, np.abs))
     )
     speed = (first + slope * away) / least
@@ -63,13 +63,13 @@ def _turning_bend(away: Floats, speed: Floats, bend: Floats) -> Floats:
 def lever_bend(lever: Floats, weight: Floats) -> Floats:
     """Bound (n,) on |u″| of the direction u of rational cubics; infinite through the origin.
 
-    Bézier points (n, 4, 3) are times their weights (n, 4). With l = r u the part of u″ across u is that of
+    Bézier points (4, n, 3) are times their weights (4, n). With l = r u the part of u″ across u is that of
     (l″ − 2 r′ u′)/r, the part along it |u′|²; both |r′| and r |u′| are at most |l′|.
     """
     speed, bend = (part[:, 0] for part in _rational(lever, weight, lambda vectors: norm(vectors)[..., None]))
-    points = lever / weight[:, :, None]
-    shortest = np.einsum("kid,kd->ki", points, unit(points.mean(axis=1))).min(axis=1)
-    inverse = np.divide(1.0, shortest, out=np.full(len(lever), np.inf), where=shortest > 0)
+    points = lever / weight[..., None]
+    shortest = dot(points, unit(points.mean(axis=0))[None]).min(axis=0)
+    inverse = np.divide(1.0, shortest, out=np.full(len(shortest), np.inf), where=shortest > 0)
     with np.errstate(invalid="ignore"):
         bound: Floats = np.nan_to_num(bend * inverse + 3.0 * (speed * inverse) ** 2, nan=np.inf, posinf=np.inf)
     return bound

@@ -211,8 +211,7 @@ def _bounds(machine: Machine, curves: Curves, angles: Floats) -> Floats:
     bounds = np.full(count, np.inf)
     for begin in range(0, count, CHUNK):
         span = np.arange(begin, min(begin + CHUNK, count))
-        ends = splines.knot[splines.span_knot[span]], splines.knot[splines.span_knot[span] + 1]
-        hull = splines.bezier(control, span, *ends)
+        hull = splines.hulls(control, span)
         lever, weight, words = hull[..., :3], hull[..., 3], hull[..., 4:]
         bend = lever_bend(lever, weight) + axis_curve_bend(machine, np.radians(words), weight)
         least = np.sqrt(bend / (8.0 * PROOF * np.radians(curves.tolerance[splines.span_run[span]])))
@@ -221,15 +220,15 @@ def _bounds(machine: Machine, curves: Curves, angles: Floats) -> Floats:
             chosen = np.flatnonzero(number == samples)
             size = max(1, CHUNK // samples)
             for part in (chosen[i : i + size] for i in range(0, len(chosen), size)):
-                off = _off(machine, hull[part], samples)
+                off = _off(machine, hull[:, part], samples)
                 bounds[span[part]] = off + np.degrees(bend[part] / (8.0 * samples**2))
     return bounds
 
 
 def _off(machine: Machine, hull: Floats, samples: int) -> Floats:
-    """(k,) degrees: largest angle between both axes at even samples of spans with these Bézier points (k, 4, 6)."""
+    """(k,) degrees: largest angle between both axes at even samples of spans with these Bézier points (4, k, 6)."""
     t = np.linspace(0.0, 1.0, samples + 1)
     share = np.stack(((1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3), axis=1)
-    points = (share @ hull).reshape(-1, 6)
+    points = np.tensordot(share, hull, 1).reshape(-1, 6)
     apart = angle_between(tool_axis(machine, points[:, 4:] / points[:, 3:4]), unit(points[:, :3]))
-    return apart.reshape(-1, samples + 1).max(axis=1)
+    return apart.reshape(samples + 1, -1).max(axis=0)
