@@ -336,3 +336,11 @@ def test_says_the_time_of_what_has_changed(tmp_path: Path) -> None:
     on = ("--control", control, "--machine", machine, "--limits", machine, "-e", EPS)
     told = run("filter", "part.nc", *on, "-o", "new.nc", cwd=tmp_path).stderr.decode()
     assert f"time of the runs {fast.seconds[1]:.1f} s instead of {fast.seconds[0]:.1f} s (" in told
+
+
+def test_a_run_that_is_not_decided_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("cornersmooth.nc_reader.reader.MOST_LINES", 1)
+    found = filtered(*PROGRAMS["fanuc words"])
+    assert found.smoothed == 0
+    assert found.data == PROGRAMS["fanuc words"][2].encode()
+    assert any("the run was not verified" in one.reason for one in found.left)

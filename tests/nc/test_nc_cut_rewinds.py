@@ -133,15 +133,6 @@ def test_lines_that_are_as_long_as_may_be_keep_both_sides_of_the_place() -> None
     assert len(checked.rewinds) == len(rewinds(lines, "fanuc")) >= 1
 
 
-def test_a_text_that_was_read_before_is_judged_in_the_same_way() -> None:
-    lines, _ = text_of("siemens", "nutated-bc", True)
-    data = ("\n".join(lines) + "\n").encode()
-    nc = read_nc(data, control="siemens", machine=short("nutated-bc"), tolerance=EPS)
-    checked = verify(read(program_text()), nc, tolerance=EPS, control="siemens", machine=short("nutated-bc"))
-    assert checked.problems == ()
-    assert checked.rewinds == found(lines, "siemens", "nutated-bc", True).rewinds
-
-
 def moved(line: str, word: str, by: float) -> str:
     return re.sub(rf"(?<=\b{word})[-+]?\d+\.\d*", lambda value: f"{float(value[0]) + by:+.4f}", line)
 

@@ -40,7 +40,7 @@ def differences(program: Program, form: str, tolerance: float, axis_length: floa
     stream = io.BytesIO()
     write(smoothed, stream, form=chosen)
     text = read_nc(stream.getvalue())
-    measured = verify(program, text, tolerance=tolerance, axis_length=axis_length)
+    measured = verify(program, stream.getvalue(), tolerance=tolerance, axis_length=axis_length)
     said = report(smoothed, dense=not chosen.curve)["summary"]
     return (
         measured.max_tip_deviation_mm - said["max_tip_error_mm"],

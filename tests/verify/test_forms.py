@@ -41,7 +41,7 @@ def chains_for(case: Case, form: Form, seed: int, count: int = how_many(4, 10), 
 
 
 def readings(case: Case, machine: Machine | None, settings: Settings) -> dict[str, object]:
-    """Keyword arguments of `read_nc`."""
+    """Keyword arguments of `read_nc` and `verify`."""
     limits = {"tolerance": settings.tolerance, "axis_length": settings.axis_length}
     return {"control": case.control, "machine": machine, "tcp": case.tcp, **limits}
 
@@ -53,8 +53,7 @@ def test_no_false_alarm_on_random_chains(case: Case, units: str) -> None:
     settings = Settings(tolerance=tolerance, axis_length=axis_length, method="proportional")
     program = chains_for(case, form, place, units=units)
     text, _ = written(program, form, settings)
-    nc = read_nc(text.encode(), **readings(case, form.machine, settings))
-    found = verify(program, nc, tolerance=tolerance, axis_length=axis_length)
+    found = verify(program, text.encode(), **readings(case, form.machine, settings), words=False)
     assert found.problems == ()
     assert found.blocks == sum(map(_is_block, text.replace(" ~\n", " ").splitlines()))
     used = form.table.lines.line_share if form.table.lines.lines == "long" and form.long_lines else 1.0
@@ -132,7 +131,7 @@ def _passes_on(case: Case, name: str, data: bytes, tolerance: float) -> None:
         text, _ = written(program, form, settings)
     except CornersmoothError:  # the machine, or the form, cannot follow the file
         return
-    assert verify(program, read_nc(text.encode(), **readings(case, form.machine, settings)), tolerance=tolerance).passed
+    assert verify(program, text.encode(), **readings(case, form.machine, settings), words=False).passed
 
 
 @pytest.mark.parametrize("control", ["fanuc", "siemens", "heidenhain"])

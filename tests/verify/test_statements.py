@@ -9,7 +9,7 @@ from cornersmooth.model import Move, Program, Source, Statement
 from cornersmooth.nc_reader import block_tables, reader
 from cornersmooth.nc_reader.ahead import Ahead
 from cornersmooth.statements import comparison
-from cornersmooth.verify import stops, verify
+from cornersmooth.verify import batches, stops, verify
 
 from .writing import HEAD, TAIL, encode
 
@@ -227,6 +227,7 @@ def test_path_before_holes_is_measured_as_it_is_read(monkeypatch):
     monkeypatch.setattr(reader, "GIVEN_OUT", 4)
     monkeypatch.setattr(block_tables, "CHUNK", 60)
     monkeypatch.setattr(stops, "TOGETHER", 4)
+    monkeypatch.setattr(batches, "BATCH", 40)
     held = []
     part = Ahead.part
     monkeypatch.setattr(Ahead, "part", lambda ahead, *rows: (held.append(len(ahead.nc)), part(ahead, *rows))[1])

@@ -118,6 +118,9 @@ def check(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> Check
             replace(one, nc_line=abs(one.nc_line), text=one.text.replace("CL file", "old program"))
             for one in found.problems
         ]
+        if found.unverified:
+            text = f"the run was not verified: {found.unverified}"
+            wrong += [Problem("CS593", 0, place.first + 1, text) for place in own]
         largest = np.maximum(largest, (found.tip.value, found.axis_point.value)).tolist()  # NaN stays
     return Checked(tuple(sorted(wrong, key=lambda one: one.nc_line)), *largest)
 

@@ -264,12 +264,11 @@ class NcProgram(Elements):
     blocks: int  #: those that are not empty, ``%`` and comments left out
     #: kinds of tokens (see `statements`), or pairs of kind and value, that the control has no words for
     unsaid: frozenset[str | tuple[str, float]] = frozenset()
-    #: rapids straight along the tool beside retracts, which posts add: the element, and whether it goes back to the
-    #: retract from the element before or down from it to the element after it
-    along_tool: tuple[tuple[int, bool], ...] = ()
     #: cuts that are left along the tool for a retract and gone on with: the elements along the tool, out and above, and
     #: NC lines of leaving and of coming back
     left_cuts: tuple[tuple[int, int, int, int], ...] = ()
+    unlooked: tuple[tuple[int, str], ...] = ()  #: NC lines, and what of the motion was not looked at there
+    coarse: int = 0  #: NC line from which on digits of X Y Z are too few for the tolerance; 0 for none
 
     @property
     def mm_per_unit(self) -> float:

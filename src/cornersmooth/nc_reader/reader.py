@@ -85,14 +85,6 @@ class Reader:
         self.given: list[Elements] = []
         #: elements up to a rapid along the tool before a retract that nobody asked for
         self.withdrawn = -1
-        #: see `NcProgram.along_tool`
-        self.along_tool: list[tuple[int, bool]] = []
-
-    def note_along_tool(self, start: Floats, end: Floats, step: float, near: Floats) -> bool:
-        """Note a rapid along the tool beside a retract; whether the CL file has it must be found out later."""
-        back = np.array_equal(start, near)
-        self.along_tool.append((self.elements - back, bool(back)))
-        return False
 
     def lines(self, source: Readable) -> Iterator[Table | Line]:
         """Read lines, and take note of the digits of all of them."""

@@ -71,30 +71,27 @@ def read_styled(data: bytes | str | os.PathLike[str], options: ReadingOptions, n
         source.finish()
         reader = Reader(label, options, options.steps(source.head(DIGITS_SAMPLE)))
         reader.comments = []
-        reader.retracts.added = reader.note_along_tool
-        parts = list(reader.chunks(reader.lines(source)))
-        return _program(reader, parts)
+        return program_of(reader, list(reader.chunks(reader.lines(source))))
     finally:
         source.close()
 
 
-def _program(reader: Reader, parts: list[Elements]) -> NcProgram:
-    """Put all that was given out together."""
+def program_of(reader: Reader, parts: list[Elements]) -> NcProgram:
+    """Put together what was given out, and what the text says beside the motion."""
     elements = Elements.joined(parts) if parts else reader.nothing
-    events = list(reader.events)
     comments = reader.comments or []
     place = np.searchsorted(elements.line, [number for number, _ in comments])
-    events.extend(
+    events = reader.events + [
         Event(int(element), number, "(", 0.0, text) for element, (number, text) in zip(place, comments, strict=True)
-    )
-    events.sort(key=lambda event: event.line)
+    ]
     return NcProgram(
         **vars(elements),
-        events=tuple(events),
+        events=tuple(sorted(events, key=lambda event: event.line)),
         problems=tuple(reader.problems),
         units=reader.units,
         blocks=reader.blocks,
         unsaid=reader.dialect.unsaid,
-        along_tool=tuple(reader.along_tool),
         left_cuts=tuple(reader.retracts.left_cuts),
+        unlooked=tuple(reader.unlooked),
+        coarse=reader.coarse,
     )

@@ -8,14 +8,14 @@ Shares no code with `smoothing` and `nc`::
 A program is verified when the written motion can be run beside the motion of the CL file, both forward only, so that at
 every moment the tips are within the tolerance and the axis points are within the tolerance. One way for every program::
 
-    elements (from `nc_reader`) -> stretches -> decision -> checks -> result
+    elements (from `nc_reader`) -> stretches -> passage -> checks -> result
 
 =================== ===================================================================================================
 what is decided     where
 =================== ===================================================================================================
 both as polylines   `cl_motion`, `motions`; how far they leave their chords, proved: `bending`
 run beside another  `passage`: by a `chain` of nearest places, where that fails exactly (`around`, `free_space`)
-stretch by stretch  `stops`: which elements reach them; `batches` cuts long stretches, `decision` goes on between them
+stretch by stretch  `stops`: which elements reach them; `batches` cuts long stretches and decides; `match`: its places
 holes               `holes`; poses that are named by their digits: `exact_poses`; tool changes: package `statements`
 what parts          `deviation`: the lines and the distances, which `distances` measures; poses that must be exact
 feeds               `feeds`; where a vertex may be besides its place: `reachable`
@@ -28,7 +28,8 @@ A *stretch* is the run of feed moves between two stops. The *bend* of a step is 
 """
 
 from cornersmooth.processes import useful_processes
-from cornersmooth.verify.result import Verification, Where
+from cornersmooth.verify.findings import Where
+from cornersmooth.verify.result import Verification
 from cornersmooth.verify.verifier import Verifier, verify
 
 __all__ = [

@@ -52,6 +52,12 @@ class Path:
         np.cumsum(np.sqrt(np.einsum("ij,ij->i", step, step)), out=length[1:])
         return cls(points, length, np.zeros(len(step)) if bend is None else bend, exact)
 
+    def only(self, columns: slice) -> Path:
+        """Tips or axis points alone."""
+        return Path.of(
+            np.ascontiguousarray(self.points[:, columns]), self.bend, lambda place: self.at(place)[:, columns]
+        )
+
     @property
     def segments(self) -> int:
         """How many."""

@@ -15,11 +15,8 @@ from cornersmooth.verify.nearest import larger_square
 def measure_continuity(match: Match, found: Findings) -> None:
     """Take down the largest jumps and the shortest element."""
     element, cosine, curved, jump = _jumps(match)
-    worst = found.continuity
-    for largest, values, where in ((worst.tangent, -cosine, element), (worst.curvature, jump, curved)):
-        if len(values):
-            k = int(np.argmax(values))
-            largest.update(values[k : k + 1], _cl_lines(match, where[k : k + 1]), match.nc.line[where[k : k + 1]])
+    _note(match, found, "tangent_jump", -cosine, element)
+    _note(match, found, "curvature_jump", jump, curved)
     # a block in rotary words may have become several elements: its length is from its start to its end
     last, first = match.motion.last, match.first
     lines = match.nc.line[first : first + len(last)]
@@ -29,14 +26,15 @@ def measure_continuity(match: Match, found: Findings) -> None:
     square = larger_square(six[1:] - six[:-1])
     square[(square == 0) | ~match.on[ends[1:]] | ~match.on[ends[:-1]]] = np.inf
     square[match.section[ends[1:]] != match.section[ends[:-1]]] = np.inf
-    if len(square):
-        k = int(np.argmin(square))
-        own = chosen[k + 1 : k + 2] + first
-        worst.shortest.update(-np.sqrt(square[k : k + 1]), _cl_lines(match, own), match.nc.line[own])
+    _note(match, found, "shortest", -np.sqrt(square), chosen[1:] + first)
 
 
-def _cl_lines(match: Match, elements: Ints) -> Ints:
-    return match.cl_lines(np.floor(match.place[match.motion.last[elements - match.first]]) + 1.0)
+def _note(match: Match, found: Findings, name: str, values: Floats, element: Ints) -> None:
+    """Take down the largest of the values of elements."""
+    if len(values):
+        k = [int(np.argmax(values))]
+        place = match.place[match.motion.last[element[k] - match.first]]
+        found.note(name, values[k], match.cl_lines(np.floor(place) + 1.0), match.nc.line[element[k]])
 
 
 def _jumps(match: Match) -> tuple[Ints, Floats, Ints, Floats]:

@@ -10,7 +10,7 @@ import numpy as np
 from cornersmooth.model import Floats, Ints
 from cornersmooth.verify.distances import Gap, Reached, nearest, of_original, of_written
 from cornersmooth.verify.exact_poses import digit_errors
-from cornersmooth.verify.findings import AXIS_OFF, Findings, Poses, Violation, Worst
+from cornersmooth.verify.findings import AXIS_OFF, Findings, Violation, Where
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.nearest import COLUMNS, Metric, on_segments
 from cornersmooth.verify.passage import AROUND, LONGER, MOST_BREAKS, Break
@@ -42,16 +42,15 @@ def _say(match: Match, found: Findings, metric: Metric, one: Break) -> None:
         where = _lines(match, place, row)
         if name == "both":
             gap = around.worst(match)
-            found.largest.together_tip.take(float(gap.tip[0]), *where)
-            found.largest.together_axis_point.take(float(gap.axis_point[0]), *where)
-            found.largest.orientation.take(float(gap.angle[0]), *where)
+            found.take_worst("together_tip", Where(float(gap.tip[0]), *where))
+            found.take_worst("together_axis_point", Where(float(gap.axis_point[0]), *where))
+            found.take_worst("orientation", Where(float(gap.angle[0]), *where))
             found.poses.append(around.poses(match))
             lines = where if off[name] > limit else lines
-        elif off[name] > limit and metric in (name, "both") and not (name == "axis point" and task.own_axis):
-            worst, code = (found.largest.tip, "CS521") if name == "tip" else (found.largest.axis_point, "CS522")
-            worst.take(off[name], *where)
-            found.violations.append(Violation(code, place, *where, off[name]))
-    if max(off["tip"], 0.0 if task.own_axis else off["axis point"]) > limit:
+        elif off[name] > limit and metric in (name, "both") and not (name == "axis_point" and task.own_axis):
+            found.take_worst(name, Where(off[name], *where))
+            found.violations.append(Violation("CS521" if name == "tip" else "CS522", place, *where, off[name]))
+    if max(off["tip"], 0.0 if task.own_axis else off["axis_point"]) > limit:
         return
     if off["both"] <= limit and not one.proved:
         found.unlooked.append((lines[1], "the order of the motion"))
@@ -130,19 +129,18 @@ class _Around:
         place = self.segments[nearest[k : k + 1]] + share[k : k + 1]
         return Gap.of(match.task, match.six[self.rows[k : k + 1]] - match.path.at(place))
 
-    def poses(self, match: Match) -> Poses:
+    def poses(self, match: Match) -> Floats:
         """How far the original poses are from the written motion."""
         trail, vertices = match.original.trail, self.vertices
         vertices = vertices[trail.fraction[vertices] == 1]
         point, pose = match.path.points[vertices], match.original.pose[trail.owner[vertices]]
         if not len(vertices):
-            nothing = np.zeros(0)
-            return Poses(pose, nothing, nothing, nothing, np.zeros(0, np.int64))
+            return np.zeros((5, 0))
         share, _, nearest = _distances(point, match.six, self.steps, COLUMNS["both"])
         step, at = self.steps[nearest], share[:, None]
         six = match.six[step] + at * (match.six[step + 1] - match.six[step])
         gap = Gap.of(match.task, six - point)
-        return Poses(pose, gap.tip, gap.axis_point, gap.angle, match.nc_lines(step + 1))
+        return np.array((pose, gap.tip, gap.axis_point, gap.angle, match.nc_lines(step + 1)))
 
 
 def _first_or_worst(off: Floats, limit: float) -> int:
@@ -181,27 +179,25 @@ def measure_original(match: Match, found: Findings) -> None:
     nc_line = match.nc_lines(row)
     _largest(match, found, reached, (original.program.line[pose], nc_line))
     gap, whole = reached.gap, original.trail.fraction[reached.vertex] == 1
-    found.poses.append(Poses(pose[whole], gap.tip[whole], gap.axis_point[whole], gap.angle[whole], nc_line[whole]))
+    columns: Floats = np.array((pose, gap.tip, gap.axis_point, gap.angle, nc_line))
+    found.poses.append(columns[:, whole])
     _check_exact_poses(match, found, reached.vertex[whole], row[whole])
 
 
 def _largest(match: Match, found: Findings, reached: Reached, lines: tuple[Ints, Ints]) -> None:
     """Take what the vertices of one of the two motions found; only the largest are looked at closely."""
-    result, gap = found.largest, reached.gap
-    result.together_tip.update(gap.tip, *lines)
-    result.together_axis_point.update(gap.axis_point, *lines)
-    result.orientation.update(gap.angle, *lines)
-    alone: tuple[tuple[Worst, Floats, Metric], ...] = (
-        (result.tip, gap.tip, "tip"),
-        (result.axis_point, gap.axis_point, "axis point"),
-    )
-    for worst, known, metric in alone:
-        rows, some = np.flatnonzero(known > worst.value), _SOME
+    gap = reached.gap
+    found.note("together_tip", gap.tip, *lines)
+    found.note("together_axis_point", gap.axis_point, *lines)
+    found.note("orientation", gap.angle, *lines)
+    alone: tuple[tuple[Metric, Floats], ...] = (("tip", gap.tip), ("axis_point", gap.axis_point))
+    for name, known in alone:
+        rows, some = np.flatnonzero(known > found.worst[name].value), _SOME
         while len(rows):
             first = rows[np.argpartition(-known[rows], some)[:some]] if len(rows) > some else rows
-            off = np.minimum(nearest(match, reached, first, metric), known[first])
-            worst.update(off, lines[0][first], lines[1][first])
-            rows = np.setdiff1d(rows[known[rows] > worst.value], first, assume_unique=True)
+            off = np.minimum(nearest(match, reached, first, name), known[first])
+            found.note(name, off, lines[0][first], lines[1][first])
+            rows = np.setdiff1d(rows[known[rows] > found.worst[name].value], first, assume_unique=True)
             some *= 4
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from typing import Final, NamedTuple, Self
+from dataclasses import dataclass, field
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -27,24 +27,24 @@ _TEXT = {
 }
 
 
-@dataclass
-class Worst:
-    """Largest value met, and where: CL line and NC line."""
+@dataclass(frozen=True)
+class Where:
+    """A largest value and where it was met."""
 
-    value: float = 0.0
+    value: float
+    #: from 1; 0 where there is none
     cl_line: int = 0
     nc_line: int = 0
 
-    def take(self, value: float, cl_line: int, nc_line: int) -> None:
-        """Take a value if it is larger than what was met."""
-        if value > self.value:
-            self.value, self.cl_line, self.nc_line = value, cl_line, nc_line
 
-    def update(self, values: Floats, cl_line: Ints, nc_line: Ints) -> None:
-        """Take the largest of (k,) values, if it is larger than what was met."""
-        if len(values):
-            k = int(np.argmax(values))
-            self.take(float(values[k]), int(cl_line[k]), int(nc_line[k]))
+#: largest values, by their fields of `Verification`, before anything is met: the orientation in rad, of jumps of the
+#: tangent minus the cosine, of the shortest block minus its length
+_NOTHING: Final = {
+    **dict.fromkeys(("tip", "axis_point", "together_tip", "together_axis_point", "orientation"), Where(0.0)),
+    "tangent_jump": Where(-1.0),
+    "curvature_jump": Where(0.0),
+    "shortest": Where(-np.inf),
+}
 
 
 class Violation(NamedTuple):
@@ -69,64 +69,6 @@ def problems_of(violations: list[Violation]) -> list[Problem]:
     return [Problem(one.code, *one[2:4], _TEXT[one.code].format(one.amount), one.amount) for one in worst]
 
 
-class Peaks:
-    """Largest values of several kinds: every field is a `Worst`."""
-
-    def take(self, other: Self) -> None:
-        """Take over what is larger elsewhere."""
-        for name, worst in vars(other).items():
-            if worst.value > getattr(self, name).value:
-                setattr(self, name, worst)
-
-
-@dataclass
-class Largest(Peaks):
-    """Largest deviations."""
-
-    #: mm: distance of the two tip paths, and of the two axis-point paths, in order along the path
-    tip: Worst = field(default_factory=Worst)
-    axis_point: Worst = field(default_factory=Worst)
-    #: mm: the same at one common pose of the tool line
-    together_tip: Worst = field(default_factory=Worst)
-    together_axis_point: Worst = field(default_factory=Worst)
-    orientation: Worst = field(default_factory=Worst)  #: rad: at the common pose
-
-    def copy(self) -> Largest:
-        """Return the same values, to go on from."""
-        return Largest(*(replace(worst) for worst in vars(self).values()))
-
-
-@dataclass
-class Continuity(Peaks):
-    """Largest jumps of direction (minus the cosine) and curvature, and the shortest element (minus its length)."""
-
-    tangent: Worst = field(default_factory=lambda: Worst(-1.0))
-    curvature: Worst = field(default_factory=Worst)
-    shortest: Worst = field(default_factory=lambda: Worst(-np.inf))
-
-
-@dataclass(frozen=True)
-class Poses:
-    """Distances of original poses from the nearest written pose."""
-
-    pose: Ints  #: (k,): poses of the CL program; none where the rows are all of them, in order
-    tip: Floats  #: (k,) mm
-    axis_point: Floats  #: (k,) mm
-    angle: Floats  #: (k,) rad
-    nc_line: Ints  #: (k,)
-
-    @classmethod
-    def nowhere(cls, count: int) -> Poses:
-        """All poses of a program, none of them passed: NaN."""
-        nan = np.full(count, np.nan)
-        return cls(np.zeros(0, np.int64), nan, nan.copy(), nan.copy(), np.zeros(count, np.int64))
-
-    def put(self, part: Poses) -> None:
-        """Put the poses of a part in their places among all."""
-        for name in ("tip", "axis_point", "angle", "nc_line"):
-            getattr(self, name)[part.pose] = getattr(part, name)
-
-
 @dataclass
 class Runs:
     """Problems of runs of elements; a run that goes on in the next batch is one problem."""
@@ -146,18 +88,36 @@ class Runs:
 class Findings:
     """What the checks of a batch find, or those of all batches so far."""
 
-    largest: Largest = field(default_factory=Largest)  #: at least what it started from
-    continuity: Continuity = field(default_factory=Continuity)
+    worst: dict[str, Where] = field(default_factory=_NOTHING.copy)  #: largest values: at least what it started from
     violations: list[Violation] = field(default_factory=list)
     feeds: Runs = field(default_factory=Runs)  #: of elements with a wrong feed
-    poses: list[Poses] = field(default_factory=list)
+    #: (5, k) each: poses of the CL program; how far they are from the nearest written pose: tip and axis point, mm, and
+    #: axis, rad; NC lines
+    poses: list[Floats] = field(default_factory=list)
     unlooked: list[tuple[int, str]] = field(default_factory=list)  #: what was not looked at, and the NC line
+    #: by element of the whole text with words behind it: the CL path length, mm, at its place, and those at other poses
+    #: that it names and may stand for as well, where the path goes to and fro
+    words: dict[int, tuple[float, tuple[float, ...]]] = field(default_factory=dict)
+
+    def note(self, name: str, values: Floats, cl_lines: Ints, nc_lines: Ints) -> None:
+        """Take the largest of (k,) values, if it is larger than what was met."""
+        if len(values):
+            k = int(np.argmax(values))
+            self.take_worst(name, Where(float(values[k]), int(cl_lines[k]), int(nc_lines[k])))
+
+    def take_worst(self, name: str, where: Where) -> None:
+        """Take a value if it is larger than what was met."""
+        if where.value > self.worst[name].value:
+            self.worst[name] = where
 
     def take(self, other: Findings) -> None:
-        """Take over what is found elsewhere."""
-        self.largest.take(other.largest)
-        self.continuity.take(other.continuity)
+        """Take over what is found in the next batch."""
+        for name, where in other.worst.items():
+            self.take_worst(name, where)
         self.violations += other.violations
         self.feeds.follow(other.feeds)
         self.poses += other.poses
         self.unlooked += other.unlooked
+        for element, (length, others) in other.words.items():
+            known = self.words.get(element, (length, others))
+            self.words[element] = known[0], known[1] or others

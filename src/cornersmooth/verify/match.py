@@ -1,23 +1,53 @@
-"""A batch with what follows from the places of its vertices on the CL path."""
+"""A batch of elements with the places of its vertices on the CL path, and what follows from them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.verify.batches import Batch
+from cornersmooth.nc_reader.elements import Elements
 from cornersmooth.verify.chain import Path, passed, points_at
 from cornersmooth.verify.cl_motion import Original
+from cornersmooth.verify.motions import Motion
+from cornersmooth.verify.nearest import Metric
+from cornersmooth.verify.passage import Break
 from cornersmooth.verify.reachable import Reachable
 from cornersmooth.verify.task import Task
 
 
 @dataclass(frozen=True, kw_only=True)
+class Batch:
+    """Elements that are decided at once, and then measured."""
+
+    nc: Elements
+    offset: int  #: number of the first of them in the whole text
+    #: `first` and `last`: each stretch begins at the end of one element and ends with another, counted in this batch;
+    #: `start`, `fraction` and `stop`: where it begins on the CL path, and its last segment plus one
+    stretches: NDArray[Any]
+    motion: Motion  #: the polyline of the elements from the end of the first stretch's `first` on, v vertices
+    #: (v,): segment plus fraction of the CL path, ascending; NaN where a vertex is none of a stretch, or not reached
+    place: Floats
+    breaks: tuple[tuple[Metric, Break], ...]  #: where the motions part, and what does
+    whole: bool  #: whether all was decided
+    #: whether the first stretch begins in the batch before: one more element stands in front of it
+    continued: bool
+    goes_on: bool  #: whether the last stretch goes on in the next batch
+    words: Ints  #: elements of the whole text with words behind them, ascending
+
+    @property
+    def first(self) -> int:
+        """Element at the end of which it begins."""
+        return int(self.stretches["first"][0])
+
+
+@dataclass(frozen=True, kw_only=True)
 class Match(Batch):
-    """A batch, v vertices."""
+    """A batch beside the CL motion, v vertices."""
 
     task: Task
 

@@ -9,10 +9,10 @@ import numpy as np
 from cornersmooth.model import Floats, Ints
 
 #: which distance is meant: of tip and axis point together, or of one of them
-Metric = Literal["both", "tip", "axis point"]
+Metric = Literal["both", "tip", "axis_point"]
 
 #: columns of a row of both that count for each
-COLUMNS: Final[dict[Metric, slice]] = {"both": slice(0, 6), "tip": slice(0, 3), "axis point": slice(3, 6)}
+COLUMNS: Final[dict[Metric, slice]] = {"both": slice(0, 6), "tip": slice(0, 3), "axis_point": slice(3, 6)}
 
 #: points taken at a time, so that the work arrays stay in the cache (speed only)
 _BLOCK: Final = 8192

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints, Move
-from cornersmooth.nc_reader.elements import Elements, Event, NcProgram
 from cornersmooth.verify.task import Task
 
 #: printed digits that ends may be off
@@ -96,25 +95,6 @@ class OwnRapids:
         for values in (original.program.tip[pose], original.program.axis[pose]):
             moved[moves[1:]] |= (values[1:] != values[:-1]).any(axis=1)
         return np.where(chosen, np.cumsum(moved), np.nan)
-
-    def left_out(self, nc: NcProgram) -> tuple[Elements, list[Event]]:
-        """Elements and events of a text that was read before, where rapids that posts add do not move the tool."""
-        elements = Elements(**{column.name: getattr(nc, column.name) for column in fields(Elements)})
-        tip, second = nc.tip.copy(), nc.second.copy()
-        withdrawn = set()
-        for element, back in nc.along_tool:
-            start, end = (element - 1, element) if back else (element, element + 1)
-            near = start if back else end
-            if self.added(tip[start], tip[end], nc.tip_step, tip[near]):
-                tip[element], second[element] = tip[near], second[near]
-                if back:  # words behind it belong where it comes from
-                    withdrawn.add(element + 1)
-        for left, above, *_ in nc.left_cuts:
-            if not any(self.goes_to(nc.tip[element], nc.tip_step) for element in (left, above)):
-                tip[[left, above]], second[[left, above]] = nc.tip[left - 1], nc.second[left - 1]
-                withdrawn.discard(left + 1)
-        events = [replace(event, element=event.element - (event.element in withdrawn)) for event in nc.events]
-        return replace(elements, tip=tip, second=second), events
 
 
 def _follow(ranks: Floats, others: Floats) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -10,21 +11,11 @@ import numpy as np
 from cornersmooth.model import Floats, Ints
 from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.verdict import Verdict
-from cornersmooth.verify.findings import AXIS_OFF, Findings, Poses, Worst
+from cornersmooth.verify.findings import AXIS_OFF, Findings, Where
 from cornersmooth.verify.task import Task
 
 #: problems of one code that are kept
 MOST_PROBLEMS = 1000
-
-
-@dataclass(frozen=True)
-class Where:
-    """A largest value and where it was met."""
-
-    value: float
-    #: from 1; 0 where there is none
-    cl_line: int
-    nc_line: int
 
 
 @dataclass(frozen=True)
@@ -159,54 +150,52 @@ class Verification:
         }
 
     @classmethod
-    def of(
-        cls,
-        found: Findings,
-        passed: Poses,
-        problems: list[Problem],
-        *,
-        task: Task,
-        **counts: Any,
-    ) -> Verification:
-        """Make it of what was found, of the poses that were passed, of all problems, and of fields that are counted."""
-        problems = sorted(problems, key=lambda problem: (problem.nc_line, problem.cl_line))
+    def of(cls, found: Findings, poses: Floats, problems: list[Problem], task: Task, **counts: Any) -> Verification:
+        """Make it of what was found, of all poses (4, n) as in `Findings`, of all problems, and of what is counted."""
         kept: list[Problem] = []
-        count: dict[str, int] = {}
-        for problem in problems:
-            count[problem.code] = count.get(problem.code, 0) + 1
+        count: Counter[str] = Counter()
+        for problem in sorted(problems, key=lambda problem: (problem.nc_line, problem.cl_line)):
+            count[problem.code] += 1
             if count[problem.code] <= MOST_PROBLEMS:
                 kept.append(problem)
-        continuity, largest, own = found.continuity, found.largest, task.own_axis
-        orientation = _where(largest.orientation, float(np.degrees(largest.orientation.value)))
+        worst, own = found.worst, task.own_axis
+        orientation = np.degrees(worst["orientation"].value)
+        tangent = np.degrees(np.arccos(np.clip(-worst["tangent_jump"].value, -1.0, 1.0)))
+        told = {"orientation": orientation, "tangent_jump": tangent, "shortest": -worst["shortest"].value}
         if own:
-            orientation = _where(largest.axis_point, float(task.degrees(largest.axis_point.value)))
-        tangent = float(np.degrees(np.arccos(np.clip(-continuity.tangent.value, -1.0, 1.0))))
+            worst = worst | {"orientation": worst["axis_point"]}
+            told |= {"orientation": task.degrees(worst["axis_point"].value)}
+            told |= {"axis_point": np.nan, "together_axis_point": np.nan}
+        peaks: dict[str, Any] = {
+            name: replace(where, value=float(told.get(name, where.value))) for name, where in worst.items()
+        }
         return cls(
             passed=not problems,
             tolerance=task.tolerance + task.sagitta,
             axis_length=np.nan if own else task.axis_length,
             axis_tolerance=task.axis_tolerance,
-            tip=_where(largest.tip),
-            axis_point=_where(largest.axis_point, np.nan if own else None),
-            together_tip=_where(largest.together_tip),
-            together_axis_point=_where(largest.together_axis_point, np.nan if own else None),
-            orientation=orientation,
             problems=tuple(kept),
             problem_count=len(problems),
-            poses=len(passed.tip),
-            shortest=_where(continuity.shortest, -continuity.shortest.value),
-            tangent_jump=_where(continuity.tangent, tangent),
-            curvature_jump=_where(continuity.curvature),
-            pose_tip=passed.tip,
-            pose_axis_point=passed.axis_point,
-            pose_angle=np.degrees(passed.angle),
-            pose_nc_line=passed.nc_line,
+            poses=poses.shape[1],
+            pose_tip=poses[0],
+            pose_axis_point=poses[1],
+            pose_angle=np.degrees(poses[2]),
+            pose_nc_line=poses[3].astype(np.int64),
+            **peaks,
             **counts,
-        )
+        ).not_verified(*_texts(found.unlooked))
 
 
-def _where(worst: Worst, value: float | None = None) -> Where:
-    return Where(worst.value if value is None else value, worst.cl_line, worst.nc_line)
+def _texts(unlooked: list[tuple[int, str]]) -> list[str]:
+    """What was not looked at: the first line of each kind, and how often."""
+    count = Counter(text for _, text in unlooked)
+    first: dict[str, int] = {}
+    for line, text in sorted(unlooked):
+        first.setdefault(text, line)
+    return [
+        f"{text} at NC line {line}" + (f" and {count[text] - 1:,} more places" if count[text] > 1 else "")
+        for text, line in first.items()
+    ]
 
 
 def _finite(value: float) -> float | None:

@@ -37,6 +37,9 @@ TOGETHER: Final = 1 << 14
 #: decide what is named, and never whether a program passes
 _AFTER_FAULT: Final = 64
 
+#: elements before those that are certain that are still looked at
+BEFORE: Final = 16
+
 #: elements looked through at a time where only one thing can happen, at first
 _FIRST_LOOK: Final = 16
 
@@ -151,7 +154,7 @@ class Stops:
     # ------------------------------------------------------------------ reading
 
     def parts(self) -> Iterator[Part]:
-        """Give out what is certain as it is read."""
+        """Give out what is certain as it is read; all but the last `BEFORE` of that may be forgotten then."""
         ahead = self._ahead
         alive, element, given = [_Trace(-1, -1, False, None)], 0, 0
         while ahead.has(element):
@@ -165,7 +168,6 @@ class Stops:
             if element - given >= TOGETHER and (sure := self._settle(alive, element)) > given:
                 yield Part(sure, self._steps)
                 given, self._steps = sure, []
-                ahead.forget(sure - _FIRST_LOOK)
         self._end(alive, element)
         yield Part(element, self._steps)
 

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Iterator, Sequence, Set
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator, Sequence, Set
+from dataclasses import fields, replace
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
 from cornersmooth.copied_signature import taking_what
 from cornersmooth.errors import SettingsError
-from cornersmooth.model import Ints, Program, Units
+from cornersmooth.model import Program
 from cornersmooth.nc_reader.elements import Elements, Event, NcProgram, Problem
 from cornersmooth.nc_reader.machine_positions import MachinePositions
 from cornersmooth.nc_reader.needed_states import CONTROL_WORDS
 from cornersmooth.nc_reader.reader import Reader
-from cornersmooth.nc_reader.reading import read_styled
+from cornersmooth.nc_reader.reading import program_of, read_styled
 from cornersmooth.nc_reader.reading_options import DIGITS_SAMPLE, ReadingOptions
 from cornersmooth.nc_reader.rotary import sagitta
 from cornersmooth.nc_reader.source import Source, readable_twice
@@ -27,19 +27,32 @@ from cornersmooth.processes import Helper, can_fork, map_in_processes
 from cornersmooth.settings import BOUNDS
 from cornersmooth.statements.comparison import KINDS
 from cornersmooth.statements.left_out import gone_over, may_be_left_out
-from cornersmooth.verify.batches import Batch, Batches
-from cornersmooth.verify.checks import Examined, examine
-from cornersmooth.verify.findings import Findings, Largest, Poses, problems_of
+from cornersmooth.verify.batches import Batches
+from cornersmooth.verify.continuity import measure_continuity
+from cornersmooth.verify.deviation import check_breaks, measure_original, measure_written
+from cornersmooth.verify.feeds import check_feeds
+from cornersmooth.verify.findings import Findings, Where, problems_of
 from cornersmooth.verify.half_turns import half_turns
+from cornersmooth.verify.match import Batch, Match
 from cornersmooth.verify.own_rapids import OwnRapids
 from cornersmooth.verify.result import Verification
 from cornersmooth.verify.task import Task, length_of
 from cornersmooth.verify.word_check import WordCheck
-from cornersmooth.verify.word_places import WordPlaces
+from cornersmooth.verify.word_places import WordPlaces, place_words
 from cornersmooth.verify.word_states import GONE_ON
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine
+
+#: what every batch goes through, in this order
+CHECKS: Final[tuple[Callable[[Match, Findings], None], ...]] = (
+    check_breaks,
+    measure_written,
+    measure_original,
+    check_feeds,
+    measure_continuity,
+    place_words,
+)
 
 #: kinds of statements that bear on the motion: where the path is moved to
 _OF_MOTION: Final = frozenset(("compensation", "register", "offset"))
@@ -63,7 +76,8 @@ class Verifier:
     Parameters
     ----------
     nc : NcProgram, bytes or path
-        A file must be there, but need not be whole.
+        A file must be there, but need not be whole. Of what was read before only the motion is measured; there is no
+        way around a retract in it that the CL file has not.
     tolerance : float, mm
         ε: what is allowed at tip and axis point.
     axis_length : float, mm
@@ -193,7 +207,34 @@ class Verifier:
 
     def _work(self) -> Verification:
         """Read and measure the text as far as it goes."""
-        return self._of_text(self._text) if isinstance(self._text, Source) else self._of_read(self._text)
+        options, text = self._options, self._text
+        if isinstance(text, NcProgram):
+            task = self._task(rotary=text.rotary)
+            elements = Elements(**{column.name: getattr(text, column.name) for column in fields(Elements)})
+            found = self._found(task, iter([elements]), list(text.events), lambda: (text, len(text.curves)))
+            words = "the words of the text: they are looked at where it is read, not afterwards"
+            return found.not_verified(words) if self._words else found
+        steps = options.steps(text.head(DIGITS_SAMPLE))
+        rotary = options.rotary(steps)
+        task = self._task(rotary=rotary is not None)  # takes memory, which who writes may need before there is text
+        lever = None if rotary is None else float(rotary.levers(task.original.trail.tip).max(initial=0.0))
+        reader = Reader(self._name, options, steps, lever)
+        machine = self._machine if options.dialect.retracts else None
+        switches, scale = word_list(options.control).switches, self._program.mm_per_unit
+        positions = MachinePositions(machine, scale, switches=switches, tcp=options.tcp)
+        check = WordCheck(options.control, options.dialect.lexer, options.tolerance / scale, *self._own, positions)
+        own_rapids = OwnRapids(task)
+        reader.retracts.added, reader.retracts.asked = own_rapids.added, own_rapids.goes_to
+        lines = reader.lines(text)
+        chunks = reader.chunks(check.watch(lines) if self._words else lines)
+
+        def said() -> tuple[NcProgram, int]:
+            nc = program_of(reader, [])
+            return replace(nc, problems=(*nc.problems, *check.problems)), reader.curves
+
+        found = self._found(task, chunks, reader.events, said).not_verified(self._unverified(check))
+        beside = self._own_kinds - _OF_MOTION
+        return replace(found, trusted=(*([(0, _own_table(beside))] if beside else []), *check.trusted))
 
     def _task(self, *, rotary: bool) -> Task:
         options = self._options
@@ -201,105 +242,65 @@ class Verifier:
         taken = sagitta(options.tolerance) if rotary else 0.0
         return Task.of(self._program, *lengths, apart=self._apart, sagitta=taken)
 
-    def _of_read(self, nc: NcProgram) -> Verification:
-        task = self._task(rotary=nc.rotary)
-        elements, events = OwnRapids(task).left_out(nc)
-        measured = self._measured(task, iter([elements]), events)
-        said = _Said(list(nc.problems), nc.units, nc.unsaid, nc.blocks, len(nc.curves), nc.left_cuts)
-        found = self._verification(measured, said)
-        return found.not_verified("the words of the text: they are looked at where it is read, not afterwards")
-
-    def _of_text(self, source: Source) -> Verification:
-        options = self._options
-        steps = options.steps(source.head(DIGITS_SAMPLE))
-        rotary = options.rotary(steps)
-        task = self._task(rotary=rotary is not None)  # takes memory, which who writes may need before there is text
-        lever = None
-        if rotary is not None:
-            lever = float(rotary.levers(task.original.trail.tip).max(initial=0.0))
-        reader = Reader(self._name, options, steps, lever)
-        lines = reader.lines(source)
-        room = options.tolerance / self._program.mm_per_unit
-        machine = self._machine if options.dialect.retracts else None
-        positions = MachinePositions(
-            machine,
-            self._program.mm_per_unit,
-            switches=word_list(self._options.control).switches,
-            tcp=self._options.tcp,
-        )
-        check = WordCheck(options.control, options.dialect.lexer, room, *self._own, positions)
-        own_rapids = OwnRapids(task)
-        reader.retracts.added, reader.retracts.asked = own_rapids.added, own_rapids.goes_to
-        chunks = reader.chunks(check.watch(lines) if self._words else lines)
-        measured = self._measured(task, chunks, reader.events)
-        measured.findings.unlooked += reader.unlooked
-        said = _Said(
-            [*reader.problems, *check.problems],
-            reader.units,
-            reader.dialect.unsaid,
-            reader.blocks,
-            reader.curves,
-            reader.retracts.left_cuts,
-            reader.coarse,
-        )
-        found = self._verification(measured, said).not_verified(self._unverified(check))
-        beside = self._own_kinds - _OF_MOTION
-        return replace(found, trusted=(*([(0, _own_table(beside))] if beside else []), *check.trusted))
-
-    def _measured(self, task: Task, chunks: Iterator[Elements], events: list[Event]) -> _Measured:
-        """Match and measure all that is read."""
-        found = _Measured(task, Batches(task, events), WordPlaces(task, events), Poses.nowhere(len(self._program)))
+    def _found(
+        self,
+        task: Task,
+        chunks: Iterator[Elements],
+        events: list[Event],
+        said: Callable[[], tuple[NcProgram, int]],
+    ) -> Verification:
+        """Measure all that is read, and put everything together; `said`: of the text and its curves, then."""
+        program, batches, findings = self._program, Batches(task, events), Findings()
+        places = WordPlaces(batches, events)
+        poses = np.concatenate((np.full((3, len(program)), np.nan), np.zeros((1, len(program)))))
         if self._slower:
             chunks = (part.at_most() for part in chunks)
 
-        def items() -> Iterator[tuple[Batch, Ints, Largest]]:
-            for batch in found.batches.of(found.places.watch(chunks)):
-                with_words = found.places.elements(batch.offset, batch.offset + batch.last)
-                yield batch, with_words, found.findings.largest.copy()
+        def items() -> Iterator[tuple[Batch, dict[str, Where]]]:
+            for batch in batches.of(places.watch(chunks)):
+                yield batch, findings.worst.copy()
 
-        def work(item: tuple[Batch, Ints, Largest]) -> Examined:
-            return examine(task, *item)
+        def work(item: tuple[Batch, dict[str, Where]]) -> Findings:
+            match, found = Match(task=task, **vars(item[0])), Findings(item[1])
+            for check in CHECKS:
+                check(match, found)
+            return found
 
-        for examined in map_in_processes(work, items(), self._processes, busy=True):
-            for poses in examined.findings.poses:
-                found.poses.put(poses)
-            examined.findings.poses = []
-            found.findings.take(examined.findings)
-            found.places.take(examined)
-        return found
-
-    def _verification(self, measured: _Measured, said: _Said) -> Verification:
-        """Put everything together."""
-        program, batches, findings = self._program, measured.batches, measured.findings
-        problems = [problem for problem in said.problems if self._words or problem.code != CONTROL_WORDS]
-        if said.units != program.units:
-            text = f"the program is in {said.units}, the CL file in {program.units}"
+        for found in map_in_processes(work, items(), self._processes, busy=True):
+            for some in found.poses:
+                poses[:, some[0].astype(np.int64)] = some[1:]
+            found.poses = []
+            findings.take(found)
+        nc, curves = said()
+        findings.unlooked += nc.unlooked
+        problems = [problem for problem in nc.problems if self._words or problem.code != CONTROL_WORDS]
+        if nc.units != program.units:
+            text = f"the program is in {nc.units}, the CL file in {program.units}"
             problems.append(Problem("CS505", 0, 1, text))
         problems += batches.problems + findings.feeds.problems + problems_of(findings.violations)
         problems += half_turns(program)
         if not self._skip_cycles:
             problems += batches.left_out
         if self._words and batches.elements:  # without any motion nothing has a place
-            of_statements, at_home = measured.places.problems(batches, said.unsaid, self._own_kinds, self._clamps)
+            of_statements, at_home = places.problems(findings, nc.unsaid, self._own_kinds, self._clamps)
             problems = [one for one in problems if one.text != GONE_ON or one.nc_line not in at_home] + of_statements
-        if said.coarse:  # a pose missed within the tolerance where digits are too few for it is not verified
-            limit = measured.task.tolerance
+        if nc.coarse:  # a pose missed within the tolerance where digits are too few for it is not verified
+            limit = task.tolerance
             missed = [one for one in problems if one.code in ("CS524", "CS531") and one.amount <= limit]
             text = f"exact poses: the digits are too few for {limit:g} mm"
             findings.unlooked += [(one.nc_line, text) for one in missed]
             problems = [one for one in problems if one not in missed] if missed else problems
-        found = Verification.of(
+        return Verification.of(
             findings,
-            measured.poses,
+            poses,
             problems,
-            task=measured.task,
-            blocks=said.blocks,
+            task,
+            blocks=nc.blocks,
             elements=batches.elements,
-            curves=said.curves,
+            curves=curves,
             left_out=len(batches.left_out) if self._skip_cycles else 0,
-            rewinds=tuple((out, back) for *_, out, back in said.left_cuts),
+            rewinds=tuple((out, back) for *_, out, back in nc.left_cuts),
         )
-        return found.not_verified(*_texts(findings.unlooked))
 
     @property
     def _own_kinds(self) -> frozenset[str]:
@@ -337,42 +338,6 @@ def verify(*args: Any, **how: Any) -> Verification:
     """
     with Verifier(*args, **how) as verifier:
         return verifier.result()
-
-
-class _Said(NamedTuple):
-    """What a text says of itself, when it has been read; as of `NcProgram`."""
-
-    problems: list[Problem]
-    units: Units
-    unsaid: frozenset[str | tuple[str, float]]
-    blocks: int
-    curves: int  #: how many
-    left_cuts: Sequence[tuple[int, int, int, int]]
-    coarse: int = 0  #: NC line from which on digits are too few for the tolerance; 0 for none
-
-
-@dataclass(frozen=True)
-class _Measured:
-    """What all batches show together."""
-
-    task: Task
-    batches: Batches
-    places: WordPlaces
-    poses: Poses  #: of the whole CL program
-    findings: Findings = field(default_factory=Findings)
-
-
-def _texts(unlooked: list[tuple[int, str]]) -> list[str]:
-    """What was not looked at: the first line of each kind, and how often."""
-    first: dict[str, int] = {}
-    count: dict[str, int] = {}
-    for line, text in sorted(unlooked):
-        first.setdefault(text, line)
-        count[text] = count.get(text, 0) + 1
-    return [
-        f"{text} at NC line {line}" + (f" and {count[text] - 1:,} more places" if count[text] > 1 else "")
-        for text, line in first.items()
-    ]
 
 
 def _check_bounds(**values: float) -> None:

@@ -6,9 +6,8 @@ A word stands between two elements of the text: behind the end of one, and befor
 from __future__ import annotations
 
 import math
-from bisect import bisect_left, bisect_right
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from bisect import bisect_right
+from collections.abc import Iterable, Set
 from itertools import count
 from typing import Final
 
@@ -21,32 +20,65 @@ from cornersmooth.statements.asked import asked
 from cornersmooth.statements.comparison import compare
 from cornersmooth.statements.said import said
 from cornersmooth.statements.tokens import TAP, Place, Token
-from cornersmooth.verify.batches import Batches
-from cornersmooth.verify.checks import Examined
-from cornersmooth.verify.task import Task
+from cornersmooth.verify.batches import Batches, elements_with_words
+from cornersmooth.verify.findings import Findings
+from cornersmooth.verify.match import Match
+from cornersmooth.verify.passage import AROUND
 
 #: CL path length of what stands before the first motion, mm
 _BEFORE: Final = -1.0
 
 
-@dataclass
-class WordPlaces:
-    """Takes down what is known of the elements that have words behind them, while they are read and measured."""
+def place_words(match: Match, found: Findings) -> None:
+    """Take down where the elements with words behind them are, as far as they are known to be in a batch."""
+    first, last = match.first + match.offset, match.motion.last
+    vertex = last[match.words - first]
+    element, vertex = match.words[match.on[vertex]], vertex[match.on[vertex]]
+    length, path = match.path.lengths_at(match.place[vertex]), match.path.length
+    for one, here, at in zip(element.tolist(), vertex.tolist(), length.tolist(), strict=True):
+        named = path[_named(match, here, at)]
+        # a word belongs to the pose that the vertex names, not to the place beside it that is as near: both within ε
+        close = named[np.abs(named - at) <= 2.0 * match.tolerance + match.margin]
+        at = close[np.argmin(np.abs(close - at))] if len(close) else at
+        beside = named[np.abs(named - at) > match.margin]
+        if len(beside):
+            beside = beside[match.reachable.may_be_at(here, np.searchsorted(path, beside))]
+        found.words[one] = float(at), tuple(beside.tolist())
 
-    task: Task
-    events: list[Event]  #: words of the text, which grow as it is read
-    margin: float = 0.0  #: what printed digits account for, mm
-    _lengths: dict[int, float] = field(default_factory=dict)  #: CL path length, mm, at the ends of elements
-    _rooms: dict[int, float] = field(default_factory=dict)  #: how far that is uncertain, mm
-    _others: dict[int, tuple[float, ...]] = field(default_factory=dict)  #: at other poses that elements may stand for
-    _still: set[int] = field(default_factory=set)  #: rapids that lead nowhere
+
+def _named(match: Match, vertex: int, length: float) -> Ints:
+    """Vertices of the CL path around its place that a written vertex names, up to the printed digits."""
+    path, around = match.path, AROUND * match.tolerance
+    low, high = np.searchsorted(path.length, (length - around, length + around)).tolist()
+    away = (path.points[low:high] - match.six[vertex]).reshape(-1, 2, 3)
+    return low + np.flatnonzero((np.linalg.norm(away, axis=2) <= match.margin).all(axis=1))
+
+
+class WordPlaces:
+    """Takes down what is known of the elements that have words behind them, while they are read; then compares these.
+
+    Attributes
+    ----------
+    margin : float, mm
+        What printed digits account for.
+    """
+
+    def __init__(self, batches: Batches, events: list[Event]) -> None:
+        self._batches, self._task, self._events = batches, batches.task, events
+        self.margin = 0.0
+        self._rooms: dict[int, float] = {}  # how far the lengths at the ends of elements are uncertain, mm
+        self._still: set[int] = set()  # rapids that lead nowhere
+        # CL path lengths, mm, where elements end and begin, as far as they are known
+        self._ends: dict[int, float] = {}
+        self._begins: dict[int, float] = {}
+        self._others: dict[int, tuple[float, ...]] = {}  # at other poses that elements may stand for
 
     def watch(self, chunks: Iterable[Elements]) -> Iterable[Elements]:
         """Give out the elements of a text, and take down how sure those with words behind them are."""
         offset = 0
         before = np.full((1, 6), np.inf)
         for nc in chunks:
-            self.margin = self.task.margin(nc)
+            self.margin = self._task.margin(nc)
             six = np.concatenate((before, np.hstack((nc.tip, nc.second))))
             rapid = np.flatnonzero(nc.kind == Element.RAPID)
             ways = np.hsplit(six[rapid + 1] - six[rapid], 2)
@@ -54,85 +86,66 @@ class WordPlaces:
             before = six[-1:]
             if len(nc) and (nc.rotary or nc.tip_room.any()):
                 last = offset + len(nc) - 1
-                for element in {*self.elements(offset, last).tolist(), last}:  # words behind it are still to come
+                # words behind the last are still to come
+                for element in {*elements_with_words(self._events, offset, last).tolist(), last}:
                     row = element - offset
-                    self._rooms[element] = self.task.axis_length * float(nc.second_room[row]) + float(nc.tip_room[row])
+                    self._rooms[element] = self._task.axis_length * float(nc.second_room[row]) + float(nc.tip_room[row])
             offset += len(nc)
             yield nc
 
-    def elements(self, first: int, last: int) -> Ints:
-        """Elements from `first` to `last` with words behind them, ascending, each once."""
-        low = bisect_left(self.events, first + 1, key=lambda event: event.element)
-        high = bisect_right(self.events, last + 1, key=lambda event: event.element)
-        return np.unique(np.array([event.element - 1 for event in self.events[low:high]], np.int64))
-
-    def take(self, examined: Examined) -> None:
-        """Take down where the elements of a batch are."""
-        for element, length in zip(examined.elements.tolist(), examined.lengths.tolist(), strict=True):
-            self._lengths.setdefault(element, length)
-        self._others = examined.others | self._others
-
     def problems(
         self,
-        batches: Batches,
+        found: Findings,
         unsaid: frozenset[str | tuple[str, float]],
         own: frozenset[str],
-        clamps: frozenset[float],
+        clamps: Set[float],
     ) -> tuple[list[Problem], set[int]]:
         """What words say wrongly, and the NC lines of those where the CL file has GOHOME.
 
         Parameters
         ----------
-        batches : Batches
-            All given out.
+        found : Findings
+            Of all batches.
         unsaid : frozenset
             As of `NcProgram`.
         own : frozenset of str
             Kinds of statements that the user says in words of his own.
-        clamps : frozenset of float
+        clamps : set of float
             M words that clamp a rotary axis or let it turn: they stand where the machine wants them, not where AUXFUN
             has them.
         """
-        places = _Places(self, batches)
-        statements = _statement_lengths(self.task)
-        theirs = asked(self.task.original.program, statements, places.end, _of_holes(batches, places))
+        batches, path, original = self._batches, self._task.path, self._task.original
+        program = original.program
+        length = float(path.length[-1]) if len(original.pose) else 0.0
+        hole, move, after = np.frombuffer(batches.holes, np.int64).reshape(-1, 3).T.copy()
+        stop, there, begin = np.frombuffer(batches.stops).reshape(-1, 3).T.copy()
+        # what is known best comes last
+        self._ends = {element: at for element, (at, _) in found.words.items()}
+        self._ends |= _by_element(stop, there) | _by_element(hole, self._of_moves(move))
+        self._begins = _by_element(stop + 1, there) | _by_element(hole, self._of_moves(np.maximum(after - 1, 0)))
+        self._begins |= _by_element(stop, begin) | {batches.elements: length}
+        self._others = {element: others for element, (_, others) in found.words.items() if others}
+        self._ended, self._holes = sorted(self._ends), frozenset(hole.tolist())
+        statements = self._statement_lengths()
+        theirs = asked(program, statements, length, self._of_holes())
         theirs = [token for token in theirs if token.kind != "auxiliary" or token.value not in clamps]
-        here = list(map(places.of, self.events))
-        found = compare(theirs, said(self.events, here), self.margin, unsaid, self.task.path.way_apart, own)
-        said_there = zip(statements, self.task.original.program.statements, strict=True)
-        homes = [length for length, statement in said_there if statement.word == "GOHOME"]
+        here = list(map(self._of, self._events))
+        wrong = compare(theirs, said(self._events, here), self.margin, unsaid, path.way_apart, own)
+        said_there = zip(statements, program.statements, strict=True)
+        homes = [at for at, statement in said_there if statement.word == "GOHOME"]
         at_home = {
             event.line
-            for event, place in zip(self.events, here, strict=True)
+            for event, place in zip(self._events, here, strict=True)
             for room in [self.margin + place.room]
             if any(-room <= home - place.at <= place.reach + room for home in homes)
         }
-        return found, at_home
+        return wrong, at_home
 
-
-class _Places:
-    """CL path lengths, mm, where elements of the program end and begin, as far as they are known."""
-
-    def __init__(self, words: WordPlaces, batches: Batches) -> None:
-        self._task, self._words, stops = words.task, words, batches.stops
-        length = self._task.path.length
-        self.end = float(length[-1]) if len(self._task.original.pose) else 0.0
-        hole, move, after = np.frombuffer(batches.holes, np.int64).reshape(-1, 3).T.copy()
-        stop, there = np.frombuffer(stops.element, np.int64), np.frombuffer(stops.length)
-        begin = np.frombuffer(stops.begin)
-        self._holes = frozenset(hole.tolist())
-        # what is known best comes last
-        self._ends = words._lengths | _by_element(stop, there) | _by_element(hole, self.of_moves(move))
-        self._ended = sorted(self._ends)
-        self._begins = _by_element(stop + 1, there)
-        self._begins |= _by_element(hole, self.of_moves(np.maximum(after - 1, 0)))
-        self._begins |= _by_element(stop, begin) | {batches.elements: self.end}
-
-    def of_moves(self, moves: Ints) -> Floats:
+    def _of_moves(self, moves: Ints) -> Floats:
         """(k,) where moves of the CL file end."""
         return self._task.path.length[self._task.original.trail.last[moves]]
 
-    def of(self, event: Event) -> Place:
+    def _of(self, event: Event) -> Place:
         """Where a word is: at the end of the element before it; that of a tap at the hole that is fed next.
 
         Between that and where the next element that leads somewhere begins, at the latest, the program may have passed
@@ -145,33 +158,30 @@ class _Places:
         at = self._ends.get(before, _BEFORE)
         if (event.letter, event.value) == ("G", TAP) and event.element in self._holes:
             at = self._ends[event.element]
-        following = next(k for k in count(event.element) if k not in self._words._still)
+        following = next(k for k in count(event.element) if k not in self._still)
         reach = max(self._begins.get(following, -math.inf) - at, 0.0)
-        return Place(at, self._words._rooms.get(before, 0.0), reach, self._words._others.get(before, ()))
+        return Place(at, self._rooms.get(before, 0.0), reach, self._others.get(before, ()))
+
+    def _statement_lengths(self) -> list[float]:
+        """CL path length, mm, where every statement of the CL file stands."""
+        original = self._task.original
+        move = np.searchsorted(original.pose, [statement.pose for statement in original.program.statements]) - 1
+        if not len(original.pose):
+            return [_BEFORE] * len(move)
+        return np.where(move >= 0, self._of_moves(np.clip(move, 0, None)), _BEFORE).tolist()
+
+    def _of_holes(self) -> list[Token]:
+        """What the cycles of holes ask for: to wait at the bottom, and to tap."""
+        original = self._task.original
+        asked_for = [("dwell", float(time), move) for move, time in self._batches.dwells]
+        asked_for += [("tap", TAP, move) for move in self._batches.taps]
+        line = original.program.line
+        there = self._of_moves(np.array([move for _, _, move in asked_for], np.int64)).tolist()
+        return [
+            Token(kind, value, at, int(line[original.pose[move]]))
+            for (kind, value, move), at in zip(asked_for, there, strict=True)
+        ]
 
 
-def _by_element(elements: Ints, lengths: Floats) -> dict[int, float]:
-    return dict(zip(elements.tolist(), lengths.tolist(), strict=True))
-
-
-def _statement_lengths(task: Task) -> list[float]:
-    """CL path length, mm, where every statement of the CL file stands."""
-    original = task.original
-    move = np.searchsorted(original.pose, [statement.pose for statement in original.program.statements]) - 1
-    if not len(original.pose):
-        return [_BEFORE] * len(move)
-    there = task.path.length[original.trail.last[np.clip(move, 0, None)]]
-    return np.where(move >= 0, there, _BEFORE).tolist()
-
-
-def _of_holes(batches: Batches, places: _Places) -> list[Token]:
-    """What the cycles of holes ask for: to wait at the bottom, and to tap."""
-    original = batches.task.original
-    asked_for = [("dwell", float(time), move) for move, time in batches.dwells]
-    asked_for += [("tap", TAP, move) for move in batches.taps]
-    line = original.program.line
-    there = places.of_moves(np.array([move for _, _, move in asked_for], np.int64)).tolist()
-    return [
-        Token(kind, value, at, int(line[original.pose[move]]))
-        for (kind, value, move), at in zip(asked_for, there, strict=True)
-    ]
+def _by_element(elements: Ints | Floats, lengths: Floats) -> dict[int, float]:
+    return dict(zip(elements.astype(np.int64).tolist(), lengths.tolist(), strict=True))
