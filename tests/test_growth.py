@@ -16,8 +16,9 @@ from oracle.loops import bytecodes
 
 HEAD = "UNITS/MM\nLOADTL/1\nSPINDL/5000,RPM,CLW\nRAPID\nGOTO/0,0,50,0,0,1\nFEDRAT/500,MMPM\nGOTO/0,0,0,0,0,1\n"
 
-#: growth with four times the work: a little above 4 for what is done once, well below the 16 of a square
-MOST = 5.0
+#: growth with four times the work: a little above 4 for what is done once, well below the 16 of a square.
+#: A step that each of 50 does for each other is found at a 60th of the work of one
+MOST = 4.25
 
 
 def poses(count: int) -> list[str]:
@@ -29,21 +30,21 @@ def between(statement: str, count: int) -> str:
 
 
 INPUTS = {
-    "poses": (4000, lambda n: "\n".join(poses(n))),
-    "unknown statements": (300, lambda n: between("ANYWORD/{}", n)),
-    "coolant changes": (200, lambda n: between("COOLNT/{}", n)),
-    "optional stops": (150, lambda n: between("OPSTOP", n)),
-    "comments": (300, lambda n: between("PPRINT of pose {}", n)),
-    "length of a line": (3000, lambda n: "GOTO/1,1,1\nPPRINT " + "word " * n + "\nGOTO/2,2,2"),
+    "poses": (6000, lambda n: "\n".join(poses(n))),
+    "unknown statements": (75, lambda n: between("ANYWORD/{}", n)),
+    "coolant changes": (50, lambda n: between("COOLNT/{}", n)),
+    "optional stops": (40, lambda n: between("OPSTOP", n)),
+    "comments": (75, lambda n: between("PPRINT of pose {}", n)),
+    "length of a line": (1500, lambda n: "GOTO/1,1,1\nPPRINT " + "word " * n + "\nGOTO/2,2,2"),
     "tools": (
-        40,
+        20,
         lambda n: "\n".join(
             f"RAPID\nGOTO/0,0,50\nLOADTL/{k % 90 + 2}\nSPINDL/5000,RPM,CLW\nRAPID\nGOTO/0,0,50,0,0,1\nGOTO/{k % 7},0,0"
             for k in range(n)
         ),
     ),
     "holes": (
-        80,
+        40,
         lambda n: (
             "CYCLE/DRILL,FEDTO,5,MMPM,80,RAPTO,2\n"
             + "\n".join(f"GOTO/{k % 40},{k // 40},0" for k in range(n))

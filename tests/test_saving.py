@@ -22,13 +22,13 @@ def winding(count: int) -> Program:
     x = np.arange(count) * 1.0
     tip = np.stack((x, np.where(np.arange(count) % 2, 0.3 + x / count, 0.0), 0.01 * x), axis=1)
     axis = np.stack((0.1 * np.sin(x / 40), 0.0 * x, np.ones(count)), axis=1)
-    kind = np.where(np.arange(count) % 97 == 0, Move.RAPID, Move.LINEAR)
+    kind = np.where(np.arange(count) % 29 == 0, Move.RAPID, Move.LINEAR)
     return Program.from_poses(tip, axis, kind=kind, feed=1500.0, statements=(Statement(50, 51, "SPINDL", (100.0,)),))
 
 
 @pytest.fixture(scope="module")
 def program() -> Program:
-    return winding(600)
+    return winding(60)
 
 
 def fitted(form, **more):
@@ -116,7 +116,7 @@ def test_holes_count_on_neither_side(program, whole):
     holes = np.vstack((last, last[1:] + [9.0, 0.0, 0.0]))
     tip, axis = np.vstack((program.tip, holes)), np.vstack((program.axis, [[0.0, 0.0, 1.0]] * 3))
     kind = np.append(program.kind, [Move.RAPID, Move.HOLE, Move.HOLE])
-    words = (Statement(602, 9, "CYCLE", ("DRILL", "DEPTH", 50.0, "MMPM", 100.0, "CLEAR", 2.0)),)
+    words = (Statement(len(program) + 2, 9, "CYCLE", ("DRILL", "DEPTH", 50.0, "MMPM", 100.0, "CLEAR", 2.0)),)
     drilled = Program.from_poses(tip, axis, kind=kind, feed=1500.0, statements=(*program.statements, *words))
     found = planned_saving(drilled, settings, form, Limits())
     assert found.direct - found.written == pytest.approx(whole.direct - whole.written, abs=0.1)
