@@ -154,28 +154,19 @@ def compare_programs(
     processes: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Table:
-    """Write, measure and plan every candidate.
+    """Write, measure and plan every candidate, of which there is one at least; all moves of the program have a feed.
 
     Parameters
     ----------
-    program : Program
-        With a feed for every move.
-    tried : list of Candidate
-        At least one.
     axes : Machine, optional
         Whose limits, in place of those of the machines of the forms.
-    blocks : BlockLimits, optional
     processes : int, optional
         As many as are useful by default; the rows do not depend on it.
     progress : callable, optional
         Called with (rows done, rows in all).
 
-    Raises
-    ------
-    SettingsError
-        CS265: no axis of the machine has limits.
-    CornersmoothError
-        The unsmoothed lines cannot be planned.
+    Raises SettingsError CS265: no axis of the machine has limits. CornersmoothError: the unsmoothed lines cannot be
+    planned.
     """
     part = without_holes(_middle(program))
     first = next((one for one in tried if Timing.of(one.form, one.settings, axes=axes) is not None), None)

@@ -37,17 +37,7 @@ def message(
 ) -> str:
     """Give a message as every output has it: ``FILE:LINE: error[CS123]: what``, and ``hint: what to do`` on a line.
 
-    Parameters
-    ----------
-    severity : {"note", "warning", "error"}
-    text : str
-        What happened. Without `hint`, that is what follows the first ``"; "``.
-    code, place : str
-        Where they are known.
-    count : int
-        How often it was met.
-    beside : str
-        Another place that belongs to it.
+    Without `hint`, that is what follows the first ``"; "`` of the text. `beside` is another place that belongs to it.
     """
     what, _, rest = (text, "", "") if hint else text.partition("; ")
     number, times = f"[{code}]" if code else "", f"{count:,} times" if count > 1 else ""
@@ -124,16 +114,10 @@ class OutputError(CornersmoothError):
 
 
 class VerdictError(CornersmoothError):
-    """The program was written, and its verdict is not good enough to put it in place.
-
-    Parameters
-    ----------
-    result : object
-        What there is all the same (`cornersmooth.Result`).
-    """
+    """The program was written, and its verdict is not good enough to put it in place."""
 
     exit_code = 1
-    result: Any = None
+    result: Any = None  #: What there is all the same (`cornersmooth.Result`)
 
 
 @dataclass(frozen=True, slots=True)

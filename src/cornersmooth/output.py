@@ -53,12 +53,10 @@ def check_output(
     force: bool | None = False,
     ours: bytes = b"",
 ) -> bool:
-    """Refuse an output that would destroy something.
+    """Refuse an output that would destroy something; say whether what stands at its place may be replaced.
 
     Parameters
     ----------
-    target : path or binary stream
-        A stream is never refused.
     inputs : iterable of path or file descriptor
         What is read: an output is never one of them.
     force : bool or None
@@ -66,17 +64,8 @@ def check_output(
     ours : bytes
         How a file begins that an earlier run made; such a file is replaced without `force`.
 
-    Returns
-    -------
-    bool
-        Whether what stands at its place may be replaced.
-
-    Raises
-    ------
-    SettingsError
-        CS220: the output is an input.
-    OutputError
-        CS401 to CS403: it exists and may not be replaced, or cannot be written at all.
+    Raises SettingsError CS220: the output is an input. OutputError CS401 to CS403: it exists and may not be replaced,
+    or cannot be written at all. A stream is never refused.
     """
     path = path_of(target)
     if path is None:
@@ -101,12 +90,7 @@ def path_of(target: Target) -> str | None:
 
 
 class HashedStream:
-    """A stream that remembers the hash of all that was written to it.
-
-    Parameters
-    ----------
-    stream : binary stream
-    """
+    """A stream that remembers the hash of all that was written to it."""
 
     def __init__(self, stream: BinaryIO) -> None:
         self._stream = stream
@@ -127,13 +111,7 @@ class HashedStream:
         return self._hash.hexdigest()
 
     def check(self, path: str) -> None:
-        """Compare what a file holds with what was written.
-
-        Raises
-        ------
-        OutputError
-            CS407: somebody else has changed it.
-        """
+        """Compare what a file holds with what was written (OutputError CS407: somebody else has changed it)."""
         with open(path, "rb") as file:
             if hashlib.file_digest(file, _HASH).hexdigest() != self.digest:
                 raise OutputError("CS407", "the program was changed before it took its place", "try again", file=path)
@@ -158,22 +136,16 @@ def open_output(target: Target, *, hold: bool = False, replace: bool = True) -> 
 
     Parameters
     ----------
-    target : path or binary stream
     hold : bool
         Keep the text in a file until the block ends, also for streams and devices, so that it can be looked at first.
     replace : bool
         Whether a file that stands at its place when the block ends may be replaced.
 
-    Raises
-    ------
-    OutputError
-        CS403: a file has appeared at its place that may not be replaced. CS404: anything the operating system refuses,
-        a full disk included. CS407: somebody changed the text.
-    ClosedPipe
-        The reader of a pipe has gone.
+    Raises OutputError CS403: a file has appeared at its place that may not be replaced; CS404: anything the operating
+    system refuses, a full disk included; CS407: somebody changed the text. ClosedPipe: the reader has gone.
     """
     path = path_of(target)
-    with _failing_as_output(path or str(getattr(target, "name", "<output>"))):
+    try:
         if path is not None and not (os.path.exists(path) and not stat.S_ISREG(os.stat(path).st_mode)):
             with _moving(os.path.realpath(path), path, replace=replace) as output:
                 yield output
@@ -192,16 +164,16 @@ def open_output(target: Target, *, hold: bool = False, replace: bool = True) -> 
             else:
                 yield Output(HashedStream(device))
             device.flush()
+    except BrokenPipeError as closed:
+        raise ClosedPipe from closed
+    except OSError as failure:
+        what = f"cannot write it: {reason(failure)}"
+        name = path or str(getattr(target, "name", "<output>"))
+        raise OutputError("CS404", what, "the old file, if any, is untouched", file=name) from failure
 
 
 def read_mark(path: str) -> dict[str, str] | None:
-    """Mark that was set when the file was written; empty where it has none or has been changed since.
-
-    Returns
-    -------
-    dict or None
-        None where the file system keeps no marks.
-    """
+    """Mark that was set when the file was written; empty without one or after a change, None where none are kept."""
     if not hasattr(os, "getxattr"):
         return None
     try:
@@ -217,28 +189,27 @@ def read_mark(path: str) -> dict[str, str] | None:
 
 def remove_unfinished() -> None:
     """Remove what is being written in this process, which is about to end; for signal handlers."""
-    for path in list(_unfinished):
-        with contextlib.suppress(OSError):
-            os.unlink(path)
+    _remove(list(_unfinished))
 
 
 def remove_leftovers(path: str, process: int | None = None) -> None:
     """Remove what a process that was killed, or any of them, has left beside an output."""
-    folder, name = os.path.split(os.path.realpath(path))
-    whose = "*" if process is None else f"{process}-*"
-    for left in glob.glob(os.path.join(glob.escape(folder), glob.escape(f".{name}.") + whose + ".part")):
+    _remove(_left(*os.path.split(os.path.realpath(path)), "*" if process is None else f"{process}-*"))
+
+
+def _left(folder: str, name: str, whose: str) -> list[str]:
+    """Temporary files of an output."""
+    return glob.glob(os.path.join(glob.escape(folder), glob.escape(f".{name}.") + whose + ".part"))
+
+
+def _remove(paths: Iterable[str]) -> None:
+    for path in paths:
         with contextlib.suppress(OSError):
-            os.unlink(left)
+            os.unlink(path)
 
 
 def make_folder(path: str) -> None:
-    """Make the folder for outputs.
-
-    Raises
-    ------
-    OutputError
-        CS405: it cannot be made.
-    """
+    """Make the folder for outputs (OutputError CS405: it cannot be made)."""
     try:
         os.makedirs(path, exist_ok=True)
     except OSError as failure:
@@ -312,18 +283,16 @@ def temporary_name(folder: str, name: str) -> Iterator[str]:
     try:
         yield path
     finally:
-        with contextlib.suppress(OSError):
-            os.unlink(path)
+        _remove([path])
         _unfinished.discard(path)
 
 
 def _remove_abandoned(folder: str, name: str) -> None:
     """Remove what killed runs on this computer have left of an output; those of others may still be at work."""
-    for left in glob.glob(os.path.join(glob.escape(folder), glob.escape(f".{name}.") + f"*-{_machine()}.part")):
+    for left in _left(folder, name, f"*-{_machine()}"):
         process = os.path.basename(left).removeprefix(f".{name}.").partition("-")[0]
         if process.isdigit() and not _is_running(int(process)):
-            with contextlib.suppress(OSError):
-                os.unlink(left)
+            _remove([left])
 
 
 def _is_running(process: int) -> bool:
@@ -343,18 +312,6 @@ def _is_running(process: int) -> bool:
 def _machine() -> str:
     """Tell computers apart that share a folder."""
     return hashlib.new(_HASH, platform.node().encode()).hexdigest()[:8]
-
-
-@contextlib.contextmanager
-def _failing_as_output(path: str) -> Iterator[None]:
-    try:
-        yield
-    except BrokenPipeError as closed:
-        raise ClosedPipe from closed
-    except OSError as failure:
-        raise OutputError(
-            "CS404", f"cannot write it: {reason(failure)}", "the old file, if any, is untouched", file=path
-        ) from failure
 
 
 def _same(source: str | os.PathLike[str] | int, path: str) -> bool:

@@ -45,13 +45,7 @@ def can_fork() -> bool:
 
 
 class Helper:
-    """A process that works on one thing while this one does another.
-
-    Parameters
-    ----------
-    work : callable
-        Called in the process, which has all that this one has; it may fork processes of its own.
-    """
+    """A process that calls `work` while this one does another thing; it has all that this one has, and may fork."""
 
     def __init__(self, work: Callable[[], Any]) -> None:
         self.connection, theirs = _CONTEXT.Pipe()
@@ -62,10 +56,7 @@ class Helper:
     def result(self) -> Any:
         """Wait for what the work returns, or raise what it raised.
 
-        Raises
-        ------
-        MemoryError
-            The process has been ended from outside, which is what a system short of memory does.
+        Raises MemoryError: the process has been ended from outside, which is what a system short of memory does.
         """
         return _received(self.connection)
 
@@ -95,87 +86,64 @@ def map_in_processes(
     keep copies of them. Nothing leaves this process where there is to be only one or the system cannot fork safely.
     `busy`: to take an item is more than to work on it, so this process keeps up with one other and no more.
 
-    Raises
-    ------
-    MemoryError
-        A process has been ended from outside, which is what a system short of memory does.
+    Raises MemoryError where a process has been ended from outside, which is what a system short of memory does.
     """
-    crew = _Crew(work, 1 if busy else processes) if processes > 1 and can_fork() else None
+    crew: list[_Member] = []
+    for _ in range(1 if busy else processes) if processes > 1 and can_fork() else ():
+        crew.append(_Member(work, crew))
     waiting: deque[Callable[[], Result]] = deque()
 
-    def start(item: Item) -> Callable[[], Result]:
-        if crew is not None:
-            return crew.start(item)
+    def start(turn: int, item: Item) -> Callable[[], Result]:
+        if crew:
+            crew[turn % len(crew)].start(item)
+            return crew[turn % len(crew)].result
         found = work(item)
         return lambda: found
 
     try:
-        for item in items:
+        for turn, item in enumerate(items):
             if len(waiting) == _AHEAD:
                 yield waiting.popleft()()
-            waiting.append(start(item))
+            waiting.append(start(turn, item))
             del item
         while waiting:
             yield waiting.popleft()()
     finally:
-        if crew is not None:
-            crew.end()
+        for member in crew:
+            member.connection.close()
+        _end([member.process for member in crew])
 
 
 class _Member:
     """A process at the other end of a pipe, with one item at a time: a pipe full both ways would stand still."""
 
-    def __init__(self, process: BaseProcess, connection: Connection) -> None:
-        self.process, self.connection = process, connection
-        self.given, self.found = 0, deque[Any]()
-        self.fetched = 0
+    def __init__(self, work: Callable[[Any], Any], others: list[_Member]) -> None:
+        self.connection, theirs = _CONTEXT.Pipe()
+        ours = [*(other.connection for other in others), self.connection]
+        self.process = _forked(_serve, work, theirs, ours, daemon=True)
+        theirs.close()
+        self.found = deque[Any]()
+        self.working = False
 
     def start(self, item: Any) -> None:
         """Send an item, after what was found for the one before has been taken in."""
-        self.take()
+        self._take()
         try:
             self.connection.send(item)
         except BrokenPipeError:
             raise MemoryError(_ENDED) from None
-        self.given += 1
+        self.working = True
 
-    def take(self) -> None:
-        """Receive what is still to come."""
-        if self.fetched < self.given:
+    def _take(self) -> None:
+        if self.working:
             self.found.append(_received(self.connection))
-            self.fetched += 1
+            self.working = False
 
     def result(self) -> Any:
         """Next result, in the order of the items."""
         if not self.found:
-            self.take()
+            self._take()
         return self.found.popleft()
-
-
-class _Crew:
-    """Processes that take turns."""
-
-    def __init__(self, work: Callable[[Any], Any], processes: int) -> None:
-        self.members: list[_Member] = []
-        self.turn = 0
-        for _ in range(processes):
-            ours, theirs = _CONTEXT.Pipe()
-            own = [member.connection for member in self.members] + [ours]
-            self.members.append(_Member(_forked(_serve, work, theirs, own, daemon=True), ours))
-            theirs.close()
-
-    def start(self, item: Any) -> Callable[[], Any]:
-        """Send an item to whose turn it is; the result is to be fetched by calling what is returned."""
-        member = self.members[self.turn]
-        self.turn = (self.turn + 1) % len(self.members)
-        member.start(item)
-        return member.result
-
-    def end(self) -> None:
-        """Let all go home; whoever is still at work is sent away."""
-        for member in self.members:
-            member.connection.close()
-        _end([member.process for member in self.members])
 
 
 def _serve(work: Callable[[Any], Any], connection: Connection, parents: list[Connection]) -> None:

@@ -59,13 +59,7 @@ class Provenance:
 
 
 def read_provenance(text: bytes) -> Provenance | None:
-    """How a text was made, as its head says; None where it says nothing that can be understood.
-
-    Parameters
-    ----------
-    text : bytes
-        The beginning of an NC text.
-    """
+    """How a text was made, as its beginning says; None where it says nothing that can be understood."""
     head = text[:HEAD].decode("latin-1")
     found = _WORDS.search(head)
     if found is None:

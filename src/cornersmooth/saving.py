@@ -57,13 +57,7 @@ class Timing:
     ) -> tuple[float, tuple[tuple[str, float], ...]]:
         """Time of a program from the first to the last pose it goes to, s, and the limits that are reached the longest.
 
-        Its way from and to the retract is not counted: the CL file does not have it.
-
-        Parameters
-        ----------
-        text : bytes
-        program : Program
-            What it was made of.
+        Its way from and to the retract is not counted: the CL file, which it was made of, does not have it.
         """
         if _linuxcnc(self.form):
             return self._on_linuxcnc(text, program), ()
@@ -135,25 +129,17 @@ def planned_saving(
 ) -> Saving | None:
     """Plan a program as it was and as it is written, under the limits of the axes of a machine.
 
-    Holes are only gone over in both: what a cycle takes is in the program, and nowhere in the CL file.
+    Holes are only gone over in both: what a cycle takes is in the program, and nowhere in the CL file. None where a
+    time would be of something that nobody runs: without limits of the axes, without any feed, or out of reach.
 
     Parameters
     ----------
-    program : Program
     settings : Settings
         Those the program is smoothed with.
-    form : Form
-    limits : Limits, optional
     axes : Machine, optional
         Whose limits, in place of those of the machine of the form.
     progress : callable, optional
         Called with (stage, work done, work in all).
-
-    Returns
-    -------
-    Saving or None
-        None where a time would be of something that nobody runs: without limits of the axes, without any feed, or
-        out of reach of the machine.
     """
     timing = Timing.of(form, settings, limits, axes)
     if timing is None:

@@ -163,27 +163,19 @@ def find_setups(
 
     Parameters
     ----------
-    program : Program
     form : Form
         What the program is written in, with the machine that it runs on.
-    settings : Settings, optional
-    limits : Limits, optional
     tilt : float, degrees
         Tilts about X and Y are up to this, either way.
     turns : bool
         Whether the part may be turned about Z. Where the first rotary axis does that without end, it need not be.
     plans : int
         Setups that are planned, beside today's.
-    processes : int
     progress : callable, optional
         Called with (what is done, setups planned, of how many).
 
-    Raises
-    ------
-    InputError
-        The machine reaches the poses of no setup.
-    SettingsError
-        CS263: the machine does not say how fast its axes may go.
+    Raises InputError: the machine reaches the poses of no setup. SettingsError CS263: the machine does not say how fast
+    its axes may go.
     """
     machine = form.machine
     if machine is None or not machine.dynamics:
@@ -261,10 +253,7 @@ def _chosen(ratings: Iterable[Rating], count: int, tilt: float) -> list[Rating]:
 def _estimate(program: Program, machine: Machine, path: Path, settings: Settings) -> float:
     """Estimate the time of a program, s, by its poses; `path` is that of the program as it is.
 
-    Raises
-    ------
-    InputError
-        A pose is beyond the axes of the machine.
+    Raises InputError where a pose is beyond the axes of the machine.
     """
     angles = rotary_angles(
         machine,

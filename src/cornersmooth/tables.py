@@ -98,15 +98,7 @@ class Shelf:
         return called.get(_plain(name), "")
 
     def choose(self, name_or_path: str | Path) -> TableText:
-        """Table of that name, or in that file.
-
-        A text that ends in ``.toml`` or holds a path separator is a file; anything else is a name.
-
-        Raises
-        ------
-        SettingsError
-            The name is unknown, or the file cannot be read.
-        """
+        """Table of that name, or in that file: a text that ends in ``.toml`` or holds a path separator."""
         given = str(name_or_path)
         if not is_file(name_or_path):
             return TableText(self.built_in(given), f"{given}.toml", given)
@@ -124,13 +116,7 @@ class Shelf:
         return TableText(text, given, Path(name_or_path).stem)
 
     def built_in(self, name: str) -> str:
-        """Text of a table that comes with the program.
-
-        Raises
-        ------
-        SettingsError
-            The name is unknown; the closest known one is named.
-        """
+        """Text of a table that comes with the program (SettingsError, which names the closest name)."""
         found = self.find(name)
         if not found:
             known, aliases = self.names(), self.aliases()
@@ -144,10 +130,7 @@ class Shelf:
     def parse(self, text: str | Table) -> Parsed:
         """Table that a text holds, or one that was read already, on top of the one that it is like.
 
-        Raises
-        ------
-        SettingsError
-            The text is not TOML, has an unknown key, or is like a table that is not known.
+        Raises SettingsError: the text is not TOML, has an unknown key, or is like a table that is not known.
         """
         try:
             table = deepcopy(_read(text)) if isinstance(text, str) else dict(text)
@@ -173,13 +156,7 @@ class Shelf:
             raise SettingsError(error.code, error.what, error.hint, file=file) from error
 
     def check_keys(self, table: Iterable[str], known: Sequence[str], where: str) -> None:
-        """Refuse a key that is not known; `where` is what stands before it in the message.
-
-        Raises
-        ------
-        SettingsError
-            With the closest known key.
-        """
+        """Refuse a key that is not known; `where` is what stands before it in the message."""
         for key in table:
             if key not in known:
                 close = closest(key, known)
@@ -189,12 +166,10 @@ class Shelf:
     def record(
         self, kind: type[Record], table: Any, where: str, given: Mapping[str, Any] | None = None, **checks: Check
     ) -> Record:
-        """Dataclass whose fields are the keys of a table.
+        """Dataclass whose fields are the keys of a table, which must have those without a default.
 
         Parameters
         ----------
-        kind : type
-            A dataclass; fields without a default must be in the table.
         where : str
             Name of the table, for messages.
         given : mapping, optional
@@ -202,10 +177,7 @@ class Shelf:
         **checks
             How some values are read; the others are by the type of their field.
 
-        Raises
-        ------
-        SettingsError
-            `table` is no table, has an unknown key (with the closest known one), or lacks one, or a value is wrong.
+        Raises SettingsError: `table` is no table, has an unknown key, or lacks one, or a value is wrong.
         """
         given, dot = given or {}, f"{where}." if where else ""
         keys = {item.name: item for item in fields(kind) if item.name not in given}  # type: ignore[arg-type]
@@ -346,13 +318,7 @@ def _read(text: str) -> Table:
 
 
 def read_toml(text: str) -> Table:
-    """Return the table of a TOML text.
-
-    Raises
-    ------
-    TOMLDecodeError
-        It is no TOML, or is nested without end.
-    """
+    """Return the table of a TOML text (TOMLDecodeError: it is no TOML, or is nested without end)."""
     try:
         return tomllib.loads(text)
     except RecursionError:
@@ -362,10 +328,7 @@ def read_toml(text: str) -> Table:
 def filled(text: str, values: Mapping[str, object]) -> str:
     """Fill the braces of a block by name: nothing but the values gets into it.
 
-    Raises
-    ------
-    ValueError
-        A brace holds more than a known name: an attribute, an index, a width.
+    Raises ValueError, A brace holds more than a known name: an attribute, an index, a width.
     """
     for _, name, form, conversion in Formatter().parse(text):
         if name is not None and (name not in values or form or conversion):
@@ -376,10 +339,7 @@ def filled(text: str, values: Mapping[str, object]) -> str:
 def check_pattern(pattern: str) -> None:
     """Refuse a regular expression that is none, or whose search may take without end.
 
-    Raises
-    ------
-    ValueError
-        It says why. Groups hold no choice and are not repeated, and only `_MOST_REPEATS` things may be.
+    Raises ValueError, which says why. Groups hold no choice and are not repeated; `_MOST_REPEATS` things may be.
     """
     try:
         with warnings.catch_warnings():

@@ -7,38 +7,16 @@ from enum import StrEnum
 
 
 class Verdict(StrEnum):
-    """How an NC program turned out, from the best to the worst.
+    """How an NC program turned out, from the best to the worst."""
 
-    Attributes
-    ----------
-    PASSED
-        All that the CL file asks for is in the program, within ε, and was measured.
-    INCOMPLETE
-        An option left something out, such as holes. The rest is in the program and was measured.
-    NOT_VERIFIED
-        Something that may bear on the motion was not looked at.
-    FAILED
-        The program is wrong: verification found a problem.
-    """
-
-    PASSED = "PASSED"
-    INCOMPLETE = "INCOMPLETE"
-    NOT_VERIFIED = "NOT VERIFIED"
-    FAILED = "FAILED"
+    PASSED = "PASSED"  #: All that the CL file asks for is in the program, within ε, and was measured
+    INCOMPLETE = "INCOMPLETE"  #: An option left something out, such as holes; the rest was measured
+    NOT_VERIFIED = "NOT VERIFIED"  #: Something that may bear on the motion was not looked at
+    FAILED = "FAILED"  #: The program is wrong: verification found a problem
 
     @classmethod
     def of(cls, *, problems: int = 0, unverified: bool = False, left_out: int = 0) -> Verdict:
-        """Give the worst verdict that applies.
-
-        Parameters
-        ----------
-        problems : int
-            Problems that verification found.
-        unverified : bool
-            Whether something was not looked at.
-        left_out : int
-            What options left out, such as holes.
-        """
+        """Give the worst verdict that applies, of problems found, things not looked at, and things left out."""
         if problems:
             return cls.FAILED
         if unverified:

@@ -108,7 +108,7 @@ def test_verification_is_the_same(monkeypatch):
     write(smooth(program, fit_settings(Settings(tolerance=0.02), choose_form(), "mm")), stream)
     nc = read_nc(stream.getvalue())
     used = []
-    monkeypatch.setattr(crews._Crew, "start", _counted(crews._Crew.start, used))
+    monkeypatch.setattr(crews._Member, "start", _counted(crews._Member.start, used))
     one, two = (verify(program, nc, tolerance=0.02, processes=processes) for processes in (1, 2))
     for field in fields(one):
         np.testing.assert_equal(getattr(one, field.name), getattr(two, field.name), err_msg=field.name)

@@ -59,13 +59,7 @@ def plain(state: ReaderState, count: int, line: int) -> None:
 
 
 def obey(state: ReaderState, record: Record) -> None:
-    """Carry out one statement.
-
-    Raises
-    ------
-    InputError
-        For everything that is not a statement in its place.
-    """
+    """Carry out one statement (InputError where it is none that can be in its place)."""
     word = state.renamed.get(record.word, record.word)
     if state.curve is not None and word not in _WITHIN_CURVE:
         motion_statements.finish_curve(state)

@@ -67,13 +67,7 @@ class Columns:
 
 
 def from_width(width: int, file: str, line: int) -> Columns:
-    """Columns of a file without a header: 3, 6 or 7 columns.
-
-    Raises
-    ------
-    InputError
-        CS159 for any other number.
-    """
+    """Columns of a file without a header: 3, 6 or 7 columns (InputError CS159 for any other number)."""
     if width == 3:
         return Columns(3, (0, 1, 2))
     if width in (6, 7):
@@ -84,10 +78,7 @@ def from_width(width: int, file: str, line: int) -> Columns:
 def from_header(text: str, file: str, line: int) -> Columns:
     """Columns that a header line names.
 
-    Raises
-    ------
-    InputError
-        CS156 where the names leave tip or axis open, CS162 for unknown units, CS165 for a quaternion.
+    Raises InputError CS156 where the names leave tip or axis open, CS162 for unknown units, CS165 for a quaternion.
     """
     names = _split(text, r"[,;\t]") if re.search(r"[,;\t]", text) else _split(text, r"\s+")
     if len(names) < 3 or not _find(_TIPS, _plain(names)):

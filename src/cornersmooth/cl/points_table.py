@@ -58,10 +58,7 @@ class PointText:
 def clean(data: bytes, file: str) -> PointText:
     """Take a file apart into header and rows.
 
-    Raises
-    ------
-    InputError
-        CS150 for an empty file, CS160 where commas may be decimal or separating, CS161 for binary data.
+    Raises InputError CS150 for an empty file, CS160 where commas may be decimal or separating, CS161 for binary data.
     """
     data = plain_lines(data, file, empty="CS150", binary="CS161")
     if b'"' in data:
@@ -162,10 +159,7 @@ def _flags(read: tuple[Floats, Ints] | None, columns: Columns) -> tuple[Floats, 
 def _rapid(cell: str, columns: Columns, file: str, line: int) -> float:
     """Whether a row is reached in rapid; an empty cell of flags is feed.
 
-    Raises
-    ------
-    InputError
-        CS166 for an unknown word, and for numbers in a column whose name does not tell what they mean.
+    Raises InputError CS166 for an unknown word, and for numbers in a column whose name does not tell what they mean.
     """
     word = re.sub(r"[^a-z0-9.]", "", cell.lower())
     number = _number(word)

@@ -175,11 +175,8 @@ class Poses:
     def axes(self) -> tuple[Floats, list[Finding]]:
         """(n, 3) float64: the unit axis of every pose in the first system, and findings about them.
 
-        Raises
-        ------
-        InputError
-            CS111 for a zero vector, CS112 for one that is no unit vector, CS188 and CS197 for one that dialects read
-            differently.
+        Raises InputError CS111 for a zero vector, CS112 for one that is no unit vector, CS188 and CS197 for one that
+        dialects read differently.
         """
         axis = self._rows[: self.n, 3:6]
         given = np.flatnonzero(~np.isnan(axis[:, 0]))

@@ -65,10 +65,7 @@ class _Reader(Protocol):
 def read_bounded(file: _Reader, name: str, *, size_limit: bool = True, most: int = LARGEST) -> bytes:
     """Read a file to its end, if it has one.
 
-    Raises
-    ------
-    InputError
-        CS199: it holds more than `most` bytes, and there is a limit of size.
+    Raises InputError CS199: it holds more than `most` bytes, and there is a limit of size.
     """
     data = file.read(most + 1 if size_limit else -1)
     if size_limit and len(data) > most:
@@ -79,10 +76,7 @@ def read_bounded(file: _Reader, name: str, *, size_limit: bool = True, most: int
 def clean(data: bytes, name: str, *, empty: str = "CS101", binary: str = "CS102") -> bytes:
     """Return the text in UTF-8 or an eight-bit code, with LF after every line.
 
-    Raises
-    ------
-    InputError
-        The codes `empty` and `binary`, for files that are.
+    Raises InputError: the codes `empty` and `binary`, for files that are.
     """
     if data.startswith(UTF16_BOMS):  # what PowerShell's > makes of a text file
         try:

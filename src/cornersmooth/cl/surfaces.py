@@ -80,10 +80,7 @@ def read_drive_arc(record: Record, start: Vector, direction: Direction, file: st
 def read_helix(record: Record, start: Vector, direction: Direction, file: str) -> tuple[Arc, Vector]:
     """Read HELICAL/centre,tangent,axis,pitch,radius[,angle,height,turns],end; return the arc and its end point.
 
-    Raises
-    ------
-    InputError
-        CS106, CS120, CS124-CS127
+    Raises InputError CS106, CS120, CS124-CS127.
     """
     values = record.values
     if len(values) != len(record.args) or len(values) not in (14, 17):

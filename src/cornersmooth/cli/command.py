@@ -97,7 +97,7 @@ def new_command(
         for metavar in arguments.split():
             field, more = _ARGUMENTS[metavar]
             params.append(click.Argument([field], **{"metavar": metavar, **more}))
-        for field in options.split():
+        for field in dict.fromkeys(options.split()):
             change = changes.get(field, {})
             params.append(_option(field, {"help": change} if isinstance(change, str) else change))
 

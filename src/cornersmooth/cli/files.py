@@ -57,10 +57,7 @@ class Beginning:
 def read_input(path: str, *, size_limit: bool = True) -> tuple[bytes, str]:
     """Contents and display name of an input; ``-`` is standard input.
 
-    Raises
-    ------
-    InputError
-        CS100: the file cannot be read; CS199: it is too large.
+    Raises InputError CS100: the file cannot be read; CS199: it is too large.
     """
     from cornersmooth.cl.source import read_bounded
 
@@ -73,13 +70,7 @@ def read_input(path: str, *, size_limit: bool = True) -> tuple[bytes, str]:
 
 
 def check_inputs(*paths: str) -> None:
-    """Refuse inputs that cannot be read, before any output is looked at.
-
-    Raises
-    ------
-    InputError
-        CS100: as `read_input`.
-    """
+    """Refuse inputs that cannot be read, before any output is looked at (InputError CS100: as `read_input`)."""
     for path in paths:
         with _reading(path):
             if path != STANDARD and not stat.S_ISFIFO(os.stat(path).st_mode):  # a pipe is opened once
@@ -116,13 +107,7 @@ def read_lines(path: str) -> tuple[str, ...]:
 
 
 def target_of(path: str) -> output.Target:
-    """Where a text goes: the path, or standard output for ``-``.
-
-    Raises
-    ------
-    OutputError
-        CS406: standard output is closed.
-    """
+    """Where a text goes: the path, or standard output for ``-`` (OutputError CS406: standard output is closed)."""
     if path != STANDARD:
         return path
     if sys.stdout is None:
@@ -143,11 +128,17 @@ def suffix_of(path: str) -> str:
     return os.path.splitext(path)[1].lower()
 
 
+def check_endings(option: str, paths: Iterable[str], endings: str) -> None:
+    """Refuse names that have none of the endings, which say the form."""
+    for path in paths:
+        if suffix_of(path) not in re.findall(r"\.\w+", endings):
+            raise click.UsageError(f"--{option} {path}: let the name end in {endings}")
+
+
 def check_reports(reports: Iterable[str], endings: str, inputs: list[str], *, force: bool) -> None:
     """Refuse reports whose names have none of the endings, or that would destroy something."""
+    check_endings("report", reports, endings)
     for path in reports:
-        if suffix_of(path) not in re.findall(r"\.\w+", endings):
-            raise click.UsageError(f"--report {path}: let the name end in {endings}")
         check_path(path, inputs, force=force)
 
 

@@ -5,13 +5,22 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from cornersmooth.cli.command import EXIT_CODES_OF_WRITERS, new_command
-from cornersmooth.cli.files import STANDARD, check_path, read_input, suffix_of, target_of, told_of, write_report
-from cornersmooth.cli.inputs import Input, check_together, find_inputs
+from cornersmooth.cli.files import (
+    STANDARD,
+    check_endings,
+    check_path,
+    read_input,
+    suffix_of,
+    target_of,
+    told_of,
+    write_report,
+)
+from cornersmooth.cli.inputs import Input, find_inputs
 from cornersmooth.cli.options import LINES
 from cornersmooth.cli.programs import filter_form_of, how_read, show_wrong
 from cornersmooth.cli.shop import command_line, loosened
@@ -72,24 +81,16 @@ def command(given: Given) -> int:
       cornersmooth filter *.mpf --control siemens -d smooth/
       cat part.nc | cornersmooth filter - > smooth.nc
     """
-    check_together(given)
     form, settings = filter_form_of(given), given.settings()
-    jobs = [_job(one, given) for one in find_inputs(given, PATTERNS)]
-    sources, targets = [job.source for job in jobs], [job.target for job in jobs]
-    if len(set(targets)) < len(targets):
-        raise click.UsageError("two inputs would be written to one name; give each a -d of its own")
-    for path in given.reports:
-        if suffix_of(path) not in (".json", ".html"):
-            raise click.UsageError(f"--report {path}: let the name end in .json or .html")
-    reports = [path for job in jobs for path in job.reports]
-    if len(set(reports)) < len(reports):
-        raise click.UsageError("two reports have the same name; with several inputs put {stem} into it")
-    if given.as_json and (STANDARD in targets or len(jobs) != 1):
+    check_endings("report", given.reports, ".json or .html")
+    jobs = find_inputs(given, PATTERNS)
+    if given.as_json and (len(jobs) != 1 or jobs[0].target == STANDARD):
         raise click.UsageError("--json needs one input and -o FILE; --report '{stem}.json' tells of several")
-    for path in (*targets, *reports):
-        check_path(path, sources, force=given.force)
-    if given.directory:
-        make_folder(given.directory)
+    for job in jobs:
+        if given.directory:
+            make_folder(os.path.dirname(job.target) or ".")
+        for path in (job.target, *job.reports):
+            check_path(path, [job.source], force=given.force)
     worst = 0
     for job in jobs:
         try:
@@ -103,27 +104,11 @@ def command(given: Given) -> int:
     return worst
 
 
-class _Job(NamedTuple):
-    """A program, and where it and its reports go."""
-
-    source: str
-    target: str
-    reports: list[str]
-
-
-def _job(one: Input, given: Given) -> _Job:
-    target = given.output or STANDARD
-    if given.directory:
-        target = os.path.join(given.directory, one.stem + os.path.splitext(one.path)[1])
-        os.makedirs(os.path.dirname(target) or ".", exist_ok=True)
-    return _Job(one.path, target, [path.replace("{stem}", one.stem) for path in given.reports])
-
-
 def _pages(reports: Iterable[str]) -> bool:
     return any(suffix_of(path) == ".html" for path in reports)
 
 
-def _filter(job: _Job, form: Form, settings: Settings, given: Given) -> int:
+def _filter(job: Input, form: Form, settings: Settings, given: Given) -> int:
     """Filter one program; return the exit code."""
     from cornersmooth.filter import filter_program
     from cornersmooth.report import NcFile

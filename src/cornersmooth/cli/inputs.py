@@ -1,4 +1,4 @@
-"""Which files a batch works on, and where each of their outputs goes."""
+"""Which files a command works on, and where the outputs of each go."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ import os
 import stat
 from dataclasses import dataclass
 from fnmatch import fnmatch
+from typing import NoReturn
 
 import click
 
-from cornersmooth.cli.files import STANDARD
+from cornersmooth.cli.files import STANDARD, check_path
 from cornersmooth.cli.show import print_line
 from cornersmooth.cli.values import Given
 from cornersmooth.errors import SettingsError
@@ -22,12 +23,50 @@ PATTERNS = ("*.cls", "*.clsf", "*.cl", "*.ncl", "*.apt", "*.aptsource", "*.nccl"
 class Input:
     """A file to work on."""
 
-    path: str
+    #: Input and NC file; ``-`` for the standard streams.
+    source: str
+    target: str
+    reports: tuple[str, ...]
     stem: str  #: its place below the folder that was named, without the ending: where its outputs go below theirs
 
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Files that are written."""
+        return tuple(path for path in (self.target, *self.reports) if path != STANDARD)
 
-def check_together(given: Given) -> None:
-    """Refuse options that do not go together, or not with so many inputs."""
+
+def find_inputs(given: Given, patterns: tuple[str, ...] = PATTERNS, suffix: str | None = None) -> list[Input]:
+    """Files that were named, and in batches those of the folders that were, with all below, in alphabetical order.
+
+    Parameters
+    ----------
+    patterns : tuple of str
+        What the names of files in folders are like where ``--glob`` does not say.
+    suffix : str or None
+        Of the names of NC files; None for that of the input.
+
+    Raises
+    ------
+    UsageError
+        Options that do not go together, or not with so many inputs; names that clash.
+    SettingsError
+        CS220: an output of one is the input of another. CS224: a folder without any such file.
+    """
+    _check_together(given)
+    found: list[Input] = []
+    for name in given.inputs:
+        for path, stem in _files(name, given, given.glob or patterns):
+            target = given.output or STANDARD
+            if given.directory:
+                target = os.path.join(given.directory, stem + (suffix or os.path.splitext(path)[1]))
+            found.append(Input(path, target, tuple(one.replace("{stem}", stem) for one in given.reports), stem))
+    if len(found) > 1 and any("{stem}" not in path for path in given.reports):
+        raise click.UsageError("with several inputs a report needs {stem} in its name, as in 'out/{stem}.json'")
+    _check_outputs(found)
+    return found
+
+
+def _check_together(given: Given) -> None:
     folder, inputs = given.directory, given.inputs
     if given.quiet and given.verbose:
         raise click.UsageError("-q and -v exclude each other")
@@ -43,60 +82,68 @@ def check_together(given: Given) -> None:
         raise click.UsageError("standard input goes with no other input")
 
 
-def find_inputs(given: Given, patterns: tuple[str, ...] = PATTERNS) -> list[Input]:
-    """Files that were named, and in batches those of the folders that were, with all below, in alphabetical order.
-
-    Parameters
-    ----------
-    patterns : tuple of str
-        What the names of files in folders are like where ``--glob`` does not say.
-
-    Raises
-    ------
-    SettingsError
-        CS224: a folder without any such file.
-    """
-    patterns = given.glob or patterns
-    found = []
-    for name in given.inputs:
-        if name == STANDARD:
-            found.append(Input(name, "stdin"))
-        elif not (given.directory and os.path.isdir(name)):
-            found.append(Input(name, _stem(os.path.basename(name))))
-        elif inside := _inside(name, patterns):
-            found += inside
-        else:
-            what = f"no file in {name} is like {', '.join(patterns)}"
-            raise SettingsError("CS224", what, "name others with --glob")
-    return found
-
-
-def _inside(folder: str, patterns: tuple[str, ...]) -> list[Input]:
-    found: list[Input] = []
+def _files(name: str, given: Given, patterns: tuple[str, ...]) -> list[tuple[str, str]]:
+    """Files that a name stands for, and their stems."""
+    if name == STANDARD:
+        return [(name, "stdin")]
+    if not (given.directory and os.path.isdir(name)):
+        return [(name, _stem(os.path.basename(name)))]
+    found: list[tuple[str, str]] = []
 
     def refused(failure: OSError) -> None:  # reading it will say why
-        found.append(Input(failure.filename, os.path.relpath(failure.filename, folder)))
+        found.append((failure.filename, os.path.relpath(failure.filename, name)))
 
-    for here, below, names in os.walk(folder, onerror=refused):
+    for here, below, names in os.walk(name, onerror=refused):
         below.sort()
-        for name in sorted(names):
-            if any(fnmatch(name.lower(), pattern.lower()) for pattern in patterns):
-                path = os.path.join(here, name)
-                if _endless(path):
-                    print_line(f"{path}: skipped: it is a pipe, a device or a socket; name it by itself to read it")
-                    continue
-                found.append(Input(path, _stem(os.path.relpath(path, folder))))
+        for one in sorted(names):
+            path = os.path.join(here, one)
+            if not any(fnmatch(one.lower(), pattern.lower()) for pattern in patterns):
+                continue
+            if os.path.exists(path) and not stat.S_ISREG(os.stat(path).st_mode):  # reading it may never end
+                print_line(f"{path}: skipped: it is a pipe, a device or a socket; name it by itself to read it")
+            else:
+                found.append((path, _stem(os.path.relpath(path, name))))
+    if not found:
+        raise SettingsError("CS224", f"no file in {name} is like {', '.join(patterns)}", "name others with --glob")
     return found
-
-
-def _endless(path: str) -> bool:
-    """Whether it is no file, so that reading it may never end; what is not there says so when it is read."""
-    try:
-        return not stat.S_ISREG(os.stat(path).st_mode)
-    except OSError:
-        return False
 
 
 def _stem(path: str) -> str:
     stem, ending = os.path.splitext(path)
     return os.path.splitext(stem)[0] if ending.lower() == ".gz" else stem
+
+
+def _check_outputs(inputs: list[Input]) -> None:
+    """Refuse two outputs of one name, and outputs of one that are the input of another."""
+    sources = [one.source for one in inputs]
+    names = {name for source in sources for name in _names(source)}
+    taken: dict[str, Input] = {}
+    for one in inputs:
+        real = [os.path.realpath(path) for path in one.outputs]
+        for path, place in zip(one.outputs, real, strict=True):
+            other = taken.setdefault(place, one)
+            if other is not one or real.count(place) > 1:
+                _refuse_clash(other, one, path)
+            if not names.isdisjoint(_names(path)):
+                check_path(path, sources, force=True)
+
+
+def _refuse_clash(one: Input, other: Input, path: str) -> NoReturn:
+    if one is other:
+        raise click.UsageError(f"{path} is the name of two outputs; give each its own")
+    if os.path.realpath(one.source) == os.path.realpath(other.source):
+        raise click.UsageError(f"{one.source} is named twice; name it once")
+    raise click.UsageError(
+        f"{one.source} and {other.source} would both be written to {path}; rename one, or give each a -d of its own"
+    )
+
+
+def _names(path: str) -> list[object]:
+    """What tells a file from others: its place, and where it exists, its number."""
+    if path == STANDARD:
+        return []
+    try:
+        found = os.stat(path)
+    except OSError:
+        return [os.path.realpath(path)]
+    return [os.path.realpath(path), (found.st_dev, found.st_ino)]

@@ -10,10 +10,11 @@ from dataclasses import dataclass, field, fields, is_dataclass
 from typing import TYPE_CHECKING, Any, BinaryIO, cast
 
 from cornersmooth import __version__
-from cornersmooth.cli.files import STANDARD, Beginning, check_path, read_input, suffix_of, target_of, write_report
+from cornersmooth.cli.files import Beginning, check_path, read_input, suffix_of, target_of, write_report
+from cornersmooth.cli.inputs import Input
 from cornersmooth.cli.show import more
 from cornersmooth.cli.values import Given
-from cornersmooth.errors import CornersmoothError, SettingsError, VerdictError, message, printable
+from cornersmooth.errors import CornersmoothError, VerdictError, message, printable
 from cornersmooth.memory import return_large_arrays
 from cornersmooth.output import ClosedPipe, make_folder, read_mark
 from cornersmooth.verdict import Verdict
@@ -44,13 +45,9 @@ _PROBLEMS_SHOWN = 5
 
 
 @dataclass(frozen=True)
-class Job:
+class Job(Input):
     """What to do with one input; every field survives the way to another process."""
 
-    #: Input and NC file; ``-`` for the standard streams.
-    source: str
-    target: str
-    reports: tuple[str, ...]
     given: Given
     settings: Settings
     form: Form
@@ -69,11 +66,6 @@ class Job:
     def batch(self) -> bool:
         """Whether it is one of a batch: folders are made, and an output of the same input and settings stays."""
         return bool(self.given.directory)
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Files that it writes."""
-        return tuple(path for path in (self.target, *self.reports) if path != STANDARD)
 
 
 @dataclass
@@ -123,11 +115,7 @@ def _check(job: Job, *, replace_target: bool | None = False) -> dict[str, bool |
     if not force and replace_target is None:
         may_replace[job.target] = None
     for path in job.reports:
-        suffix = suffix_of(path)
-        if suffix not in _OURS:
-            what = f"cannot tell the form of the report {path}"
-            raise SettingsError("CS221", what, "let it end in .json, .csv or .html")
-        may_replace[path] = check_path(path, [job.source], force=force, ours=_OURS[suffix])
+        may_replace[path] = check_path(path, [job.source], force=force, ours=_OURS[suffix_of(path)])
     return may_replace
 
 

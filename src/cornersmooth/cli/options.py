@@ -312,18 +312,20 @@ FLAGS = {
     for flags in [[word for word in item.metadata["spelled"].split() if word.startswith("-")]]
 }
 
-#: options that several commands have, in the order of their helps
-CURVES = "weights reversal_angle"
-LINES = "lines chord_tolerance block_time axis_step"
+
+def under(*headings: str) -> str:
+    """Names of the options with some headings."""
+    return " ".join(item.name for item in fields(Options) if item.metadata.get("heading") in headings)
+
+
+#: options that several commands have
+CURVES, LINES = under("Curves"), under("Lines")
 LIMITS = (
     "feed accel jerk centripetal period rapid rapid_accel rapid_jerk angular_feed angular_accel angular_jerk "
     "vector_jerk turn_speed turn_accel turn_jerk"
 )
 READING = "format dialect units arc_rule operation lenient no_size_limit"
-WRITING = (
-    "control machine no_tcp extras digits program_name work_offset approach retract rewind skip_cycles cycles planes "
-    "header footer block_numbers line_ends modal no_comments"
-)
+WRITING = f"control machine {under('Control', 'Program', 'Holes and planes')}"
 #: of a plan whose feeds are written
 PLANNED = "accel jerk centripetal period"
 #: the feed of commands that only plan

@@ -24,10 +24,7 @@ _WRONG_SHOWN = 20
 def filter_form_of(given: Given) -> Form:
     """Form of the control that blocks are read and written in.
 
-    Raises
-    ------
-    SettingsError
-        CS240: a control whose programs are not read as a filter.
+    Raises SettingsError CS240: a control whose programs are not read as a filter.
     """
     from cornersmooth.errors import SettingsError
     from cornersmooth.filter.vocabulary import VOCABULARIES

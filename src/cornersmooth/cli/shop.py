@@ -167,10 +167,7 @@ def origin(ctx: click.Context, name: str) -> str:
 def find_files(first: str) -> tuple[ShopFile, ...]:
     """Shop settings of the project that a file or folder belongs to, and of the user.
 
-    Raises
-    ------
-    SettingsError
-        CS240: a file cannot be read or is not TOML. CS241: an unknown table.
+    Raises SettingsError CS240: a file cannot be read or is not TOML. CS241: an unknown table.
     """
     here = Path(os.path.abspath(first))
     folders = [here, *here.parents] if os.path.isdir(here) else list(here.parents)

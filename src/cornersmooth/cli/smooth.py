@@ -6,13 +6,13 @@ import os
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING
 
 import click
 
 from cornersmooth.cli.command import EXIT_CODES_OF_WRITERS, new_command
-from cornersmooth.cli.files import STANDARD, check_inputs, check_path, read_lines
-from cornersmooth.cli.inputs import Input, check_together, find_inputs
+from cornersmooth.cli.files import STANDARD, check_endings, check_inputs, check_path, read_lines
+from cornersmooth.cli.inputs import find_inputs
 from cornersmooth.cli.job import Job, Outcome, run_job
 from cornersmooth.cli.options import CURVES, LINES, PLANNED, READING, WRITING
 from cornersmooth.cli.shop import command_line, loosened
@@ -27,7 +27,7 @@ from cornersmooth.cli.show import (
     show_verdict,
     warn,
 )
-from cornersmooth.cli.summary import batch_report, check_summary, end_lines, interrupted_line, line_of, write_summary
+from cornersmooth.cli.summary import batch_report, end_lines, interrupted_line, line_of, write_summary
 from cornersmooth.cli.values import Given
 from cornersmooth.errors import printable
 from cornersmooth.output import make_folder
@@ -147,19 +147,18 @@ def _make_jobs(given: Given) -> list[Job]:
 
     folder = given.directory
     _check_usage(given)
-    files = find_inputs(given)
-    _check_side_outputs(files, given)
     settings, form, frame = given.settings(), given.choose_form(), _frame(given)
+    files = find_inputs(given, suffix=form.table.layout.suffix)
+    if given.summary:
+        check_path(given.summary, [found.source for found in files], force=True)
     fit_settings(settings, form, "mm")  # refuses wrong ones before any file is touched
     jobs = [
         Job(
-            source=found.path,
-            target=os.path.join(folder, found.stem + form.table.layout.suffix) if folder else given.output or STANDARD,
-            reports=tuple(path.replace("{stem}", found.stem) for path in given.reports),
+            **vars(found),
             given=given,
             settings=settings,
             form=form,
-            frame=replace(frame, stem="" if found.path == STANDARD else os.path.basename(found.stem)),
+            frame=replace(frame, stem="" if found.source == STANDARD else os.path.basename(found.stem)),
             plan_feeds=given.planned_limits(),
             alone=len(files) == 1,
             beginning=not folder and not given.output and _to_terminal(),
@@ -169,7 +168,6 @@ def _make_jobs(given: Given) -> list[Job]:
         )
         for found in files
     ]
-    _check_targets(jobs)
     if not given.quiet:
         _tell_same_programs(jobs)
     if folder:
@@ -178,26 +176,18 @@ def _make_jobs(given: Given) -> list[Job]:
 
 
 def _check_usage(given: Given) -> None:
-    """Refuse options that do not go together, or not with so many inputs."""
+    """Refuse options that do not go together."""
     folder = given.directory
-    check_together(given)
+    check_endings("report", given.reports, ".json, .csv or .html")
     if given.as_json and not folder and given.output in (None, STANDARD):
         raise click.UsageError("--json needs -o FILE or -d FOLDER: standard output is for the JSON object")
     if given.summary and not folder:
         raise click.UsageError("--summary is for batches, which need -d FOLDER; --report tells of a single file")
+    check_endings("summary", [given.summary] if given.summary else [], ".json or .csv")
     if given.scheduler and (not folder or given.jobs != 1):
         raise click.UsageError("--scheduler is for batches, which need -d FOLDER and take no -j")
     if given.feed is not None and not 0.0 < given.feed < 1e6:
         raise click.UsageError("--feed must be a positive number of mm/min")
-
-
-def _check_side_outputs(files: list[Input], given: Given) -> None:
-    """Refuse a summary or reports that cannot be written for these files."""
-    if given.summary:
-        check_summary(given.summary)
-        check_path(given.summary, [found.path for found in files], force=True)
-    if len(files) > 1 and any("{stem}" not in path for path in given.reports):
-        raise click.UsageError("with several inputs a report needs {stem} in its name, as in 'out/{stem}.json'")
 
 
 def _frame(given: Given) -> Frame:
@@ -220,21 +210,6 @@ def _frame(given: Given) -> Frame:
     )
 
 
-def _check_targets(jobs: list[Job]) -> None:
-    """Refuse two outputs of one name, and outputs of one job that are the input of another."""
-    sources = [job.source for job in jobs]
-    names = {name for source in sources for name in _names(source)}
-    by_target: dict[str, Job] = {}
-    for job in jobs:
-        real = [os.path.realpath(path) for path in job.outputs]
-        for path, place in zip(job.outputs, real, strict=True):
-            other = by_target.setdefault(place, job)
-            if other is not job or real.count(place) > 1:
-                _refuse_clash(other, job, path)
-            if not names.isdisjoint(_names(path)):
-                check_path(path, sources, force=True)
-
-
 def _tell_same_programs(jobs: list[Job]) -> None:
     """Say which programs a control would take for the same one."""
     sources: dict[str, list[str]] = {}
@@ -248,27 +223,6 @@ def _tell_same_programs(jobs: list[Job]) -> None:
                 f"{', '.join(same[:_NAMED])}{others}: all become program {name}, and a control keeps one of "
                 "them; let the names of the files end in different numbers, or give each its --program-name"
             )
-
-
-def _refuse_clash(one: Job, other: Job, path: str) -> NoReturn:
-    if one is other:
-        raise click.UsageError(f"{path} is the name of two outputs; give each its own")
-    if os.path.realpath(one.source) == os.path.realpath(other.source):
-        raise click.UsageError(f"{one.source} is named twice; name it once")
-    raise click.UsageError(
-        f"{one.source} and {other.source} would both be written to {path}; rename one, or give each a -d of its own"
-    )
-
-
-def _names(path: str) -> list[object]:
-    """What tells a file from others: its place, and where it exists, its number."""
-    if path == STANDARD:
-        return []
-    try:
-        found = os.stat(path)
-    except OSError:
-        return [os.path.realpath(path)]
-    return [os.path.realpath(path), (found.st_dev, found.st_ino)]
 
 
 def _to_terminal() -> bool:

@@ -10,7 +10,6 @@ from typing import Any
 
 from cornersmooth.cli.files import suffix_of, write_report
 from cornersmooth.cli.job import STATUSES, Outcome
-from cornersmooth.errors import SettingsError
 from cornersmooth.verdict import Verdict
 
 
@@ -116,12 +115,6 @@ def _warnings(findings: Iterable[Mapping[str, Any]]) -> dict[str, tuple[int, str
             count, text = found.get(finding["code"], (0, finding["text"]))
             found[finding["code"]] = (count + finding["count"], text)
     return dict(sorted(found.items()))
-
-
-def check_summary(path: str) -> None:
-    """Refuse a name that does not say the form (SettingsError CS221)."""
-    if suffix_of(path) not in (".json", ".csv"):
-        raise SettingsError("CS221", f"cannot tell the form of the summary {path}", "let it end in .json or .csv")
 
 
 def batch_report(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

@@ -77,10 +77,7 @@ class Given(Options):
     def planned_limits(self) -> Limits | None:
         """Limits of the plan whose feeds are written; None where they are the programmed ones.
 
-        Raises
-        ------
-        UsageError
-            Limits without `--feed-from-plan`.
+        Raises UsageError: limits without `--feed-from-plan`.
         """
         if self.feed_from_plan:
             return self.path_limits(PLANNED)
@@ -113,10 +110,8 @@ class Given(Options):
     def reading_back(self) -> dict[str, Any]:
         """Keyword arguments of `cornersmooth.nc_reader.read_nc` for a program that somebody wrote.
 
-        Raises
-        ------
-        SettingsError
-            CS204: it is not known how the control's programs are read; or the control or the machine is unknown.
+        Raises SettingsError CS204: it is not known how the control's programs are read; or the control or the machine
+        is unknown.
         """
         from cornersmooth.nc_reader import CONTROLS
 
