@@ -11,11 +11,10 @@ from cornersmooth.cl.arcs import LEAST_DECIMALS, Arc, read_arc
 from cornersmooth.cl.grammar import NUMBER, Argument, Record, joined, number
 from cornersmooth.cl.messages import error
 from cornersmooth.cl.nurbs import CURVE_DIGITS, Curve, lines_of
-from cornersmooth.cl.poses import check_range
+from cornersmooth.cl.poses import Vector, check_range
 from cornersmooth.cl.reader_state import ReaderState
 from cornersmooth.cl.state_statements import Handler
 from cornersmooth.cl.surfaces import read_drive_arc, read_helix
-from cornersmooth.cl.systems import Vector
 from cornersmooth.cl.words import GOTO_WORDS
 from cornersmooth.errors import InputError
 from cornersmooth.model import Move

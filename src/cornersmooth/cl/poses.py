@@ -15,10 +15,61 @@ from numpy.typing import NDArray
 
 from cornersmooth.cl.bulk import FARTHEST, Chunk
 from cornersmooth.cl.messages import error, finding
-from cornersmooth.cl.systems import IDENTITY, System, Vector
 from cornersmooth.errors import Finding
 from cornersmooth.model import Floats, Ints, Keep, Move
 from cornersmooth.vectors import norm
+
+Vector = tuple[float, float, float]
+
+#: by how much axes of a system may miss length 1 and right angles: what four printed decimals leave
+_SQUARE: Final = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class System:
+    """A coordinate system, seen from another one."""
+
+    axes: Floats  #: (3, 3): its X, Y and Z axes as columns, orthonormal
+    origin: Floats  #: (3,)
+
+    def points(self, points: Floats) -> Floats:
+        """Points (n, 3) of this system, in the other one."""
+        return points @ self.axes.T + self.origin
+
+    def vectors(self, vectors: Floats) -> Floats:
+        """Vectors (n, 3) of this system, in the other one."""
+        return vectors @ self.axes.T
+
+    def seen_from(self, other: System) -> System:
+        """Return this system as it is seen from another one, both seen from the same."""
+        return System(other.axes.T @ self.axes, other.axes.T @ (self.origin - other.origin))
+
+    def point(self, point: Vector) -> Vector:
+        """One point of this system, in the other one."""
+        x, y, z = self.points(np.array([point]))[0].tolist()
+        return x, y, z
+
+    def vector(self, vector: Vector) -> Vector:
+        """One vector of this system, in the other one."""
+        x, y, z = self.vectors(np.array([vector]))[0].tolist()
+        return x, y, z
+
+
+IDENTITY: Final = System(np.eye(3), np.zeros(3))
+
+
+def system_of(values: list[float]) -> System | None:
+    """Return the system of origin, X axis and Y axis, as NX writes MSYS; None where the axes are not orthonormal."""
+    if len(values) != 9:
+        return None
+    origin, x, y = np.array(values).reshape(3, 3)
+    if max(abs(x @ x - 1), abs(y @ y - 1), abs(x @ y)) > _SQUARE:
+        return None
+    x = x / np.linalg.norm(x)
+    z = np.cross(x, y)
+    z = z / np.linalg.norm(z)
+    return System(np.stack((x, np.cross(z, x), z), axis=1), origin)
+
 
 #: largest ||v|−1| of an axis vector: three printed decimals leave 1e-3
 UNIT_TOLERANCE: Final = 1e-2
@@ -81,47 +132,63 @@ class Poses:
     special: dict[int, Move] = field(default_factory=dict)
     axis_set: list[tuple[int, Vector]] = field(default_factory=lambda: [(0, UP)])
     systems: list[tuple[int, System]] = field(default_factory=list)  #: first pose, system seen from the first one
-    last_axis: Vector = UP  #: of the last pose; where it has none of its own, the one that was set before it, or +Z
-    _rows: Floats = field(default_factory=lambda: np.empty((_ROOM, 7)))  #: as `Chunk.poses`
+    _last_axis: Vector = UP
+    _settled: int = 0  #: poses that `_last_axis` knows of
+    _rows: Floats = field(default_factory=lambda: np.empty((_ROOM, 7)))
+    _filled: int = 0  #: rows that hold their poses; those of the others are in the chunk
     _chunk: Chunk | None = None
     _taken: int = 0  #: poses of the chunk
 
     def enter(self, chunk: Chunk) -> None:
         """Take the next chunk; its plain poses follow by `take`."""
+        _ = self.rows  # those of the chunk before
         self._chunk, self._taken = chunk, 0
 
     def take(self, count: int) -> None:
         """Append the next poses of the chunk."""
-        assert self._chunk is not None
-        here, rows = self._next(count), self._chunk.poses[self._taken : self._taken + count]
-        self._rows[here] = rows
+        self.n += count
         self._taken += count
-        if not self.axis_locked.now:
-            _, _, _, x, y, z, _ = rows[-1].tolist()
-            if x == x:
-                self.last_axis = x, y, z
-            elif self.short_axis_up:
-                self.last_axis = self.axis_set[-1][1]
-            elif len(own := np.flatnonzero(~np.isnan(rows[:, 3]))):
-                x, y, z = rows[own[-1], 3:6].tolist()
-                self.last_axis = x, y, z
 
     def append(self, tip: Vector, axis: Vector | None, line: int) -> None:
         """Append one pose (InputError CS113)."""
         check_range(tip, self.file, line)
-        here = self._next(1)
-        self._rows[here] = (*tip, *(axis or _NONE), line)
-        if not self.axis_locked.now and (axis is not None or self.short_axis_up):
-            self.last_axis = axis or self.axis_set[-1][1]
+        _ = self.rows  # those before it
+        self.n += 1
+        self._fill(np.array([(*tip, *(axis or _NONE), line)]))
 
-    def _next(self, count: int) -> slice:
-        """Rows of the next poses, which there is room for."""
-        first, self.n = self.n, self.n + count
-        if self.n > len(self._rows):
+    @property
+    def rows(self) -> Floats:
+        """(n, 7) float64: tip, axis and line of every pose, as `Chunk.poses`."""
+        if self._filled < self.n and self._chunk is not None:
+            self._fill(self._chunk.poses[self._taken - self.n + self._filled : self._taken])
+        return self._rows[: self.n]
+
+    def _fill(self, rows: Floats) -> None:
+        """Put further rows in their places, which there is room for."""
+        end = self._filled + len(rows)
+        if end > len(self._rows):
             old = self._rows
-            self._rows = np.empty((2 * self.n, 7))
-            self._rows[:first] = old[:first]
-        return slice(first, self.n)
+            self._rows = np.empty((2 * end, 7))
+            self._rows[: self._filled] = old[: self._filled]
+        self._rows[self._filled : end] = rows
+        self._filled = end
+
+    @property
+    def last_axis(self) -> Vector:
+        """Axis of the last pose; where it has none of its own, the one that was set before it, or +Z."""
+        rows, self._settled = self.rows[self._settled :, 3:6], self.n
+        if len(rows) and not self.axis_locked.now:
+            if self.short_axis_up and np.isnan(rows[-1, 0]):
+                self._last_axis = self.axis_set[-1][1]
+            elif len(own := np.flatnonzero(~np.isnan(rows[:, 0]))):
+                x, y, z = rows[own[-1]].tolist()
+                self._last_axis = x, y, z
+        return self._last_axis
+
+    def _hold(self, axis: Vector) -> None:
+        """Let poses without an axis of their own have this one from here on."""
+        self.axis_set.append((self.n, axis))
+        self._last_axis, self._settled = axis, self.n
 
     @property
     def system(self) -> System:
@@ -131,13 +198,12 @@ class Poses:
     def enter_system(self, system: System) -> None:
         """Let positions and axes be in another coordinate system from here on; an axis that holds stays where it is."""
         if self.axis_set[-1][0] != self.n:
-            self.last_axis = self.system.seen_from(system).vector(self.last_axis)
-            self.axis_set.append((self.n, self.last_axis))
+            self._hold(self.system.seen_from(system).vector(self.last_axis))
         self.systems.append((self.n, system))
 
     def last_tip(self) -> Vector:
         """Tip of the last pose, in the coordinate system of what follows."""
-        x, y, z = self._rows[self.n - 1, :3].tolist()
+        x, y, z = self.rows[-1, :3].tolist()
         if not self.systems or self.systems[-1][0] < self.n:
             return x, y, z
         before = next((system for pose, system in reversed(self.systems) if pose < self.n), IDENTITY)
@@ -149,22 +215,22 @@ class Poses:
 
     def set_axis(self, axis: Vector) -> None:
         """Let poses without an axis of their own have this one from here on."""
-        self.axis_set.append((self.n, axis))
-        self.last_axis = axis
+        self._hold(axis)
         if self.axis_locked.now:
             self.axis_locked.set(self.n, _STATED)
 
     def lock_axis(self, locked: bool) -> None:
         """Ignore (or heed again) the axes that poses have of their own."""
+        _ = self.last_axis  # as it is under the lock until now
         self.axis_locked.set(self.n, _LOCKED if locked else _FREE)
 
     def tips(self) -> Floats:
         """(n, 3) float64: all tips, in the first coordinate system."""
-        return self._placed(self._rows[: self.n, :3], System.points)
+        return self._placed(self.rows[:, :3], System.points)
 
     def lines(self) -> Ints:
         """(n,) int64: line of every pose."""
-        return self._rows[: self.n, 6].astype(np.int64)
+        return self.rows[:, 6].astype(np.int64)
 
     def kinds(self) -> NDArray[np.uint8]:
         """(n,) uint8: `Move` of every pose."""
@@ -178,7 +244,7 @@ class Poses:
         Raises InputError CS111 for a zero vector, CS112 for one that is no unit vector, CS188 and CS197 for one that
         dialects read differently.
         """
-        axis = self._rows[: self.n, 3:6]
+        axis = self.rows[:, 3:6]
         given = np.flatnonzero(~np.isnan(axis[:, 0]))
         findings: list[Finding] = []
         unit = self._normalised(axis[given], given, findings)
@@ -186,7 +252,7 @@ class Poses:
         dropped = state[given] != _FREE
         off_axes = given[dropped], unit[dropped]
         if dropped.any():
-            findings.append(finding("CS137", int(self._rows[off_axes[0][0], 6]), int(dropped.sum())))
+            findings.append(finding("CS137", int(self.rows[off_axes[0][0], 6]), int(dropped.sum())))
             unit, given = unit[~dropped], given[~dropped]
         axis = self._held(unit, given)
         if not self.off_known:
@@ -217,7 +283,7 @@ class Poses:
         pose = int(doubtful.argmax())
         at = np.flatnonzero(own == pose)
         words = ",".join(f"{part:g}" for part in (unit[at[0]] if len(at) else axis[pose]))
-        raise error("CS197" if len(at) else "CS188", self.file, int(self._rows[pose, 6]), axis=words)
+        raise error("CS197" if len(at) else "CS188", self.file, int(self.rows[pose, 6]), axis=words)
 
     def _placed(self, rows: Floats, place: Callable[[System, Floats], Floats]) -> Floats:
         """Rows of all poses, from their coordinate systems into the first one."""
@@ -237,7 +303,7 @@ class Poses:
         if wrong.any():
             refused = wrong & ((length == 0) | ~np.isfinite(length)) if self.lenient else wrong
             first = int((refused if refused.any() else wrong).argmax())
-            line, value = int(self._rows[pose[first], 6]), float(length[first])
+            line, value = int(self.rows[pose[first], 6]), float(length[first])
             if refused.any():
                 raise error("CS111" if value == 0 else "CS112", self.file, line, length=value)
             findings.append(finding("CS139", line, int(wrong.sum()), length=value))

@@ -13,8 +13,7 @@ from cornersmooth.cl.dialects import Dialect
 from cornersmooth.cl.grammar import Argument, Record, joined, number
 from cornersmooth.cl.messages import error, finding
 from cornersmooth.cl.nurbs import Curve
-from cornersmooth.cl.poses import Poses
-from cornersmooth.cl.systems import System, Vector
+from cornersmooth.cl.poses import Poses, System, Vector
 from cornersmooth.errors import Finding, InputError
 from cornersmooth.model import Move, Statement, Units
 
@@ -38,7 +37,7 @@ class ReaderState(Poses):
     direction: tuple[str, Vector] | None = None  #: INDIRV or INDIRP, for the arc after it
     first_system: tuple[tuple[Argument, ...], System | None] | None = None  #: MSYS, MCS or MCSYS as written, and read
     offsets: dict[str, tuple[Argument, ...]] = field(default_factory=dict)  #: FIXTURE, WCS; $$-> CSYS, $$*CATIA0
-    rows: list[str] | None = None  #: numbers after $$*CATIA0
+    matrix: list[str] | None = None  #: numbers after $$*CATIA0
     clearance: tuple[Vector | None, Vector] | None = None  #: normal of the plane of RETRCT (None: the tool axis), point
     renamed: dict[str, str] = field(default_factory=dict)  #: SYN
     finished: bool = False  #: FINI was met
@@ -95,23 +94,22 @@ class ReaderState(Poses):
 
     def add(self, tip: Vector, axis: Vector | None, line: int) -> None:
         """Append a pose that a feed motion or the pending RAPID reaches."""
+        self.arrive()
         self.append(tip, axis, line)
-        self.arrived()
 
     def add_special(self, tip: Vector, axis: Vector | None, line: int, move: Move) -> None:
         """Append a pose that is reached in a way of its own."""
         self.special[self.n] = move
         self.append(tip, axis, line)
 
-    def arrived(self) -> None:
-        """Settle how the last pose was reached."""
-        pose = self.n - 1
+    def arrive(self) -> None:
+        """Settle how the next pose is reached."""
         if self.arc is not None:
-            self.arcs.append(replace(self.arc, pose=pose))
-            self.special[pose] = Move.ARC
+            self.arcs.append(replace(self.arc, pose=self.n))
+            self.special[self.n] = Move.ARC
             self.arc = None
         elif self.rapid and not self.hole:
-            self.special[pose] = Move.RAPID
+            self.special[self.n] = Move.RAPID
         self.rapid = False
 
     def set_kind(self) -> None:

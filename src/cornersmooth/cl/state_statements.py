@@ -8,9 +8,8 @@ from typing import Final
 
 from cornersmooth.cl.bulk import FARTHEST
 from cornersmooth.cl.grammar import Record, joined, number
-from cornersmooth.cl.poses import UNIT_TOLERANCE, UP
+from cornersmooth.cl.poses import IDENTITY, UNIT_TOLERANCE, UP, System, Vector, system_of
 from cornersmooth.cl.reader_state import ReaderState
-from cornersmooth.cl.systems import IDENTITY, System, Vector, from_numbers
 from cornersmooth.cl.words import MOTION_WORDS, REFUSED_WORDS, TURNS
 from cornersmooth.model import FeedMode, Keep, Units
 
@@ -122,7 +121,7 @@ def _msys(state: ReaderState, record: Record) -> None:
     """MSYS/origin,x,y of NX, also misspelt SYS: positions are in this system; those of all go into the first one."""
     args, values = record.args, record.values
     plain = len(values) == len(args) == 9 and max(map(abs, values)) <= FARTHEST
-    system = from_numbers(values) if plain else None
+    system = system_of(values) if plain else None
     if state.n and state.first_system is None:  # positions before it are in no system that is known
         state.first_system = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0), None
     if state.first_system is None:
@@ -188,14 +187,14 @@ def _comment(state: ReaderState, record: Record) -> None:
     """Comments that say which system positions are in: Creo's $$-> CSYS, and the 3 rows after CATIA's $$*CATIA0."""
     text = str(record.args[0])
     if text.startswith("*CATIA0"):
-        state.rows = []
+        state.matrix = []
     elif text.startswith("->") and text[2:].lstrip().upper().startswith("CSYS"):
         _same_system(state, record, "$$-> CSYS", text.partition("/")[2].replace(",", " ").split())
-    elif state.rows is not None and len(row := text.split()) == 4:
-        state.rows += row
-        if len(state.rows) == 12:
-            _same_system(state, record, "$$*CATIA0", state.rows)
-            state.rows = None
+    elif state.matrix is not None and len(row := text.split()) == 4:
+        state.matrix += row
+        if len(state.matrix) == 12:
+            _same_system(state, record, "$$*CATIA0", state.matrix)
+            state.matrix = None
 
 
 def _same_system(state: ReaderState, record: Record, word: str, given: list[str]) -> None:

@@ -21,8 +21,7 @@ import numpy as np
 from cornersmooth.cl.arcs import LEAST_DECIMALS, MOST_TURNS, NORMAL_TOLERANCE, RADIUS_DIGITS, RADIUS_SHARE, Arc
 from cornersmooth.cl.grammar import Record, number
 from cornersmooth.cl.messages import error
-from cornersmooth.cl.poses import check_range
-from cornersmooth.cl.systems import Vector
+from cornersmooth.cl.poses import Vector, check_range
 from cornersmooth.errors import InputError
 from cornersmooth.model import Floats
 
