@@ -15,7 +15,6 @@ HERE = Path(__file__).resolve().parent
 LISTS = HERE.parent / "src" / "cornersmooth" / "nc_reader" / "word_lists"
 PAGE = HERE / "dev" / "words.md"
 BEGIN, END = "<!-- made by make_words.py -->\n", "<!-- end -->\n"
-CONTROLS = ("fanuc", "mitsubishi", "haas", "linuxcnc", "generic", "siemens", "heidenhain")
 
 
 def shown(text: str) -> str:
@@ -78,6 +77,9 @@ def section(control: str) -> Iterator[str]:
         yield f"Comments may not begin with {shown(table['orders'])}."
     if "like" in table:
         yield f"What is not named here is as for {table['like']}."
+    if said := table.get("means"):
+        words = (f"{shown(word)} {text or 'nothing'}" for word, text in said.items())
+        yield f"Beside the motion: {', '.join(words)}. Words of spindle and coolant are compared with the statements."
     rows = [(entry, kind) for kind in ("word", "block") for entry in table.get(kind, ())]
     if rows:
         yield "\n| word | what it is | state | where it may stand |\n|---|---|---|---|"
@@ -90,7 +92,7 @@ def page() -> str:
     """The page with the tables as they are now."""
     before, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
     after = rest.partition(END)[2]
-    tables = "\n".join(line for control in CONTROLS for line in section(control))
+    tables = "\n".join(line for path in sorted(LISTS.iterdir()) for line in section(path.stem))
     return f"{before}{BEGIN}\n{tables}\n{END}{after}"
 
 

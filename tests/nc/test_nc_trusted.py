@@ -82,7 +82,7 @@ def test_a_function_in_the_cut_that_nobody_asked_for_is_still_found(tmp_path: Pa
     [
         ("fanuc", '["M.*"]', "holds M0, which verification compares"),
         ("fanuc", '["M8"]', "holds M8, which verification compares"),
-        ("fanuc", '["M88"]', "holds M88, which verification compares"),
+        ("haas", '["M88"]', "holds M88, which verification compares"),
         ("fanuc", '["M9[0-9]"]', "holds M96, which may move the tool"),
         ("heidenhain", '["M140"]', "holds M140, which may move the tool"),
         ("linuxcnc", '["M428"]', "holds M428, which may move the tool"),

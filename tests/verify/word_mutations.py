@@ -20,7 +20,7 @@ from cornersmooth.errors import InputError
 from cornersmooth.nc import fit_settings, write
 from cornersmooth.nc_reader.block_tables import read_lines
 from cornersmooth.nc_reader.reader import Reader
-from cornersmooth.nc_reader.reading_options import ReadingOptions
+from cornersmooth.nc_reader.reading import ReadingOptions
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from cornersmooth.verify import verify

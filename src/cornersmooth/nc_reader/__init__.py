@@ -16,10 +16,10 @@ event             a word that stands beside the motion
 
 Where is what:
 
-- what a text is: `source` (bytes), `reading_options` (control, machine, digits), `dialects` (grammar), `word_list`,
+- what a text is: `source` (bytes), `dialects` (grammar), `word_list`,
   `word_rules` (what may stand together in a block)
 - bytes to tables: `lexer`, `words`, `block_tables`, `line_patterns`
-- tables to elements: `reader` holds the modal state, `execution` executes: `arcs`, `splines`, `long_curves`, `rotary`;
+- tables to elements: `reader` holds the modal state, `execution` executes: `arcs`, `splines`, `rotary`;
   `needed_states` says which words want another state; `retracts` leads back from retracts, and back into cuts
 - what comes out: `elements`; `ahead` reads on as far as need be, `curves` evaluates, `reading` puts a
   whole text together

@@ -9,12 +9,10 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Callable, Generator, Iterator
-from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Final, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cornersmooth.errors import InputError
 from cornersmooth.model import Bools, Floats, Ints
@@ -154,127 +152,63 @@ class LetteredLines:
     """
 
     def __init__(self, text: bytes, lexer: Lexer) -> None:
-        self._numbers = find_numbers(text, lexer)
-        kinds = _BLOCK_NUMBER.sub(rb"\g<1>0", self._numbers.marked()).split(b"\n")[:-1]
-        known = {kind: _LineKind.of(kind.replace(_MARK, _ANY_NUMBER), lexer) for kind in set(kinds)}
+        self._text, self._lexer = text, lexer
+        marked = lexer.measure.sub(_MARK, text.replace(_MARK, b"?"))
+        kinds = _BLOCK_NUMBER.sub(rb"\g<1>0", marked).split(b"\n")[:-1]
+        known = {kind: _line_kind(kind.replace(_MARK, _ANY_NUMBER), lexer) for kind in set(kinds)}
         self._kinds = [known[kind] for kind in kinds]
+        self._counts = [kind.count(_MARK) for kind in kinds]
 
     def bulk(self) -> Bools:
         """(l,) whether each line can be read in a run."""
         return np.array([kind is not None for kind in self._kinds])
 
+    @cached_property
+    def _numbers(self) -> tuple[Floats, Ints]:
+        """All numbers, and which is the first one of each line."""
+        values = parse_numbers(b"\n".join([*self._lexer.measure.findall(self._text), b""]))
+        return values, np.cumsum([0, *self._counts[:-1]])
+
     def columns(self, rows: Ints) -> dict[str, Floats] | None:
         """Numbers of lines that stand in a run, NaN where a line has none; None if the run is none."""
-        kinds = [self._kinds[row] for row in rows.tolist()]
         try:
-            values = self._numbers.values
+            values, first = self._numbers
         except NumberError:  # too large
             return None
-        begin = self._numbers.first[rows]
-        order = {kind: k for k, kind in enumerate(dict.fromkeys(kinds))}
-        label = np.array([order[kind] for kind in kinds])
-        groups: list[Group] = []
-        for kind, k in order.items():
+        begin = first[rows]
+        own: dict[int, tuple[_Kind, list[int]]] = {}
+        for place, row in enumerate(rows.tolist()):
+            kind = self._kinds[row]
             assert kind is not None
-            own = np.flatnonzero(label == k)
+            own.setdefault(id(kind), (kind, []))[1].append(place)
+        groups: list[Group] = []
+        for kind, places in own.values():
             numbers = [
-                np.full(len(own), column) if isinstance(column, float) else values[begin[own] + column]
-                for column in kind.columns.values()
+                np.full(len(places), column) if isinstance(column, float) else values[begin[places] + column]
+                for column in kind.values()
             ]
-            groups.append((own, tuple(kind.columns), numbers))
+            groups.append((places, tuple(kind), numbers))
         return merged(groups, len(rows))
 
 
-@dataclass(frozen=True)
-class Numbers:
-    """Where the numbers of a text are that differ from block to block (`Lexer.measure`), m of them."""
-
-    text: NDArray[np.uint8]  #: (n,): ends with a line end
-    start: Ints  #: (m,)
-    stop: Ints  #: (m,)
-
-    def marked(self) -> bytes:
-        """The text with a mark instead of each number."""
-        marked, kept = self.text.copy(), ~self._inside
-        marked[marked == _MARK[0]] = ord("?")
-        marked[self.start] = _MARK[0]
-        kept[self.start] = True
-        return marked[kept].tobytes()
-
-    @cached_property
-    def values(self) -> Floats:
-        """(m,) The numbers."""
-        written, kept = np.where(self._inside, self.text, ord(" ")), self._inside.copy()
-        kept[self.stop] = True
-        return parse_numbers(written[kept].astype(np.uint8).tobytes())
-
-    @cached_property
-    def first(self) -> Ints:
-        """(l,) Number of the first one of each line, or behind it."""
-        ends = np.flatnonzero(self.text == _LINE_END)
-        return np.searchsorted(self.start, np.concatenate(([0], ends[:-1] + 1)))
-
-    @cached_property
-    def _inside(self) -> Bools:
-        """(n,) whether a byte belongs to a number."""
-        edges = np.zeros(len(self.text) + 1, np.int8)
-        edges[self.start] = 1
-        edges[self.stop] -= 1
-        return np.cumsum(edges[:-1], dtype=np.int8) > 0
+#: columns of lines that differ in their numbers only: which number stands there, or the value that all have
+_Kind = dict[str, int | float]
 
 
-def find_numbers(text: bytes, lexer: Lexer) -> Numbers:
-    """Numbers of a text as `Lexer.measure` finds them; those of most controls all at once."""
-    raw = np.frombuffer(text, np.uint8)
-    if lexer.measure is Lexer.measure:
-        return Numbers(raw, *_plain_numbers(raw))
-    spans = np.array([match.span() for match in lexer.measure.finditer(text)], np.int64).reshape(-1, 2)
-    return Numbers(raw, spans[:, 0], spans[:, 1])
-
-
-def _plain_numbers(raw: NDArray[np.uint8]) -> tuple[Ints, Ints]:
-    """Starts and stops of `Lexer.measure`: digits with a point, perhaps a sign before; a second point ends them."""
-    point = raw == ord(".")
-    edges = np.flatnonzero(np.diff(point | _digit(raw), prepend=False, append=False))
-    start, stop = edges[::2], edges[1::2]
-    points = np.append(np.flatnonzero(point), [len(raw)] * 2)
-    own = np.searchsorted(points, start)
-    stop = np.minimum(stop, points[own + 1])
-    with_point = (points[own] < stop) & (stop - start > 1)
-    start, stop = start[with_point], stop[with_point]
-    before, farther = (np.where(start >= k, raw[start - k], _LINE_END) for k in (1, 2))
-    signed = (before == ord("+")) | (before == ord("-"))
-    taken = (farther == ord("G")) | (farther == ord(".")) | _digit(farther)
-    free = before != ord("G")
-    return (start - (signed & ~taken))[free], stop[free]
-
-
-def _digit(raw: NDArray[np.uint8]) -> Bools:
-    return raw - np.uint8(ord("0")) <= np.uint8(9)
-
-
-@dataclass(frozen=True, eq=False)
-class _LineKind:
-    """What lines have in common that differ in their numbers only."""
-
-    count: int  #: numbers of a line
-    columns: dict[str, int | float]  #: which of them stands in a column, or the value that all lines have there
-
-    @classmethod
-    def of(cls, kind: bytes, lexer: Lexer) -> _LineKind | None:
-        """Kind of a line in which all numbers are `_ANY_NUMBER`; None for lines that are read on their own."""
-        try:
-            line = lexer.line(kind, 0, None)
-        except InputError:
-            return None
-        found = None if line.comments or line.skipped else lexer.motion(line)
-        if found is None:
-            return None
-        place = {match.start(): k for k, match in enumerate(re.finditer(re.escape(_ANY_NUMBER), kind))}
-        columns: dict[str, int | float] = {}
-        for name, word in found.items():
-            if isinstance(word, float) or word.start not in place:
-                columns[name] = word if isinstance(word, float) else word.value
-            else:
-                columns[name] = place[word.start]
-        return cls(len(place), columns)
+def _line_kind(line: bytes, lexer: Lexer) -> _Kind | None:
+    """Kind of a line in which all numbers are `_ANY_NUMBER`; None for lines that are read on their own."""
+    try:
+        taken = lexer.line(line, 0, None)
+    except InputError:
+        return None
+    found = None if taken.comments or taken.skipped else lexer.motion(taken)
+    if found is None:
+        return None
+    return {
+        name: word
+        if isinstance(word, float)
+        else line[: word.start].count(_ANY_NUMBER)
+        if line.startswith(_ANY_NUMBER, word.start) and not word.fixed
+        else word.value
+        for name, word in found.items()
+    }

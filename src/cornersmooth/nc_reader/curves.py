@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -65,13 +66,9 @@ def basis_derivative(knot: Floats, order: int, u: Floats, times: int = 1) -> Flo
         return np.zeros((len(u), points))
     lower = np.pad(basis_derivative(knot[1:-1], order - 1, u, times - 1), ((0, 0), (1, 1)))
     width = knot[order - 1 : order + points] - knot[: points + 1]
-    share = (order - 1) * _ratio(lower, width)
+    # the quotient with an empty knot interval counts as zero
+    share = (order - 1) * np.divide(lower, width, out=np.zeros_like(lower), where=width > 0)
     return share[:, :-1] - share[:, 1:]
-
-
-def _ratio(above: Floats, below: Floats) -> Floats:
-    """Quotient where an empty knot interval counts as zero, as the recursion asks for."""
-    return np.divide(above, below, out=np.zeros(np.broadcast_shapes(above.shape, below.shape)), where=below > 0)
 
 
 @dataclass(frozen=True)
@@ -148,12 +145,8 @@ class CurveGroup:
         """
         start, stop = self.spans[k], self.spans[k + 1]
         t = (np.arange(self.order) + 0.5) / self.order
-        degree = self.order - 1
-        i = np.arange(self.order)
-        binomial = np.array([_binomial(degree, int(r)) for r in i])
-        bernstein = binomial * t[:, None] ** i * (1 - t[:, None]) ** (degree - i)
         nodes = basis(self.knot, self.order, start + t * (stop - start))
-        convert: Floats = np.linalg.solve(bernstein, nodes).astype(np.float64)
+        convert: Floats = np.linalg.solve(bernstein(self.order, t), nodes).astype(np.float64)
         weight = self.weight @ convert.T
         return self._combine(convert) / weight[:, :, None], weight
 
@@ -162,11 +155,11 @@ class CurveGroup:
         return CurveGroup(self.index[rows], self.order, self.knot, self.points[rows], self.weight[rows])
 
 
-def _binomial(n: int, k: int) -> float:
-    result = 1.0
-    for step in range(k):
-        result = result * (n - step) / (step + 1)
-    return result
+def bernstein(order: int, t: Floats) -> Floats:
+    """(len(t), order) Bernstein polynomials."""
+    i = np.arange(order)
+    binomial = np.array([float(math.comb(order - 1, k)) for k in range(order)])
+    return binomial * t[:, None] ** i * (1 - t[:, None]) ** (order - 1 - i)
 
 
 def groups(curves: Curves, index: Ints) -> Iterator[CurveGroup]:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from enum import IntEnum
 from functools import cached_property
+from itertools import repeat
 from typing import Any, Final, Literal, Self
 
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from cornersmooth.errors import message
 from cornersmooth.model import MM_PER_UNIT, Bools, Floats, Ints, Units
+from cornersmooth.nc_reader.word_list import Means
 
 #: what the second triple of a motion block is: the tool vector, or a point on the tool axis
 Second = Literal["vector", "point"]
@@ -28,11 +30,48 @@ class Element(IntEnum):
 
 
 @dataclass(frozen=True)
-class Curves:
+class _Shapes:
+    """What some elements are beside their ends, one row for each of them, ascending."""
+
+    #: (k,): index of the path element each is; while a run is executed, of the block it begins with
+    element: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+
+    def __len__(self) -> int:
+        return len(self.element)
+
+    def only(self, chosen: Ints) -> Self:
+        """Some of them."""
+        return replace(self, **{name: values[chosen] for name, values in _stored(self).items()})
+
+    def part(self, first: int, stop: int) -> Self:
+        """Those that are elements from `first` to `stop`, the latter excluded."""
+        a, b = np.searchsorted(self.element, (first, stop)).tolist()
+        chosen = self.only(np.arange(a, b)) if a < b else type(self)()
+        return replace(chosen, element=chosen.element - first)
+
+    @classmethod
+    def joined(cls, parts: Sequence[Self], start: Sequence[int] | None = None) -> Self:
+        """Put several tables together, whose elements are counted from `start` on, in the order of their elements."""
+        pairs = [(part, first) for part, first in zip(parts, start or repeat(0), strict=False) if len(part)]
+        if not pairs:
+            return cls()
+        if len(pairs) == 1 and not pairs[0][1]:
+            return pairs[0][0]
+        own = {name: np.concatenate([getattr(part, name) for part, _ in pairs]) for name in _stored(pairs[0][0])}
+        own["element"] = np.concatenate([part.element + first for part, first in pairs])
+        whole = cls(**own)
+        rises = (np.diff(whole.element) >= 0).all()
+        return whole if rises else whole.only(np.argsort(whole.element, kind="stable"))
+
+
+def _stored(shapes: _Shapes) -> dict[str, NDArray[Any]]:
+    return {one.name: getattr(shapes, one.name) for one in fields(shapes)}
+
+
+@dataclass(frozen=True)
+class Curves(_Shapes):
     """Control points and knots of the curves, c of them, one after another."""
 
-    #: (c,): index of the path element each curve is, ascending; while a run is executed, of the block it begins with
-    element: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     #: (c,): degree plus one, and how many control points there are
     order: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     points: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
@@ -42,9 +81,6 @@ class Curves:
     knot: Floats = field(default_factory=lambda: np.zeros(0))  #: (q,): ``points + order`` of each curve
     #: (c,): the block each curve ends with, while a run is executed
     end: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
-
-    def __len__(self) -> int:
-        return len(self.element)
 
     @cached_property
     def first_point(self) -> Ints:
@@ -57,54 +93,14 @@ class Curves:
         size = self.points + self.order
         return np.cumsum(size) - size
 
-    def part(self, first: int, stop: int) -> Curves:
-        """Curves that are elements from `first` to `stop`, the latter excluded."""
-        a, b = np.searchsorted(self.element, (first, stop)).tolist()
-        if a == b:
-            return Curves()
-        point, knot = int(self.first_point[a]), int(self.first_knot[a])
-        last_point = int(self.first_point[b - 1] + self.points[b - 1])
-        last_knot = int(self.first_knot[b - 1] + self.points[b - 1] + self.order[b - 1])
-        return Curves(
-            self.element[a:b] - first,
-            self.order[a:b],
-            self.points[a:b],
-            self.point[point:last_point],
-            self.weight[point:last_point],
-            self.knot[knot:last_knot],
-            self.end[a:b],
-        )
-
-    def only(self, chosen: Ints) -> Curves:
-        """Some of the curves."""
-        place, at = slices(self.points, chosen), slices(self.points + self.order, chosen)
-        return Curves(
-            self.element[chosen],
-            self.order[chosen],
-            self.points[chosen],
-            self.point[place],
-            self.weight[place],
-            self.knot[at],
-            self.end[chosen],
-        )
-
-    @classmethod
-    def joined(cls, parts: Sequence[Curves], start: Sequence[int] | None = None) -> Curves:
-        """Curves of several tables, whose elements are counted from `start` on, in the order of their elements."""
-        start = [0] * len(parts) if start is None else start
-        pairs = [(part, first) for part, first in zip(parts, start, strict=False) if len(part)]
-        if not pairs:
-            return cls()
-        if len(pairs) == 1 and not pairs[0][1]:
-            return pairs[0][0]
-        own = {one.name: np.concatenate([getattr(part, one.name) for part, _ in pairs]) for one in fields(cls)}
-        own["element"] = np.concatenate([part.element + first for part, first in pairs])
-        whole = cls(**own)
-        rises = (np.diff(whole.element) >= 0).all()
-        return whole if rises else whole.only(np.argsort(whole.element, kind="stable"))
+    def only(self, chosen: Ints) -> Self:
+        """Some of them."""
+        place, at = _slices(self.points, chosen), _slices(self.points + self.order, chosen)
+        rows = {"point": place, "weight": place, "knot": at}
+        return replace(self, **{name: values[rows.get(name, chosen)] for name, values in _stored(self).items()})
 
 
-def slices(size: Ints, chosen: Ints) -> Ints:
+def _slices(size: Ints, chosen: Ints) -> Ints:
     """Indices of the parts `chosen` of a table that consists of parts of given sizes."""
     first = np.cumsum(size) - size
     count = size[chosen]
@@ -113,32 +109,13 @@ def slices(size: Ints, chosen: Ints) -> Ints:
 
 
 @dataclass(frozen=True)
-class NcArcs:
+class NcArcs(_Shapes):
     """The circular elements, k of them."""
 
-    element: Ints = field(default_factory=lambda: np.zeros(0, np.int64))  #: (k,)
     centre: Floats = field(default_factory=lambda: np.zeros((0, 3)))  #: (k, 3) mm: a point of the arc's axis
     #: (k, 3): unit vector; the rotation is right-handed about it
     normal: Floats = field(default_factory=lambda: np.zeros((0, 3)))
     sweep: Floats = field(default_factory=lambda: np.zeros(0))  #: (k,) rad: always positive
-
-    def __len__(self) -> int:
-        return len(self.element)
-
-    def part(self, first: int, stop: int) -> NcArcs:
-        """Arcs that are elements from `first` to `stop`, the latter excluded."""
-        a, b = np.searchsorted(self.element, (first, stop)).tolist()
-        return NcArcs(self.element[a:b] - first, self.centre[a:b], self.normal[a:b], self.sweep[a:b])
-
-    @classmethod
-    def joined(cls, parts: Sequence[NcArcs], start: Sequence[int]) -> NcArcs:
-        """Arcs of parts of a text whose elements are counted from `start` on."""
-        pairs = [(part, first) for part, first in zip(parts, start, strict=False) if len(part)]
-        if not pairs:
-            return cls()
-        own = {name: np.concatenate([getattr(part, name) for part, _ in pairs]) for name in vars(pairs[0][0])}
-        own["element"] = np.concatenate([part.element + first for part, first in pairs])
-        return cls(**own)
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,6 +139,11 @@ class Problem:
     nc_line: int
     text: str  #: one sentence in the user's words
     amount: float = float("nan")  #: how much, mm, where that says something; else NaN
+
+    @classmethod
+    def at(cls, code: str, wrong: Bools, line: Ints, text: str, most: int | None = None) -> list[Problem]:
+        """One for each row where something is wrong, or for the first of them; `line` are the NC lines of the rows."""
+        return [cls(code, 0, number, text) for number in line[np.flatnonzero(wrong)[:most]].tolist()]
 
     def message(self, place: str, beside: str = "") -> str:
         """Give it as it is printed, with another place in brackets."""
@@ -207,22 +189,13 @@ class Elements:
 
     def only(self, kept: Bools) -> Elements:
         """Those of the elements, among them all curves and arcs."""
-        own: dict[str, Any] = {name: getattr(self, name)[kept] for name in _COLUMNS}
-        return replace(self, **own).moved_on(np.cumsum(kept) - 1)
+        return self.divided(np.flatnonzero(kept), np.cumsum(kept) - 1)
 
     def divided(self, owner: Ints, last: Ints) -> Elements:
         """Every element as often as it is in `owner`, ascending; curves and arcs are the `last` of theirs."""
         own: dict[str, Any] = {name: getattr(self, name)[owner] for name in _COLUMNS}
-        return replace(self, **own).moved_on(last)
-
-    def moved_on(self, number: Ints) -> Elements:
-        """The same with other numbers for the elements that are curves and arcs."""
-        curves, arcs = self.curves, self.arcs
-        return replace(
-            self,
-            curves=replace(curves, element=number[curves.element]),
-            arcs=replace(arcs, element=number[arcs.element]),
-        )
+        curves = replace(self.curves, element=last[self.curves.element])
+        return replace(self, **own, curves=curves, arcs=replace(self.arcs, element=last[self.arcs.element]))
 
     def at_most(self) -> Self:
         """Return the same elements with feeds that those of the moves are not below.
@@ -262,8 +235,7 @@ class NcProgram(Elements):
     problems: tuple[Problem, ...]  #: what breaks the rules of the control
     units: Units
     blocks: int  #: those that are not empty, ``%`` and comments left out
-    #: kinds of tokens (see `statements`), or pairs of kind and value, that the control has no words for
-    unsaid: frozenset[str | tuple[str, float]] = frozenset()
+    means: Means  #: what words of the control say beside the motion
     #: cuts that are left along the tool for a retract and gone on with: the elements along the tool, out and above, and
     #: NC lines of leaving and of coming back
     left_cuts: tuple[tuple[int, int, int, int], ...] = ()

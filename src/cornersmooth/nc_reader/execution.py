@@ -11,8 +11,7 @@ import numpy as np
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.arcs import circles
 from cornersmooth.nc_reader.elements import Curves, Element, Elements, NcArcs, Problem
-from cornersmooth.nc_reader.long_curves import cut_long
-from cornersmooth.nc_reader.splines import interval_curves, knot_curves, poly_curves, spl_curves
+from cornersmooth.nc_reader.splines import cut_long, interval_curves, knot_curves, poly_curves, spl_curves
 from cornersmooth.nc_reader.words import BSPLINE, NURBS, POLY, SPL, Table
 
 _TIP, _VECTOR, _POINT = "XYZ", "IJK", "UVW"
@@ -123,9 +122,7 @@ def execute(table: Table, modal: Modal, problems: list[Problem]) -> tuple[Elemen
         tip_room=none.copy(),
         curves=replace(curves, element=curved) if len(curves) else curves,
     )
-    unknown = np.flatnonzero(np.isnan(code[rows]))
-    if len(unknown):
-        problems.append(Problem("CS502", 0, int(run.line[unknown[0]]), "a motion before the first G0 or G1"))
+    problems += Problem.at("CS502", np.isnan(code[rows]), run.line, "a motion before the first G0 or G1", most=1)
     _check_straight(table, straight, problems, knots="R PL PW K" if points or modal.rotary else "R PL PW")
     if modal.inverse_time:
         _check_inverse_time(table, code, rows, problems)
@@ -212,8 +209,7 @@ def _vectors(table: Table, modal: Modal, straight: Bools, values: Floats, proble
     bare = values[:, 2] == 0
     if bare.any():  # seldom: only then the others are looked at
         bare &= given & (values[:, 0] == 0) & (values[:, 1] == 0)
-        text = "a tool vector without length"
-        problems.extend(Problem("CS507", 0, int(table.line[row]), text) for row in np.flatnonzero(bare).tolist())
+        problems += Problem.at("CS507", bare, table.line, "a tool vector without length")
     return given
 
 
@@ -261,36 +257,22 @@ def _check_starts(run: Elements, modal: Modal, exact: Bools, problems: list[Prob
     """First control points must be where the tool is, digit for digit (FANUC alarm PS1009)."""
     element = run.curves.element[exact]
     control = run.curves.point.take(run.curves.first_point[exact], axis=0)
-    wrong = np.zeros(len(element), np.bool_)
-    for ends, start, columns in ((run.tip, modal.tip, (0, 1, 2)), (run.second, modal.second, (3, 4, 5))):
-        for k, column in enumerate(columns):
-            position = ends[element - 1, k]
-            position[element == 0] = start[k]
-            wrong |= control[:, column] != position
-    for k in np.flatnonzero(wrong).tolist():
-        text = "first control point is not the current position"
-        problems.append(Problem("CS519", 0, int(run.line[element[k]]), text))
+    before = np.hstack((run.tip[element - 1], run.second[element - 1]))
+    before[element == 0] = (*modal.tip, *modal.second)
+    text = "first control point is not the current position"
+    problems += Problem.at("CS519", (control != before).any(axis=1), run.line[element], text)
 
 
 def _check_straight(table: Table, straight: Bools, problems: list[Problem], *, knots: str) -> None:
     """Words of curves have no meaning on lines: what was to begin the curve is missing."""
-    for name in knots.split():
-        column = table.columns.get(name)
-        if column is None:
-            continue
-        rows = np.flatnonzero(straight & ~np.isnan(column))
-        if len(rows):
-            text = "curve blocks without what begins a curve before them"
-            problems.append(Problem("CS511", 0, int(table.line[rows[0]]), text))
-            return
+    given = [~np.isnan(table.columns[name]) for name in knots.split() if name in table.columns]
+    if given:
+        text = "curve blocks without what begins a curve before them"
+        problems += Problem.at("CS511", straight & np.any(given, axis=0), table.line, text, most=1)
 
 
 def _check_inverse_time(table: Table, code: Floats, rows: Ints, problems: list[Problem]) -> None:
     """Under G93 every block of feed needs its F, and curves are refused (FANUC alarm PS1006)."""
-    missing = rows[np.isnan(table.column("F")[rows]) & (code[rows] > 0)]
-    curved = rows[code[rows] == NURBS]
-    for wrong, number, text in (
-        (missing, "CS542", "a block without F at inverse time feed (G93)"),
-        (curved, "CS511", "a curve at inverse time feed (G93)"),
-    ):
-        problems.extend(Problem(number, 0, int(table.line[row]), text) for row in wrong[:1].tolist())
+    line, missing = table.line[rows], np.isnan(table.column("F")[rows]) & (code[rows] > 0)
+    problems += Problem.at("CS542", missing, line, "a block without F at inverse time feed (G93)", most=1)
+    problems += Problem.at("CS511", code[rows] == NURBS, line, "a curve at inverse time feed (G93)", most=1)

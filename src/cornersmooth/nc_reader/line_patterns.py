@@ -47,9 +47,6 @@ _CARE: Final = bytes(0 if code in b"0123456789" else 255 for code in range(256))
 _MOST_DIGITS: Final = 15
 _NUMBER: Final = re.compile(rb"(?P<sign>[-+]?)(?P<whole>\d*)(?P<point>\.?)(?P<part>\d*)(?:E(?P<power>[-+]?\d+))?")
 
-#: numbers of so few bytes are compared before they are read: they may all be the same
-_FEW: Final = 4
-
 #: the bytes behind the point, for so many decimals; all where there is no point
 _BEHIND = np.array([((1 << (8 * k)) - 1) << (64 - 8 * k) for k in range(9)] + [(1 << 64) - 1], np.uint64)
 #: the first bits of a word
@@ -161,8 +158,7 @@ class LinePatterns:
 class Lines:
     """Lines of a chunk, each with its pattern."""
 
-    raw: Bytes  #: (n,): the text between line ends, `MARGIN` before it
-    words: NDArray[np.void]  #: what stands from every place of it on
+    words: NDArray[np.void]  #: what stands from every place of the text on, between line ends, `MARGIN` before it
     start: Ints  #: (l,): first byte of every line
     label: Ints  #: (l,): row of `line_patterns`
     patterns: list[LinePattern]
@@ -197,87 +193,63 @@ class Lines:
 
     def _numbers(self, start: Ints, label: Ints, table: Ints) -> list[Floats]:
         """Numbers of lines with the same letters, one array for each of them; `table` as in `LinePattern.fields`."""
+
+        def each(values: Any) -> Any:
+            """Value for every line, or the one of all."""
+            return values.take(label) if isinstance(values, np.ndarray) else values
+
         found: list[Floats] = []
         at = np.empty(len(start), np.int64)
-        for column in _columns(table):
-            np.add(start, _each(column.begin, label), out=at)
+        for begin, behind, keep, divisor, lead_begin, lead_keep, point, long, lead in _columns(table):
+            np.add(start, each(begin), out=at)
             word = self.words[at].view(np.uint64)
-            if column.short:
-                same = word >> np.uint64(64 - 8 * column.short)
-                if (same == same[0]).all():
-                    last = int(at[0]) + DIGITS
-                    found.append(np.full(len(at), float(self.raw[last - column.short : last].tobytes())))
-                    continue
-            if column.point:  # close the gap that it leaves
+            if point:  # close the gap that it leaves
                 closed = word << _EIGHT
-                if column.long:
+                if long:
                     at -= DIGITS
                     before = self.words[at].view(np.uint64)
                     before >>= _REST
                     closed |= before
                 word ^= closed
-                word &= _each(column.behind, label)
+                word &= each(behind)
                 word ^= closed
-            word &= _each(column.keep, label)
+            word &= each(keep)
             value = join_digits(word).view(np.int64)
-            if column.lead:  # digits before those eight
-                np.add(start, _each(column.lead_begin, label), out=at)
+            if lead:  # digits before those eight
+                np.add(start, each(lead_begin), out=at)
                 word = self.words[at].view(np.uint64)
-                word &= _each(column.lead_keep, label)
+                word &= each(lead_keep)
                 value += 10**DIGITS * join_digits(word).view(np.int64)
-            found.append(np.divide(value, _each(column.divisor, label)))
+            found.append(np.divide(value, each(divisor)))
         return found
 
 
-@dataclass(frozen=True)
-class _Column:
-    """How to read one number of lines with the same letters; values of every pattern, or the one of all."""
+def _columns(table: Ints) -> Iterator[tuple[Any, ...]]:
+    """How to read the numbers of lines with the same letters, of which `table` is as in `LinePattern.fields`.
 
-    begin: Any  #: from the start of the line to eight bytes before the end of the number
-    #: the bytes behind the point, and the last eight digits
-    behind: Any
-    keep: Any
-    divisor: Any
-    lead_begin: Any  #: from the start of the line to eight bytes before the end of the digits before those
-    lead_keep: Any  #: the digits before those
-    #: whether there is a point, and more bytes than a word has, in any pattern
-    point: bool
-    long: bool
-    lead: bool  #: whether there are digits before the last eight, in any pattern
-    short: int  #: bytes of the number, its sign included, where they are few and as many in all patterns; else 0
-
-
-def _columns(table: Ints) -> list[_Column]:
-    """Columns of a table as in `LinePattern.fields`."""
+    Of each number, one value for every pattern or the one of all: from the start of the line to eight bytes before its
+    end; the bytes behind the point; its last eight digits; what to divide by; the same of the digits before those
+    eight. Then of any pattern: whether there is a point, more bytes than a word has, digits before the last eight.
+    """
     end, digits, decimals, power, minus = np.ascontiguousarray(table.transpose(2, 0, 1))
     size = digits + (decimals >= 0)
     divisor = np.where(minus > 0, -1.0, 1.0) * _TENS[power]
     lead = np.maximum(digits - DIGITS, 0)
     lead_begin = end - 2 * DIGITS - (decimals >= 0)
     values = (end - DIGITS, _BEHIND[decimals], LAST_DIGITS[digits - lead], divisor, lead_begin, LAST_DIGITS[lead])
-    short = (size <= _FEW) & (size == size[0]) & (minus == minus[0]) & (power == np.maximum(decimals, 0))
-    return [
-        _Column(*column)
-        for column in zip(
-            *map(_alike, values),
-            (decimals >= 0).any(axis=0).tolist(),
-            (size > DIGITS).any(axis=0).tolist(),
-            (lead > 0).any(axis=0).tolist(),
-            np.where(short.all(axis=0), size[0] + minus[0], 0).tolist(),
-            strict=True,
-        )
-    ]
+    return zip(
+        *map(_alike, values),
+        (decimals >= 0).any(axis=0).tolist(),
+        (size > DIGITS).any(axis=0).tolist(),
+        (lead > 0).any(axis=0).tolist(),
+        strict=True,
+    )
 
 
 def _alike(values: NDArray[Any]) -> list[Any]:
     """Columns of a table, those that are all the same as one value."""
     same = (values == values[0]).all(axis=0).tolist()
     return [values[0, k] if one else values[:, k] for k, one in enumerate(same)]
-
-
-def _each(values: Any, label: Ints) -> Any:
-    """Value for every line, or the one of all."""
-    return values.take(label) if isinstance(values, np.ndarray) else values
 
 
 _TENS = np.array([float(f"1e{k}") for k in range(23)])
@@ -365,7 +337,7 @@ def _labelled(
         _, first, inverse = np.unique(label[rows], return_index=True, return_inverse=True)
         label[rows] = len(known) + inverse
         sample = rows[first]
-    return Lines(raw, words_of(raw), start, label, known)
+    return Lines(words_of(raw), start, label, known)
 
 
 def _unlike(raw: Bytes, start: Ints, size: Ints, label: Ints, known: list[LinePattern]) -> Bools | bool:

@@ -34,10 +34,9 @@ _KINDS = {
 }
 
 
-def first_wrong(code: str, wrong: Bools, line: Ints, text: str) -> Iterator[Problem]:
+def first_wrong(code: str, wrong: Bools, line: Ints, text: str) -> list[Problem]:
     """The first of some rows where something is wrong, if there is one; `line` are the NC lines of the rows."""
-    if wrong.any():
-        yield Problem(code, 0, int(line[np.argmax(wrong)]), text)
+    return Problem.at(code, wrong, line, text, most=1)
 
 
 def control_problems(table: Table, state: Reader, code: float, approach: Set[int]) -> Iterator[Problem]:

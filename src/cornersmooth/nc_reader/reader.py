@@ -6,7 +6,7 @@ import math
 import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from typing import Any, Final, NoReturn
+from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 import numpy as np
 
@@ -28,10 +28,12 @@ from cornersmooth.nc_reader.needed_states import (
     unclamped_problems,
 )
 from cornersmooth.nc_reader.planes import ASIDE, NOT_ABOVE, TiltedPlane
-from cornersmooth.nc_reader.reading_options import ReadingOptions, Steps
 from cornersmooth.nc_reader.retracts import Retracts
 from cornersmooth.nc_reader.rotary import MOST_LINES
 from cornersmooth.nc_reader.words import MOTION_CODES, Line, Table, joined_tables, table_of
+
+if TYPE_CHECKING:
+    from cornersmooth.nc_reader.reading import ReadingOptions, Steps
 
 #: share of the tolerance, at the axis point, that a tool without words for its axis may lean
 FIXED_SHARE: Final = 0.1
@@ -379,18 +381,20 @@ class Reader:
         """Element that words stand before."""
         return self.elements - (self.elements == self.withdrawn)
 
-    def event(self, line: Line, letter: str, value: float, text: str = "", *, late: bool = False) -> None:
-        """Say a word that stands beside the motion; a late one acts after the motion of its block."""
+    def event(self, line: Line, letter: str, value: float, text: str = "") -> None:
+        """Say a word that stands beside the motion."""
         self.flush()
         if letter == "T":
             self._tool = value
             self.retracts.forget()
+        elif letter == "S":
+            self.memory.speed = value
         elif (letter, value) == ("M", 6.0) and self.rotary is not None:
             self._take_tool()
         if letter == "M" and self.rotary is not None and take_clamp(value, self.rotary.machine, self.memory):
             return
         event = Event(self._place, line.number, letter, value, text)
-        (self.late if late else self.events).append(event)
+        (self.late if self.dialect.after_motion(letter, value) else self.events).append(event)
 
     def move(self, line: Line, row: dict[str, float], *, later: bool = False) -> None:
         """Execute a single motion block, `later` with those behind it; one without position only changes what holds."""

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.nc_reader.curves import basis, groups
+from cornersmooth.nc_reader.curves import basis, bernstein, groups
 from cornersmooth.nc_reader.elements import Curves, Element, Elements
 from cornersmooth.nc_reader.execution import Modal
 from cornersmooth.nc_reader.needed_states import MOST_TURN
@@ -85,11 +85,13 @@ class Rotary:
 
     def carried(self, vectors: Floats, angles: Floats) -> Floats:
         """(n, 3) vectors of the machine in a part that tables have turned by (n, 2) degrees."""
-        for index in (1, 0):
-            axis = self.machine.axes[index]
-            if axis.carrier == "table":
-                vectors = _turned(axis, angles[:, index], vectors)
+        for axis, column in self._carrying("table"):
+            vectors = _turned(axis, angles[:, column], vectors)
         return vectors
+
+    def _carrying(self, carrier: str) -> list[tuple[RotaryAxis, int]]:
+        """Axes that carry the table, or the head, and their columns; the nearest to the tool first."""
+        return [(axis, column) for column, axis in reversed([*enumerate(self.machine.axes)]) if axis.carrier == carrier]
 
     def tips(self, position: Floats, angles: Floats) -> Floats:
         """(n, 3) tips in the part, mm, for words of the linear axes and degrees.
@@ -102,16 +104,12 @@ class Rotary:
         machine = self.machine
         nose = machine.tool_length * machine.tool
         swing = np.zeros_like(position)
-        for index in (1, 0):
-            axis = machine.axes[index]
-            if axis.carrier == "head":
-                pivot = nose + axis.point
-                swing = pivot + _turned(axis, angles[:, index], swing - pivot)
+        for axis, column in self._carrying("head"):
+            pivot = nose + axis.point
+            swing = pivot + _turned(axis, angles[:, column], swing - pivot)
         tip = position + swing + machine.part_zero
-        for index in (1, 0):
-            axis = machine.axes[index]
-            if axis.carrier == "table":
-                tip = axis.point + _turned(axis, angles[:, index], tip - axis.point)
+        for axis, column in self._carrying("table"):
+            tip = axis.point + _turned(axis, angles[:, column], tip - axis.point)
         return tip - machine.part_zero
 
     def levers(self, position: Floats) -> Floats:
@@ -260,19 +258,15 @@ class Rotary:
             return none, axis_bend
         nose = machine.tool_length * machine.tool
         moved = _Moved(np.zeros_like(start), none, none)
-        for index in (1, 0):
-            axis = machine.axes[index]
-            if axis.carrier == "head":
-                moved = moved.turned(axis, angles[:, index], turn[:, index], nose + np.array(axis.point))
+        for axis, k in self._carrying("head"):
+            moved = moved.turned(axis, angles[:, k], turn[:, k], nose + axis.point)
         moved = replace(
             moved,
             point=moved.point + start + machine.part_zero,
             way=moved.way + np.linalg.norm(end - start, axis=1),
         )
-        for index in (1, 0):
-            axis = machine.axes[index]
-            if axis.carrier == "table":
-                moved = moved.turned(axis, angles[:, index], turn[:, index], np.array(axis.point))
+        for axis, k in self._carrying("table"):
+            moved = moved.turned(axis, angles[:, k], turn[:, k], np.array(axis.point))
         return moved.bend, axis_bend
 
     def _timed(self, run: Elements, position: Floats, tip: Floats, vector: Floats, angles: Floats) -> Elements:
@@ -360,10 +354,10 @@ class Rotary:
             return whole.reshape(len(points), spans, len(share), 7)
 
         nodes = at(t)
-        bezier = np.einsum("ij,ksjd->ksid", np.linalg.inv(_bernstein(t)), nodes)
+        bezier = np.einsum("ij,ksjd->ksid", np.linalg.inv(bernstein(_ORDER, t)), nodes)
         bezier[:, :, [0, -1]] = nodes[:, :, [0, -1]]
         true = at(between)
-        close = np.einsum("ij,ksjd->ksid", _bernstein(between), bezier)
+        close = np.einsum("ij,ksjd->ksid", bernstein(_ORDER, between), bezier)
         off = np.linalg.norm(close[..., 3:6] / close[..., 6:] - true[..., 3:6] / true[..., 6:], axis=3)
         good = off.max(axis=(1, 2)) * self.axis_length <= self.sagitta / 10
         joined = np.concatenate((bezier[:, :, :-1].reshape(len(points), -1, 7), bezier[:, -1, -1:]), axis=1)
@@ -402,14 +396,6 @@ class _Moved:
 def _apart(a: Floats, b: Floats) -> Floats:
     """Degrees between unit vectors, row by row."""
     return np.degrees(2.0 * np.arcsin(np.minimum(np.linalg.norm(a - b, axis=1) / 2.0, 1.0)))
-
-
-def _bernstein(t: Floats) -> Floats:
-    """(len(t), order) Bernstein polynomials."""
-    degree = _ORDER - 1
-    i = np.arange(_ORDER)
-    binomial = np.cumprod(np.concatenate(([1.0], (degree - i[:-1]) / (i[:-1] + 1))))
-    return binomial * t[:, None] ** i * (1 - t[:, None]) ** (degree - i)
 
 
 def _turned(axis: RotaryAxis, degrees: Floats, vectors: Floats) -> Floats:

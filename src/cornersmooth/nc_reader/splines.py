@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.nc_reader.elements import Curves, Problem, slices
+from cornersmooth.nc_reader.elements import Curves, Problem
 from cornersmooth.nc_reader.words import Table
 
 #: FANUC: order of a curve whose first block has no P (B-63324EN/03 4.17)
@@ -64,21 +64,17 @@ def knot_curves(
     weight = np.where(np.isnan(weight), 1.0, weight)
 
     def complain(mask: Bools, code: str, text: str) -> None:
-        problems.extend(Problem(code, 0, int(table.line[rows[k]]), text) for k in np.flatnonzero(mask).tolist())
-
-    def complain_curve(mask: Bools, code: str, text: str) -> None:
-        wrong = np.zeros(len(rows), np.bool_)
-        wrong[start[mask]] = True
-        complain(wrong, code, text)
+        line = table.line[rows if len(mask) == len(rows) else rows[start]]
+        problems.extend(Problem.at(code, mask, line, text))
 
     gap = np.append(False, (np.diff(table.line[rows]) != 1) & ~starts[rows][1:])
     complain(gap, "CS510", "something else is between the blocks of a curve")
     complain(np.isnan(knot), "CS512", "a curve block without its knot K")
     knot = np.nan_to_num(knot)
     single = size - points
-    complain_curve(single < order, "CS513", "fewer blocks with only a knot than the order of the curve asks for")
-    complain_curve(single > order, "CS513", "more blocks with only a knot than the order of the curve asks for")
-    complain_curve((points < order) | (order < 2), "CS514", "fewer control points than the order of the curve")
+    complain(single < order, "CS513", "fewer blocks with only a knot than the order of the curve asks for")
+    complain(single > order, "CS513", "more blocks with only a knot than the order of the curve asks for")
+    complain((points < order) | (order < 2), "CS514", "fewer control points than the order of the curve")
     late = is_point[1:] & ~is_point[:-1]
     late &= ~starts[rows][1:]
     complain(np.append(False, late), "CS515", "a control point after the blocks with only a knot")
@@ -96,19 +92,17 @@ def knot_curves(
     falls = np.append(False, (np.diff(knot) < 0) & ~starts[rows][1:])
     complain(falls, "CS516", "a knot below the one before it")
     unclamped = _unclamped(knot, start, size, order)
-    complain_curve(unclamped, "CS517", "first or last knots that are not all equal")
+    complain(unclamped, "CS517", "first or last knots that are not all equal")
     crowded = _crowded(knot, start, size, order) & np.repeat(single == order, size)
     complain(crowded, "CS517", "a knot that is repeated more often than the order of the curve")
     point_rows = rows[is_point]
-    wrong = np.flatnonzero((weight <= 0) | ~np.isfinite(weight))
-    text = "a weight R that is not positive"
-    problems.extend(Problem("CS518", 0, int(table.line[row]), text) for row in point_rows[wrong].tolist())
+    wrong = (weight <= 0) | ~np.isfinite(weight)
+    problems += Problem.at("CS518", wrong, table.line[point_rows], "a weight R that is not positive")
     weight[wrong] = 1.0  # has been said; what follows wants curves that can be measured
     bad = (single != order) | (points < order) | (order < 2) | unclamped
     bad |= np.logical_or.reduceat(falls | crowded, start)
-    own = _exactly(knot, start, size, points + order)
     if bad.any():
-        order, own = _replaced(own, order, points, bad)
+        order, knot = _replaced(knot, start, order, points, bad)
     return Curves(
         element=rows[start],
         end=point_rows[np.cumsum(points) - 1],
@@ -116,32 +110,26 @@ def knot_curves(
         points=points,
         point=six[point_rows],
         weight=weight,
-        knot=own,
+        knot=knot,
     )
 
 
-def _replaced(knot: Floats, order: Ints, points: Ints, bad: Bools) -> tuple[Ints, Floats]:
+def _replaced(knot: Floats, start: Ints, order: Ints, points: Ints, bad: Bools) -> tuple[Ints, Floats]:
     """Orders and knots with those of malformed curves replaced by such that can be measured."""
     fitting = np.where(bad, np.clip(order, 1, np.maximum(points, 1)), order)
-    first = np.cumsum(points + order) - points - order
     parts = []
-    for k in range(len(points)):
-        count, own = int(points[k]), int(fitting[k])
+    for k, (count, own) in enumerate(zip(points.tolist(), fitting.tolist(), strict=True)):
         inner = np.arange(1.0, max(count - own, 0) + 1)
         clamped = np.concatenate((np.zeros(own), inner, np.full(own, len(inner) + 1.0)))
-        parts.append(clamped if bad[k] else knot[first[k] : first[k] + count + own])
+        parts.append(clamped if bad[k] else knot[start[k] : start[k] + count + own])
     return fitting, np.concatenate(parts)
 
 
 def _unclamped(knot: Floats, start: Ints, size: Ints, order: Ints) -> Bools:
-    """(c,) whether the first `order` or the last `order` knots of a curve differ."""
-    wrong = np.zeros(len(start), np.bool_)
-    for k in range(1, int(order.max(initial=1))):
-        used = k < np.minimum(order, size)
-        wrong[used] |= knot[start[used] + k] != knot[start[used]]
-        end = start[used] + size[used] - 1
-        wrong[used] |= knot[end - k] != knot[end]
-    return wrong
+    """(c,) whether the first `order` or the last `order` knots of a curve, which do not fall, differ."""
+    end = start + size - 1
+    inner = np.clip(np.minimum(order, size), 1, None) - 1
+    return (knot[start + inner] != knot[start]) | (knot[end - inner] != knot[end])
 
 
 def _crowded(knot: Floats, start: Ints, size: Ints, order: Ints) -> Bools:
@@ -149,14 +137,6 @@ def _crowded(knot: Floats, start: Ints, size: Ints, order: Ints) -> Bools:
     before = np.arange(len(knot)) - np.repeat(order, size)
     own = (before >= np.repeat(start, size)) & (np.repeat(order, size) > 0)
     return own & (knot == knot[np.maximum(before, 0)])
-
-
-def _exactly(knot: Floats, start: Ints, size: Ints, wanted: Ints) -> Floats:
-    """Knots cut or filled to the number each curve needs, so that a malformed curve can still be measured."""
-    if (size == wanted).all():
-        return knot
-    index = np.arange(wanted.sum()) - np.repeat(np.cumsum(wanted) - wanted, wanted)
-    return knot[np.repeat(start, wanted) + np.minimum(index, np.repeat(size, wanted) - 1)]
 
 
 def interval_curves(table: Table, six: Floats, spline: Bools, before: Floats, problems: list[Problem]) -> Curves:
@@ -178,7 +158,7 @@ def interval_curves(table: Table, six: Floats, spline: Bools, before: Floats, pr
     opens = np.append(True, np.diff(rows) != 1)
 
     def complain(mask: Bools, code: str, text: str) -> None:
-        problems.extend(Problem(code, 0, int(table.line[rows[k]]), text) for k in np.flatnonzero(mask).tolist())
+        problems.extend(Problem.at(code, mask, table.line[rows], text))
 
     interval, weight = table.column("PL")[rows], table.column("PW")[rows]
     complain(np.isnan(interval), "CS512", "a spline block without its knot interval PL")
@@ -200,16 +180,15 @@ def interval_curves(table: Table, six: Floats, spline: Bools, before: Floats, pr
     index = np.repeat(rows[first] - 1 - np.cumsum(points) + points, points) + np.arange(int(points.sum()))
     control = np.vstack((before, six))[index + 1]
     own = np.concatenate(([1.0], weight))
-    at = slices(points, np.arange(len(points)))
-    place = np.repeat(first - np.cumsum(points) + points, points) + at
-    weights = own[place]
+    weights = own[np.repeat(first - np.cumsum(points) + points, points) + np.arange(int(points.sum()))]
     # the first control point of a spline is no block's own
     weights[(np.cumsum(points) - points)[opens[first]]] = 1.0
     knot = _knots_of(interval, first, count)
     order = np.full(len(first), SPLINE_ORDER, np.int64)
     bad = (points < SPLINE_ORDER) | (interval[first] != 0) | (interval[first + count - 1] != 0)
     if bad.any():
-        order, knot = _replaced(knot, order, points, bad)
+        size = points + SPLINE_ORDER
+        order, knot = _replaced(knot, np.cumsum(size) - size, order, points, bad)
     return Curves(
         element=rows[first],
         end=rows[first + count - 1],
@@ -258,7 +237,7 @@ def poly_curves(
     length = table.column("PL")[rows]
     length = np.where(np.isnan(length), 1.0, length)
     text = "a parameter interval PL that is not positive"
-    problems.extend(Problem("CS516", 0, int(table.line[row]), text) for row in rows[length <= 0].tolist())
+    problems += Problem.at("CS516", length <= 0, table.line[rows], text)
     length = np.where(length > 0, length, 1.0)[:, None]
     square = _factors(table, rows, letters, "{}2") * length**2
     cube = _factors(table, rows, letters, "{}3") * length**3
@@ -281,7 +260,7 @@ def spl_curves(table: Table, six: Floats, before: Floats, spl: Bools, letters: s
     start = end + slope + square + cube
     off = np.abs(start - np.vstack((before, six))[rows]).max(axis=1)
     text = "a spline begins more than a micrometre beside where the block before has ended"
-    problems.extend(Problem("CS519", 0, int(table.line[row]), text) for row in rows[off > _GAP].tolist())
+    problems += Problem.at("CS519", off > _GAP, table.line[rows], text)
     return bezier_curves(rows, rows, np.stack((start, end + 2 * slope / 3 + square / 3, end + slope / 3, end), axis=1))
 
 
@@ -304,3 +283,60 @@ def bezier_curves(row: Ints, end: Ints, points: Floats) -> Curves:
         weight=np.ones(4 * count),
         knot=np.tile(_KNOTS, count),
     )
+
+
+def cut_long(curves: Curves) -> tuple[Curves, Bools]:
+    """Cut curves through several corners at their knots, so that what is measured is near one place of the path.
+
+    Cubics with all weights 1, distinct inner knots and a parameter that does not run from 0 to 1 are cut; the curve of
+    one corner has knots from 0 to 1. The part between two knots belongs to the block whose control point ends it.
+
+    Returns
+    -------
+    Curves
+        Each part has knots from 0 to 1, and starts where the one before it ends.
+    cut : (c,) bool
+        Which of the curves are parts.
+    """
+    size, first_knot, first_point = curves.points + curves.order, curves.first_knot, curves.first_point
+    plain = np.logical_and.reduceat(curves.weight == 1.0, first_point) & (curves.order == 4)
+    rises = np.append(np.diff(curves.knot) > 0, False)
+    within = np.arange(len(curves.knot)) - np.repeat(first_knot, size)
+    wanted = (within >= 3) & (within < np.repeat(curves.points, size))
+    long = plain & (curves.points > 4) & np.logical_and.reduceat(rises | ~wanted, first_knot)
+    long &= curves.knot[first_knot + size - 1] != 1.0
+    if not long.any():
+        return curves, np.zeros(len(curves), np.bool_)
+    number = np.where(long, curves.points - 3, 1)
+    owner = np.repeat(np.arange(len(curves)), number)
+    k = np.arange(len(owner)) - np.repeat(np.cumsum(number) - number, number)
+    mine = long[owner]
+    own, place = owner[mine], k[mine]
+    bezier = _intervals_alone(curves, first_knot[own] + place, first_point[own] + place)
+    for outer, at in ((place == 0, 0), (place == curves.points[own] - 4, 3)):
+        bezier[outer, at] = curves.point[(first_point[own] + place)[outer] + at]  # digit for digit
+    bezier[1:][place[1:] > 0, 0] = bezier[:-1][place[1:] > 0, 3]
+    row, end = curves.element[owner], curves.end[owner]
+    block = end - curves.points[owner] + 4 + k  # of the control point that ends each part
+    end = np.where(mine, block, end)
+    row = np.where(mine & (k > 0), block, row)
+    parts = bezier_curves(row[mine], end[mine], bezier)
+    others = curves.only(np.flatnonzero(~long))
+    joined = Curves.joined([parts, others])
+    return joined, np.isin(joined.element, parts.element)
+
+
+def _intervals_alone(curves: Curves, knot: Ints, point: Ints) -> Floats:
+    """(r, 4, 6) Bézier points of the knot intervals behind knots `knot` + 3, from control points `point` on.
+
+    By blossoms: f(b, c, d) is the control point with these inner knots, and f is affine in each argument.
+    """
+    a, b, c, d, e, f = (curves.knot[knot + shift][:, None] for shift in range(1, 7))
+    p0, p1, p2, p3 = (curves.point[point + shift] for shift in range(4))
+    second = p1 + (c - b) / (e - b) * (p2 - p1)  # f(c, c, d)
+    third = p1 + (d - b) / (e - b) * (p2 - p1)  # f(c, d, d)
+    before = p0 + (c - a) / (d - a) * (p1 - p0)  # f(b, c, c)
+    behind = p2 + (d - c) / (f - c) * (p3 - p2)  # f(d, d, e)
+    start = before + (c - b) / (d - b) * (second - before)
+    end = third + (d - c) / (e - c) * (behind - third)
+    return np.stack((start, second, third, end), axis=1)

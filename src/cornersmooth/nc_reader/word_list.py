@@ -12,8 +12,15 @@ The lists are data, one TOML file for each control in `word_lists`, with the man
     Whether tip control is switched by blocks that the machine's file names.
 ``orders``
     What a comment begins with that the control would obey.
+``spelling``
+    How the words are spelt: a class of `dialects`; ``"iso"`` unless it says otherwise.
 ``[grammar]``
     How the words are read: attributes of the control's class in `dialects`.
+``[means]``
+    What words say beside the motion, as `statements` has it: the kind, then the word of the CL file. Words of spindle
+    and coolant need no ``[[word]]``: their rules follow. What is no value here the control has no word for. A third
+    part says of what kind alone a word is the end (``M89 = "coolant OFF THRU"``). ``""``: not the word of a control
+    that this one is like.
 ``[[word]]``
     ``is``: the word, blanks left out. ``says``: what it means, for the documentation.
 
@@ -38,7 +45,7 @@ The lists are data, one TOML file for each control in `word_lists`, with the man
     ``outside``: it may not be said while a word that ``ends`` holds. ``drops``: a state that the control forgets with
     it, and that must be said behind it. ``moves``: the tool moves, though the block names no axis.
 
-    In programs of our own: ``bars``: a state of which no word that is ``tidy`` or ``ends`` may hold where it is said.
+    In programs of our own: ``bars``: states of which no word that is ``tidy`` or ``ends`` may hold where it is said.
     ``tidy``: it must be switched off before another tool and at the end. ``preset``: the one that is meant where the
     head names none. ``down``: one of its state must hold where the tool comes down from a retract while a word like
     this holds.
@@ -51,16 +58,27 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cache, cached_property
 from importlib.resources import files
 from typing import Any, Final
 
 from cornersmooth.nc_reader.words import Word
 
+#: words, and kind and value of what each says beside the motion
+Means = Mapping[str, tuple[str, str]]
+
+#: values that end a state, or do not begin one
+_ENDS: Final = frozenset(("OFF", "ORIENT"))
+
+_LISTS: Final = files(__package__).joinpath("word_lists")
+
+#: controls whose texts are read
+CONTROLS: Final = tuple(sorted(item.name.removesuffix(".toml") for item in _LISTS.iterdir()))
+
 #: keys of a word that are regular expressions
-_PATTERNS: Final = frozenset(("is", "needs", "must", "after", "then", "behind", "down"))
+_PATTERNS: Final = frozenset(("is", "needs", "must", "after", "then", "behind", "down", "bars"))
 
 
 @dataclass(frozen=True)
@@ -97,7 +115,7 @@ class WordRule:
     first: str = ""
     tidy: bool = False
     preset: str = ""
-    bars: str = ""
+    bars: re.Pattern[str] | None = None
     down: re.Pattern[str] | None = None
 
     @property
@@ -115,8 +133,10 @@ class WordList:
     header: re.Pattern[str] | None = None
     points: frozenset[str] = frozenset()
     switches: bool = False
+    spelling: str = "iso"
     orders: re.Pattern[str] | None = None
     grammar: Mapping[str, Any] = field(default_factory=dict)
+    means: Means = field(default_factory=dict)
     #: what is the control's own comes first
     words: tuple[WordRule, ...] = ()
     blocks: tuple[WordRule, ...] = field(default=())
@@ -142,11 +162,49 @@ class WordList:
 @cache
 def word_list(control: str) -> WordList:
     """Words of a control."""
-    table = tomllib.loads(files(__package__).joinpath("word_lists", f"{control}.toml").read_text(encoding="utf-8"))
-    base = word_list(table.pop("like")) if "like" in table else WordList()
-    words, blocks = (tuple(map(_rule, table.pop(key, ()))) for key in ("word", "block"))
-    own = {key: _READ[key](value) for key, value in table.items()}
-    return replace(base, **own, words=(*words, *base.words), blocks=(*blocks, *base.blocks))
+    table = _table(control)
+    means = {word: text.split() for word, text in table.pop("means").items() if text}
+    words, blocks = (tuple(map(_rule, table.pop(key))) for key in ("word", "block"))
+    return WordList(
+        **{key: _READ[key](value) for key, value in table.items()},
+        means={word: (parts[0], "".join(parts[1:2])) for word, parts in means.items()},
+        words=(*_functions(means), *words),
+        blocks=blocks,
+    )
+
+
+def _table(control: str) -> dict[str, Any]:
+    """Table of a control, with what it takes over of the control that it is like."""
+    table = tomllib.loads(_LISTS.joinpath(f"{control}.toml").read_text(encoding="utf-8"))
+    if "like" in table:
+        base = _table(table.pop("like"))
+        table = {
+            **base,
+            **table,
+            "means": base["means"] | table.get("means", {}),
+            **{key: [*table.get(key, ()), *base[key]] for key in ("word", "block")},
+        }
+    return table
+
+
+def _functions(means: Mapping[str, Sequence[str]]) -> Iterator[WordRule]:
+    """Rules of words of spindle and coolant: what has an end of its own is a state of its own, beside no other."""
+    apart = {f"{parts[0]} {parts[2]}" for parts in means.values() if len(parts) > 2}
+    for word, parts in means.items():
+        kind, last = parts[0], parts[-1]
+        if kind in ("spindle", "coolant"):
+            states = {kind, *(state for state in apart if state.startswith(kind))}
+            state = name if (name := f"{kind} {last}") in apart else kind
+            others = sorted(states - {state}) if len(parts) == 2 else ()
+            yield WordRule(
+                re.compile(re.escape(word)),
+                f"{' '.join(parts)}: compared with the statements",
+                state=state,
+                follows=True,
+                compared=True,
+                tidy=parts[1] not in _ENDS,
+                bars=re.compile("|".join(others)) if others else None,
+            )
 
 
 def _patterns(texts: list[str]) -> tuple[re.Pattern[str], ...]:
@@ -160,6 +218,7 @@ _READ: Final[dict[str, Callable[[Any], Any]]] = {
     "header": re.compile,
     "points": frozenset,
     "switches": bool,
+    "spelling": str,
     "orders": lambda text: re.compile(text, re.IGNORECASE),
     "grammar": dict,
 }

@@ -9,24 +9,33 @@ from dataclasses import replace
 import numpy as np
 
 from cornersmooth.model import Move, Program, Statement
+from cornersmooth.nc_reader.word_list import Means
 from cornersmooth.statements.tokens import PAUSES, SPEED_DECIMALS, Token, of_m
 
 #: cutting speeds in mm per minute
 _MM_PER_MINUTE = {"SMM": 1000.0, "SFM": 304.8}
 
-_COOLANT = {"ON": 8.0, "FLOOD": 8.0, "MIST": 7.0, "THRU": 88.0, "OFF": 9.0, "NOMORE": 9.0}
+#: planes of cutter compensation
+_PLANES = {"XYPLAN", "ZXPLAN", "YZPLAN"}
 
-_COMPENSATION = {"LEFT": 41.0, "RIGHT": 42.0, "OFF": 40.0, "NOMORE": 40.0}
+#: one word for those that ask for the same
+_ALIKE = {"ON": "FLOOD", "NOMORE": "OFF"}
 
 
 class Asking:
-    """Goes through the CL statements and notes what they ask for. What it cannot interpret asks for nothing."""
+    """Goes through the CL statements and notes what they ask for. What it cannot interpret asks for nothing.
 
-    def __init__(self, program: Program) -> None:
-        self.program = program
+    Parameters
+    ----------
+    means : mapping
+        What words of the control say (`WordList.means`), for AUXFUN.
+    """
+
+    def __init__(self, program: Program, means: Means | None = None) -> None:
+        self.program, self.means = program, means or {}
         self.tokens: list[Token] = []
         self.place, self.line, self.moment = 0.0, 0, 0
-        self.running, self.speed, self.diameter = 3.0, 0.0, 0.0
+        self.running, self.speed, self.diameter = "CLW", 0.0, 0.0
         self.tool, self.offset, self.offset_at = -1.0, 1.0, (-1, 0)
         self.moving = np.flatnonzero(program.kind != Move.FROM)
         said = {statement.word for statement in program.statements}
@@ -43,8 +52,8 @@ class Asking:
             "TLDATA": self.cutter,
             "AUXFUN": self.auxiliary,
             "END": self.end,
-            "STOP": lambda words, numbers, statement: self.say("stop", 0.0),
-            "OPSTOP": lambda words, numbers, statement: self.say("stop", 1.0),
+            "STOP": lambda words, numbers, statement: self.say("stop", "STOP"),
+            "OPSTOP": lambda words, numbers, statement: self.say("stop", "OPSTOP"),
         }
         if not said & {"LOADTL", "LOAD", "TURRET"}:
             self.handlers["TOOLNO"] = self.load
@@ -60,7 +69,7 @@ class Asking:
             self.place, self.line = place, statement.line
             handler(words, numbers, statement)
 
-    def say(self, kind: str, value: float) -> None:
+    def say(self, kind: str, value: float | str) -> None:
         """Note a token."""
         self.tokens.append(Token(kind, value, self.place, self.line, moment=self.moment))
         self.moment += kind in PAUSES
@@ -110,10 +119,10 @@ class Asking:
             return
         if {"LOCK", "ORIENT"} & set(words):
             if numbers in ([], [0.0]):
-                self.say("spindle", 19.0)
+                self.say("spindle", "ORIENT")
             return
         if {"OFF", "NOMORE"} & set(words) or numbers == [0.0]:
-            self.say("spindle", 5.0)
+            self.say("spindle", "OFF")
             return
         speed = numbers[0] if numbers else None
         cutting = next((_MM_PER_MINUTE[word] for word in words if word in _MM_PER_MINUTE), None)
@@ -122,7 +131,7 @@ class Asking:
                 return
             speed = float(round(speed * cutting / (math.pi * self.diameter)))
         if {"CLW", "CCLW"} & set(words):
-            self.running = 4.0 if "CCLW" in words else 3.0
+            self.running = "CCLW" if "CCLW" in words else "CLW"
         if speed is not None:
             self.speed = speed
             self.say("speed", round(speed, SPEED_DECIMALS))
@@ -134,17 +143,17 @@ class Asking:
             return
         words = words or ["ON"]
         kinds = ["OFF"] if "OFF" in words else [word for word in words if word != "ON"] or ["ON"]
-        if len(kinds) == 1 and not numbers and kinds[0] in _COOLANT:
-            self.say("coolant", _COOLANT[kinds[0]])
+        if len(kinds) == 1 and not numbers:
+            self.say("coolant", _ALIKE.get(kinds[0], kinds[0]))
 
     def compensation(self, words: list[str], numbers: list[float], statement: Statement) -> None:
         """Cutter compensation left, right or off."""
-        code = _COMPENSATION.get((words or [""])[0])
+        side = _ALIKE.get(words[0], words[0]) if words else ""
         register = (numbers or [self.offset])[0]
-        if code is None or not set(words[1:]) <= {"XYPLAN", "ZXPLAN", "YZPLAN"} or not _whole(register):
+        if side not in ("LEFT", "RIGHT", "OFF") or not set(words[1:]) <= _PLANES or not _whole(register):
             return
-        self.say("compensation", code)
-        if code != _COMPENSATION["OFF"]:
+        self.say("compensation", side)
+        if side != "OFF":
             self.say("register", register)
 
     def delay(self, words: list[str], numbers: list[float], statement: Statement) -> None:
@@ -165,15 +174,21 @@ class Asking:
     def auxiliary(self, words: list[str], numbers: list[float], statement: Statement) -> None:
         """An M word by its number, unless it would end or change more than a word may."""
         if len(numbers) == 1 and not words and _whole(numbers[0]) and numbers[0] not in (2, 6, 30, 98, 99):
-            self.say(*of_m(numbers[0]))
+            self.say(*of_m(numbers[0], self.means))
 
     def end(self, words: list[str], numbers: list[float], statement: Statement) -> None:
         """END in the middle of the path is a stop."""
         if len(self.moving) and statement.pose <= self.moving[-1]:
-            self.say("stop", 0.0)
+            self.say("stop", "STOP")
 
 
-def asked(program: Program, places: Sequence[float], end: float, dwells: Sequence[Token] = ()) -> list[Token]:
+def asked(
+    program: Program,
+    places: Sequence[float],
+    end: float,
+    means: Means,
+    dwells: Sequence[Token] = (),
+) -> list[Token]:
     """What the CL statements ask for.
 
     Parameters
@@ -182,16 +197,18 @@ def asked(program: Program, places: Sequence[float], end: float, dwells: Sequenc
         Where the statements stand along the path.
     end : float, mm
         Length of the path.
+    means : mapping
+        What words of the control say, as of `WordList`.
     dwells : sequence of Token
         What the cycles of holes ask for, in order.
     """
-    asking = Asking(program)
+    asking = Asking(program, means)
     for statement, place in zip(program.statements, places, strict=True):
         asking.take(statement, place)
     asking.idle_from(len(program.kind))
     line = max((item.line for item in program.statements if item.word in ("FINI", "END")), default=0)
     tokens = sorted([*dwells, *asking.tokens], key=lambda token: token.place) if dwells else asking.tokens
-    return [*tokens, Token("end", 30.0, end, line)]
+    return [*tokens, Token("end", "", end, line)]
 
 
 def _behind(statement: Statement, word: str) -> float | None:

@@ -10,10 +10,10 @@ import math
 from bisect import bisect_left
 from collections import deque
 from collections.abc import Callable, Iterator, Set
-from dataclasses import dataclass
 from itertools import pairwise, takewhile, zip_longest
 
 from cornersmooth.nc_reader.elements import Problem
+from cornersmooth.nc_reader.word_list import Means
 from cornersmooth.statements.tokens import Token
 
 #: codes and names of kinds
@@ -21,15 +21,15 @@ _NAMES = {
     "tool": ("CS551", "tool T{:g}"),
     "next tool": ("CS551", "next tool T{:g}"),
     "offset": ("CS559", "offset H{:g}"),
-    "spindle": ("CS552", "spindle M{:g}"),
+    "spindle": ("CS552", "spindle {}"),
     "speed": ("CS552", "speed S{:g}"),
-    "coolant": ("CS553", "coolant M{:g}"),
-    "compensation": ("CS554", "cutter compensation G{:g}"),
+    "coolant": ("CS553", "coolant {}"),
+    "compensation": ("CS554", "cutter compensation {}"),
     "register": ("CS554", "compensation register D{:g}"),
-    "stop": ("CS555", "stop M{:g}"),
+    "stop": ("CS555", "stop {}"),
     "dwell": ("CS556", "dwell of {:g} ms"),
     "tap": ("CS566", "tap G{:g}"),
-    "end": ("CS557", "end of program M{:g}"),
+    "end": ("CS557", "end of program{}"),
     "auxiliary": ("CS558", "M{:g}"),
 }
 
@@ -39,11 +39,14 @@ _LOOSE = frozenset(("tool", "next tool", "stop", "end"))
 #: all kinds
 KINDS = frozenset(_NAMES)
 
-#: what holds before anything is said; repeating it changes nothing
-_AT_START = {"spindle": 5.0, "coolant": 9.0, "compensation": 40.0, "offset": 1.0}
-
 #: states that a tool change and the end of the program may end by themselves
-_ENDED = {"spindle": 5.0, "coolant": 9.0, "compensation": 40.0}
+_ENDED = ("spindle", "coolant", "compensation")
+
+#: what holds before anything is said; repeating it changes nothing
+_AT_START: dict[str, float | str] = {**dict.fromkeys(_ENDED, "OFF"), "offset": 1.0}
+
+#: kinds for which a control may have no words
+_WORDED = (*_ENDED, "offset", "register")
 
 #: states that a tool change stops, to go on behind it
 _STOPPED = ("spindle", "coolant")
@@ -55,40 +58,23 @@ _STATES = ("tool", "offset", "spindle", "speed", "coolant", "compensation")
 _MOST_WAYS = 100_000
 
 #: how many tokens of both are paired, and what holds then
-_Way = tuple[int, int, float | None]
+_Way = tuple[int, int, float | str | None]
 
 #: tokens of the CL file and of the program that should be the same; None where one is missing
 _Pair = tuple[Token | None, Token | None]
 
 
-def way_between(here: float, there: float) -> float:
-    """How far two places are apart along the path, mm."""
-    return abs(there - here)
-
-
-@dataclass(frozen=True)
-class _Nearness:
-    """What is near along the path; `room` and `apart` are those of `compare`."""
-
-    room: float
-    apart: Callable[[float, float], float]
-
-    def away(self, place: float, ours: Token) -> bool:
-        """Whether a token of the program is elsewhere than asked for."""
-        nearest = min(max(place, ours.place), ours.place + ours.reach)
-        if any(abs(place - here) <= self.room + ours.room for here in (nearest, *ours.others)):
-            return False
-        # a pose is a rounding off, and its place as far from it as the room
-        return self.apart(place, nearest) > 2 * self.room + ours.room
+#: whether a token of the program is elsewhere than a place, mm of path, where the CL file asks for it
+_Away = Callable[[float, Token], bool]
 
 
 def compare(
     asked_for: list[Token],
     found: list[Token],
     room: float,
-    unsaid: frozenset[str | tuple[str, float]] = frozenset(),
-    apart: Callable[[float, float], float] = way_between,
-    own: frozenset[str] = frozenset(),
+    means: Means,
+    apart: Callable[[float, float], float],
+    own: Set[str],
 ) -> list[Problem]:
     """Compare the two, kind by kind.
 
@@ -96,24 +82,36 @@ def compare(
     ----------
     room : float, mm
         How far apart along the path the places of the same token may be.
-    unsaid : frozenset
-        Kinds, and pairs of kind and value, that the control has no words for.
+    means : mapping
+        What words of the control say, as of `WordList`: for what none says nothing is missing.
     apart : callable
         How far, in mm, two places along the path are apart that differ by more than the room.
-    own : frozenset of str
+    own : set of str
         Kinds that the user says in words of his own, which are no tokens; of most there must be no others.
     """
+
+    def away(place: float, ours: Token) -> bool:
+        nearest = min(max(place, ours.place), ours.place + ours.reach)
+        if any(abs(place - here) <= room + ours.room for here in (nearest, *ours.others)):
+            return False
+        return apart(place, nearest) > 2 * room + ours.room  # a pose is a rounding off, and its place as far from it
+
     end = max((token.place for token in asked_for if token.kind == "end"), default=math.inf)
     # what shifts the path counts wherever it is said
-    unsaid = unsaid - {token.kind for token in found if token.kind == "compensation" and token.value != 40.0}
-    asked_for = [token for token in asked_for if not {token.kind, (token.kind, token.value)} & (unsaid | own)]
-    found = [token for token in found if token.kind not in unsaid | (own & _LOOSE)]
-    near = _Nearness(room, apart)
+    shifted = {token.kind for token in found if token.kind == "compensation" and token.value != "OFF"}
+    sayable = {*shifted, *means.values()}
+
+    def counts(token: Token) -> bool:
+        names = token.kind, (token.kind, ""), (token.kind, token.value)
+        return token.kind not in _WORDED or not sayable.isdisjoint(names)
+
+    asked_for = [token for token in asked_for if counts(token) and token.kind not in own]
+    found = [token for token in found if counts(token) and token.kind not in own & _LOOSE]
     changes = [token.line for token in found if token.kind == "tool"]
     problems: list[Problem] = []
     for kind, (code, name) in _NAMES.items():
         theirs, ours = ([token for token in tokens if token.kind == kind] for tokens in (asked_for, found))
-        for wanted, token in _unlike(theirs, ours, _optional(theirs), _habits(ours, changes, end, near), near):
+        for wanted, token in _unlike(theirs, ours, _habits(ours, changes, end, away), away):
             if wanted is None:
                 assert token is not None
                 text = f"{name.format(token.value)} is nothing that the CL file asks for"
@@ -132,20 +130,13 @@ def compare(
     return problems
 
 
-def _unlike(
-    theirs: list[Token], ours: list[Token], optional: Set[int], habits: Set[int], near: _Nearness
-) -> Iterator[_Pair]:
-    """Tokens of one kind that are wrong, in another place, missing or too much: as few as can be.
-
-    Parameters
-    ----------
-    optional, habits : set of int
-        Tokens of the CL file, and of the program, that may be left over.
-    """
+def _unlike(theirs: list[Token], ours: list[Token], habits: Set[int], away: _Away) -> Iterator[_Pair]:
+    """Tokens of one kind that are wrong, in another place, missing or too much: as few as can be."""
 
     def alike(wanted: Token | None, token: Token | None) -> bool:
-        return bool(wanted and token and wanted.value == token.value and not near.away(wanted.place, token))
+        return bool(wanted and token and wanted.value == token.value and not away(wanted.place, token))
 
+    optional = _optional(theirs)
     kind = next((token.kind for token in (*theirs, *ours)), "")
     came: dict[_Way, tuple[_Way | None, _Pair | None]] = {}
     waiting: deque[tuple[_Way, _Way | None, _Pair | None]] = deque([((0, 0, _AT_START.get(kind)), None, None)])
@@ -188,28 +179,23 @@ def _optional(tokens: list[Token]) -> set[int]:
     return {k for k, (token, idle) in enumerate(zip_longest(tokens, stopped)) if token.optional or idle}
 
 
-def _habits(ours: list[Token], changes: list[int], end: float, near: _Nearness) -> set[int]:
+def _habits(ours: list[Token], changes: list[int], end: float, away: _Away) -> set[int]:
     """Tokens of the program that posts write on their own.
 
     Those are what only ends what ends with the program anyway; and what ends a state which begins again before any
     motion, also where the program waits after a tool change: `changes` are the lines of those.
     """
     found = _optional(ours)
-    off = [token.value == _ENDED.get(token.kind) for token in ours]
+    off = [token.kind in _ENDED and token.value == "OFF" for token in ours]
     last = len(ours) - len(list(takewhile(bool, reversed(off))))
-    found |= {k for k in range(last, len(ours)) if ours[k].place >= end or not near.away(end, ours[k])}
+    found |= {k for k in range(last, len(ours)) if ours[k].place >= end or not away(end, ours[k])}
     on: Token | None = None
     for k in range(len(ours) - 1, -1, -1):
         if not off[k]:
             on = ours[k]
-        elif on is not None and on.kind in _STOPPED and _goes_on(ours[k], on, changes):
-            found.add(k)
+        elif on is not None and on.kind in _STOPPED:
+            at = bisect_left(changes, ours[k].line)
+            changed = ours[k].element == on.element and at < len(changes) and changes[at] < on.line
+            if changed or on.moment == ours[k].moment:
+                found.add(k)
     return found
-
-
-def _goes_on(off: Token, on: Token, changes: list[int]) -> bool:
-    """Whether a state that is ended begins again before anything moves, dwells or stops, a tool change apart."""
-    if on.moment == off.moment:
-        return True
-    at = bisect_left(changes, off.line)
-    return on.element == off.element and at < len(changes) and changes[at] < on.line

@@ -1,9 +1,13 @@
-"""Tokens: what the CL file asks for beside the motion, and what the words of a text do, in one form."""
+"""Tokens: what the CL file asks for beside the motion, and what the words of a program do, in one form."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
+
+from cornersmooth.nc_reader.elements import Event
+from cornersmooth.nc_reader.word_list import Means
 
 #: decimals of a spindle speed that count: FANUC's S takes whole numbers only
 SPEED_DECIMALS = 0
@@ -19,7 +23,7 @@ class Token:
     #: ``"tool"``, ``"spindle"``, ``"speed"``, ``"coolant"``, ``"compensation"``, ``"stop"``, ``"dwell"``, ``"tap"``,
     #: ``"end"``
     kind: str
-    value: float
+    value: float | str  #: a number; or the word of the CL file that says the same: ``"FLOOD"``, ``"OFF"``
     place: float  #: mm: path length from the start of the original motion
     line: int  #: CL or NC line
     #: mm: how far the place is uncertain beyond what printed digits account for: rotary words near the pole
@@ -46,13 +50,63 @@ class Place(NamedTuple):
 #: kinds during which a state matters although nothing moves
 PAUSES = ("stop", "dwell")
 
+#: what G words mean that the reader says for all controls
+_CODES: dict[float, tuple[str, float | str]] = {
+    TAP: ("tap", TAP),
+    40.0: ("compensation", "OFF"),
+    41.0: ("compensation", "LEFT"),
+    42.0: ("compensation", "RIGHT"),
+}
 
-def of_m(value: float) -> tuple[str, float]:
-    """Kind and value of what an M word other than M6 does."""
-    if value in (3, 4, 5, 19):
-        return "spindle", value
-    if value in (7, 8, 9, 88, 89):
-        return "coolant", 9.0 if value == 89 else value
-    if value in (2, 30):
-        return "end", 30.0
-    return ("stop" if value in (0, 1) else "auxiliary"), value
+#: word that takes another tool
+_CHANGE = ("M", 6.0)
+
+
+def of_m(value: float, means: Means) -> tuple[str, float | str]:
+    """Kind and value of what an M word other than M6 does on a control; `means` as of `WordList`."""
+    return means.get(f"M{value:g}", ("auxiliary", value))
+
+
+def said(events: Sequence[Event], places: Sequence[Place], means: Means) -> list[Token]:
+    """What the words of the NC program do, each at its place; `means` as of `WordList`."""
+    tokens: list[Token] = []
+    chosen: float | None = None
+    moment = element = 0
+    spoken = [(event, place) for event, place in zip(events, places, strict=True) if event.letter != "("]
+    words = [(event.letter, event.value) for event, _ in spoken]
+    elements = [event.element for event, _ in spoken]
+    ends = [word == _CHANGE or (word[0] == "M" and of_m(word[1], means)[0] == "end") for word in words]
+    for k, (event, place) in enumerate(spoken):
+        letter, value = words[k]
+        moment, element = moment + (event.element != element), event.element
+        meaning: tuple[str, float | str] | None = None
+        if letter == "T":
+            chosen = value
+            if words[k + 1 : k + 2] != [_CHANGE]:
+                meaning = "next tool", value
+        elif words[k] == _CHANGE:
+            meaning = None if chosen is None else ("tool", chosen)
+        elif letter == "M":
+            meaning = of_m(value, means)
+        elif (letter, value) == ("G", 4.0):
+            meaning = "dwell", round(float(event.text))
+        elif letter == "G" and value in _CODES:
+            meaning = _CODES[value]
+        elif letter == "S":
+            meaning = "speed", round(value, SPEED_DECIMALS)
+        elif letter in means:
+            meaning = means[letter][0], value
+        if meaning is None:
+            continue
+        optional = False
+        if meaning == ("stop", "OPSTOP"):  # before another tool, and nothing moves between
+            after = next((j for j in range(k + 1, len(words)) if words[j] != ("G", 40.0)), None)  # R0 of M91
+            another = after is not None and words[after][0] == "T" and elements[after] == element
+            optional = another and any(letter == "T" for letter, _ in words[:k])
+        elif letter == "H":  # nothing moves before the next tool, or the end
+            after = next((j for j in range(k + 1, len(words)) if ends[j]), None)
+            optional = after is not None and elements[after] == element
+        at, room, reach, others = place
+        tokens.append(Token(*meaning, at, event.line, room, moment, optional, others, reach, element))
+        moment += meaning[0] in PAUSES and not optional
+    return tokens

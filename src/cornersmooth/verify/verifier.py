@@ -18,8 +18,7 @@ from cornersmooth.nc_reader.elements import Elements, Event, NcProgram, Problem
 from cornersmooth.nc_reader.machine_positions import MachinePositions
 from cornersmooth.nc_reader.needed_states import CONTROL_WORDS
 from cornersmooth.nc_reader.reader import Reader
-from cornersmooth.nc_reader.reading import program_of, read_styled
-from cornersmooth.nc_reader.reading_options import DIGITS_SAMPLE, ReadingOptions
+from cornersmooth.nc_reader.reading import DIGITS_SAMPLE, ReadingOptions, program_of, read_styled
 from cornersmooth.nc_reader.rotary import sagitta
 from cornersmooth.nc_reader.source import Source, readable_twice
 from cornersmooth.nc_reader.word_list import word_list
@@ -282,7 +281,7 @@ class Verifier:
         if not self._skip_cycles:
             problems += batches.left_out
         if self._words and batches.elements:  # without any motion nothing has a place
-            of_statements, at_home = places.problems(findings, nc.unsaid, self._own_kinds, self._clamps)
+            of_statements, at_home = places.problems(findings, nc.means, self._own_kinds, self._clamps)
             problems = [one for one in problems if one.text != GONE_ON or one.nc_line not in at_home] + of_statements
         if nc.coarse:  # a pose missed within the tolerance where digits are too few for it is not verified
             limit = task.tolerance

@@ -16,10 +16,10 @@ import numpy as np
 from cornersmooth.model import Floats, Ints
 from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem
 from cornersmooth.nc_reader.tool import leads_somewhere
+from cornersmooth.nc_reader.word_list import Means
 from cornersmooth.statements.asked import asked
 from cornersmooth.statements.comparison import compare
-from cornersmooth.statements.said import said
-from cornersmooth.statements.tokens import TAP, Place, Token
+from cornersmooth.statements.tokens import TAP, Place, Token, said
 from cornersmooth.verify.batches import Batches, elements_with_words
 from cornersmooth.verify.findings import Findings
 from cornersmooth.verify.match import Match
@@ -96,7 +96,7 @@ class WordPlaces:
     def problems(
         self,
         found: Findings,
-        unsaid: frozenset[str | tuple[str, float]],
+        means: Means,
         own: frozenset[str],
         clamps: Set[float],
     ) -> tuple[list[Problem], set[int]]:
@@ -106,7 +106,7 @@ class WordPlaces:
         ----------
         found : Findings
             Of all batches.
-        unsaid : frozenset
+        means : mapping
             As of `NcProgram`.
         own : frozenset of str
             Kinds of statements that the user says in words of his own.
@@ -127,10 +127,10 @@ class WordPlaces:
         self._others = {element: others for element, (_, others) in found.words.items() if others}
         self._ended, self._holes = sorted(self._ends), frozenset(hole.tolist())
         statements = self._statement_lengths()
-        theirs = asked(program, statements, length, self._of_holes())
+        theirs = asked(program, statements, length, means, self._of_holes())
         theirs = [token for token in theirs if token.kind != "auxiliary" or token.value not in clamps]
         here = list(map(self._of, self._events))
-        wrong = compare(theirs, said(self._events, here), self.margin, unsaid, path.way_apart, own)
+        wrong = compare(theirs, said(self._events, here, means), self.margin, means, path.way_apart, own)
         said_there = zip(statements, program.statements, strict=True)
         homes = [at for at, statement in said_there if statement.word == "GOHOME"]
         at_home = {

@@ -38,9 +38,8 @@ _LENGTH: Final = "tool length"
 _PLANES: Final = ("tilted plane", "swivelled plane")
 _DYNAMIC: Final = "dynamic work offset"
 
-#: blocks that stop the program, and states that they end on most machines
+#: blocks that stop the program
 _STOPS: Final = ("M0", "M1", "STOP")
-_ENDED: Final = ("spindle", "coolant", "coolant through the spindle")
 
 _SPINDLE: Final = re.compile(r"M[345]")
 
@@ -224,8 +223,9 @@ class WordStates:
         """Take over the state that a word sets, and complain of what a program of our own says around it."""
         if rule.drops in self._held:
             self._forgotten[rule.drops] = word
-        if word in _STOPS:
-            self._halted = {state: word for state in _ENDED if state in self._held and self._held[state].rule.tidy}
+        if word in _STOPS:  # ends spindle and coolant on most machines
+            rules = [(state, held.rule) for state, held in self._held.items()]
+            self._halted = {state: word for state, rule in rules if rule.tidy and rule.compared}
         if rule.state:
             beside = [
                 other
@@ -242,9 +242,10 @@ class WordStates:
                     self._retract = 0
             if rule.before and self._first is not None and word != self._first.get(rule.state):
                 self._arc = word, line
-        held = self._in_force(rule.bars)
-        if held and (held.rule.tidy or held.rule.ends):
-            self._lost_since(line, [f"{word} under {held.text}"], retracts=False)
+        if rule.bars is not None:
+            on = [held for held in self._all_in_force if rule.bars.fullmatch(held.rule.state)]
+            texts = [f"{word} under {held.text}" for held in on if held.rule.tidy or held.rule.ends]
+            self._lost_since(line, texts, retracts=False)
         if rule.rotary == "zero" or (rule.rotary and self._high):  # elsewhere they are where the last motion left them
             self._tip_on = rule, dict(self.angles)
         if rule.off and rule.state == _LENGTH and self._first is not None and not self.above:

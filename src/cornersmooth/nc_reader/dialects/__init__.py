@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
 from typing import Final
 
 from cornersmooth.errors import SettingsError
@@ -11,17 +9,11 @@ from cornersmooth.nc_reader.dialects.base import Dialect
 from cornersmooth.nc_reader.dialects.heidenhain import Heidenhain
 from cornersmooth.nc_reader.dialects.iso import Iso
 from cornersmooth.nc_reader.dialects.siemens import Siemens
+from cornersmooth.nc_reader.word_list import CONTROLS, word_list
 
 __all__ = ["CONTROLS", "Dialect", "dialect_of"]
 
-_DIALECTS: Final[dict[str, Callable[[str], Dialect]]] = {
-    **{name: partial(Iso, name) for name in ("fanuc", "generic", "haas", "linuxcnc", "mitsubishi")},
-    "heidenhain": Heidenhain,
-    "siemens": Siemens,
-}
-
-#: controls whose texts are read
-CONTROLS: Final = tuple(sorted(_DIALECTS))
+_SPELLINGS: Final[dict[str, type[Dialect]]] = {"iso": Iso, "siemens": Siemens, "heidenhain": Heidenhain}
 
 
 def dialect_of(control: str, rotary: str = "") -> Dialect:
@@ -37,6 +29,6 @@ def dialect_of(control: str, rotary: str = "") -> Dialect:
     SettingsError
         CS204 for an unknown control.
     """
-    if control not in _DIALECTS:
+    if control not in CONTROLS:
         raise SettingsError("CS204", f"unknown control {control!r}", f"use one of {', '.join(CONTROLS)}")
-    return _DIALECTS[control](rotary)
+    return _SPELLINGS[word_list(control).spelling](control, rotary)

@@ -17,10 +17,6 @@ if TYPE_CHECKING:
     from cornersmooth.nc_reader.reader import Reader
 
 
-#: M words that act after the motion of their block: stops, spindle off, coolant off, end
-AFTER_MOTION = (0.0, 1.0, 2.0, 5.0, 9.0, 30.0)
-
-
 #: word around the number of a modulo axis that sends it the shorter way; a column of tables with the axis behind it
 BY_WORD = "DC"
 
@@ -48,7 +44,6 @@ _READ: Mapping[str, Callable[[Any], Any]] = {
     "tip_control": lambda table: {float(code): name for code, name in table.items()},
     "controls": lambda table: {kind: tuple(names) for kind, names in table.items()},
     "silent": lambda codes: frozenset(map(float, codes)),
-    "unsaid": lambda kinds: frozenset(tuple(kind) if isinstance(kind, list) else kind for kind in kinds),
 }
 
 
@@ -57,6 +52,8 @@ class Dialect:
 
     Parameters
     ----------
+    control : str
+        One of `CONTROLS`.
     rotary : str
         Addresses of the rotary axes; empty without a machine.
     """
@@ -66,8 +63,6 @@ class Dialect:
     feed_step = 1e-4
     #: inches per minute that F counts in, in a text in inches
     inch_feed = 1.0
-    #: kinds of tokens, or pairs of kind and value, that the control has no words for
-    unsaid: frozenset[str | tuple[str, float]] = frozenset()
     #: what must be in force for words of a kind: ``"vector"``, ``"point"``, ``"angles"``, ``"machine"``
     controls: Mapping[str, tuple[str, ...]] = {}
     #: whether texts can send the tool up, so that rotary axes turn there
@@ -80,6 +75,11 @@ class Dialect:
     names_spline_axes: bool = False
     #: whether tip control is switched by blocks that the machine's file names
     switches: bool = False
+    #: G words of inches and of millimetres, and those that change nothing measured: of all its controls, of this one
+    inches: frozenset[float] = frozenset()
+    millimetres: frozenset[float] = frozenset()
+    always_silent: frozenset[float] = frozenset()
+    silent: frozenset[float] = frozenset()
     #: the first letter, or letters, of tip and second triple in the lexer, with their decimals
     digits: re.Pattern[bytes] = re.compile(rb"(?:([XYZ])|([IJUVW]))[-+]?\d*\.(\d*)")
 
@@ -87,11 +87,16 @@ class Dialect:
         listed = word_list(control)
         for key, value in listed.grammar.items():
             setattr(self, key, _READ[key](value) if key in _READ else value)
-        self.switches, self.rotary = listed.switches, rotary
+        self.switches, self.means, self.rotary = listed.switches, listed.means, rotary
         if rotary:
             self.digits = re.compile(
                 rb"(?<!K\d)(?:([XYZ])|(?<![A-Z0-9])([%b])(?:=DC\()?)[-+]?\d*\.(\d*)" % rotary.encode()
             )
+
+    def after_motion(self, letter: str, value: float) -> bool:
+        """Whether a word acts after the motion of its block: M words that stop, end or switch off."""
+        kind, said = self.means.get(f"M{value:g}", ("", "")) if letter == "M" else ("", "")
+        return kind in ("stop", "end") or said == "OFF"
 
     def row(self, line: Line) -> dict[str, float] | None:
         """Words of a motion block; None where the line is something else."""
@@ -101,6 +106,20 @@ class Dialect:
     def words(self, line: Line, state: Reader) -> None:
         """Interpret a line that is no motion block."""
         raise NotImplementedError
+
+    def mode(self, code: float, line: Line, state: Reader) -> None:
+        """Take a G word outside group 01 that changes what holds from block to block."""
+        if code in (17.0, 18.0, 19.0):
+            state.change(line, plane=int(code))
+        elif code in self.inches | self.millimetres:
+            state.change(line, inch=code in self.inches)
+        elif code in (93.0, 94.0, 95.0):
+            state.change(line, per_revolution=code == 95.0, inverse_time=code == 93.0)
+        elif code in (40.0, 41.0, 42.0):
+            state.event(line, "G", code, f"G{code:g}")
+        elif code not in self.always_silent | self.silent:
+            hint = "only absolute milling with tool vectors, axis points or rotary words is read"
+            state.refuse(line, f"G{code:g} is not understood", hint)
 
     def machine_axes(self, line: Line, state: Reader, beside: Set[tuple[str, float]]) -> str:
         """Axes that a block sends to positions of the machine; refuses words beside them but for some."""

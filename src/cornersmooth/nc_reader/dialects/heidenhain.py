@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
-from cornersmooth.nc_reader.dialects.base import AFTER_MOTION, Dialect, values
+from cornersmooth.nc_reader.dialects.base import Dialect, values
 from cornersmooth.nc_reader.hole_cycles import HoleCycle, drill
 from cornersmooth.nc_reader.lexer import NUMBER, Lexer, fixed, number_of
 from cornersmooth.nc_reader.planes import TiltedPlane, room_of, rotated_frame
@@ -51,17 +51,14 @@ _SIDES = {"R0": 40.0, "RL": 41.0, "RR": 42.0}
 class Heidenhain(Dialect):
     """Blocks that say in words what they are.
 
-    Parameters
-    ----------
-    rotary : str
-        Addresses of the rotary axes; empty without a machine.
+    Parameters are those of `Dialect`.
     """
 
     lexer: _KlartextLexer
     digits = re.compile(rb"(?<!K\d)(?:(?<!T)([XYZ])|(T[XYZ]))[-+]?\d*\.(\d*)")
 
-    def __init__(self, rotary: str = "") -> None:
-        super().__init__("heidenhain", rotary)
+    def __init__(self, control: str, rotary: str = "") -> None:
+        super().__init__(control, rotary)
         self.lexer = _KlartextLexer(rotary)
 
     def words(self, line: Line, state: Reader) -> None:
@@ -170,7 +167,7 @@ class Heidenhain(Dialect):
         elif value in (91.0, 92.0):
             state.refuse(line, f"{text}: positions of the machine", "only positions of the part are read")
         else:
-            state.event(line, "M", value, text, late=value in AFTER_MOTION)
+            state.event(line, "M", value, text)
 
     def _block(self, text: str, line: Line, state: Reader) -> None:
         """Blocks that are words: tools, cycles, functions."""
@@ -199,7 +196,7 @@ class Heidenhain(Dialect):
         elif text == "PLANE RESET STAY":
             state.level(line)
         elif text == "STOP":
-            state.event(line, "M", 0.0, text, late=True)
+            state.event(line, "M", 0.0, text)
         elif match := re.fullmatch(r"FUNCTION TCPM F (?:TCP|CONT) AXIS POS PATHCTRL (AXIS|VECTOR)(?: .*)?", text):
             state.tip_control = f"TCPM {match[1]}"
         elif text == "FUNCTION RESET TCPM":

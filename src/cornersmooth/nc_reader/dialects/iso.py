@@ -8,7 +8,7 @@ from collections.abc import Mapping, Set
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from cornersmooth.nc_reader.dialects.base import AFTER_MOTION, Dialect
+from cornersmooth.nc_reader.dialects.base import Dialect
 from cornersmooth.nc_reader.hole_cycles import HoleCycle, drill
 from cornersmooth.nc_reader.lexer import NUMBER, Lexer, fixed, number_of
 from cornersmooth.nc_reader.planes import TiltedPlane, room_of, rotated_frame, turned_frame
@@ -21,12 +21,9 @@ if TYPE_CHECKING:
 #: letters whose words are events
 _EVENT_LETTERS = "TSMHD"
 
-#: G words that change nothing measured here: cancellations, work offsets
-_SILENT = frozenset((80.0, 90.0, *map(float, range(54, 60))))
 #: G words that send axes to positions of the machine
 _TO_REFERENCE = (28.0, 30.0)
 _IN_MACHINE = 53.0
-_COMPENSATION = (40.0, 41.0, 42.0)
 #: hole cycles with what they take besides X Y Z R F, and the codes that stand beside them
 _CYCLES = {73.0: "Q", 81.0: "", 82.0: "P", 83.0: "Q", 84.0: "P", 85.0: "", 89.0: "P"}
 _BACK_TO_START = 98.0
@@ -42,19 +39,15 @@ _NO_CYCLE = 80.0
 class Iso(Dialect):
     """Words of one letter and a number; what differs between these controls is in `WordList.grammar`.
 
-    Parameters
-    ----------
-    name : str
-        Of the control.
-    rotary : str
-        Addresses of the rotary axes; empty without a machine.
+    Parameters are those of `Dialect`.
     """
 
     lexer: _IsoLexer
     #: name of what a G word switches on, which takes a length register H with it; ``""`` switches off
     tip_control: Mapping[float, str]
-    #: further G words that change nothing measured
-    silent: frozenset[float] = frozenset()
+    inches, millimetres = frozenset((20.0,)), frozenset((21.0,))
+    #: cancellations, work offsets
+    always_silent = frozenset((80.0, *map(float, range(54, 60))))
     #: milliseconds that ``G4 P`` counts in
     dwell: float = 1.0
     #: letters that say nothing here
@@ -68,9 +61,9 @@ class Iso(Dialect):
     #: what switches tilted planes on
     planes: str = ""
 
-    def __init__(self, name: str, rotary: str = "") -> None:
-        super().__init__(name, rotary)
-        self.lexer = (_LinuxLexer if self.semicolon else _IsoLexer)(rotary, word_list(name).points)
+    def __init__(self, control: str, rotary: str = "") -> None:
+        super().__init__(control, rotary)
+        self.lexer = (_LinuxLexer if self.semicolon else _IsoLexer)(rotary, word_list(control).points)
 
     def decimals(self, text: bytes) -> tuple[int, int | None]:
         """As `Dialect.decimals`: the angles of a tilted plane are no vectors."""
@@ -94,7 +87,7 @@ class Iso(Dialect):
         if _NO_CYCLE in codes:
             state.memory.height, state.memory.rigid = None, False
         motion: dict[str, float] = {}
-        late = any(word.name == "M" and word.value in AFTER_MOTION for word in line.words)
+        late = any(self.after_motion(*word[:2]) for word in line.words)
         given = {letter: value for letter, value, *_ in line.words}
         if given.get("G") == 5.0:
             state.memory.high_speed = given.get("P", 0.0) >= 10000.0
@@ -103,16 +96,15 @@ class Iso(Dialect):
                 if value in MOTION_CODES:
                     motion["G"] = value
                 elif value == 4.0:
-                    self._dwell(given, line, state)
+                    time = self.dwell * given["P"] if "P" in given else 1000.0 * given.get("X", given.get("U", 0.0))
+                    state.event(line, "G", 4.0, f"{time:.10g}")
                     return
                 else:
-                    self._mode(value, line, state)
+                    self.mode(value, line, state)
             elif (letter, value) == ("M", 29.0) and self.rigid:
                 state.memory.rigid = True
             elif letter in _EVENT_LETTERS:
-                if letter == "S":
-                    state.memory.speed = value
-                state.event(line, letter, value, text, late=letter == "M" and value in AFTER_MOTION)
+                state.event(line, letter, value, text)
             elif letter in self.lexer.letters:
                 motion[letter] = value
             elif letter not in self.others:
@@ -210,29 +202,15 @@ class Iso(Dialect):
             state.move(line, {"G": 0.0})
         state.leave(axes)
 
-    def _dwell(self, given: Mapping[str, float], line: Line, state: Reader) -> None:
-        """G4: P in milliseconds or seconds, X and U in seconds."""
-        time = self.dwell * given["P"] if "P" in given else 1000.0 * given.get("X", given.get("U", 0.0))
-        state.event(line, "G", 4.0, f"{time:.10g}")
-
-    def _mode(self, code: float, line: Line, state: Reader) -> None:
-        """Take a G word outside group 01 that changes the state."""
+    def mode(self, code: float, line: Line, state: Reader) -> None:
+        """Take a G word outside group 01 that changes what holds from block to block."""
         if code == 90.0:
             state.memory.incremental = False
-        elif code in (17.0, 18.0, 19.0):
-            state.change(line, plane=int(code))
-        elif code in (20.0, 21.0):
-            state.change(line, inch=code == 20.0)
-        elif code in (93.0, 94.0, 95.0):
-            state.change(line, per_revolution=code == 95.0, inverse_time=code == 93.0)
         elif code in self.tip_control:
             state.tip_control = self.tip_control[code]
             state.event(line, "G", code, f"G{code:g}")
-        elif code in _COMPENSATION:
-            state.event(line, "G", code, f"G{code:g}")
-        elif code not in _SILENT and code not in self.silent:
-            hint = "only absolute milling with tool vectors, axis points or rotary words is read"
-            state.refuse(line, f"G{code:g} is not understood", hint)
+        else:
+            super().mode(code, line, state)
 
 
 class _IsoLexer(Lexer):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from cornersmooth.nc_reader.dialects.base import AFTER_MOTION, BY_WORD, Dialect
+from cornersmooth.nc_reader.dialects.base import BY_WORD, Dialect
 from cornersmooth.nc_reader.hole_cycles import HoleCycle, drill, numbers
 from cornersmooth.nc_reader.lexer import NUMBER, Lexer, fixed, number_of
 from cornersmooth.nc_reader.planes import TiltedPlane, room_of, rotated_frame
@@ -62,16 +62,15 @@ _KINDS: Final = {"POLY": POLY, "BSPLINE": BSPLINE, "SD": None}
 class Siemens(Dialect):
     """Words of letters, words with ``=``, and keywords.
 
-    Parameters
-    ----------
-    rotary : str
-        Addresses of the rotary axes; empty without a machine.
+    Parameters are those of `Dialect`.
     """
 
+    inches, millimetres = frozenset((70.0, 700.0)), frozenset((71.0, 710.0))
+    always_silent = _SILENT_CODES
     digits = re.compile(rb"(?:([XYZ])|([ABC]3=|[XYZ]H=))[-+]?\d*\.(\d*)")
 
-    def __init__(self, rotary: str = "") -> None:
-        super().__init__("siemens", rotary)
+    def __init__(self, control: str, rotary: str = "") -> None:
+        super().__init__(control, rotary)
         self.lexer = _SiemensLexer(rotary)
 
     def words(self, line: Line, state: Reader) -> None:
@@ -96,11 +95,9 @@ class Siemens(Dialect):
             if name == "G" and value in _CODES:
                 motion["G"] = value
             elif name == "G":
-                self._mode(value, line, state)
+                self.mode(value, line, state)
             elif name in ("M", "T", "S"):
-                if name == "S":
-                    state.memory.speed = value
-                state.event(line, name, value, text, late=name == "M" and value in AFTER_MOTION)
+                state.event(line, name, value, text)
             elif name == "SPOS":
                 state.event(line, "M", 19.0, text)
             elif name in ("X", "Y", "Z", "F", *self.rotary) or name.removeprefix(f"{BY_WORD} ") in self.rotary:
@@ -183,18 +180,6 @@ class Siemens(Dialect):
         else:
             on = name == "TRAORI"
         state.tip_control = f"TRAORI {state.memory.orientation}".rstrip() if on else ""
-
-    def _mode(self, code: float, line: Line, state: Reader) -> None:
-        if code in (17.0, 18.0, 19.0):
-            state.change(line, plane=int(code))
-        elif code in (70.0, 71.0, 700.0, 710.0):
-            state.change(line, inch=code in (70.0, 700.0))
-        elif code in (93.0, 94.0, 95.0):
-            state.change(line, per_revolution=code == 95.0, inverse_time=code == 93.0)
-        elif code in (40.0, 41.0, 42.0):
-            state.event(line, "G", code, f"G{code:g}")
-        elif code not in _SILENT_CODES:
-            state.refuse(line, f"G{code:g} is not understood", "only absolute milling is read")
 
 
 class _SiemensLexer(Lexer):

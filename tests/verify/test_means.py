@@ -1,0 +1,116 @@
+"""What M words mean is data of each control: a new one needs a line of its control's tables and nothing else."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+
+import pytest
+
+from cornersmooth.cl import read
+from cornersmooth.kinematics import load_machine
+from cornersmooth.nc import choose_form, control_tables
+from cornersmooth.nc_reader import word_list
+from cornersmooth.pipeline import postprocess
+from cornersmooth.settings import Settings
+from cornersmooth.tables import Shelf
+from cornersmooth.verify import verify
+
+CL = """LOADTL/1
+SPINDL/900,RPM,CLW
+{}
+RAPID
+GOTO/0,0,50
+FEDRAT/100,MMPM
+GOTO/0,0,0
+COOLNT/FLOOD
+GOTO/9,0,0
+{}
+GOTO/9,9,0
+COOLNT/OFF
+GOTO/20,9,0
+RAPID
+GOTO/20,9,50
+FINI
+"""
+
+#: air: its word in the table of the writer, what the reader's list says, blocks of the program in their order
+AIR = {
+    "fanuc": ('AIR = ["M77"]', {"M77": "coolant AIR"}, ["M77", "M8", "M77", "M9"]),
+    "siemens": ('AIR = ["M78"]', {"M78": "coolant AIR"}, ["M78", "M8", "M78", "M9"]),
+    "haas": (
+        'AIR = ["M83"]',
+        {"M83": "coolant AIR", "M84": "coolant OFF AIR"},
+        ["M83", "M84", "M8", "M9", "M83", "M84"],
+    ),
+}
+
+
+@pytest.fixture
+def _with_air(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Tables of both sides with one entry more; HEIDENHAIN has none."""
+    written, listed = Shelf.built_in, word_list._table
+
+    def table(self: Shelf, name: str) -> str:
+        text = written(self, name)
+        entry = AIR[name][0] if name in AIR else ""
+        text = text.replace("coolant = {", f"coolant = {{ {entry},") if entry else text
+        return text.replace("coolant_off = {", 'coolant_off = { AIR = ["M84"],')
+
+    def means(control: str) -> dict[str, object]:
+        found = listed(control)
+        return {**found, "means": found["means"] | (AIR[control][1] if control in AIR else {})}
+
+    monkeypatch.setattr(Shelf, "built_in", table)
+    monkeypatch.setattr(word_list, "_table", means)
+    for cached in (control_tables._built_in, word_list.word_list):
+        cached.cache_clear()
+    yield
+    monkeypatch.undo()
+    for cached in (control_tables._built_in, word_list.word_list):
+        cached.cache_clear()
+
+
+def _lines(control: str, cl: str) -> tuple[list[str], dict[str, object]]:
+    """Lines of the verified program, and how it is read."""
+    machine = load_machine("table-bc") if control == "haas" else None
+    stream = io.BytesIO()
+    result = postprocess(cl.encode(), stream, Settings(), form=choose_form(control, machine=machine))
+    assert result.verification is not None
+    assert result.verification.passed
+    how = {"control": control, "machine": machine, "tolerance": 0.01, "axis_length": 10}
+    return stream.getvalue().decode().splitlines(), how
+
+
+@pytest.mark.usefixtures("_with_air")
+@pytest.mark.parametrize("control", AIR)
+def test_a_new_coolant_of_a_control(control: str) -> None:
+    cl = CL.format("COOLNT/AIR", "COOLNT/AIR")
+    lines, how = _lines(control, cl)
+    program = read(cl.encode(), name="air.cls")
+    words = {"M8", "M9", *AIR[control][1]}
+    at = [k for k, line in enumerate(lines) if line in words]
+    assert [lines[k] for k in at] == AIR[control][2]
+    for k in at:
+        for other in ([], ["M7"]):
+            text = "\n".join([*lines[:k], *other, *lines[k + 1 :]]) + "\n"
+            assert verify(program, text.encode(), **how).problems, (lines[k], other)
+
+
+@pytest.mark.usefixtures("_with_air")
+@pytest.mark.parametrize("control", ["fanuc", "siemens", "heidenhain"])
+def test_the_number_of_one_control_is_another_word_on_the_next(control: str) -> None:
+    cl = CL.format("AUXFUN/77", "COOLNT/ON")
+    lines, how = _lines(control, cl)
+    without = [line for line in lines if not line.endswith("M77")]
+    assert len(without) == len(lines) - 1
+    text = "\n".join(without) + "\n"
+    code = "CS553" if control == "fanuc" else "CS558"
+    found = verify(read(cl.encode(), name="air.cls"), text.encode(), **how).problems
+    assert [problem.code for problem in found] == [code]
+
+
+@pytest.mark.usefixtures("_with_air")
+def test_what_a_control_has_no_word_for_is_not_missing() -> None:
+    lines, _ = _lines("heidenhain", CL.format("COOLNT/AIR", "COOLNT/AIR"))
+    assert any("COOLNT/AIR" in line for line in lines)
