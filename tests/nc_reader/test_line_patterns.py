@@ -78,7 +78,7 @@ def test_fast_path_is_the_careful_path(control, seed, odd):
     patterns = LinePatterns(lexer)
     lines = lines_of(data, patterns)
     assert lines is not None or odd not in READABLE
-    fast = read(block_tables.read_lines(data, None, lexer, patterns=patterns))
+    fast = read(block_tables.read_lines(data, None, lexer))
     careful = read(block_tables._in_order(block_tables.LetteredLines(data, lexer), data, 1, lexer, None))
     assert fast == careful
     assert any(isinstance(item, dict) for _, item in fast[0])

@@ -17,7 +17,7 @@ import numpy as np
 from cornersmooth.errors import InputError
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.lexer import Lexer
-from cornersmooth.nc_reader.line_patterns import Group, LinePatterns, lines_of, merged
+from cornersmooth.nc_reader.line_patterns import Group, LinePatterns, Lines, lines_of, merged
 from cornersmooth.nc_reader.words import Line, Table
 from cornersmooth.text import NumberError, parse_numbers
 
@@ -39,23 +39,10 @@ class Readable(Protocol):
         """Next bytes, at most so many; none at the end."""
 
 
-class RunLines(Protocol):
-    """Lines of a chunk, of which those that stand in runs can be read together."""
-
-    def bulk(self) -> Bools:
-        """(l,) whether each line can be read in a run."""
-
-    def columns(self, rows: Ints) -> dict[str, Floats] | None:
-        """Numbers of lines that stand in a run, NaN where a line has none; None if the run is none."""
-
-
 def read_lines(
     data: bytes | Readable,
     name: str | None,
     lexer: Lexer,
-    *,
-    patterns: LinePatterns | None = None,
-    number: int = 1,
     show: Callable[[bytes], None] = lambda lines: None,
 ) -> Iterator[Table | Line]:
     """Give out the text in order, as runs of motion blocks and as other lines.
@@ -63,12 +50,6 @@ def read_lines(
     Parameters
     ----------
     data : bytes or file, open at its start
-    lexer : Lexer
-        Of the control.
-    patterns : LinePatterns, optional
-        Those met so far in the same text.
-    number : int
-        Of the first line.
     show : callable
         Gets lines in which the digits of all others stand, before these are given out.
 
@@ -77,7 +58,7 @@ def read_lines(
     InputError
         CS501 where a line is not made of words.
     """
-    patterns = patterns or LinePatterns(lexer)
+    patterns, number = LinePatterns(lexer), 1
     for chunk in _chunks(data, lexer):
         chunk = lexer.unfolded(chunk)
         lines = lines_of(chunk, patterns)
@@ -106,7 +87,7 @@ def _chunks(data: bytes | Readable, lexer: Lexer) -> Iterator[bytes]:
 
 
 def _in_order(
-    lines: RunLines, chunk: bytes, number: int, lexer: Lexer, name: str | None
+    lines: Lines | LetteredLines, chunk: bytes, number: int, lexer: Lexer, name: str | None
 ) -> Generator[Table | Line, None, int]:
     """Give out the lines of a chunk, runs as tables and the others one by one; return how many there are.
 

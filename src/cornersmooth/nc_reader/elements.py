@@ -249,17 +249,9 @@ class NcProgram(Elements):
 
 
 def settle(elements: Elements) -> int | None:
-    """Put the tool where words that come later first send it, as long as it moves at rapid only.
+    """Put the tool where words that come later first send it, as long as it moves at rapid only: in place, for NaN.
 
-    Parameters
-    ----------
-    elements : Elements
-        Positions are changed in place; they have NaN where no word has been said yet.
-
-    Returns
-    -------
-    int or None
-        NC line where a feed move goes from or to such a place although a part of it has been said; None without any.
+    Return the NC line where a feed move goes from or to such a place although a part of it has been said, or None.
     """
     for values in (elements.tip, elements.second):
         if not len(values) or not np.isnan(values[0]).any():  # what has been said holds

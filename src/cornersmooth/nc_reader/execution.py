@@ -11,8 +11,8 @@ import numpy as np
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.arcs import circles
 from cornersmooth.nc_reader.elements import Curves, Element, Elements, NcArcs, Problem
-from cornersmooth.nc_reader.splines import cut_long, interval_curves, knot_curves, poly_curves, spl_curves
-from cornersmooth.nc_reader.words import BSPLINE, NURBS, POLY, SPL, Table
+from cornersmooth.nc_reader.splines import curves_of, cut_long
+from cornersmooth.nc_reader.words import NURBS, Table
 
 _TIP, _VECTOR, _POINT = "XYZ", "IJK", "UVW"
 
@@ -47,12 +47,10 @@ class Modal:
 
 
 def execute(table: Table, modal: Modal, problems: list[Problem]) -> tuple[Elements, Modal]:
-    """Run the blocks of a table.
+    """Run the blocks of a table, which ends where no curve is open.
 
     Parameters
     ----------
-    table : Table
-        Of r blocks, ending where no curve is open.
     modal : Modal
         Before the first block.
     problems : list of Problem
@@ -87,7 +85,7 @@ def execute(table: Table, modal: Modal, problems: list[Problem]) -> tuple[Elemen
     element_rows = placed
     if not (straight | is_arc).all():
         before = np.array((*modal.tip, *modal.second))
-        curves, cut = cut_long(_curves(table, six, placed, code, before, _TIP + letters, problems))
+        curves, cut = cut_long(curves_of(table, six, placed, code, before, _TIP + letters, problems))
         element_rows = placed & (straight | is_arc)
         element_rows[curves.element] = True
     rows = np.flatnonzero(element_rows)
@@ -229,28 +227,6 @@ def _to_unit_length(vectors: Floats, given: Bools) -> float:
     length[length == 0.0] = 1.0  # said to be wrong elsewhere
     vectors /= length[:, None]
     return float(length[given].min())
-
-
-def _curves(
-    table: Table,
-    six: Floats,
-    placed: Bools,
-    code: Floats,
-    before: Floats,
-    letters: str,
-    problems: list[Problem],
-) -> Curves:
-    """Curves of all kinds in a run."""
-    found = []
-    if (nurbs := code == NURBS).any():
-        starts = nurbs & (table.column("G") == NURBS)
-        found.append(knot_curves(table, six, placed, nurbs, starts, letters, problems))
-    if (spline := placed & (code == BSPLINE)).any():
-        found.append(interval_curves(table, six, spline, before, problems))
-    for kind, read in ((POLY, poly_curves), (SPL, spl_curves)):
-        if (polynomial := placed & (code == kind)).any():
-            found.append(read(table, six, before, polynomial, letters, problems))
-    return Curves.joined(found)
 
 
 def _check_starts(run: Elements, modal: Modal, exact: Bools, problems: list[Problem]) -> None:

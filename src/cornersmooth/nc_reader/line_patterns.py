@@ -257,18 +257,7 @@ _EIGHT, _REST = np.uint64(8), np.uint64(56)
 
 
 def lines_of(text: bytes, patterns: LinePatterns) -> Lines | None:
-    """Lines of a chunk.
-
-    Parameters
-    ----------
-    text : bytes
-        Ends with a line end.
-
-    Returns
-    -------
-    Lines or None
-        None where anything in the chunk is not regular.
-    """
+    """Lines of a chunk, which ends with a line end; None where anything in it is not regular."""
     raw = np.frombuffer(b"".join((b"\n" * MARGIN, text, b"\n" * LONGEST)), np.uint8)
     ends = np.flatnonzero(raw[: MARGIN + len(text)] == _LINE_END)[MARGIN - 1 :]
     start, stop = ends[:-1] + 1, ends[1:]

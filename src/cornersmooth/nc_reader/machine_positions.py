@@ -85,10 +85,7 @@ class MachinePositions:
     def take(self, line: Line, text: str, *, retract: bool) -> list[Problem]:
         """Return what is wrong with a block that moves no tool at the part.
 
-        Parameters
-        ----------
-        retract : bool
-            Whether it is a retract on the control's own list, which holds where the file says nothing of home.
+        A retract on the control's own list holds where the file says nothing of home.
         """
         if any(rule.pattern.fullmatch(text) for rule in self.rules):
             return list(self._goes(line, free="Z" if retract and "Z" not in self._home else ""))

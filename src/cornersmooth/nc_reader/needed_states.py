@@ -40,14 +40,9 @@ def first_wrong(code: str, wrong: Bools, line: Ints, text: str) -> list[Problem]
 
 
 def control_problems(table: Table, state: Reader, code: float, approach: Set[int]) -> Iterator[Problem]:
-    """What of a run of motion blocks the control would not take for what it is.
+    """What of a run of motion blocks the control would not take for what it is; `code` is the G word before the run.
 
-    Parameters
-    ----------
-    code : float
-        G word of group 01 before the run.
-    approach : set of int
-        Lines on the way down from a retract: there rotary axes turn before the control is told of the tip.
+    On the way down from a retract, in lines `approach`, rotary axes turn before the control is told of the tip.
     """
     if state.rotary is not None:
         kind, letters = ("angles" if state.rotary.tip_control else "machine"), set(state.rotary.names)
@@ -75,16 +70,8 @@ def axis_problems(
 ) -> Iterator[Problem]:
     """What is wrong with the rotary words of a run: beyond the limits of their axes, or words of modulo axes.
 
-    Those are from 0 to 360 degrees, and are told to go the shorter way.
-
-    Parameters
-    ----------
-    run : Elements
-        What becomes of it; of curves, whose control points may lie farther out, the ends count for limits.
-    way : str
-        `Dialect.shorter_way`.
-    step : float, degrees
-        Last printed digit.
+    Those are from 0 to 360 degrees, and are told to go the shorter way (`Dialect.shorter_way`). Of curves, whose
+    control points may lie farther out, the ends in `run` count for limits; `step` is the last printed digit, degrees.
     """
     for column, axis in enumerate(machine.axes):
         name, values = axis.name, table.column(axis.name)
@@ -111,15 +98,7 @@ def axis_problems(
 
 
 def turn_problems(run: Elements, before: Sequence[float], machine: Machine) -> Iterator[Problem]:
-    """Which rotary axes turn more than once round in one feed move, which nobody asks for.
-
-    Parameters
-    ----------
-    run : Elements
-        With its rotary words.
-    before : sequence of float
-        Those before it, NaN where they are not known.
-    """
+    """Which rotary axes turn more than once round in one feed move; `before`: their words before the run, or NaN."""
     curves = run.curves
     of_points = np.repeat(run.line[run.kind == Element.CURVE], curves.points)
     next_curve = np.cumsum(curves.points)[:-1] - 1
@@ -168,13 +147,7 @@ def unclamped_problems(machine: Machine, memory: Memory) -> Iterator[Problem]:
 def kinematics_problems(run: Elements, machine: Machine, memory: Memory, *, tip_control: bool) -> Iterator[Problem]:
     """What is wrong with a run where the machine's file says what switches tip control of its kinematics.
 
-    Parameters
-    ----------
-    run : Elements
-        With its rotary words.
-    tip_control : bool
-        Whether the words are those of the tip; without it, of the machine's axes. With both rotary axes at zero that is
-        the same.
+    Without `tip_control` the words are those of the machine's axes; with both rotary axes at zero that is the same.
     """
     on = memory.keeps_tip
     if machine.tip_control and on is not tip_control:

@@ -58,15 +58,7 @@ class TiltedPlane:
         return modal.but(tip=tuple(known.tolist()), second=second)
 
     def problems(self, table: Table, run: Elements, tip_control: str, axis_words: str) -> list[Problem]:
-        """Return what is wrong with a run of motion blocks in it.
-
-        Parameters
-        ----------
-        tip_control : str
-            In force.
-        axis_words : str
-            Addresses of words of the tool axis.
-        """
+        """Return what is wrong with a run of motion blocks in it; `axis_words`: addresses of its axis."""
         if not len(run.kind):
             return []
         line, found = int(run.line[0]), []
@@ -86,13 +78,7 @@ class TiltedPlane:
 
 
 def rotated_frame(turns: Sequence[tuple[str, float]]) -> Floats:
-    """(3, 3) frame after turns about its own axes, one after another, as columns.
-
-    Parameters
-    ----------
-    turns : sequence of (str, float)
-        Axis, of those that the turns before have made, and degrees.
-    """
+    """(3, 3) frame after turns by degrees about its own axes, one after another, as columns."""
     axes = [np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])]
     for name, degrees in turns:
         about = "XYZ".index(name)
@@ -106,13 +92,7 @@ def rotated_frame(turns: Sequence[tuple[str, float]]) -> Floats:
 
 
 def turned_frame(rotary: Rotary, angles: Sequence[float]) -> Floats | None:
-    """(3, 3) frame of the machine's directions in a part that its tables have turned; None where a head turns the tool.
-
-    Parameters
-    ----------
-    angles : sequence of two float
-        Degrees.
-    """
+    """(3, 3) frame of the machine in a part that its tables have turned by degrees; None with a head."""
     if any(axis.carrier != "table" for axis in rotary.machine.axes):
         return None
     degrees = np.tile(np.array(angles[:2]), (3, 1))

@@ -89,14 +89,7 @@ class Retracts:
     def leave(self, given: list[Elements], ready: list[Elements], elements: int) -> bool:
         """Take note of a retract; return whether a last rapid along the tool was none that moves it.
 
-        Parameters
-        ----------
-        given : list of Elements
-            The last element that has been given out.
-        ready : list of Elements
-            What is to be given out, and may be changed.
-        elements : int
-            How many there are in all.
+        Of the elements so far `given` is the last one that was given out, and `ready` may be changed.
         """
         self.open = True
         if ready and int(ready[-1].line[-1]) == self._came:  # what is before is on the other side of a retract
@@ -122,12 +115,7 @@ class Retracts:
         return True
 
     def arrive(self, run: Elements, aside: Ints) -> Elements:
-        """Leave out the rapids of the way back.
-
-        Parameters
-        ----------
-        aside : (k,) int64
-            Lines with words of X or Y: others only turn the rotary axes.
+        """Leave out the rapids of the way back; lines `aside` have words of X or Y, others only turn the rotary axes.
 
         Raises
         ------

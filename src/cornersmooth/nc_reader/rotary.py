@@ -168,14 +168,7 @@ class Rotary:
     def resolve(self, run: Elements, before: Modal, *, inverse_time: bool) -> Elements:
         """Return a run in tips and tool vectors, all in mm, the second triple being degrees before.
 
-        Parameters
-        ----------
-        run : Elements
-            In mm.
-        before : Modal
-            In mm; what is not known of the angles is zero.
-        inverse_time : bool
-            Whether the feeds are moves per minute.
+        What is not known of the angles before the run is zero. With `inverse_time` feeds are moves per minute.
         """
         position = np.vstack((before.tip, run.tip))
         angles = np.nan_to_num(np.vstack((before.second, run.second))[:, :2])
@@ -239,14 +232,7 @@ class Rotary:
     def _second_derivatives(self, start: Floats, end: Floats, angles: Floats, turn: Floats) -> tuple[Floats, Floats]:
         """(b,) bounds of the second derivatives of tip (mm) and tool vector by the share of a block.
 
-        Parameters
-        ----------
-        start, end : (b, 3) float64, mm
-            Words of the linear axes.
-        angles : (b, 2) float64, degrees
-            Where it begins.
-        turn : (b, 2) float64, rad
-            Size of the turns.
+        `start` and `end` are words of the linear axes, mm; `angles` degrees where it begins; `turn` the turns, rad.
         """
         machine = self.machine
         none = np.zeros(len(start))

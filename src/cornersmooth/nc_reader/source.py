@@ -109,13 +109,7 @@ class Source:
         return parts[0] if len(parts) == 1 else b"".join(parts)
 
     def _size(self, wanted: int) -> int:
-        """Bytes there are: at least so many, unless the text is shorter.
-
-        Raises
-        ------
-        BrokenPipeError
-            Who writes the text has gone.
-        """
+        """Bytes there are: at least so many, unless the text is shorter; BrokenPipeError where its writer has gone."""
         file = self._text
         assert not isinstance(file, bytes)
         while True:

@@ -9,7 +9,7 @@ import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.elements import Curves, Problem
-from cornersmooth.nc_reader.words import Table
+from cornersmooth.nc_reader.words import BSPLINE, NURBS, POLY, SPL, Table
 
 #: FANUC: order of a curve whose first block has no P (B-63324EN/03 4.17)
 DEFAULT_ORDER = 4
@@ -24,28 +24,42 @@ _GAP = 1.1e-3
 _KNOTS = np.array([0.0] * 4 + [1.0] * 4)
 
 
-def knot_curves(
-    table: Table, six: Floats, placed: Bools, curve: Bools, starts: Bools, letters: str, problems: list[Problem]
+def curves_of(
+    table: Table,
+    six: Floats,
+    placed: Bools,
+    code: Floats,
+    before: Floats,
+    letters: str,
+    problems: list[Problem],
 ) -> Curves:
-    """Curves of FANUC's G06.2 (B-63324EN/03 4.17): a knot K and a weight R in every block.
+    """Curves of all kinds in a run of r blocks.
 
     Parameters
     ----------
-    table : Table
-        Of r blocks.
     six : (r, 6) float64
-        Tip and second triple after every block.
-    placed : (r,) bool
-        Blocks with words of position.
-    curve : (r,) bool
-        Blocks that belong to curves.
-    starts : (r,) bool
-        Those with which one begins.
-    letters : str
-        Addresses of the axes.
+        Tip and second triple after every block, in the order of `letters`; `before`: in front of the run.
+    placed, code : (r,)
+        Blocks with words of position; G word of group 01, or what stands for it.
     problems : list of Problem
         Takes what breaks the rules.
     """
+    found = []
+    if (nurbs := code == NURBS).any():
+        found.append(_knot_curves(table, six, placed, nurbs, letters, problems))
+    if (spline := placed & (code == BSPLINE)).any():
+        found.append(_interval_curves(table, six, spline, before, problems))
+    for kind, read in ((POLY, _poly_curves), (SPL, _spl_curves)):
+        if (polynomial := placed & (code == kind)).any():
+            found.append(read(table, six, before, polynomial, letters, problems))
+    return Curves.joined(found)
+
+
+def _knot_curves(
+    table: Table, six: Floats, placed: Bools, curve: Bools, letters: str, problems: list[Problem]
+) -> Curves:
+    """Curves of FANUC's G06.2 (B-63324EN/03 4.17): a knot K and a weight R in every block."""
+    starts = curve & (table.column("G") == NURBS)
     rows = np.flatnonzero(curve)
     start = np.flatnonzero(starts[rows])
     if len(start) == 0 or start[0] != 0:
@@ -139,20 +153,11 @@ def _crowded(knot: Floats, start: Ints, size: Ints, order: Ints) -> Bools:
     return own & (knot == knot[np.maximum(before, 0)])
 
 
-def interval_curves(table: Table, six: Floats, spline: Bools, before: Floats, problems: list[Problem]) -> Curves:
+def _interval_curves(table: Table, six: Floats, spline: Bools, before: Floats, problems: list[Problem]) -> Curves:
     """Curves of Siemens' BSPLINE (programming manual 12/2019): control points with knot intervals PL and weights PW.
 
     The first control point is where the block before has ended. With the knots u the block of control point j has
     PL = u[j+2] − u[j+1]. Where three knots meet a spline passes its control point, and a new curve begins.
-
-    Parameters
-    ----------
-    table, six, problems
-        As in `knot_curves`.
-    spline : (r,) bool
-        Blocks on splines; neighbours are one spline.
-    before : (6,) float64
-        Tip and second point in front of the run.
     """
     rows = np.flatnonzero(spline)
     opens = np.append(True, np.diff(rows) != 1)
@@ -213,24 +218,12 @@ def _knots_of(interval: Floats, first: Ints, count: Ints) -> Floats:
     return total - np.repeat(total[start], size)
 
 
-def poly_curves(
+def _poly_curves(
     table: Table, six: Floats, before: Floats, poly: Bools, letters: str, problems: list[Problem]
 ) -> Curves:
-    """Curves of POLY: ``PO[X]=(end, a2, a3)`` of a parameter p from 0 to PL.
+    """Curves of POLY: ``PO[X]=(end, a2, a3)`` of a parameter p from 0 to PL; a2 and a3 are in columns X2 and X3.
 
     The control takes a0 from where the block before ended; a1 follows from the end.
-
-    Parameters
-    ----------
-    table : Table
-        Columns ``X2`` and ``X3`` hold the coefficients of ``X``; without them an axis runs straight.
-    six : (r, 6) float64
-        Positions after every block, in the order of `letters`.
-    before : (6,) float64
-        Position in front of the run.
-    poly : (r,) bool
-    problems : list of Problem
-        Takes what breaks the rules.
     """
     rows = np.flatnonzero(poly)
     start, end = np.vstack((before, six))[rows], six[rows]
@@ -242,18 +235,13 @@ def poly_curves(
     square = _factors(table, rows, letters, "{}2") * length**2
     cube = _factors(table, rows, letters, "{}3") * length**3
     slope = end - start - square - cube
-    return bezier_curves(
+    return _bezier_curves(
         rows, rows, np.stack((start, start + slope / 3, start + 2 * slope / 3 + square / 3, end), axis=1)
     )
 
 
-def spl_curves(table: Table, six: Floats, before: Floats, spl: Bools, letters: str, problems: list[Problem]) -> Curves:
-    """Curves of SPL: X(t) = K3X·t³ + K2X·t² + K1X·t + X with t from 1 to 0.
-
-    Parameters
-    ----------
-    As in `poly_curves`; the columns are ``K3X``, ``K2X`` and ``K1X``.
-    """
+def _spl_curves(table: Table, six: Floats, before: Floats, spl: Bools, letters: str, problems: list[Problem]) -> Curves:
+    """Curves of SPL: X(t) = K3X·t³ + K2X·t² + K1X·t + X with t from 1 to 0."""
     rows = np.flatnonzero(spl)
     end = six[rows]
     cube, square, slope = (_factors(table, rows, letters, f"K{power}{{}}") for power in (3, 2, 1))
@@ -261,7 +249,7 @@ def spl_curves(table: Table, six: Floats, before: Floats, spl: Bools, letters: s
     off = np.abs(start - np.vstack((before, six))[rows]).max(axis=1)
     text = "a spline begins more than a micrometre beside where the block before has ended"
     problems += Problem.at("CS519", off > _GAP, table.line[rows], text)
-    return bezier_curves(rows, rows, np.stack((start, end + 2 * slope / 3 + square / 3, end + slope / 3, end), axis=1))
+    return _bezier_curves(rows, rows, np.stack((start, end + 2 * slope / 3 + square / 3, end + slope / 3, end), axis=1))
 
 
 def _factors(table: Table, rows: Ints, letters: str, name: str) -> Floats:
@@ -271,7 +259,7 @@ def _factors(table: Table, rows: Ints, letters: str, name: str) -> Floats:
     return np.stack(columns, axis=1)
 
 
-def bezier_curves(row: Ints, end: Ints, points: Floats) -> Curves:
+def _bezier_curves(row: Ints, end: Ints, points: Floats) -> Curves:
     """Cubics by their Bézier points (c, 4, 6), from blocks `row` to `end`, of a parameter from 0 to 1."""
     count = len(row)
     return Curves(
@@ -320,7 +308,7 @@ def cut_long(curves: Curves) -> tuple[Curves, Bools]:
     block = end - curves.points[owner] + 4 + k  # of the control point that ends each part
     end = np.where(mine, block, end)
     row = np.where(mine & (k > 0), block, row)
-    parts = bezier_curves(row[mine], end[mine], bezier)
+    parts = _bezier_curves(row[mine], end[mine], bezier)
     others = curves.only(np.flatnonzero(~long))
     joined = Curves.joined([parts, others])
     return joined, np.isin(joined.element, parts.element)

@@ -25,10 +25,7 @@ _ALIKE = {"ON": "FLOOD", "NOMORE": "OFF"}
 class Asking:
     """Goes through the CL statements and notes what they ask for. What it cannot interpret asks for nothing.
 
-    Parameters
-    ----------
-    means : mapping
-        What words of the control say (`WordList.means`), for AUXFUN.
+    What words of the control say (`WordList.means`) is for AUXFUN.
     """
 
     def __init__(self, program: Program, means: Means | None = None) -> None:
@@ -194,9 +191,7 @@ def asked(
     Parameters
     ----------
     places : sequence of float, mm
-        Where the statements stand along the path.
-    end : float, mm
-        Length of the path.
+        Of the statements, along the path, whose length is `end`.
     means : mapping
         What words of the control say, as of `WordList`.
     dwells : sequence of Token

@@ -32,14 +32,8 @@ def gone_over(program: Program, nc: NcProgram, *, stays: bool) -> Program | None
     """The CL program with holes that a text leaves out as rapids to where the text goes over them.
 
     Which rapids of a text belong to such a hole is open where others are along its line. The text says in comments
-    where it leaves a hole out; the rapid behind one goes over it, or the tool is there already.
-
-    Parameters
-    ----------
-    nc : NcProgram
-        The text, with its comments among the events.
-    stays : bool
-        Whether a tool that is over the hole already stays there, rather than goes on along its line.
+    where it leaves a hole out; the rapid behind one goes over it, or the tool is there already. It `stays` where it is
+    over the hole, or goes on along its line.
 
     Returns
     -------

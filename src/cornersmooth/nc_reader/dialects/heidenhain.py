@@ -210,13 +210,7 @@ def _shown(parameters: set[int]) -> str:
 
 
 class _KlartextLexer(Lexer):
-    """Blocks that begin with their number and with what they are.
-
-    Parameters
-    ----------
-    rotary : str
-        Addresses of the rotary axes; empty without a machine.
-    """
+    """Blocks that begin with their number and with what they are."""
 
     word = re.compile(
         rf"(?P<factor>K[123][XYZABC])(?P<of>{NUMBER}(?:E[-+]?\d+)?)|(?P<vector>T[XYZ])(?P<part>{NUMBER})"

@@ -214,15 +214,7 @@ class Iso(Dialect):
 
 
 class _IsoLexer(Lexer):
-    """Words of one letter and a number; a program name in brackets.
-
-    Parameters
-    ----------
-    rotary : str
-        Addresses of the rotary axes; empty without a machine.
-    points : frozenset of str
-        See `Lexer.points`.
-    """
+    """Words of one letter and a number; a program name in brackets."""
 
     word = re.compile(rf"([A-Z])[ \t]*({NUMBER})|(<[^>]*>)")
     #: a semicolon at the end of a line is how listings show the end of a block

@@ -183,13 +183,7 @@ class Siemens(Dialect):
 
 
 class _SiemensLexer(Lexer):
-    """Words of letters, words with ``=``, polynomials, keywords and calls.
-
-    Parameters
-    ----------
-    rotary : str
-        Addresses of the rotary axes; empty without a machine.
-    """
+    """Words of letters, words with ``=``, polynomials, keywords and calls."""
 
     word = re.compile(
         rf"(?P<axis>[ABC])[ \t]*=[ \t]*{BY_WORD}\([ \t]*(?P<angle>{NUMBER})[ \t]*\)"
