@@ -328,7 +328,7 @@ def read_toml(text: str) -> Table:
 def filled(text: str, values: Mapping[str, object]) -> str:
     """Fill the braces of a block by name: nothing but the values gets into it.
 
-    Raises ValueError, A brace holds more than a known name: an attribute, an index, a width.
+    Raises ValueError where a brace holds more than a known name: an attribute, an index, a width.
     """
     for _, name, form, conversion in Formatter().parse(text):
         if name is not None and (name not in values or form or conversion):

@@ -13,12 +13,12 @@ from cornersmooth.cl import arcs as arc_geometry
 from cornersmooth.cl import motion_statements, state_statements
 from cornersmooth.cl.arcs import ArcRule
 from cornersmooth.cl.bulk import chunks
-from cornersmooth.cl.cards import without_card_columns
 from cornersmooth.cl.dialects import DIALECTS, recognise
 from cornersmooth.cl.grammar import Decode, Record, joined, number, read_records
 from cornersmooth.cl.messages import error, finding
 from cornersmooth.cl.poses import AXIS_NOISE
 from cornersmooth.cl.reader_state import ReaderState
+from cornersmooth.cl.source import without_card_columns
 from cornersmooth.cl.words import (
     GOTO_WORDS,
     KNOWN_WORDS,

@@ -73,12 +73,8 @@ class Arc:
 def read_arc(record: Record, file: str, rule: ArcRule | None, decimals: int) -> Arc:
     """Read CIRCLE or MOVARC (InputError CS106, CS113, CS120, CS124, CS125, CS127).
 
-    Parameters
-    ----------
-    rule : {"left", "right", "tangent"} or None
-        Sense of rotation that overrides the dialect's; "tangent" is settled when the neighbours are known.
-    decimals : int
-        Digits after the point that the dialect prints at most.
+    The rule overrides the dialect's sense of rotation; "tangent" is settled when the neighbours are known. The dialect
+    prints so many decimals at most.
     """
     values, words = record.values, record.words
     if record.word == "MOVARC" and record.args[:9:4] == _PARTS_OF_MOVARC:  # DMG MORI MfgSuite
@@ -138,20 +134,9 @@ class ResolvedArcs:
 def resolve(
     table: Sequence[Arc], tip: Floats, kind: NDArray[np.uint8], file: str, rule: ArcRule | None
 ) -> ResolvedArcs:
-    """Find sweep and sense of all arcs from the poses around them.
+    """Find sweep and sense of all arcs from the poses around them; tips are as written, in the unit of the arcs.
 
-    Parameters
-    ----------
-    tip : (n, 3) float64
-        Tips as written, in the unit of the arcs.
-    kind : (n,) uint8
-        `Move` of every pose.
-    rule : {"left", "right", "tangent"} or None
-
-    Raises
-    ------
-    InputError
-        CS123 where an end is not on the circle, CS126 where a stated angle is not the arc's.
+    Raises InputError CS123 where an end is not on the circle, CS126 where a stated angle is not the arc's.
     """
     if not table:
         none = np.zeros(0, np.int64)

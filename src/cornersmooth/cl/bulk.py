@@ -49,14 +49,9 @@ class Chunk:
 
 
 def chunks(data: bytes, *, fast: bool = True) -> Iterator[Chunk]:
-    """Cut a text into chunks that end before a GOTO line, and find the plain GOTO statements.
+    """Cut a text, whose last line has an end, too, into chunks that end before a GOTO line; find the plain GOTOs.
 
-    Parameters
-    ----------
-    data : bytes
-        Lines end with LF, the last one too.
-    fast : bool
-        False leaves everything to the careful reader.
+    Without `fast` everything is left to the careful reader.
     """
     start, first = 0, 1
     while start < len(data):
@@ -133,14 +128,7 @@ def _find_plain(text: bytes, first: int) -> Chunk | None:
 
 
 def _classify(text: bytes, starts: Ints) -> tuple[NDArray[np.uint8], Bools]:
-    """Say of every line whether it is a plain GOTO, and whether that goes on in the next line.
-
-    Returns
-    -------
-    (n,) uint8
-        0, `_THREE` or `_SIX`.
-    (n,) bool
-    """
+    """Say of every line whether it is a plain GOTO (0, `_THREE`, `_SIX`), and whether that goes on in the next line."""
     residue = text.translate(None, _DIGITS) + _PADDING
     words = _words(residue)
     left = _line_starts(residue)[: len(starts)]

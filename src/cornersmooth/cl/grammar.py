@@ -111,16 +111,9 @@ class _Lines:
 
 
 def read_records(lines: Sequence[bytes], first: int, decode: Decode, file: str, follows: str) -> Iterator[Record]:
-    """Yield the statements of some consecutive lines (InputError CS104, CS105, CS190).
+    """Yield the statements of some lines, whose first has a number (InputError CS104, CS105, CS190).
 
-    Parameters
-    ----------
-    lines : sequence of bytes
-        Without line ends.
-    first : int
-        Number of the first of them.
-    follows : str
-        What comes after these lines, for the message when the last statement is not complete.
+    `follows` is what comes after these lines, for the message when the last statement is not complete.
     """
     source = _Lines(lines, first, decode, file, follows)
     while source.at < len(lines):

@@ -66,21 +66,10 @@ class Curve:
 
 
 def lines_of(curve: Curve, start: tuple[float, float, float], tolerance: float) -> tuple[Floats, Ints] | None:
-    """Points on the curve whose chords stay within a tolerance of it, without the start, with the end.
+    """Points on a curve without a complaint (m, 3), whose chords stay within a tolerance of it, and their lines (m,).
 
-    Parameters
-    ----------
-    curve : Curve
-        Without a complaint.
-    start : (x, y, z)
-        First control point.
-    tolerance : float
-        Largest distance between chord and curve, in the unit of the curve.
-
-    Returns
-    -------
-    (m, 3) float64, (m,) int64
-        Points, and the lines of the control points next to them; None if there would be more than `MOST_LINES` a point.
+    The start is its first control point and is left out; the end is not. None if there would be more than `MOST_LINES`
+    points a control point.
     """
     from scipy.interpolate import BSpline  # which takes long to load
 

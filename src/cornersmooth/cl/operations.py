@@ -95,15 +95,8 @@ def find_operations(program: Program) -> tuple[Operation, ...]:
 def one_operation(program: Program, which: str) -> Program:
     """Take one operation alone, with the tool, spindle, coolant and cycle that hold where it begins.
 
-    Parameters
-    ----------
-    which : str
-        Name of the operation, in any case, or its number.
-
-    Raises
-    ------
-    InputError
-        CS168: there is no such operation, or several are called so. CS169: it cannot be written alone.
+    `which` is its name, in any case, or its number. Raises InputError CS168: there is no such operation, or several are
+    called so; CS169: it cannot be written alone.
     """
     own = _chosen(program, find_operations(program), which)
     statements = program.statements[own.first_statement : own.last_statement]
@@ -142,19 +135,9 @@ def one_operation(program: Program, which: str) -> Program:
 
 
 def with_tool(program: Program, number: int | None, spindle: tuple[float, str] | None) -> Program:
-    """Return the program with a tool and a spindle speed of its own.
+    """Return the program with a tool, and a spindle speed and direction (CLW, CCLW), of its own; None keeps its own.
 
-    Parameters
-    ----------
-    number : int or None
-        Of the tool; None where the program keeps its own.
-    spindle : (float, str) or None
-        Revolutions per minute, and ``CLW`` or ``CCLW``; None as before.
-
-    Raises
-    ------
-    SettingsError
-        CS248: the program has such statements itself.
+    Raises SettingsError CS248: the program has such statements itself.
     """
     line = int(program.line[0]) if len(program) else 0
     given: list[Statement] = []
@@ -228,10 +211,7 @@ def _chosen(program: Program, operations: Sequence[Operation], which: str) -> Op
 def _held(before: Sequence[Statement], at_once: Sequence[Statement]) -> tuple[list[Statement], list[Statement]]:
     """Statements that hold on where an operation begins, in order, and those of which nobody knows whether they do.
 
-    Parameters
-    ----------
-    at_once : sequence of Statement
-        What the operation says itself before its first move: that takes the place of what held.
+    What the operation says itself before its first move, `at_once`, takes the place of what held.
     """
     last: dict[str, int] = {}
     spindle: list[int] = []

@@ -55,26 +55,16 @@ def looks_like_points(data: bytes) -> bool:
 
 
 def read_points(data: bytes, *, name: str, units: Units | None = None, lenient: bool = False) -> Program:
-    """Read a CSV or column file: every row is a linear move to its pose, at feed or rapid.
+    """Read a CSV or column file: every row is a linear move to its pose, at feed or rapid (InputError CS150-CS166).
 
     A column says which moves are rapid; where there is none, the first is, and all others are at feed. Columns are
     named by a header line (also one in a comment) or known from their number: 3 are tips with axis +Z, 6 are tip and
     axis vector or tip and second point of the axis, whichever the numbers say, a seventh is the feed.
 
-    Parameters
-    ----------
-    data : bytes
-        UTF-8, UTF-16 or Windows-1252; cells between commas, semicolons, tabs or blanks; decimal commas where
-        semicolons or tabs separate; comments after ``#``, ``%`` or ``//``.
-    units : {"mm", "inch"} or None
-        None for what the header says, or mm. Feeds are per minute in the same unit.
-    lenient : bool
-        Normalise axis vectors of any length and skip feeds that are not positive, with findings.
-
-    Raises
-    ------
-    InputError
-        CS150-CS166, with the line.
+    The text is UTF-8, UTF-16 or Windows-1252; cells are between commas, semicolons, tabs or blanks, with decimal commas
+    where semicolons or tabs separate; comments come after ``#``, ``%`` or ``//``. Without units the header says them,
+    or they are mm, and feeds are per minute in the same unit. With `lenient` axis vectors of any length are normalised,
+    and feeds that are not positive are left out, with findings.
     """
     text = table.clean(data, name)
     columns = _find_columns(text, name)

@@ -75,23 +75,10 @@ def clean(data: bytes, file: str) -> PointText:
 
 
 def numbers(text: PointText, columns: Columns, file: str) -> tuple[Floats, Ints]:
-    """Read the rows of a cleaned file.
+    """Read the rows of a cleaned file: (n, columns.width) float64, and the line of each.
 
-    Parameters
-    ----------
-    columns : Columns
-        Says which columns must hold a number, and which may (the feed); whatever stands in the others becomes NaN
-        where it is no number.
-
-    Returns
-    -------
-    table : (n, columns.width) float64
-    line : (n,) int64
-
-    Raises
-    ------
-    InputError
-        CS151, CS152, CS153, CS164, CS166 with the line of the first row that does not fit.
+    The columns say which of them must hold a number, and which may (the feed); whatever stands in the others becomes
+    NaN where it is no number. Raises InputError CS151, CS152, CS153, CS164, CS166 with the first row that does not fit.
     """
     tables, lines = [], []
     first, start = text.first_line, 0

@@ -40,12 +40,7 @@ Direction = tuple[str, Vector] | None
 def read_drive_arc(record: Record, start: Vector, direction: Direction, file: str) -> tuple[Arc, Vector]:
     """Read TLON,GOFWD on a circle or cylinder; return the arc and its end point (InputError CS123, CS125, CS126).
 
-    Parameters
-    ----------
-    start : (x, y, z)
-        Where the tool stands; the unit of the file.
-    direction : (word, vector) or None
-        INDIRV or INDIRP before it.
+    The tool stands at `start`; INDIRV or INDIRP before it gave the direction.
     """
     text = "".join(record.text.split())
     surface, _, check = text.partition(",ON,")

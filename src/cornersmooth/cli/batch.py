@@ -24,16 +24,9 @@ _PR_SET_PDEATHSIG = 1
 
 
 class Batch:
-    """The jobs of one run.
+    """The jobs of one run: in so many processes, 0 for all cores, or on the cluster of a scheduler, where one is named.
 
-    Parameters
-    ----------
-    processes : int
-        0 for all cores.
-    scheduler : str
-        Of a cluster that does the work instead: its address or file; empty for none.
-    progress : callable, optional
-        Called with the files that have ended, and with all.
+    `progress` is called with the files that have ended, and with all.
     """
 
     def __init__(

@@ -35,15 +35,8 @@ _AHEAD = 64
 def run_on_cluster(jobs: list[Job], scheduler: str) -> Iterator[tuple[int, Outcome]]:
     """Have jobs of one batch done by a cluster; places in the list and outcomes, as they end.
 
-    Parameters
-    ----------
-    scheduler : str
-        Address such as ``tcp://host:8786``, or a scheduler file.
-
-    Raises
-    ------
-    SettingsError
-        CS243: distributed is not installed. CS244: the scheduler does not answer.
+    The scheduler is an address such as ``tcp://host:8786``, or a file. Raises SettingsError CS243: distributed is not
+    installed; CS244: the scheduler does not answer.
     """
     client, as_completed = _connect(scheduler)
     here, run = os.getcwd(), secrets.token_hex(8)
@@ -71,14 +64,8 @@ def run_on_cluster(jobs: list[Job], scheduler: str) -> Iterator[tuple[int, Outco
 def do(job: Job, folder: str, proof: str, version: str) -> Outcome:
     """Do a job in a process of the cluster; the outcome tells paths as they were named.
 
-    Parameters
-    ----------
-    folder : str
-        Where relative paths begin.
-    proof : str
-        A file that is there where the folders are shared.
-    version : str
-        Of the program that asks.
+    Relative paths begin in the folder. The proof is a file that is there where the folders are shared; the version is
+    that of the program that asks.
     """
     host = socket.gethostname()
     if version != __version__:

@@ -84,12 +84,8 @@ def new_command(
 ) -> Callable[[Callable[[Given], int]], click.Command]:
     """Make a command of a function of what was given.
 
-    Parameters
-    ----------
-    name, arguments, options : str
-        Arguments as the usage line has them, and fields of `Options` in the order of the help.
-    **changes
-        Helps of some options in this command, or all that is different of them there.
+    Arguments are as the usage line has them, and options fields of `Options` in the order of the help. Changes are the
+    helps of some options in this command, or all that is different of them there.
     """
 
     def decorate(function: Callable[[Given], int]) -> click.Command:

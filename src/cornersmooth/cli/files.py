@@ -24,17 +24,7 @@ _SHOWN = 20
 
 
 class Beginning:
-    """A stream that lets the first lines of a text through and counts the others.
-
-    Parameters
-    ----------
-    stream : binary stream
-
-    Attributes
-    ----------
-    held_back : int
-        Lines that were not let through.
-    """
+    """A stream that lets the first lines of a text through and counts the others, which it holds back."""
 
     def __init__(self, stream: BinaryIO) -> None:
         self._stream, self._left = stream, _SHOWN
@@ -55,10 +45,7 @@ class Beginning:
 
 
 def read_input(path: str, *, size_limit: bool = True) -> tuple[bytes, str]:
-    """Contents and display name of an input; ``-`` is standard input.
-
-    Raises InputError CS100: the file cannot be read; CS199: it is too large.
-    """
+    """Contents and display name of an input; ``-`` is standard input (InputError CS100, and CS199: too large)."""
     from cornersmooth.cl.source import read_bounded
 
     if path == STANDARD:

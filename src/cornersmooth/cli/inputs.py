@@ -38,19 +38,9 @@ class Input:
 def find_inputs(given: Given, patterns: tuple[str, ...] = PATTERNS, suffix: str | None = None) -> list[Input]:
     """Files that were named, and in batches those of the folders that were, with all below, in alphabetical order.
 
-    Parameters
-    ----------
-    patterns : tuple of str
-        What the names of files in folders are like where ``--glob`` does not say.
-    suffix : str or None
-        Of the names of NC files; None for that of the input.
-
-    Raises
-    ------
-    UsageError
-        Options that do not go together, or not with so many inputs; names that clash.
-    SettingsError
-        CS220: an output of one is the input of another. CS224: a folder without any such file.
+    In folders they are like the patterns where ``--glob`` does not say. NC files have the suffix, or that of the input.
+    Raises UsageError: options do not go together, or not with so many inputs, or names clash; SettingsError CS220: an
+    output of one is the input of another; CS224: a folder without any such file.
     """
     _check_together(given)
     found: list[Input] = []

@@ -103,10 +103,7 @@ class Outcome:
 def _check(job: Job, *, replace_target: bool | None = False) -> dict[str, bool | None]:
     """Refuse what would fail later or destroy something; say of each output whether it may replace what is there.
 
-    Parameters
-    ----------
-    replace_target : bool or None
-        Whether the NC file may be replaced, besides `--force`: as `force` of `cornersmooth.output.check_output`.
+    `replace_target` is whether the NC file may be replaced, besides `--force`: as `force` of `output.check_output`.
     """
     force = job.given.force
     may_replace: dict[str, bool | None] = {

@@ -27,18 +27,10 @@ Units = Literal["mm", "inch"]
 
 
 def option(heading: str, spelled: str, help: str, default: Any = None, **given: Any) -> Any:
-    """Field of an option.
+    """Field of an option under a heading; `given` is as `click.Option` takes it.
 
-    Parameters
-    ----------
-    heading : str
-        Its place in the help: one of `HEADINGS`.
-    spelled : str
-        Flags, and what the help shows in the place of the value. The long flag is the field's name if there is none.
-    default
-        That of the command line, and of the commands that do not have the option.
-    **given
-        As `click.Option` takes them.
+    It is spelled by flags, and by what the help shows in the place of the value. The long flag is the field's name if
+    there is none. The default is that of the command line, and of the commands that do not have the option.
     """
     return field(default=default, metadata={"heading": heading, "spelled": spelled, "help": help, **given})
 

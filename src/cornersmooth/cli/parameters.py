@@ -18,15 +18,9 @@ _LENGTH = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(mm|in|inch
 
 
 class Value(click.ParamType[Any]):
-    """A value that a function reads from text; what its ValueError says is the message.
+    """A value that a function reads from text; what its ValueError says is the message, and the name is in the help.
 
-    Parameters
-    ----------
-    name : str
-        What the help shows in its place.
-    read : callable
-    complete : callable, optional
-        Gives what a shell offers, as `click.ParamType.shell_complete` does without the parameter.
+    `complete` gives what a shell offers, as `click.ParamType.shell_complete` does without the parameter.
     """
 
     def __init__(

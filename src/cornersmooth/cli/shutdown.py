@@ -23,16 +23,9 @@ _TIDY_TERMINAL = b"\r\x1b[2K\x1b[?25h"
 
 
 class Shutdown:
-    """What is done when the run is told to end.
+    """What is done when the run is told to end: `clean` first, then `keep`, which writes what has to outlast the run.
 
-    Attributes
-    ----------
-    say : callable
-        Gives the line that is printed.
-    clean : callable or None
-        What is called first.
-    keep : callable or None
-        What is called after it: writes what has to outlast the run.
+    `say` gives the line that is printed.
     """
 
     def __init__(self) -> None:

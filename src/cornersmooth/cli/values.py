@@ -75,10 +75,7 @@ class Given(Options):
         return Limits(**{name: getattr(self, name) for name in names.split()})
 
     def planned_limits(self) -> Limits | None:
-        """Limits of the plan whose feeds are written; None where they are the programmed ones.
-
-        Raises UsageError: limits without `--feed-from-plan`.
-        """
+        """Limits of the plan whose feeds are written; None where they are the programmed ones (and UsageError)."""
         if self.feed_from_plan:
             return self.path_limits(PLANNED)
         for name in filter(typed, PLANNED.split()):
@@ -108,11 +105,7 @@ class Given(Options):
         return data, name, program
 
     def reading_back(self) -> dict[str, Any]:
-        """Keyword arguments of `cornersmooth.nc_reader.read_nc` for a program that somebody wrote.
-
-        Raises SettingsError CS204: it is not known how the control's programs are read; or the control or the machine
-        is unknown.
-        """
+        """Keyword arguments of `nc_reader.read_nc` for a program that somebody wrote (SettingsError CS204)."""
         from cornersmooth.nc_reader import CONTROLS
 
         control = self.load_control()
