@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from cornersmooth.model import Floats
+from cornersmooth.verify.around import Inner
 from cornersmooth.verify.chain import Path, Sections
 from cornersmooth.verify.passage import Passage, Walk
 
@@ -26,6 +27,7 @@ def passage(
     *,
     own_bend: Floats | None = None,
     path_bend: Floats | None = None,
+    inner: Inner | None = None,
     chunk: int = CHUNK,
 ) -> Passage:
     """Decide whether two polylines can be run beside each other within a radius, both forward only.
@@ -39,6 +41,8 @@ def passage(
     own_bend, path_bend : (n - 1,), (m,) float64, mm, optional
         By how much the motions may leave each segment: an eighth of the largest second derivative by its fraction.
         They are proved to be within the radius, not their chords.
+    inner : callable, optional
+        As of `Walk.take`; vertices are counted in `own`.
     chunk : int
         Own vertices that are looked at together; the verdict does not depend on it.
 
@@ -59,7 +63,8 @@ def passage(
     for first in range(0, len(own) - 1, chunk):
         rows = slice(first, min(first + chunk, len(own) - 1) + 1)
         sections = whole_section(rows.stop - rows.start - 1, len(path) - 1, open_end=rows.stop < len(own))
-        part = walk.take(own[rows], bend[rows.start : rows.stop - 1], sections)
+        within = None if inner is None else lambda number, first=first: inner(_inside(number, rows) + first)
+        part = walk.take(own[rows], bend[rows.start : rows.stop - 1], sections, within)
         place.append(part.place[1 if first else 0 :])
         breaks += [replace(one, row=one.row + first) for one in part.breaks]
         whole = whole and part.whole
@@ -67,3 +72,10 @@ def passage(
             place.append(np.full(len(own) - rows.stop, np.nan))
             break
     return Passage(np.concatenate(place), tuple(breaks), whole)
+
+
+def _inside(number: Floats, rows: slice) -> Floats:
+    """Numbers of vertices of a chunk, which knows no others."""
+    assert (number >= 0).all()
+    assert (number <= rows.stop - rows.start - 1).all()
+    return number

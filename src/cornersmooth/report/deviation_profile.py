@@ -11,7 +11,7 @@ from cornersmooth.nc_reader.elements import NcProgram
 from cornersmooth.nc_reader.tool import written_at
 from cornersmooth.slices import joined_rows, some_rows
 from cornersmooth.verify.batches import Batches
-from cornersmooth.verify.distances import Gap, of_original
+from cornersmooth.verify.deviation import Gap, of_original
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.nearest import nearest_places
 from cornersmooth.verify.task import Task

@@ -21,22 +21,11 @@ _MOST_PARTS: Final = 64
 Inner = Callable[[Floats], Floats]
 
 
-@dataclass(frozen=True)
-class Rows:
-    """Own vertices one after another."""
-
-    begin: int  #: the first, counted by the caller
-    own: Floats  #: (k, 3h) mm
-    bend: Floats  #: (k - 1,) mm
-    number: Floats  #: (k,): their numbers for `Inner`
-
-
 @dataclass
 class Around:
     """Some rows against a part of the path, both perhaps divided more finely, and what of them is reached."""
 
     space: FreeSpace
-    begin: int  #: the first row
     at: Ints  #: (k,): where the rows are among those of the space
     places: Floats  #: (m + 1,): of the vertices of the space on the whole path
     start: float  #: the place of the first row
@@ -44,25 +33,36 @@ class Around:
 
     @classmethod
     def of(
-        cls, rows: Rows, path: Path, radius: float, start: float, top: int, inner: Inner | None, *, fine: bool
+        cls,
+        rows: tuple[Floats, Floats, Floats],
+        path: Path,
+        radius: float,
+        start: float,
+        top: int,
+        inner: Inner | None,
+        *,
+        fine: bool,
     ) -> Around:
         """Rows against the path from the place of the first up to a vertex.
 
-        Their bends are taken off the radius; `fine`: bent steps and segments are divided before.
+        They are vertices (k, 3h), the bends (k - 1,) of their steps, and their numbers (k,) for `Inner`. Their bends
+        are taken off the radius; `fine`: bent steps and segments are divided before, but no steps that are looked back
+        on: of these nothing is known but their ends.
         """
+        own, bend, number = rows
         base = min(int(start), top - 1)
         theirs = _parts(path.bend[base:top], radius if fine else np.inf)
-        ours = _parts(rows.bend, radius if fine and inner is not None else np.inf)
+        ours = _parts(np.where(number[:-1] < 0.0, 0.0, bend), radius if fine and inner is not None else np.inf)
         places = _divided(np.arange(base, top + 1, dtype=np.float64), theirs)
         at = np.append(0, np.cumsum(ours))
-        own = np.empty((rows.own.shape[1], at[-1] + 1))
-        own[:, at] = rows.own.T
+        points = np.empty((own.shape[1], at[-1] + 1))
+        points[:, at] = own.T
         between = np.setdiff1d(np.arange(at[-1] + 1), at, assume_unique=True)
         if inner is not None and len(between):
-            own[:, between] = inner(_divided(rows.number, ours)[between]).T
-        points = path.at(places) if fine else path.points[base : top + 1]
-        bends = np.repeat(rows.bend / ours**2, ours), np.repeat(path.bend[base:top] / theirs**2, theirs)
-        return cls(FreeSpace(own, points.T, radius, *bends), rows.begin, at, places, start)
+            points[:, between] = inner(_divided(number, ours)[between]).T
+        beside = path.at(places) if fine else path.points[base : top + 1]
+        bends = np.repeat(bend / ours**2, ours), np.repeat(path.bend[base:top] / theirs**2, theirs)
+        return cls(FreeSpace(points, beside.T, radius, *bends), at, places, start)
 
     @property
     def base(self) -> int:
@@ -78,7 +78,7 @@ class Around:
     def row_reached(self) -> int:
         """The first row after the last of which something is reached; the last row if that is."""
         count = len(self.reached) - (not self.reached[-1])
-        return self.begin + min(int(np.searchsorted(self.at, count)), len(self.at) - 1)
+        return min(int(np.searchsorted(self.at, count)), len(self.at) - 1)
 
     @property
     def bent(self) -> bool:

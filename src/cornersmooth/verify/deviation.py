@@ -1,4 +1,8 @@
-"""Deviation: where the motions part, how far they are apart at most, and which poses are missed that must be exact."""
+"""Deviation: where the motions part, how far they are apart at most, and which poses are missed that must be exact.
+
+Amounts decide nothing. At common poses they are the distances at the places that prove the decision: all that is proved
+keeps within them. Of tips and of axis points alone the nearest places are looked for beside those.
+"""
 
 from __future__ import annotations
 
@@ -8,19 +12,115 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.model import Floats, Ints
-from cornersmooth.verify.distances import Gap, Reached, nearest, of_original, of_written
+from cornersmooth.verify.chain import points_at
 from cornersmooth.verify.exact_poses import digit_errors
 from cornersmooth.verify.findings import AXIS_OFF, Findings, Violation, Where
 from cornersmooth.verify.match import Match
-from cornersmooth.verify.nearest import COLUMNS, Metric, on_segments
+from cornersmooth.verify.motions import inner_points
+from cornersmooth.verify.nearest import COLUMNS, Metric, larger_square, nearest_places, on_segments
 from cornersmooth.verify.passage import AROUND, LONGER, MOST_BREAKS, Break
-from cornersmooth.verify.task import ARITHMETIC
+from cornersmooth.verify.task import ARITHMETIC, Task
+
+#: segments on either side of a place among which a nearer one is looked for
+_REACH: Final = 2
+
+#: distances from a place, in steps, through which parabolas are laid, one after the other
+_WIDTHS: Final = (1 / 8, 1 / 64, 1 / 512)
 
 #: rows for which tip and axis point are looked at each on its own at a time: only the largest are wanted
 _SOME: Final = 16
 
 #: vertices and segments around a break that are looked at for what is said of it
 _MOST_ROWS, _MOST_SEGMENTS = 256, 4096
+
+
+@dataclass(frozen=True)
+class Gap:
+    """How far poses are from a motion, k rows."""
+
+    tip: Floats  #: (k,) mm
+    axis_point: Floats  #: (k,) mm
+    angle: Floats  #: (k,) rad: between the tool axes
+
+    @classmethod
+    def of(cls, task: Task, away: Floats) -> Gap:
+        """That of differences (k, 6) of tips and axis points."""
+        turned = away[:, 3:] if task.own_axis else away[:, 3:] - away[:, :3]
+        tip, axis_point, turn = (np.sqrt(np.einsum("ij,ij->i", off, off)) for off in (away[:, :3], away[:, 3:], turned))
+        return cls(tip, axis_point, 2.0 * np.arcsin(np.minimum(turn / (2.0 * task.axis_length), 1.0)))
+
+
+@dataclass(frozen=True)
+class Reached:
+    """What vertices of one motion find on the other, k rows."""
+
+    vertex: Ints  #: (k,): the vertices
+    gap: Gap  #: at a common pose
+    place: Floats  #: (k,): where on the other polyline: segment plus fraction
+    mine: bool  #: whether they are written vertices
+
+
+def of_written(match: Match) -> Reached:
+    """Every written vertex that has a place, against the polyline of the original there."""
+    vertex = np.flatnonzero(match.on)
+    away = match.away if len(vertex) == len(match.away) else match.away[vertex]
+    return Reached(vertex, Gap.of(match.task, away), match.place[vertex], True)
+
+
+def of_original(match: Match) -> Reached:
+    """Every vertex of the original that is passed, against the written motion."""
+    vertex, row, share = match.passing
+    first, last = match.runs
+    point = match.path.points[vertex]
+    place = nearest_places(point, match.six, row, 1, first[row], last[row] - 1)
+    away = _written(match, place) - point
+    far = np.flatnonzero(larger_square(away) > match.tolerance**2)
+    if len(far):  # the sum of both squares is least there, but not the larger: the place that is proved
+        place[far] = row[far] + share[far]
+        away[far] = _written(match, place[far]) - point[far]
+    return Reached(vertex, Gap.of(match.task, away), place, False)
+
+
+def nearest(match: Match, reached: Reached, rows: Ints, metric: Metric) -> Floats:
+    """(k,) distances of some rows from the nearest place of the other motion: of tips, or of axis points."""
+    vertex = reached.vertex[rows]
+    if reached.mine:
+        own, other, middle, low, high = match.six, match.path.points, match.segment, match.low, match.high
+        middle, low, high = middle[vertex], low[vertex], high[vertex]
+    else:
+        own, other = match.path.points, match.six
+        middle = np.minimum(reached.place[rows].astype(np.int64), len(other) - 2)
+        first, last = match.runs
+        low, high = first[middle], last[middle] - 1
+    point, columns = own[vertex], COLUMNS[metric]
+    best = nearest_places(point, other, middle, _REACH, low, high, metric)
+    first_place, last_place = low.astype(np.float64), high + 1.0
+
+    def square(place: Floats) -> Floats:
+        away = ((match.path.at(place) if reached.mine else _written(match, place)) - point)[:, columns]
+        return np.einsum("ij,ij->i", away, away)
+
+    least = square(best)
+    for width in _WIDTHS:
+        centre = np.clip(best, first_place + width, last_place - width)  # a bent step may go on in the next one
+        before, here, after = (square(centre + side) for side in (-width, 0.0, width))
+        bend = before - 2.0 * here + after
+        shift = np.divide(width * (before - after), 2.0 * bend, out=np.zeros_like(bend), where=bend > 0.0)
+        best = np.clip(centre + np.clip(shift, -1.0, 1.0), first_place, last_place)
+        least = np.minimum.reduce((least, before, here, after))
+    return np.sqrt(np.minimum(least, square(best)))
+
+
+def _written(match: Match, place: Floats) -> Floats:
+    """(k, 6) points of the written motion at places of its polyline."""
+    six, segment = match.six, np.minimum(place.astype(np.int64), len(match.six) - 2)
+    share = place - segment
+    points = six.take(segment, axis=0)
+    points += share[:, None] * (six.take(segment + 1, axis=0) - points)
+    bent = np.flatnonzero((match.motion.bend[segment] > 0.0) & (share > 0.0) & (share < 1.0))
+    if len(bent):
+        points[bent] = inner_points(match.nc, match.motion, match.task, place[bent], match.first)
+    return points
 
 
 def check_breaks(match: Match, found: Findings) -> None:
@@ -35,17 +135,18 @@ def check_breaks(match: Match, found: Findings) -> None:
 def _say(match: Match, found: Findings, metric: Metric, one: Break) -> None:
     """Take down one break: what is off around it, or else that the order is wrong."""
     task, limit, around = match.task, match.tolerance + ARITHMETIC, _Around.of(match, one)
+    gap = around.note(match, found)
     off: dict[str, float] = {}
     lines = _lines(match, one.place, int(around.rows[0]))
     for name in COLUMNS:
-        off[name], place, row = around.farthest(match, name)
-        where = _lines(match, place, row)
+        distance, places, rows = around.distances(match, name)
+        off[name] = float(distance.max())
+        k = int(np.argmax(distance > limit)) if off[name] > limit else int(distance.argmax())  # there it begins
+        place, where = float(places[k]), _lines(match, float(places[k]), int(rows[k]))
         if name == "both":
-            gap = around.worst(match)
             found.take_worst("together_tip", Where(float(gap.tip[0]), *where))
             found.take_worst("together_axis_point", Where(float(gap.axis_point[0]), *where))
             found.take_worst("orientation", Where(float(gap.angle[0]), *where))
-            found.poses.append(around.poses(match))
             lines = where if off[name] > limit else lines
         elif off[name] > limit and metric in (name, "both") and not (name == "axis_point" and task.own_axis):
             found.take_worst(name, Where(off[name], *where))
@@ -101,66 +202,47 @@ class _Around:
         low = min(max(low - 1, int(match.low[row])), int(match.high[row]))
         high = max(min(high, int(match.high[row]) + 1, low + _MOST_SEGMENTS), low + 1)
         vertices = vertices[:_MOST_SEGMENTS]
-        steps = np.arange(max(row - 1, 0), max(min(resumed, end, last + 1), row))
-        vertices = vertices if len(steps) else vertices[:0]
+        before = max(row - 1, 0)
+        steps = np.arange(before, max(min(resumed, end, last + 1), before + 1))
         return cls(np.arange(row, last + 1), np.arange(low, high), vertices, steps)
 
-    def farthest(self, match: Match, metric: Metric) -> tuple[float, float, int]:
-        """The largest distance of the vertices of both motions, mm; place and written vertex.
+    def distances(self, match: Match, metric: Metric) -> tuple[Floats, Floats, Ints]:
+        """(k,) distances of vertices of both motions, mm; places and written vertices: those of the latter first."""
+        columns, path = COLUMNS[metric], match.path.points
+        at, off = _nearest(match.six[self.rows], path, self.segments, columns)
+        step, other = _nearest(path[self.vertices], match.six, self.steps, columns)
+        return np.append(off, other), np.append(at, self.vertices), np.append(self.rows, self.after(step))
 
-        The latter are those of the first that is beyond the tolerance: there it begins.
-        """
-        columns, path, limit = COLUMNS[metric], match.path.points, match.tolerance + ARITHMETIC
-        share, off, nearest = _distances(match.six[self.rows], path, self.segments, columns)
-        k = _first_or_worst(off, limit)
-        found = float(off.max()), float(self.segments[nearest[k]] + share[k]), int(self.rows[k])
-        if len(self.vertices):
-            _, off, nearest = _distances(path[self.vertices], match.six, self.steps, columns)
-            k = _first_or_worst(off, limit)
-            if off.max() > found[0]:  # else the written vertices tell more
-                place, row = float(self.vertices[k]), int(self.steps[nearest[k]]) + 1
-                found = (float(off.max()), place, row) if found[0] <= limit else (float(off.max()), *found[1:])
-        return found
+    def after(self, step: Floats) -> Ints:
+        """(k,) written vertices to which steps lead, of places on these."""
+        return np.maximum(np.ceil(step), self.steps[0] + 1).astype(np.int64)
 
-    def worst(self, match: Match) -> Gap:
-        """That of the written vertex that is farthest off both paths at common places."""
-        share, off, nearest = _distances(match.six[self.rows], match.path.points, self.segments, COLUMNS["both"])
-        k = int(off.argmax())
-        place = self.segments[nearest[k : k + 1]] + share[k : k + 1]
-        return Gap.of(match.task, match.six[self.rows[k : k + 1]] - match.path.at(place))
-
-    def poses(self, match: Match) -> Floats:
-        """How far the original poses are from the written motion."""
-        trail, vertices = match.original.trail, self.vertices
-        vertices = vertices[trail.fraction[vertices] == 1]
-        point, pose = match.path.points[vertices], match.original.pose[trail.owner[vertices]]
-        if not len(vertices):
-            return np.zeros((5, 0))
-        share, _, nearest = _distances(point, match.six, self.steps, COLUMNS["both"])
-        step, at = self.steps[nearest], share[:, None]
-        six = match.six[step] + at * (match.six[step + 1] - match.six[step])
-        gap = Gap.of(match.task, six - point)
-        return np.array((pose, gap.tip, gap.axis_point, gap.angle, match.nc_lines(step + 1)))
+    def note(self, match: Match, found: Findings) -> Gap:
+        """Take down how far the original poses are from the written motion; that of the written vertex farthest off."""
+        task, six, trail = match.task, match.six, match.original.trail
+        poses = self.vertices[trail.fraction[self.vertices] == 1]
+        step, _ = _nearest(match.path.points[poses], six, self.steps, COLUMNS["both"])
+        gap = Gap.of(task, points_at(six, step).T - match.path.points[poses])
+        pose, lines = match.original.pose[trail.owner[poses]], match.nc_lines(self.after(step))
+        found.poses.append(np.array((pose, gap.tip, gap.axis_point, gap.angle, lines)))
+        at, off = _nearest(six[self.rows], match.path.points, self.segments, COLUMNS["both"])
+        k = slice(int(off.argmax()), int(off.argmax()) + 1)
+        return Gap.of(task, six[self.rows[k]] - match.path.at(at[k]))
 
 
-def _first_or_worst(off: Floats, limit: float) -> int:
-    """The first that is beyond a limit, or the largest."""
-    return int(np.argmax(off > limit)) if off.max() > limit else int(off.argmax())
-
-
-def _distances(point: Floats, vertices: Floats, segments: Ints, columns: slice) -> tuple[Floats, Floats, Ints]:
-    """Of points (k, 6): fraction, distance (k,) and which of segments (m,) is nearest.
+def _nearest(point: Floats, vertices: Floats, segments: Ints, columns: slice) -> tuple[Floats, Floats]:
+    """(k,) nearest places of points (k, 6) on segments (m,), and distances.
 
     Of both, tip and axis point, the larger distance at the nearest common place.
     """
     segments = np.broadcast_to(segments, (len(point), len(segments)))
     share, square = on_segments(point[:, None, columns], vertices, segments, columns)
-    if columns == slice(0, 6):
+    if columns == COLUMNS["both"]:
         start = vertices[segments]
         away = point[:, None] - start - share[..., None] * (vertices[segments + 1] - start)
         square = np.maximum((away[..., :3] ** 2).sum(axis=2), (away[..., 3:] ** 2).sum(axis=2))
     nearest, each = square.argmin(axis=1), np.arange(len(point))
-    return share[each, nearest], np.sqrt(square[each, nearest]), nearest
+    return segments[each, nearest] + share[each, nearest], np.sqrt(square[each, nearest])
 
 
 def measure_written(match: Match, found: Findings) -> None:
@@ -238,4 +320,4 @@ def _passed_elsewhere(match: Match, vertex: int, tip: Floats, axis: Floats) -> b
     tips, axes = np.tile(tip, (len(ends), 1)), np.tile(axis, (len(ends), 1))
     exact, _ = digit_errors(match.nc, match.owner[ends], tips, axes, match.task.axis_length)
     pose = np.array([vertex])
-    return any(match.reachable.may_be_at(end, pose)[0] for end in ends[exact].tolist())
+    return any(match.may_be_at(end, pose)[0] for end in ends[exact].tolist())

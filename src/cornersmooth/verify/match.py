@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +14,15 @@ from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.elements import Elements
 from cornersmooth.verify.chain import Path, passed, points_at
 from cornersmooth.verify.cl_motion import Original
+from cornersmooth.verify.free_space import FreeSpace
 from cornersmooth.verify.motions import Motion
 from cornersmooth.verify.nearest import Metric
 from cornersmooth.verify.passage import Break
-from cornersmooth.verify.reachable import Reachable
 from cornersmooth.verify.task import Task
+
+#: vertices on either side of one from whose places it is worked out where it may be: more places could only be found
+#: with more
+_AROUND: Final = 64
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -169,10 +174,32 @@ class Match(Batch):
         row, share = np.concatenate((row[inside], begin)), np.concatenate((share[inside], np.zeros(len(begin))))
         return vertex[order], row[order], share[order]
 
-    @cached_property
-    def reachable(self) -> Reachable:
-        """What else can be reached around a vertex."""
-        return Reachable(self.task, self.motion, self.place, self.section)
+    def may_be_at(self, vertex: int, pose: Ints) -> Bools:
+        """(k,) whether a written vertex may be at vertices of the CL path: it has more places where that turns back.
+
+        They are those from which the places of vertices far before and far behind it can be reached. Words and exact
+        poses ask for it: what holds at one of these places holds.
+        """
+        there = np.zeros(len(pose), np.bool_)
+        if not self.on[vertex]:
+            return there
+        first = max(int(self.runs[0][vertex]), vertex - _AROUND)
+        last = min(int(self.runs[1][vertex]), vertex + _AROUND)
+        start, end = self.place[[first, last]].tolist()
+        bottom = int(start)
+        top = min(max(math.ceil(end), bottom + 1), self.path.segments)
+        bend = self.motion.bend[first:last]
+        radius = self.task.radius + float(bend.max(initial=0.0))
+        own, path = self.six[first : last + 1].T, self.path.points[bottom : top + 1].T
+        space = FreeSpace(own, path, radius, bend, np.zeros(top - bottom))
+        forward = [space.along(0, start - bottom)]
+        forward += [reached for _, reached in space.sweep(0, forward[0])]
+        if len(forward) <= last - first or not forward[-1]:
+            return there
+        places = space.between(forward, end - bottom)[vertex - first]
+        for k, (low, high) in places.items():
+            there |= (bottom + k + low <= pose) & (pose <= bottom + k + high)
+        return there
 
     def cl_lines(self, place: Floats) -> Ints:
         """(k,) lines of the CL file that lead to places."""

@@ -9,13 +9,13 @@ before it was reached, and yet nothing behind it is; else what lies too far back
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
 from cornersmooth.model import Floats, Ints
-from cornersmooth.verify.around import Around, Inner, Rows
+from cornersmooth.verify.around import Around, Inner
 from cornersmooth.verify.chain import Path, Sections, chain, points_at
 from cornersmooth.verify.free_space import free_interval, is_all, largest_square, lowest
 
@@ -73,119 +73,79 @@ class Passage:
         return not self.breaks and self.whole
 
 
-@dataclass
 class Walk:
-    """Goes along a path as the own motion comes in, chunk by chunk."""
+    """Goes along a path as the own motion comes in, chunk by chunk; the radius in mm."""
 
-    path: Path
-    radius: float  #: mm
-    _own: Floats | None = None  #: (k, 3h) last vertices of a section that goes on, to look back on
-    _bend: Floats = field(default_factory=lambda: np.zeros(0))
-    _place: Floats = field(default_factory=lambda: np.zeros(0))
-    _known: int = 0  #: row of them at whose place and nowhere else the motion begins; -1: forgotten
-    _left: float = 0.0  #: last place that was reached before a break
-    _breaks: int = 0  #: how many so far
+    def __init__(self, path: Path, radius: float) -> None:
+        self.path, self.radius = path, radius
+        # vertices (k, 3h) at hand, those to look back on first; their places, bends of the steps from them, and their
+        # numbers in the chunk, with fractions where they were put between two
+        self._own = np.zeros((0, path.points.shape[1]))
+        self._place = self._bend = self._number = np.zeros(0)
+        # sections at hand: the first vertices that are not decided, the last ones, and the vertices at whose places and
+        # nowhere else the motion begins (-1: forgotten); places where they begin and end
+        self._first = self._last = self._known = np.zeros(0, np.int64)
+        self._begin = self._stop = np.zeros(0)
+        self._open = False
+        self._breaks: list[Break] = []
+        self._count = 0  # of breaks in the chunks before
+        self._left = 0.0  # last place that was reached before a break
+        self._whole = True
 
     def take(self, own: Floats, bend: Floats, sections: Sections, inner: Inner | None = None) -> Passage:
-        """Go on.
+        """Go on with vertices (n, 3h), mm, and the bends (n - 1,) of their steps; NaN between sections.
 
-        Parameters
-        ----------
-        own : (n, 3h) float64, mm
-            The next vertices. After an open section the first of them is the last of those before, and the first
-            section is the rest of that one.
-        bend : (n - 1,) float64, mm
-        sections : Sections
-            Where a section of one vertex has more than one place, the motion stands still.
-        inner : callable, optional
-            Gives more points of bent steps; vertices are counted in `own`.
-
-        Returns
-        -------
-        Passage
-            Of these vertices; NaN between sections.
+        After an open section the first vertex is the last of those before, and the first section is the rest of that
+        one. Where a section of one vertex has more than one place, the motion stands still. `inner` gives points of
+        bent steps; vertices are counted in `own`.
         """
-        if self._breaks >= MOST_BREAKS:
+        if self._count >= MOST_BREAKS:
             return Passage(np.full(len(own), np.nan), (), False)
-        part = _Part(self, own, bend, sections)
-        part.decide(inner)
-        if sections.open:
-            kept = max(part.last - LOOK_BACK[-1], int(part.known[-1]), 0)
-            self._own, self._bend, self._place = part.own[kept:], part.bend[kept:], part.place[kept:]
-            self._known = max(int(part.known[-1]) - kept, -1)
-        else:
-            self._own = None
-        self._left = part.left
-        self._breaks += len(part.breaks)
-        number = part.number[part.start :]
-        return Passage(part.place[part.start :][number == np.floor(number)], tuple(part.breaks), part.whole)
-
-
-class _Part:
-    """The last vertices of what was looked at before, and those of a chunk."""
-
-    def __init__(self, walk: Walk, own: Floats, bend: Floats, sections: Sections) -> None:
-        self.path, self.radius, self.left = walk.path, walk.radius, walk._left
-        self.start = 0
-        self.first, self.ends = sections.first.copy(), sections.last.copy()
-        self.begin, self.stop, self.open = sections.start.copy(), sections.stop, sections.open
-        if walk._own is None:
-            self.own, self.bend = own, bend
-            self.place = np.full(len(own), np.nan)
-            self.known = self.first.copy()
-        else:
-            self.start = len(walk._own) - 1
-            self.own, self.bend = np.concatenate((walk._own, own[1:])), np.concatenate((walk._bend, bend))
-            self.place = np.concatenate((walk._place, np.full(len(own) - 1, np.nan)))
-            self.first += self.start
-            self.ends += self.start
-            self.known = self.first.copy()
-            self.first[0], self.known[0], self.begin[0] = self.start, walk._known, walk._place[-1]
-        #: of each vertex in the chunk, with fractions where it was put between two
-        self.number = np.arange(len(self.own), dtype=np.float64) - self.start
-        self.most = MOST_BREAKS - walk._breaks
-        self.breaks: list[Break] = []
-        self.whole = True
-
-    @property
-    def last(self) -> int:
-        """The last vertex."""
-        return len(self.own) - 1
-
-    def decide(self, inner: Inner | None) -> None:
-        """Find places for all vertices of sections, or breaks."""
+        end = len(self._own)
+        kept = max(end - 1 - LOOK_BACK[-1], int(self._known[-1]), 0) if self._open else end
+        before = slice(kept, end - 1)
+        start = len(self._own[before])
+        self._own, self._bend = np.concatenate((self._own[before], own)), np.concatenate((self._bend[before], bend))
+        last_place, last_known = (self._place[-1], self._known[-1]) if self._open else (np.nan, 0)
+        self._place = np.concatenate((self._place[before], np.full(len(own), np.nan)))
+        self._number = np.arange(len(self._own), dtype=np.float64) - start
+        self._first, self._last, self._known = (
+            rows + start for rows in (sections.first, sections.last, sections.first)
+        )
+        self._begin, self._stop = sections.start.copy(), sections.stop
+        if self._open:
+            self._known[0] = max(last_known - kept, -1)
+            self._begin[0] = self._place[start] = last_place
+        self._open, self._breaks = sections.open, []
         section = 0
-        while section < len(self.first) and self.whole:
+        while section < len(self._first) and self._whole:
             section = self._go_on(section, inner)
+        self._count += len(self._breaks)
+        chunk = (self._number >= 0.0) & (self._number == np.floor(self._number))
+        return Passage(self._place[chunk], tuple(self._breaks), self._whole)
 
-    def meets(self, row: int, place: float) -> bool:
+    def _meets(self, row: int, place: float) -> bool:
         """Whether a vertex is near a place of the path."""
-        off = largest_square(self.own[row] - points_at(self.path.points, np.array([place]))[:, 0])
+        off = largest_square(self._own[row] - points_at(self.path.points, np.array([place]))[:, 0])
         return bool(off <= self.radius**2)
 
     def _go_on(self, section: int, inner: Inner | None) -> int:
-        """Go on from the first vertex of a section; return the section to go on with."""
-        row, begin = int(self.first[section]), float(self.begin[section])
+        """Find places for vertices from the first of a section on, or a break; return the section to go on with."""
+        row, begin = int(self._first[section]), float(self._begin[section])
         if np.isnan(begin):  # the motion has not come back to the path yet
             return self._resume(section, row)
-        if np.isnan(self.place[row]) and not self.meets(row, begin):
+        if np.isnan(self._place[row]) and not self._meets(row, begin):
             return self._break(section, Break(row, begin, True))
         bad = self._prove(section, row, begin, inner)
         while len(bad):
-            one = int(np.searchsorted(self.first, bad[0], side="right")) - 1
+            one = int(np.searchsorted(self._first, bad[0], side="right")) - 1
             gaps = np.flatnonzero(np.diff(bad) > LOOK_BACK[0])
-            last = min(int(bad[gaps[0] if len(gaps) else -1]), int(bad[0]) + _SOON, int(self.ends[one]))
-            end = self._repair(one, int(bad[0]), last, inner)
-            if isinstance(end, Break):
-                after = self._next(one, end.row)
-                if after is None or len(self.breaks) + 1 >= self.most:
-                    return self._break(one, end)
-                self._take_down(end)
-                self.place[end.row : after] = np.nan
-                self._begin_at(one, after, float(self.place[after]))
-                end = after
-            bad = bad[bad > end]
-        return len(self.first)
+            last = min(int(bad[gaps[0] if len(gaps) else -1]), int(bad[0]) + _SOON, int(self._last[one]))
+            found = self._repair(one, int(bad[0]), last, inner)
+            if isinstance(found, Break):
+                return self._break(one, found)
+            bad = bad[bad > found]
+        return len(self._first)
 
     def _prove(self, section: int, row: int, begin: float, inner: Inner | None) -> Ints:
         """Find places for vertices from one on by the chain; return those that it does not prove.
@@ -193,56 +153,57 @@ class _Part:
         Bent steps are divided as long as they are what is in the way.
         """
         while True:
-            sections = Sections(self.first, self.ends, self.begin, self.stop, self.open)
-            columns = np.ascontiguousarray(self.own[row:].T)
+            sections = Sections(self._first, self._last, self._begin, self._stop, self._open)
+            columns = np.ascontiguousarray(self._own[row:].T)
             rest = sections.behind(section, row, begin)
-            found = chain(columns, self.bend[row:], self.path, self.radius, rest)
+            found = chain(columns, self._bend[row:], self.path, self.radius, rest)
             bent = np.flatnonzero(found.bad & ~found.far) + row
             if not len(bent) or inner is None or not self._divide(row, bent, inner):
                 break
         _, inside = rest.of(np.arange(len(found.place)))
-        self.place[row:] = np.where(found.bad | ~inside, np.nan, found.place)
+        self._place[row:] = np.where(found.bad | ~inside, np.nan, found.place)
         return np.flatnonzero(found.bad) + row
 
     def _divide(self, row: int, bad: Ints, inner: Inner) -> bool:
         """Put points into bent steps, from a row on, to some vertices and beside them; say whether there were any."""
         steps = np.unique(np.concatenate((bad - 2, bad - 1, bad)))
-        steps = steps[(steps >= row) & (steps < self.last)]
-        steps = steps[self.bend[steps] > _TINY * self.radius]
+        steps = steps[(steps >= row) & (steps < len(self._own) - 1)]
+        steps = steps[self._bend[steps] > _TINY * self.radius]
         if not len(steps):
             return False
         share = np.arange(1, PARTS) / PARTS
-        begin, end = self.number[steps], self.number[steps + 1]
+        begin, end = self._number[steps], self._number[steps + 1]
         number = (begin[:, None] + share * (end - begin)[:, None]).ravel()
         at = np.repeat(steps + 1, PARTS - 1)
-        self.own = np.insert(self.own, at, inner(number), axis=0)
-        self.number, self.place = np.insert(self.number, at, number), np.insert(self.place, at, np.nan)
-        for rows in (self.first, self.ends, self.known):
+        self._own = np.insert(self._own, at, inner(number), axis=0)
+        self._number, self._place = np.insert(self._number, at, number), np.insert(self._place, at, np.nan)
+        for rows in (self._first, self._last, self._known):
             rows += (PARTS - 1) * np.searchsorted(steps, rows)
-        bend = self.bend.copy()
+        bend = self._bend.copy()
         bend[steps] /= PARTS**2
-        self.bend = np.insert(bend, at, bend[np.repeat(steps, PARTS - 1)])
+        self._bend = np.insert(bend, at, bend[np.repeat(steps, PARTS - 1)])
         return True
 
     def _repair(self, section: int, first: int, last: int, inner: Inner | None) -> int | Break:
         """Work out exactly how to come past some vertices; return one after them that has a place."""
-        known, end, stop = int(self.known[section]), int(self.ends[section]), int(self.stop[section])
-        unfinished = self.open and section == len(self.first) - 1
+        known, end, stop = int(self._known[section]), int(self._last[section]), int(self._stop[section])
+        unfinished = self._open and section == len(self._first) - 1
         if first == known:
-            return Break(first, float(self.begin[section]), True)
-        found = Break(first, float(self.place[first - 1]), False)
+            return Break(first, float(self._begin[section]), True)
+        found = Break(first, float(self._place[first - 1]), False)
         # whether more is wrong need not be known so well
-        for back in LOOK_BACK[: 2 if self.breaks or self.most < MOST_BREAKS else None]:
+        for back in LOOK_BACK[: 2 if self._breaks or self._count else None]:
             begin = max(first - back, known, 0)
             until = end if back > _SOON else min(last + _SOON, end)
-            rows = Rows(begin, *(values[begin : until + 1] for values in (self.own, self.bend[:until], self.number)))
+            rows, steps = slice(begin, until + 1), slice(begin, until)
+            own = self._own[rows], self._bend[steps], self._number[rows]
             top = self._within_reach(begin, until, stop)
             ends = -1 if until < end else None if unfinished else stop
             for fine in (False, True):
-                around = Around.of(rows, self.path, self.radius, float(self.place[begin]), top, inner, fine=fine)
-                goal = around.goal(self.place[begin : until + 1], last - begin, ends)
+                around = Around.of(own, self.path, self.radius, float(self._place[begin]), top, inner, fine=fine)
+                goal = around.goal(self._place[rows], last - begin, ends)
                 if goal is not None:
-                    return self._settle(around, goal)
+                    return self._settle(begin, around, goal)
                 if not around.bent:
                     break
             if not around.reached[0] and begin not in (known, 0):  # what bends take off leaves nothing of that place
@@ -250,8 +211,9 @@ class _Part:
             if around.reached[-1] and until < end:
                 continue
             proved = begin == known or self._all_known(around, section)
-            row = max(around.row_reached, first)  # the chain has proved what is before that
-            found = Break(row, around.farthest(), proved and row == around.row_reached)
+            reached = begin + around.row_reached
+            row = max(reached, first)  # the chain has proved what is before that
+            found = Break(row, around.farthest(), proved and row == reached)
             if proved or begin == 0:
                 break
         return found
@@ -259,23 +221,23 @@ class _Part:
     def _within_reach(self, begin: int, until: int, stop: int) -> int:
         """Vertex of the path before which some rows end, if they run beside it."""
         path = self.path
-        step = np.diff(self.own[begin : until + 1], axis=0)
+        step = np.diff(self._own[begin : until + 1], axis=0)
         gone = float(np.sqrt(np.einsum("ij,ij->i", step, step)).sum())
-        length = path.length_at(float(self.place[begin])) + LONGER * gone + AROUND * self.radius
+        length = path.length_at(float(self._place[begin])) + LONGER * gone + AROUND * self.radius
         return min(int(np.searchsorted(path.length, length)) + 1, stop)
 
-    def _settle(self, around: Around, goal: float) -> int:
+    def _settle(self, begin: int, around: Around, goal: float) -> int:
         """Give vertices the first places from which another place, of the last row reached, can be reached."""
         between = around.space.between(around.reached, around.inward(goal))
         count = int(np.searchsorted(around.at, len(between)))
-        begin, end = around.begin, around.begin + count - 1
-        self.place[begin : end + 1] = [around.outward(lowest(between[k])) for k in around.at[:count].tolist()]
-        self.place[end] = goal
+        end = begin + count - 1
+        self._place[begin : end + 1] = [around.outward(lowest(between[k])) for k in around.at[:count].tolist()]
+        self._place[end] = goal
         return end
 
     def _all_known(self, around: Around, section: int) -> bool:
         """Whether all that is free of one of some rows was reached."""
-        path, first, stop = self.path, int(self.begin[section]), int(self.stop[section])
+        path, first, stop = self.path, int(self._begin[section]), int(self._stop[section])
         for row in range(len(around.reached) - 1, -1, -1):
             reached = around.reached[row]
             if reached:
@@ -299,21 +261,11 @@ class _Part:
         low, high = free_interval(point[:, None], start, way, np.asarray(self.radius))
         return bool((low <= high).any())
 
-    def _next(self, section: int, row: int) -> int | None:
-        """The first vertex of a section after one that the chain has proved."""
-        known = np.flatnonzero(~np.isnan(self.place[row + 1 : self.ends[section]]))
-        return row + 1 + int(known[0]) if len(known) else None
-
-    def _take_down(self, found: Break) -> None:
-        """Take down a break."""
-        self.breaks.append(replace(found, row=int(np.ceil(self.number[found.row]))))
-        self.left = found.place
-        self.whole = len(self.breaks) < self.most
-
     def _break(self, section: int, found: Break) -> int:
-        """Take down a break, and find where to go on: the section that it is in."""
-        self._take_down(found)
-        self.place[found.row :] = np.nan
+        """Take down a break, and find where to go on: the section that it is in, or the next."""
+        self._breaks.append(replace(found, row=int(np.ceil(self._number[found.row]))))
+        self._left, self._whole = found.place, self._count + len(self._breaks) < MOST_BREAKS
+        self._place[found.row :] = np.nan
         return self._resume(section, found.row)
 
     def _resume(self, section: int, row: int) -> int:
@@ -321,8 +273,8 @@ class _Part:
 
         It gets a place: the nearest to where the path was left.
         """
-        path, end, left = self.path, int(self.ends[section]), self.path.length_at(self.left)
-        bottom, top = int(np.nan_to_num(self.begin[section])), int(self.stop[section])
+        path, end, left = self.path, int(self._last[section]), self.path.length_at(self._left)
+        bottom, top = int(np.nan_to_num(self._begin[section])), int(self._stop[section])
         tried = row + np.unique(np.geomspace(1, max(end - row, 1), _TRIED).astype(np.int64)) - 1
         for width, rows in ((AROUND, tried), (AROUND * AROUND, tried[::6])):
             low, high = np.searchsorted(path.length, (left - width * self.radius, left + width * self.radius)).tolist()
@@ -332,16 +284,13 @@ class _Part:
             start = path.points[segments].T
             way = path.points[segments.start + 1 : segments.stop + 1].T - start
             for k in rows.tolist():
-                bend = self.bend[max(k - 1, 0) : k + 1].max(initial=0.0)
-                at, other = free_interval(self.own[k][:, None], start, way, self.radius - bend - path.bend[segments])
+                bend = self._bend[max(k - 1, 0) : k + 1].max(initial=0.0)
+                at, other = free_interval(self._own[k][:, None], start, way, self.radius - bend - path.bend[segments])
                 free = np.flatnonzero(at <= other)
                 if len(free):
-                    place = segments.start + free + np.clip(self.left - segments.start - free, at[free], other[free])
-                    return self._begin_at(section, k, float(place[np.argmin(np.abs(place - self.left))]))
-        self.place[end] = np.nan
+                    place = segments.start + free + np.clip(self._left - segments.start - free, at[free], other[free])
+                    self._first[section] = self._known[section] = k
+                    self._begin[section] = self._place[k] = place[np.argmin(np.abs(place - self._left))]
+                    return section
+        self._place[end] = np.nan
         return section + 1
-
-    def _begin_at(self, section: int, row: int, place: float) -> int:
-        self.first[section] = self.known[section] = row
-        self.begin[section] = self.place[row] = place
-        return section

@@ -42,7 +42,7 @@ def place_words(match: Match, found: Findings) -> None:
         at = close[np.argmin(np.abs(close - at))] if len(close) else at
         beside = named[np.abs(named - at) > match.margin]
         if len(beside):
-            beside = beside[match.reachable.may_be_at(here, np.searchsorted(path, beside))]
+            beside = beside[match.may_be_at(here, np.searchsorted(path, beside))]
         found.words[one] = float(at), tuple(beside.tolist())
 
 
