@@ -13,7 +13,7 @@ from cornersmooth.verify import passage as module
 from cornersmooth.verify.chain import Path, Sections
 from cornersmooth.verify.passage import Walk
 from oracle.free_space import passes
-from verify.whole_passage import CHUNK, passage, whole_section
+from verify.whole_passage import CHUNK, passage
 
 SEEDS = st.integers(0, 2**32 - 1)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -63,7 +64,7 @@ def passage(
     for first in range(0, len(own) - 1, chunk):
         rows = slice(first, min(first + chunk, len(own) - 1) + 1)
         sections = whole_section(rows.stop - rows.start - 1, len(path) - 1, open_end=rows.stop < len(own))
-        within = None if inner is None else lambda number, first=first: inner(_inside(number, rows) + first)
+        within = None if inner is None else partial(_within, inner, rows)
         part = walk.take(own[rows], bend[rows.start : rows.stop - 1], sections, within)
         place.append(part.place[1 if first else 0 :])
         breaks += [replace(one, row=one.row + first) for one in part.breaks]
@@ -74,8 +75,8 @@ def passage(
     return Passage(np.concatenate(place), tuple(breaks), whole)
 
 
-def _inside(number: Floats, rows: slice) -> Floats:
-    """Numbers of vertices of a chunk, which knows no others."""
+def _within(inner: Inner, rows: slice, number: Floats) -> Floats:
+    """Points at numbers of a chunk, which knows no others."""
     assert (number >= 0).all()
     assert (number <= rows.stop - rows.start - 1).all()
-    return number
+    return inner(number + rows.start)
