@@ -68,8 +68,8 @@ def retracts_before(form: Form, angles: Floats, rapid: Bools, line: Ints, findin
     return rows
 
 
-def from_zero(form: Form, program: Program, axis: Floats, angles: Floats, move: Ints, rapid: Bools) -> Floats:
-    """What is to be added to angles so that none carries over what a tool before has left; constant between retracts.
+def from_zero(form: Form, program: Program, axis: Floats, angles: Floats, move: Ints, rapid: Bools) -> None:
+    """Take off angles what a tool before has left, in place; what is taken off is constant between retracts.
 
     After a retract the axes turn as they like. A tool that stays along the pole, where the first angle is free, has
     that at zero, not where another tool needs it. Where the rotary axes go to zero before a tool, its angles are
@@ -77,9 +77,8 @@ def from_zero(form: Form, program: Program, axis: Floats, angles: Floats, move: 
     """
     machine = form.machine
     assert machine is not None
-    shift = np.zeros_like(angles)
     if not form.table.program.retract:
-        return shift
+        return
     endless = np.array([each.limits is None and not each.modulo for each in machine.axes])
     endless &= "{rotary_zero}" in form.begin
     homes = [one.pose for one in program.statements if one.word == "GOHOME" and not one.args]
@@ -90,16 +89,19 @@ def from_zero(form: Form, program: Program, axis: Floats, angles: Floats, move: 
     # a pose that repeats the one before is no row
     rows = rows[(move[rows] == starts) & rapid[rows] & ~np.isnan(angles[rows]).any(axis=1)]
     for row, end in pairwise([*rows.tolist(), len(move)]):
-        shift[row:end, endless] = -360.0 * np.round(angles[row, endless] / 360.0)
+        first = angles[row].copy()
         if len(machine.names) == 2 and _along_pole(machine, axis[row:end], angles[row:end, 0]):
-            shift[row:end, 0] = np.clip(0.0, *machine.limits[0]) - angles[row, 0]
-    return shift
+            angles[row:end, 0] += np.clip(0.0, *machine.limits[0]) - first[0]
+            endless = endless & (False, True)
+        angles[row:end, endless] += -360.0 * np.round(first[endless] / 360.0)
 
 
 def _along_pole(machine: Machine, axis: Floats, first: Floats) -> bool:
     """Whether the tool is parallel to the first rotary axis all the while, and that stands."""
+    if np.nanmax(first) - np.nanmin(first) > _PARALLEL:
+        return False
     across = axis - dot(axis, np.broadcast_to(machine.axes[0].unit, axis.shape))[:, None] * machine.axes[0].unit
-    return bool(np.abs(across).max() <= _PARALLEL and np.nanmax(first) - np.nanmin(first) <= _PARALLEL)
+    return bool(np.abs(across).max() <= _PARALLEL)
 
 
 def refuse_compensated(program: Program, pose: int) -> NoReturn:

@@ -36,17 +36,17 @@ class RotaryWay:
     #: back there into a cut that it has left
     free: Bools
     left: Bools
-    place: Floats  #: (n,) as in `Rows`
+    place: Floats  #: (n,) as in `Rows`; (0,) where there are no curves
     tolerance: Floats  #: (n,), degrees by which the axis may be off on the way to the row
 
 
 def rotary_way(rows: Iterator[Rows], smoothed: SmoothProgram, form: Form, findings: Findings) -> RotaryWay:
-    """Angles of rows with tool vectors; all rows are held at once.
+    """Angles of rows with tool vectors; all rows are held at once, and their places on curves if the form has such.
 
     Raises InputError where the machine cannot follow the path.
     """
     program, settings, machine = smoothed.program, smoothed.settings, machine_of(form).with_longest_tool()
-    tip, axis, move, place = whole_rows(rows)
+    tip, axis, move, place = whole_rows(rows, places=bool(form.curves))
     if not len(move):
         none = np.zeros(0, np.bool_)
         return RotaryWay(tip, axis, move, np.zeros((0, 2)), np.zeros(0, np.int8), none, none, place, place)
@@ -59,15 +59,17 @@ def rotary_way(rows: Iterator[Rows], smoothed: SmoothProgram, form: Form, findin
     if form.rewind:
         path, source, left = rewound_angles(machine, tip, axis, **how)
         if left.any():
-            tip, axis, move, place = tip[source], axis[source], move[source], place[source]
+            tip, axis, move, place = tip[source], axis[source], move[source], place[source] if len(place) else place
             rapid = rapid[source] | left
             _note_rewinds(machine, path.angles, left, program.line[move], findings)
     else:
         path = rotary_angles(machine, tip, axis, **how)
     findings.add_all(path.findings)
-    angles = path.angles + from_zero(form, program, axis, path.angles, move, rapid)
+    from_zero(form, program, axis, path.angles, move, rapid)
     return_free_memory()  # rows are written while all of this is held
-    return RotaryWay(tip, axis, move, angles, path.branch, rapid, left, place, np.broadcast_to(tolerance, len(move)))
+    return RotaryWay(
+        tip, axis, move, path.angles, path.branch, rapid, left, place, np.broadcast_to(tolerance, len(move))
+    )
 
 
 def machine_of(form: Form) -> Machine:
@@ -77,14 +79,20 @@ def machine_of(form: Form) -> Machine:
     return form.machine
 
 
-def whole_rows(rows: Iterator[Rows]) -> tuple[Floats, Floats, Ints, Floats]:
-    """Tip, axis, move and place of all dense rows; what they were gathered in is given back part by part."""
+def whole_rows(rows: Iterator[Rows], *, places: bool = False) -> tuple[Floats, Floats, Ints, Floats]:
+    """Tip, axis, move and, if asked for, place of all dense rows.
+
+    What they were gathered in is given back part by part.
+    """
     columns: tuple[deque[Any], ...] = (deque(), deque(), deque(), deque())
     for chunk in rows:
         for column, part in zip(columns, (chunk.tip, chunk.other, chunk.move, chunk.place), strict=True):
             column.append(part)
+        if not places:
+            columns[3].clear()
     total = sum(map(len, columns[2]))
-    tip, axis, move, place = np.empty((total, 3)), np.empty((total, 3)), np.empty(total, np.int64), np.empty(total)
+    tip, axis, move = np.empty((total, 3)), np.empty((total, 3)), np.empty(total, np.int64)
+    place = np.empty(total if places else 0)
     for whole, parts in zip((tip, axis, move, place), columns, strict=True):
         begin = 0
         while parts:
