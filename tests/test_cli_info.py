@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from cornersmooth.cli.info import command
+from cornersmooth.cli.commands import COMMANDS
 from cornersmooth.errors import InputError
 from oracle.messages import one_line
 
@@ -16,7 +16,7 @@ SAMPLE = Path(__file__).resolve().parent.parent / "samples" / "impeller.cls"
 
 
 def run(*args: str, data: bytes = b"") -> str:
-    result = CliRunner().invoke(command, args, input=data, standalone_mode=False, catch_exceptions=False)
+    result = CliRunner().invoke(COMMANDS["info"], args, input=data, standalone_mode=False, catch_exceptions=False)
     assert result.return_value == 0
     return result.stdout
 

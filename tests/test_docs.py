@@ -20,7 +20,7 @@ import pytest
 
 import cornersmooth as cs
 from cornersmooth import read
-from cornersmooth.cli.group import COMMANDS
+from cornersmooth.cli.commands import COMMANDS
 from cornersmooth.kinematics import parse_machine
 from cornersmooth.nc import parse_control
 from oracle.command import DONE, SCRIPT, SMALL, run

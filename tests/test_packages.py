@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from cornersmooth import __version__
-from cornersmooth.cli.group import COMMANDS
+from cornersmooth.cli.commands import COMMANDS
 from oracle.command import run
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -6,10 +6,15 @@ Both carry a stable code. The library raises and returns them; only `cornersmoot
 
 from __future__ import annotations
 
+import os
+import traceback
 from dataclasses import dataclass
 from typing import Any, Literal
 
 Severity = Literal["note", "warning", "error"]
+
+#: exit code of the command line for a fault of the program itself
+EXIT_INTERNAL = 70
 
 #: numbers of warnings that say nothing of the metal: how the input is spelt, what was asked for, what costs time, what
 #: the verdict says already
@@ -44,6 +49,14 @@ def message(
     brackets = "".join(f" ({part})" for part in (beside, times) if part)
     lines = [f"{place}: " * bool(place) + f"{severity}{number}: {what}{brackets}", f"hint: {hint or rest}"]
     return "\n".join(map(printable, lines if hint or rest else lines[:1]))
+
+
+def internal_error(failure: Exception, source: str = "") -> str:
+    """Text for an error that is a fault of the program."""
+    last = traceback.extract_tb(failure.__traceback__)[-1]
+    place = f"{os.path.basename(last.filename)}:{last.lineno}"
+    what = f"internal error, {type(failure).__name__} at {place}: {failure}"
+    return message("error", what, place=source, hint="please report it with the input file")
 
 
 class CornersmoothError(Exception):

@@ -67,9 +67,6 @@ class Batch:
 
     def _beside(self, ending: Shutdown) -> Iterator[tuple[int, Outcome]]:
         """Places and outcomes of jobs, each in a process of its own, as they end."""
-        import cornersmooth.pipeline
-        import cornersmooth.report  # noqa: F401  once, for all processes
-
         running: dict[Helper, int] = {}
         waiting = iter(enumerate(self.jobs))
 

@@ -13,7 +13,9 @@ import secrets
 import socket
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from distributed import Client
 
 from cornersmooth import __version__
 from cornersmooth.cli.files import STANDARD
@@ -21,9 +23,6 @@ from cornersmooth.cli.job import Job, Outcome, run_job
 from cornersmooth.errors import SettingsError, message
 from cornersmooth.optional_packages import install_hint
 from cornersmooth.output import make_folder, remove_leftovers, temporary_name
-
-if TYPE_CHECKING:
-    from distributed import Client
 
 #: seconds to wait for the scheduler to answer
 _PATIENCE = 15

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import fields
 from functools import cache
+from importlib import import_module
 from types import NoneType
 from typing import Any, Final, Literal, get_args, get_origin, get_type_hints
 
@@ -80,29 +81,33 @@ def _styled(text: str, **style: Any) -> str:
 
 
 def new_command(
-    name: str, arguments: str, options: str, *, epilog: str = EXIT_CODES, **changes: str | Mapping[str, Any]
-) -> Callable[[Callable[[Given], int]], click.Command]:
-    """Make a command of a function of what was given.
+    name: str,
+    arguments: str,
+    options: str,
+    help: str,
+    *,
+    epilog: str = EXIT_CODES,
+    module: str = "",
+    **changes: str | Mapping[str, Any],
+) -> click.Command:
+    """Make a command, whose work is `run_NAME` in the module of its name, or in another.
 
     Arguments are as the usage line has them, and options fields of `Options` in the order of the help. Changes are the
     helps of some options in this command, or all that is different of them there.
     """
+    params: list[click.Parameter] = []
+    for metavar in arguments.split():
+        field, more = _ARGUMENTS[metavar]
+        params.append(click.Argument([field], **{"metavar": metavar, **more}))
+    for field in dict.fromkeys(options.split()):
+        change = changes.get(field, {})
+        params.append(_option(field, {"help": change} if isinstance(change, str) else change))
 
-    def decorate(function: Callable[[Given], int]) -> click.Command:
-        params: list[click.Parameter] = []
-        for metavar in arguments.split():
-            field, more = _ARGUMENTS[metavar]
-            params.append(click.Argument([field], **{"metavar": metavar, **more}))
-        for field in dict.fromkeys(options.split()):
-            change = changes.get(field, {})
-            params.append(_option(field, {"help": change} if isinstance(change, str) else change))
+    def called(**given: Any) -> int:
+        run = getattr(import_module(f"cornersmooth.cli.{module or name}"), f"run_{name}")
+        return int(run(Given(**{key: value for key, value in given.items() if value is not None})))
 
-        def called(**given: Any) -> int:
-            return function(Given(**{key: value for key, value in given.items() if value is not None}))
-
-        return Command(name, params=params, callback=called, help=function.__doc__, epilog=epilog)
-
-    return decorate
+    return Command(name, params=params, callback=called, help=help, epilog=epilog)
 
 
 @cache

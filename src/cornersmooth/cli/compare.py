@@ -7,49 +7,25 @@ import io
 import os
 import shlex
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from cornersmooth.cli.command import EXIT_CODES_OF_READERS, new_command
+from cornersmooth.cl import read
 from cornersmooth.cli.files import check_inputs, check_path, told_of, write_report
-from cornersmooth.cli.options import CURVES, READING
 from cornersmooth.cli.show import progress_bar, say
 from cornersmooth.cli.values import Given
-
-if TYPE_CHECKING:
-    from cornersmooth.comparing import Row, Table
+from cornersmooth.comparing import Row, Table, candidates, compare_programs
+from cornersmooth.feedrate import BlockLimits
+from cornersmooth.report.verdict import limits_text
 
 #: options of this command that `smooth` has not, or that would write
 _OWN = frozenset(("as_json", "csv", "verbose", "quiet", "force", "machine", "limits", "source", "look_ahead"))
 
 
-@new_command(
-    "compare",
-    "IN",
-    f"tolerance axis_length axis_tolerance control machine limits look_ahead {CURVES} feed {READING} tip_control "
-    "as_json csv force quiet verbose",
-    epilog=EXIT_CODES_OF_READERS,
-)
-def command(given: Given) -> int:
-    """Write the CL file IN in every form, method and line density that the control can run, and compare the times.
-
-    Every program is verified and planned as it is written, under the limits of the axes of --limits, or of --machine.
-    The best row is the fastest that keeps the tolerance; the command that writes it follows. Of parts of more than
-    2,000 poses whole runs from the middle are compared. -v states by which law lines are planned. The method zhang2016
-    is left out: it is there as published. IN may be a finished NC program: every way in which filter can smooth it.
-
-    \b
-    Examples:
-      cornersmooth compare part.cls --control siemens --limits table-ac
-      cornersmooth compare part.cls --control fanuc --limits mill.toml --csv p.csv
-      cornersmooth compare part.cls --control linuxcnc --machine xyzac-trt -v
-      cornersmooth compare part.ngc --control linuxcnc --machine xyzac-trt
-    """
-    from cornersmooth.cl import read
+def run_compare(given: Given) -> int:
+    """Do the work of the command; return its exit code."""
     from cornersmooth.cli.programs import axes_of, how_read
-    from cornersmooth.comparing import candidates, compare_programs
-    from cornersmooth.feedrate import BlockLimits
     from cornersmooth.filter.compared import compare_filtered
 
     source = given.source
@@ -83,7 +59,6 @@ def command(given: Given) -> int:
 
 
 def _lines(table: Table, commands: list[str], verbose: bool) -> Iterator[str]:
-    from cornersmooth.report.verdict import limits_text
 
     if table.share < 1.0:
         yield f"from {100.0 * table.share:.2g} % of the poses: whole runs from the middle of the part"

@@ -9,7 +9,7 @@ from typing import Final
 import click
 
 from cornersmooth.cli import shop
-from cornersmooth.cli.command import new_command
+from cornersmooth.cli.commands import COMMANDS
 from cornersmooth.cli.show import say
 from cornersmooth.cli.values import Given
 from cornersmooth.errors import InputError
@@ -18,20 +18,9 @@ from cornersmooth.errors import InputError
 _DEFAULT: Final = re.compile(r"\[default: ([^]]+)\]")
 
 
-@new_command("config", "[IN]", "as_json")
-def command(given: Given) -> int:
-    """Say which values 'cornersmooth smooth' would use for the file or folder IN, and where each comes from.
-
-    Options come first, then the environment (CORNERSMOOTH_TOLERANCE), the file cornersmooth.toml in the folder of the
-    input or above it, ~/.config/cornersmooth/cornersmooth.toml, and the defaults.
-
-    \b
-    Examples:
-      cornersmooth config
-      cornersmooth config jobs/part.cls
-    """
-    from cornersmooth.cli.smooth import command as smooth
-
+def run_config(given: Given) -> int:
+    """Do the work of the command; return its exit code."""
+    smooth = COMMANDS["smooth"]
     source = given.source
     if not os.path.exists(source):
         raise InputError("CS100", "cannot read it: no such file or directory", "check the path", file=source)
@@ -58,16 +47,8 @@ def _told(value: object) -> str:
     return ", ".join(map(str, value)) if isinstance(value, tuple) else str(value)
 
 
-@new_command("completion", "SHELL", "")
-def completion(given: Given) -> int:
-    """Print what makes SHELL complete commands, options, names of controls, machines and forms, and files.
-
-    \b
-    Examples:
-      eval "$(cornersmooth completion bash)"    # in ~/.bashrc
-      eval "$(cornersmooth completion zsh)"     # in ~/.zshrc, behind compinit
-      cornersmooth completion fish | source     # in ~/.config/fish/config.fish
-    """
+def run_completion(given: Given) -> int:
+    """Do the work of the command; return its exit code."""
     from click.shell_completion import get_completion_class
 
     from cornersmooth.cli.group import cli

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from cornersmooth.cli.command import new_command
 from cornersmooth.cli.show import say, say_json
 from cornersmooth.cli.values import Given
-
-if TYPE_CHECKING:
-    from cornersmooth.nc import Control
+from cornersmooth.kinematics import load_machine, machine_names, machine_table
+from cornersmooth.kinematics.posed import Posed, parse_pose
+from cornersmooth.nc import Control, control_aliases, control_names, control_table, load_control
 
 #: what the modes of a form are called for people
 _MODES = {
@@ -25,21 +24,8 @@ _MODES = {
 }
 
 
-@new_command("controls", "[CONTROL]", "table as_json")
-def command(given: Given) -> int:
-    """List the controls with their forms, or check and describe one.
-
-    A TOML file of your own is like one of them and says only what is different; see docs/controls.md.
-
-    \b
-    Examples:
-      cornersmooth controls
-      cornersmooth controls siemens
-      cornersmooth controls siemens --table > mine.toml
-      cornersmooth controls mine.toml
-    """
-    from cornersmooth.nc import control_names, control_table, load_control
-
+def run_controls(given: Given) -> int:
+    """Do the work of the command; return its exit code."""
     if given.table:
         _check_table(given, "control")
         click.echo(control_table(str(given.name)), nl=False)
@@ -60,8 +46,6 @@ def _check_table(given: Given, kind: str) -> None:
 
 def _values(control: Control) -> dict[str, Any]:
     """What is told of a control."""
-    from cornersmooth.nc import control_aliases
-
     aliases = [alias for alias, own in control_aliases().items() if own == control.name and not control.own]
     forms = [{**_named(form), "with": [_MODES[mode] for mode in form.modes]} for form in control.forms.values()]
     return {**_named(control), "aliases": aliases, "forms": forms, "functions": [*map(_named, control.extras.values())]}
@@ -86,24 +70,8 @@ def _told(before: str, item: dict[str, Any]) -> str:
     return f"{before}{item['name']}: {item['description']}" if item["description"] else f"{before}{item['name']}"
 
 
-@new_command("machines", "[MACHINE]", "table as_json pose")
-def machines(given: Given) -> int:
-    """List the machines that come with the program, or check and describe one.
-
-    A machine has up to two rotary axes, each in a table or a head, with direction, point and limits. A TOML file
-    describes your own. It may be like one of these and hold only what is different.
-
-    \b
-    Examples:
-      cornersmooth machines
-      cornersmooth machines xyzac-trt
-      cornersmooth machines table-ac --table > mine.toml
-      cornersmooth machines mine.toml
-      cornersmooth machines mine.toml --pose A30,C45
-      cornersmooth machines mine.toml --json
-    """
-    from cornersmooth.kinematics import load_machine, machine_names, machine_table
-
+def run_machines(given: Given) -> int:
+    """Do the work of the command; return its exit code."""
     name = given.name
     if given.table:
         _check_table(given, "machine")
@@ -111,8 +79,6 @@ def machines(given: Given) -> int:
     elif given.pose and name is None:
         raise click.UsageError("--pose needs the name of a machine")
     elif given.pose and name:
-        from cornersmooth.kinematics.posed import Posed, parse_pose
-
         machine = load_machine(name)
         posed = Posed.of(machine, parse_pose(machine, given.pose))
         if given.as_json:

@@ -11,7 +11,6 @@ from typing import Any, Final
 
 import click
 
-from cornersmooth.cli.command import new_command
 from cornersmooth.cli.show import say
 from cornersmooth.cli.values import Given
 
@@ -34,16 +33,8 @@ KINDS: Final = {
 _WIDTH: Final = 80
 
 
-@new_command("explain", "[CODE]", "as_json")
-def command(given: Given) -> int:
-    """Explain the code of a message: its cause, what to do, and how it is printed. Without a code, list them all.
-
-    \b
-    Examples:
-      cornersmooth explain
-      cornersmooth explain CS337
-      cornersmooth explain 337 --json
-    """
+def run_explain(given: Given) -> int:
+    """Do the work of the command; return its exit code."""
     known, code = codes(), given.name
     if code is not None:
         number = re.fullmatch(r"(?:CS)?(\d{3})", code.strip("[]"), re.IGNORECASE)

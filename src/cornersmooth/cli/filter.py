@@ -5,11 +5,10 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from cornersmooth.cli.command import EXIT_CODES_OF_WRITERS, new_command
 from cornersmooth.cli.files import (
     STANDARD,
     check_endings,
@@ -21,7 +20,6 @@ from cornersmooth.cli.files import (
     write_report,
 )
 from cornersmooth.cli.inputs import Input, find_inputs
-from cornersmooth.cli.options import LINES
 from cornersmooth.cli.programs import filter_form_of, how_read, show_wrong
 from cornersmooth.cli.shop import command_line, loosened
 from cornersmooth.cli.show import (
@@ -36,19 +34,18 @@ from cornersmooth.cli.show import (
 )
 from cornersmooth.cli.values import Given
 from cornersmooth.errors import CornersmoothError
+from cornersmooth.filter import Filtered, filter_program, verify_programs
+from cornersmooth.filter.checking import Checked, measure
+from cornersmooth.kinematics import Machine
+from cornersmooth.nc import Form
+from cornersmooth.nc_reader import Problem
 from cornersmooth.output import FAILED, make_folder, open_output
+from cornersmooth.report import NcFile, report_json
+from cornersmooth.report.record import Kind, planned_times, record, sha256_of
+from cornersmooth.report.verdict import Judgement, Saving
+from cornersmooth.settings import Settings
 from cornersmooth.verdict import Verdict
-
-if TYPE_CHECKING:
-    from cornersmooth.filter import Filtered
-    from cornersmooth.filter.checking import Checked
-    from cornersmooth.kinematics import Machine
-    from cornersmooth.nc import Form
-    from cornersmooth.nc_reader import Problem
-    from cornersmooth.report import NcFile
-    from cornersmooth.report.record import Kind
-    from cornersmooth.report.verdict import Judgement
-    from cornersmooth.settings import Settings
+from cornersmooth.verify import useful_processes
 
 #: names of NC programs, for folders
 PATTERNS = ("*.nc", "*.ngc", "*.mpf", "*.spf", "*.h", "*.tap", "*.cnc", "*.eia", "*.iso", "*.gcode")
@@ -57,30 +54,8 @@ PATTERNS = ("*.nc", "*.ngc", "*.mpf", "*.spf", "*.h", "*.tap", "*.cnc", "*.eia",
 _SHOWN = 10
 
 
-@new_command(
-    "filter",
-    "IN...",
-    "tolerance output control machine no_tcp tip_control units form axis_length axis_tolerance directory glob reports "
-    f"as_json method {LINES} limits no_verify strict force quiet verbose",
-    epilog=f"{EXIT_CODES_OF_WRITERS} With several inputs: that of the worst.",
-    reports="Write what was done: .json, or .html for a page to look at. May be repeated; {stem} is the input's name.",
-    units="Units of a program that does not say them.",
-)
-def command(given: Given) -> int:
-    """Smooth the cutting runs of the finished NC programs IN; every other byte stays.
-
-    Runs of plain cuts are replaced where the state of the control is surely known. What the program does there today
-    is what the new blocks stay within the tolerance of. Both programs are read again and compared. All other cuts stay
-    as they are, and a table says why. - is standard input.
-
-    \b
-    Examples:
-      cornersmooth filter part.ngc --control linuxcnc --machine xyzac-trt -o n.ngc
-      cornersmooth filter part.mpf --control siemens -e 0.01 -o smooth.mpf
-      cornersmooth filter part.nc -e 0.01 --lines long -o smooth.nc
-      cornersmooth filter *.mpf --control siemens -d smooth/
-      cat part.nc | cornersmooth filter - > smooth.nc
-    """
+def run_filter(given: Given) -> int:
+    """Do the work of the command; return its exit code."""
     form, settings = filter_form_of(given), given.settings()
     check_endings("report", given.reports, ".json or .html")
     jobs = find_inputs(given, PATTERNS)
@@ -110,12 +85,6 @@ def _pages(reports: Iterable[str]) -> bool:
 
 def _filter(job: Input, form: Form, settings: Settings, given: Given) -> int:
     """Filter one program; return the exit code."""
-    from cornersmooth.filter import filter_program
-    from cornersmooth.report import NcFile
-    from cornersmooth.report.record import planned_times
-    from cornersmooth.report.verdict import Saving
-    from cornersmooth.verify import useful_processes
-
     data, name = read_input(job.source)
     axes = given.load_limits()
     with told_of(name):
@@ -167,12 +136,6 @@ def _filter(job: Input, form: Form, settings: Settings, given: Given) -> int:
 
 def verify_with_program(source: str, old: bytes, given: Given) -> int:
     """Compare an NC program with what was made of it; return the exit code of ``verify``."""
-    from cornersmooth.filter import verify_programs
-    from cornersmooth.report import NcFile
-    from cornersmooth.report.record import sha256_of
-    from cornersmooth.report.verdict import Judgement
-    from cornersmooth.verify import useful_processes
-
     new, name = read_input(given.text)
     settings, form = given.settings(), filter_form_of(given)
     found = verify_programs(
@@ -207,10 +170,7 @@ def _reported(
     **more: Any,
 ) -> dict[str, Any]:
     """Make the report of two programs, write it where it is asked for, and the page of the runs before and after."""
-    from cornersmooth.filter.checking import measure
     from cornersmooth.page import verified_page
-    from cornersmooth.report import report_json
-    from cornersmooth.report.record import record, sha256_of
 
     old_name, old = source
     contents = record(
@@ -290,8 +250,6 @@ def _show(name: str, contents: Mapping[str, Any], found: Filtered, given: Given)
 
 def _judgement(found: Filtered, tolerance: float) -> Judgement:
     """Give the verdict, and what it rests on."""
-    from cornersmooth.report.verdict import Judgement
-
     what, unverified = f"{found.smoothed} of {found.cuts} cuts smoothed in {found.runs} runs", ""
     if found.checked is None:
         unverified = "it was not asked for"

@@ -1,4 +1,4 @@
-"""The group of all commands, and how it is run; commands are imported when they are called."""
+"""The group of all commands, and how it is run."""
 
 from __future__ import annotations
 
@@ -6,43 +6,18 @@ import contextlib
 import errno
 import os
 import sys
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import click
 
 from cornersmooth import __version__
+from cornersmooth.cli.command import write_part
+from cornersmooth.cli.commands import COMMANDS, GROUPS
+from cornersmooth.cli.show import print_message
 from cornersmooth.cli.shutdown import Shutdown
-
-#: line in the list of commands of each, which is the `command` of the module of its name
-COMMANDS = {
-    "smooth": "Round the corners of CL files and write NC programs.",
-    "filter": "Smooth the cutting runs of a finished NC program.",
-    "verify": "Measure an NC program against the CL file it was made from.",
-    "compare": "Compare the programs of all forms, methods and line densities of a control.",
-    "time": "Plan the motion directly and smoothed, and compare the times.",
-    "setup": "Find how to clamp a part so that its program runs fastest.",
-    "surface": "Measure what an NC program leaves of the surface of the CL file.",
-    "info": "Say what a CL file holds and what would limit the rounding of its corners.",
-    "controls": "List the controls that programs can be written for, and their forms.",
-    "machines": "List the machines whose rotary words can be written, or describe one.",
-    "config": "Say which values hold here, and where each comes from.",
-    "completion": "Print what makes a shell complete commands, names and files.",
-    "explain": "Explain the code of a message: cause, and what to do.",
-}
-
-#: of commands in the module of another one, by their names
-_MODULES = {"machines": "controls", "completion": "config"}
-
-#: how the list shows them
-GROUPS = {
-    "Make programs": "smooth filter",
-    "Check programs": "verify surface",
-    "Save time": "compare time setup",
-    "Look up": "info controls machines config explain",
-    "Shell": "completion",
-}
+from cornersmooth.errors import EXIT_INTERNAL, CornersmoothError, internal_error, message
+from cornersmooth.output import ClosedPipe, reason
 
 EXIT_INTERRUPTED = 130
 
@@ -60,20 +35,8 @@ EXIT_CLOSED_PIPE = 141
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 
-class LazyGroup(click.Group):
-    """A group that knows its commands by name and imports them when they are asked for."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        """Names in the order of the table."""
-        return list(COMMANDS)
-
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Import the module of the command."""
-        if cmd_name not in COMMANDS:
-            return None
-        module = import_module(f"cornersmooth.cli.{_MODULES.get(cmd_name, cmd_name)}")
-        command: click.Command = getattr(module, cmd_name if cmd_name in _MODULES else "command")
-        return command
+class _Group(click.Group):
+    """A group that lists its commands in parts, and knows which was probably meant."""
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
@@ -87,17 +50,16 @@ class LazyGroup(click.Group):
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """List the commands without importing them."""
-        from cornersmooth.cli.command import write_part
-
-        for heading, names in GROUPS.items():
-            write_part(formatter, heading, [(name, COMMANDS[name]) for name in names.split()])
+        """List the commands."""
+        for heading, commands in GROUPS.items():
+            write_part(formatter, heading, [(str(one.name), one.get_short_help_str(150)) for one in commands])
         with formatter.section("Pages that helps name"):
             formatter.write_dl([("docs/", str(_pages()))])
 
 
 @click.group(
-    cls=LazyGroup,
+    cls=_Group,
+    commands=COMMANDS,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
     epilog="Exit codes: 0 done; 1 the program FAILED, or is not PASSED under --strict; 2 wrong usage or configuration; "
     "3 input cannot be read or is not valid; 4 output cannot be written.",
@@ -115,10 +77,6 @@ def cli() -> None:
 
 def run(args: list[str] | None, ending: Shutdown) -> int:
     """Run the command line with the given arguments; returns the exit code."""
-    from cornersmooth.cli.job import EXIT_INTERNAL, internal_error
-    from cornersmooth.errors import CornersmoothError, message
-    from cornersmooth.output import ClosedPipe
-
     try:
         result: Any = cli.main(args=args, standalone_mode=False, obj=ending)
         return result if isinstance(result, int) else 0
@@ -178,9 +136,6 @@ def _close_quietly() -> None:
 
 def _unwritten(failure: OSError) -> int:
     """Say that standard output does not take what is written to it; returns the exit code."""
-    from cornersmooth.errors import message
-    from cornersmooth.output import reason
-
     _close_quietly()
     what = f"cannot write to it: {reason(failure)}"
     _say(message("error", what, "CS404", place="<stdout>", hint="choose another place"))
@@ -189,7 +144,5 @@ def _unwritten(failure: OSError) -> int:
 
 def _say(text: str) -> None:
     """Print an error; where standard error is full, the exit code must do."""
-    from cornersmooth.cli.show import print_message
-
     with contextlib.suppress(OSError):
         print_message(text)

@@ -5,28 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from cornersmooth.cli.command import EXIT_CODES_OF_READERS, new_command
-from cornersmooth.cli.options import READING
+from cornersmooth.cl import read
 from cornersmooth.cli.show import say, say_line, told_finding
 from cornersmooth.cli.values import Given
+from cornersmooth.report.info import describe
 
 
-@new_command("info", "IN", f"tolerance axis_length {READING} as_json", epilog=EXIT_CODES_OF_READERS)
-def command(given: Given) -> int:
-    """Say what the CL file IN holds: dialect, moves, lengths, turns, axis changes, arcs, statements, findings.
-
-    IN is an APT/CL file or a table of points; - is standard input. -e and -H do not write anything: they tell how many
-    corners that tolerance would round, and what would limit them.
-
-    \b
-    Examples:
-      cornersmooth info part.cls
-      cornersmooth info part.ncl -e 0.05 -H 25
-      cornersmooth info part.cls --json > part.json
-    """
-    from cornersmooth.cl import read
+def run_info(given: Given) -> int:
+    """Do the work of the command; return its exit code."""
     from cornersmooth.cli.programs import describe_program
-    from cornersmooth.report.info import describe
 
     data, name, is_program = given.read()
     if is_program:

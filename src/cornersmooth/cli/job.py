@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-import traceback
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import TYPE_CHECKING, Any, BinaryIO, cast
@@ -14,18 +13,19 @@ from cornersmooth.cli.files import Beginning, check_path, read_input, suffix_of,
 from cornersmooth.cli.inputs import Input
 from cornersmooth.cli.show import more
 from cornersmooth.cli.values import Given
-from cornersmooth.errors import CornersmoothError, VerdictError, message, printable
+from cornersmooth.errors import EXIT_INTERNAL, CornersmoothError, VerdictError, internal_error, message, printable
+from cornersmooth.kinematics import Machine
 from cornersmooth.memory import return_large_arrays
+from cornersmooth.nc import Form, Frame
 from cornersmooth.output import ClosedPipe, make_folder, read_mark
+from cornersmooth.pipeline import Progress, Result, postprocess
+from cornersmooth.report import corners_csv, report_json
+from cornersmooth.report.verdict import Saving
+from cornersmooth.settings import TIMED_POSES, Settings
 from cornersmooth.verdict import Verdict
 
 if TYPE_CHECKING:
     from cornersmooth.feedrate import Limits
-    from cornersmooth.kinematics import Machine
-    from cornersmooth.nc import Form, Frame
-    from cornersmooth.pipeline import Progress, Result
-    from cornersmooth.report.verdict import Saving
-    from cornersmooth.settings import Settings
 
 #: how the reports of earlier runs begin; such files are replaced without being asked
 _OURS = {
@@ -36,9 +36,6 @@ _OURS = {
 
 #: what becomes of a file: a verdict, nothing as before, or none of both
 STATUSES = (*map(str, Verdict), "skipped", "error", "not done")
-
-#: exit code for a fault of the program itself
-EXIT_INTERNAL = 70
 
 #: problems of a program that are printed
 _PROBLEMS_SHOWN = 5
@@ -146,14 +143,6 @@ def run_job(job: Job, progress: Progress | None = None) -> Outcome:
     return outcome
 
 
-def internal_error(failure: Exception, source: str = "") -> str:
-    """Text for an error that is a fault of the program."""
-    last = traceback.extract_tb(failure.__traceback__)[-1]
-    place = f"{os.path.basename(last.filename)}:{last.lineno}"
-    what = f"internal error, {type(failure).__name__} at {place}: {failure}"
-    return message("error", what, place=source, hint="please report it with the input file")
-
-
 def _made_of(job: Job, source: bytes) -> str:
     """Hash of all that the program of a job depends on, in hexadecimal digits: the same settings have the same."""
     given = job.given
@@ -197,10 +186,6 @@ def _may_replace(job: Job, made_of: str, outcome: Outcome) -> bool | None:
 
 def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> dict[str, Any]:
     """Make text and reports; a verdict that is not good enough goes to the outcome, and why there was nothing to do."""
-    from cornersmooth.pipeline import postprocess
-    from cornersmooth.report import corners_csv, report_json
-    from cornersmooth.settings import TIMED_POSES
-
     given = job.given
     may_replace = {} if job.batch else _check(job)
     source, name = read_input(job.source, size_limit=not given.no_size_limit)

@@ -3,54 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
-from cornersmooth.cli.command import EXIT_CODES_OF_READERS, new_command
+from cornersmooth.cl import read
 from cornersmooth.cli.files import read_input
-from cornersmooth.cli.options import FEED_OF_ALL, LIMITS, LINES, READING
 from cornersmooth.cli.show import progress_bar, say
 from cornersmooth.cli.values import Given
-
-if TYPE_CHECKING:
-    from cornersmooth.model import Floats
-    from cornersmooth.setup import Rating, Setups
+from cornersmooth.model import Floats
+from cornersmooth.nc import choose_form
+from cornersmooth.processes import useful_processes
+from cornersmooth.setup import Rating, Setups, find_setups
 
 #: savings of less are none, %
 _WORTH = 0.1
 
 
-@new_command(
-    "setup",
-    "IN",
-    "limits tolerance axis_length axis_tolerance control form tilt no_turn plans "
-    f"{LIMITS} method {LINES} {READING} as_json quiet",
-    epilog=EXIT_CODES_OF_READERS,
-    feed=FEED_OF_ALL,
-    limits={
-        "heading": "Everyday",
-        "required": True,
-        "help": "Machine that the program runs on: a name that 'cornersmooth machines' lists (its numbers are "
-        "examples), or a TOML file with [dynamics.X] and so on.",
-    },
-)
-def command(given: Given) -> int:
-    """Find how to clamp the part of the CL file IN so that its program takes the least time.
-
-    The part is turned about Z and tilted about X and Y of the machine. Many setups are estimated; the best are
-    smoothed, written and planned under the limits of the machine's axes, and compared with today's. Fixture, reach of
-    the tool and collisions are not looked at: they are yours.
-
-    \b
-    Examples:
-      cornersmooth setup part.cls --limits mill.toml
-      cornersmooth setup part.cls --limits mill.toml --control siemens -f bspline
-      cornersmooth setup part.cls --limits table-ac --tilt 20 --json
-    """
-    from cornersmooth.cl import read
-    from cornersmooth.nc import choose_form
-    from cornersmooth.processes import useful_processes
-    from cornersmooth.setup import find_setups
-
+def run_setup(given: Given) -> int:
+    """Do the work of the command; return its exit code."""
     machine = given.load_limits()
     form = choose_form(given.load_control(), given.form, machine=machine)
     data, name = read_input(given.source, size_limit=not given.no_size_limit)

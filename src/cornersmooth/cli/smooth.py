@@ -6,15 +6,13 @@ import os
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import click
 
-from cornersmooth.cli.command import EXIT_CODES_OF_WRITERS, new_command
+from cornersmooth.cli.batch import Batch
 from cornersmooth.cli.files import STANDARD, check_endings, check_inputs, check_path, read_lines
 from cornersmooth.cli.inputs import find_inputs
 from cornersmooth.cli.job import Job, Outcome, run_job
-from cornersmooth.cli.options import CURVES, LINES, PLANNED, READING, WRITING
 from cornersmooth.cli.shop import command_line, loosened
 from cornersmooth.cli.show import (
     more,
@@ -27,51 +25,23 @@ from cornersmooth.cli.show import (
     show_verdict,
     warn,
 )
+from cornersmooth.cli.shutdown import Shutdown
 from cornersmooth.cli.summary import batch_report, end_lines, interrupted_line, line_of, write_summary
 from cornersmooth.cli.values import Given
 from cornersmooth.errors import printable
+from cornersmooth.nc import Frame, fit_settings
 from cornersmooth.output import make_folder
 from cornersmooth.verdict import Verdict
-
-if TYPE_CHECKING:
-    from cornersmooth.cli.shutdown import Shutdown
-    from cornersmooth.nc import Frame
 
 #: files named in a warning
 _NAMED = 3
 
 
-@new_command(
-    "smooth",
-    "IN...",
-    "tolerance output form axis_length axis_tolerance directory glob skip_existing summary jobs scheduler reports "
-    f"as_json tool {WRITING} method {CURVES} {LINES} feed feed_from_plan {PLANNED} limits time "
-    f"{READING} tool_number spindle no_verify strict force quiet verbose",
-    epilog=f"{EXIT_CODES_OF_WRITERS} With several inputs: that of the worst.",
-)
-def command(given: Given) -> int:
-    """Round the corners of the CL files IN and write NC programs.
-
-    IN is an APT/CL file (NX, CATIA, Creo, ...) or a table of points (x y z i j k, or two points); - is standard input.
-    The written path stays within the tolerance of the CL path, at the tool tip and at the axis point.
-
-    \b
-    Examples:
-      cornersmooth smooth part.cls -e 0.04 -o part.nc
-      cornersmooth smooth part.cls -e 0.04 -o part.nc --report part.html
-      cornersmooth smooth part.cls -e 0.04 -f g6.2 -o part.nc --report part.csv
-      cornersmooth smooth part.cls --control siemens -f bspline -o part.mpf
-      cornersmooth smooth part.cls --method global -f g6.2 -o part.nc
-      cornersmooth smooth part.cls --control linuxcnc --machine xyzac-trt -o p.ngc
-      cornersmooth smooth part.ncl -e 0.0005in -H 25 -o part.nc
-      cornersmooth smooth *.cls -e 0.04 -d out/ -j 2
-      cornersmooth smooth cl/ -e 0.04 -d nc/ -j --summary made.csv
-      cat part.cls | cornersmooth smooth - -e 0.04 > part.nc
-    """
+def run_smooth(given: Given) -> int:
+    """Do the work of the command; return its exit code."""
     jobs = _make_jobs(given)
     if len(jobs) == 1 and not given.directory:
         return _alone(jobs[0])
-    from cornersmooth.cli.batch import Batch
 
     ending: Shutdown = click.get_current_context().obj
     worst = 0
@@ -143,8 +113,6 @@ def _tell(outcome: Outcome, told: bool = False) -> None:
 
 def _make_jobs(given: Given) -> list[Job]:
     """One job for every input, all of them checked for names that clash."""
-    from cornersmooth.nc import fit_settings
-
     folder = given.directory
     _check_usage(given)
     settings, form, frame = given.settings(), given.choose_form(), _frame(given)
@@ -192,8 +160,6 @@ def _check_usage(given: Given) -> None:
 
 def _frame(given: Given) -> Frame:
     """What stands around the motion, with the texts of header and footer."""
-    from cornersmooth.nc import Frame
-
     return Frame(
         given.program_name,
         given.block_numbers,

@@ -10,6 +10,7 @@ from typing import Any
 
 from cornersmooth.cli.files import suffix_of, write_report
 from cornersmooth.cli.job import STATUSES, Outcome
+from cornersmooth.report.record import report_json
 from cornersmooth.verdict import Verdict
 
 
@@ -129,8 +130,6 @@ def batch_report(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 def write_summary(path: str, rows: Sequence[Mapping[str, Any]]) -> None:
     """Write a row for each file, as `row_of` gives them; as JSON, with the counts."""
-    from cornersmooth.report.record import report_json
-
     text = io.StringIO()
     if suffix_of(path) == ".json":
         text.write(report_json(batch_report(rows)))

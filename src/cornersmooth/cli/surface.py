@@ -3,50 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from cornersmooth.cli.command import new_command
+from cornersmooth.cl import read
 from cornersmooth.cli.files import STANDARD, check_inputs, check_reports, read_input, suffix_of, write_report
-from cornersmooth.cli.options import READING
 from cornersmooth.cli.show import say
 from cornersmooth.cli.values import Given
 from cornersmooth.errors import SettingsError
+from cornersmooth.model import Program
+from cornersmooth.nc_reader import read_nc
+from cornersmooth.report import report_json
+from cornersmooth.report.surface import draw_surface, surface_csv, surface_lines
+from cornersmooth.surface import SurfaceMap, Tool, measure_surface, tools_of
 from cornersmooth.verdict import Verdict
-
-if TYPE_CHECKING:
-    from cornersmooth.model import Program
-    from cornersmooth.surface import SurfaceMap, Tool
+from cornersmooth.verify import verify
 
 
-@new_command(
-    "surface",
-    "IN NC",
-    f"tolerance axis_length tool stations levels control machine no_tcp {READING} reports as_json force quiet",
-    epilog="Exit codes: 0 the surface is within the tolerance; 1 it is not; 2 wrong usage or configuration; 3 an input "
-    "cannot be read or is not valid; 4 output cannot be written.",
-    reports="Write what was found: .json, .csv for a row per point, .html, or a map: .png, .svg, .pdf. May be "
-    "repeated.",
-)
-def command(given: Given) -> int:
-    """Measure the surface that the NC program NC leaves against that of the CL file IN.
-
-    Points are taken on the envelope of the original motion of the tool, up to the length of its cutting edge (-H). At
-    each the distance to the volume that the written motion sweeps says whether metal is cut below the surface (overcut)
-    or left on it (undercut). The tool is that of the file (CUTTER, TLDATA) or of --tool.
-
-    \b
-    Examples:
-      cornersmooth surface part.cls part.nc -e 0.04 -H 12
-      cornersmooth surface part.cls part.nc --tool 10,5 --report map.html
-      cornersmooth surface part.cls part.nc --tool 12,0,3 --report points.csv
-    """
-    from cornersmooth.cl import read
-    from cornersmooth.nc_reader import read_nc
-    from cornersmooth.report.surface import surface_lines
-    from cornersmooth.surface import measure_surface
-
+def run_surface(given: Given) -> int:
+    """Do the work of the command; return its exit code."""
     source, text = given.source, given.text
     if source == text == STANDARD:
         raise click.UsageError("only one of the inputs can be standard input")
@@ -76,8 +52,6 @@ def command(given: Given) -> int:
 
 def _tool(program: Program, asked: Tool | None) -> Tool:
     """The tool of the option, or the only one of the file."""
-    from cornersmooth.surface import tools_of
-
     if asked is not None:
         return asked
     tools = tools_of(program)
@@ -95,8 +69,6 @@ def _tool(program: Program, asked: Tool | None) -> Tool:
 def _report(
     form: str, program: Program, source: bytes, written: bytes | str, nc: Any, found: SurfaceMap, given: Given
 ) -> Iterator[str | bytes]:
-    from cornersmooth.report import report_json
-    from cornersmooth.report.surface import draw_surface, surface_csv
 
     if form == ".json":
         yield report_json(found.as_dict())
@@ -104,7 +76,6 @@ def _report(
         yield from surface_csv(found)
     elif form == ".html":
         from cornersmooth.page import verified_page
-        from cornersmooth.verify import verify
 
         how = {"tolerance": given.tolerance, "axis_length": given.axis_length, **given.reading_back()}
         checked = verify(program, written, **how)

@@ -4,21 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import click
+import numpy as np
 
-from cornersmooth.cli.command import EXIT_CODES_OF_READERS, new_command
+from cornersmooth.cl import read
 from cornersmooth.cli.files import check_inputs, check_path, check_reports, read_head, write_report
-from cornersmooth.cli.options import CURVES, FEED_OF_ALL, LIMITS, READING
 from cornersmooth.cli.show import print_message, progress_bar, say
 from cornersmooth.cli.values import Given
+from cornersmooth.comparing import law_of_lines
 from cornersmooth.errors import message
+from cornersmooth.feedrate import BlockLimits, Comparison, axis_peaks, compare, limiting, plan_text
+from cornersmooth.feedrate.compare import slowest, stops, turning_seconds
+from cornersmooth.feedrate.reached import peaks
+from cornersmooth.kinematics import machine_names
+from cornersmooth.kinematics.dynamics import LINEAR
 from cornersmooth.methods import METHODS
-
-if TYPE_CHECKING:
-    from cornersmooth.feedrate import Comparison
-    from cornersmooth.model import Program
+from cornersmooth.model import Move, Program
+from cornersmooth.nc import fit_settings
+from cornersmooth.nc_reader import read_nc
+from cornersmooth.pipeline import read_back
+from cornersmooth.provenance import read_provenance
+from cornersmooth.report.verdict import times_text
+from cornersmooth.saving import Timing, without_holes, written_text
 
 _TITLES = {
     "direct_exact_stop": "direct, exact stop",
@@ -29,37 +37,8 @@ _TITLES = {
 LAWS = tuple(_TITLES)
 
 
-@new_command(
-    "time",
-    "IN",
-    f"tolerance axis_length axis_tolerance {LIMITS} control form machine method limits text text_machine block_time "
-    f"look_ahead {CURVES} {READING} tip_control as_json law csv reports tool force quiet verbose",
-    epilog=EXIT_CODES_OF_READERS,
-    feed=FEED_OF_ALL,
-    block_time="Shortest time that the control takes for one block, of lines to write and in the plan. [default: that "
-    "of the control's table for lines, none in the plan]",
-    csv="Write the motion, a row every period.",
-    reports="Write a page to look at: .html. May be repeated.",
-)
-def command(given: Given) -> int:
-    """Plan the CL file IN as it is and the program that the options write, under the same limits.
-
-    The path of the CL file is planned twice: with a stop at the end of every move, and without. At corners, the
-    velocity may then jump by what the acceleration allows in one period. The program is that of smooth with the same
-    options, or --text. -v adds the ideal curves of each method, which no control runs. Delays, tool changes and the
-    strokes of hole cycles are not counted. Limits are those of the tip, and of the axes of --limits or --machine.
-    IN may be a finished NC program: its time as it is, and as filter smooths it, or beside that of --text.
-
-    \b
-    Examples:
-      cornersmooth time part.cls -e 0.04 --limits table-ac
-      cornersmooth time part.cls -e 0.04 --feed 1800 --accel 1000 --json
-      cornersmooth time part.cls -e 0.04 --csv motion.csv
-      cornersmooth time part.cls -e 0.04 --machine mill.toml --csv axes.csv
-      cornersmooth time part.cls -e 0.04 --report times.html
-      cornersmooth time part.cls --text part.nc --block-time 1ms --look-ahead 200
-      cornersmooth time part.ngc --control linuxcnc --machine xyzac-trt
-    """
+def run_time(given: Given) -> int:
+    """Do the work of the command; return its exit code."""
     from cornersmooth.cli.programs import time_of_program
 
     inputs = [given.source, given.text] if given.text else [given.source]
@@ -95,12 +74,6 @@ def command(given: Given) -> int:
 
 
 def _compare(data: bytes, name: str, given: Given) -> Comparison:
-    from cornersmooth.cl import read
-    from cornersmooth.feedrate import BlockLimits, compare, plan_text
-    from cornersmooth.nc import fit_settings
-    from cornersmooth.nc_reader import read_nc
-    from cornersmooth.pipeline import read_back
-    from cornersmooth.saving import without_holes, written_text
 
     machine, axes = given.load_machine(), given.load_limits()
     axes = machine if axes is None else axes
@@ -126,11 +99,6 @@ def _compare(data: bytes, name: str, given: Given) -> Comparison:
 
 def _by_own_law(data: bytes, name: str, given: Given) -> int:
     """Times of a control that plans lines by a law of its own."""
-    from cornersmooth.cl import read
-    from cornersmooth.comparing import law_of_lines
-    from cornersmooth.nc import fit_settings
-    from cornersmooth.saving import Timing, without_holes, written_text
-
     program = without_holes(read(data, name=name, **given.reading()).with_feed(given.feed))
     form = given.choose_form()
     settings = fit_settings(given.settings(), form, program.units)
@@ -153,9 +121,6 @@ def _by_own_law(data: bytes, name: str, given: Given) -> int:
 
 def _as_text_was_made(given: Given) -> Given:
     """Options to read the text by: the machine of its own option, else of its head, else the one planned for."""
-    from cornersmooth.kinematics import machine_names
-    from cornersmooth.provenance import read_provenance
-
     made = read_provenance(read_head(given.text))
     machine = given.text_machine or given.machine
     if made is not None and not given.text_machine and made.machine in ("", *machine_names()):
@@ -165,10 +130,6 @@ def _as_text_was_made(given: Given) -> Given:
 
 def _tell_feeds(program: Program, feed: float | None) -> None:
     """Say that the CL file has no feed for some moves, and that of the command line is taken."""
-    import numpy as np
-
-    from cornersmooth.model import Move
-
     without = np.flatnonzero(np.isnan(program.feed) & (program.kind != Move.RAPID))
     if feed is None or not len(without):  # without any feed the planning itself refuses
         return
@@ -179,11 +140,6 @@ def _tell_feeds(program: Program, feed: float | None) -> None:
 
 def _tables(compared: Comparison, verbose: bool) -> Iterator[str]:
     """Times and savings; with `verbose` what was reached, and the places that lose most."""
-    from cornersmooth.feedrate import limiting
-    from cornersmooth.feedrate.compare import slowest, stops, turning_seconds
-    from cornersmooth.feedrate.reached import peaks
-    from cornersmooth.report.verdict import times_text
-
     settings, saving = compared.settings, compared.saving_percent
     yield times_text(compared.seconds, ["as_written"], limiting(compared.laws["as_written"]))
     own = settings.axis_tolerance
@@ -226,9 +182,6 @@ def _tables(compared: Comparison, verbose: bool) -> Iterator[str]:
 
 def _axis_table(compared: Comparison) -> Iterator[str]:
     """What each axis of the machine reaches of its speed, acceleration and jerk."""
-    from cornersmooth.feedrate import axis_peaks
-    from cornersmooth.kinematics.dynamics import LINEAR
-
     machine = "" if compared.machine is None else compared.machine.name
     found = {name: axis_peaks(law) for name, law in compared.laws.items()}
     first = next(iter(found.values()))

@@ -6,11 +6,11 @@ import hashlib
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from cornersmooth.cli.command import new_command
+from cornersmooth.cl import read
 from cornersmooth.cli.files import (
     STANDARD,
     check_inputs,
@@ -21,17 +21,25 @@ from cornersmooth.cli.files import (
     suffix_of,
     write_report,
 )
-from cornersmooth.cli.options import READING
 from cornersmooth.cli.shop import command_line, loosened, typed
 from cornersmooth.cli.show import more, print_line, print_message, say_json, say_line, show_findings, warn
 from cornersmooth.cli.values import Given
 from cornersmooth.errors import SettingsError
+from cornersmooth.kinematics import machine_names
 from cornersmooth.memory import return_large_arrays
+from cornersmooth.nc import control_names, own_words
+from cornersmooth.nc_reader import NcProgram, Problem, read_nc
+from cornersmooth.nc_reader.recognition import recognise_control
+from cornersmooth.nc_reader.source import readable_twice
+from cornersmooth.provenance import read_provenance
+from cornersmooth.report import NcFile, findings_table, report_json
+from cornersmooth.report.record import cl_file, record, sha256_of
+from cornersmooth.report.verdict import judge, trusted_blocks
+from cornersmooth.report.verification import along_lines, histogram_lines, verification_csv
+from cornersmooth.settings import UNITS
 from cornersmooth.verdict import Verdict
-
-if TYPE_CHECKING:
-    from cornersmooth.nc_reader import NcProgram, Problem
-    from cornersmooth.verify import Verification, Where
+from cornersmooth.verify import Verification, Where, useful_processes, verify
+from cornersmooth.verify.task import APART, length_of
 
 #: problems shown without -v
 _PROBLEMS_SHOWN = 20
@@ -43,49 +51,8 @@ _REWINDS_SHOWN = 5
 _ALIKE = 1e-9
 
 
-@new_command(
-    "verify",
-    "IN NC",
-    "tolerance axis_length axis_tolerance control machine no_tcp trusted slower skip_cycles strict "
-    f"{READING} tool_number spindle tip_control reports as_json tool force quiet verbose",
-    epilog="Exit codes: 0 PASSED or INCOMPLETE; 1 FAILED or NOT VERIFIED, and INCOMPLETE under --strict; "
-    "2 wrong usage or configuration; 3 an input cannot be read or is not valid; 4 output cannot be written.",
-    strict="Take no verdict but PASSED: else 1 is returned.",
-    reports="Write what was found: .json for the results, .csv for a row per pose, .html for a page to look at. May be "
-    "repeated.",
-    verbose="More: every problem, and how large deviations are and where along the path.",
-)
-def command(given: Given) -> int:
-    """Measure the NC program NC against the CL file IN, whoever wrote it.
-
-    Tip and axis point must stay within the tolerance of their paths, in order; rapids, statements, feeds and exact
-    poses must be where the CL file has them. Shares no code with what smooths and writes.
-
-    A program that cornersmooth has written says in its head how it was made; options come before it. What is taken
-    from the head is named, and where it loosens the check without an option the verdict is NOT VERIFIED.
-
-    \b
-    Examples:
-      cornersmooth verify part.cls part.nc
-      cornersmooth verify part.cls part.nc -e 0.04 -H 25 --report poses.csv
-      cornersmooth verify part.cls part.mpf -e 0.04 --control siemens
-      cornersmooth verify part.cls part.ngc -e 0.04 --control linuxcnc
-      cornersmooth verify part.cls part.nc -e 0.04 --report found.html
-    """
-    from cornersmooth.cl import read
-    from cornersmooth.cli.filter import verify_with_program
-    from cornersmooth.nc import own_words
-    from cornersmooth.nc_reader import read_nc
-    from cornersmooth.nc_reader.source import readable_twice
-    from cornersmooth.report import NcFile, findings_table, report_json
-    from cornersmooth.report.deviation_profile import deviation_along
-    from cornersmooth.report.record import cl_file, record, sha256_of
-    from cornersmooth.report.verdict import judge, trusted_blocks
-    from cornersmooth.report.verification import along_lines, histogram_lines, verification_csv
-    from cornersmooth.settings import UNITS
-    from cornersmooth.verify import useful_processes, verify
-    from cornersmooth.verify.task import length_of
-
+def run_verify(given: Given) -> int:
+    """Do the work of the command; return its exit code."""
     source, text = given.source, given.text
     if source == text == STANDARD:
         raise click.UsageError("only one of the inputs can be standard input")
@@ -94,6 +61,8 @@ def command(given: Given) -> int:
     check_reports(given.reports, ".json, .csv or .html", [source, text], force=given.force)
     data, name, is_program = given.read()
     if is_program:
+        from cornersmooth.cli.filter import verify_with_program
+
         return verify_with_program(name, data, given)
     nc: bytes | str | os.PathLike[str] = read_input(text)[0] if text == STANDARD else text
     head = _take_over(given, nc, data)
@@ -183,6 +152,8 @@ def command(given: Given) -> int:
         for line in _summary(found):
             say_line(line, indent=18)
         if given.verbose:
+            from cornersmooth.report.deviation_profile import deviation_along
+
             along = deviation_along(program, read_again(), **measures)
             for line in ("", *histogram_lines(found), "", *along_lines(along, found.tolerance)):
                 say_line(line)
@@ -205,11 +176,6 @@ class _Head:
 
 def _take_over(given: Given, nc: bytes | str | os.PathLike[str], source: bytes) -> _Head:
     """Take what the head of a program says of how it was made for options that were not typed."""
-    from cornersmooth.kinematics import machine_names
-    from cornersmooth.nc import control_names
-    from cornersmooth.nc_reader import Problem
-    from cornersmooth.provenance import read_provenance
-
     head = read_head(nc)
     made = read_provenance(head)
     if made is None:
@@ -243,7 +209,6 @@ def _take_over(given: Given, nc: bytes | str | os.PathLike[str], source: bytes) 
 
 def _loose(before: Given, given: Given, taken: set[str]) -> Iterator[str]:
     """Say where words of the head make the check looser than the options and settings do without them."""
-    from cornersmooth.verify.task import length_of
 
     def lever(options: Given) -> float:
         """Distance from the tip at which the axis is off by the tolerance where it is off by what it may."""
@@ -265,8 +230,6 @@ def _loose(before: Given, given: Given, taken: set[str]) -> Iterator[str]:
 
 def _recognised(given: Given, head: bytes) -> _Head:
     """Take the control that a program looks like, where none was named, and say so."""
-    from cornersmooth.nc_reader.recognition import recognise_control
-
     looks = recognise_control(head)
     source = click.get_current_context().get_parameter_source("control")
     named = source != click.core.ParameterSource.DEFAULT
@@ -292,8 +255,6 @@ def _problems(found: Verification, name: str, text: str, verbose: int) -> Iterat
 
 def _summary(found: Verification) -> Iterator[str]:
     """Label and text of everything measured."""
-    from cornersmooth.verify.task import APART
-
     if found.taken_from_head:
         yield f"{'from the head':<18}{' '.join(found.taken_from_head)}"
     own_axis = found.axis_tolerance is not None
