@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from cornersmooth import optional_packages
+from cornersmooth import errors
 from cornersmooth.cli.commands import COMMANDS
 from cornersmooth.cli.files import Beginning
 from cornersmooth.cli.options import HEADINGS
@@ -155,8 +155,8 @@ def test_what_is_missing_is_installed_as_the_package_was(tmp_path: Path, monkeyp
     root = SAMPLES.parent
     assert f"install it with: pip install -e '{root}[plot]'" in run(*words, cwd=tmp_path).stderr.decode()
     assert "install it with: pip install -e '.[plot]'" in run(*words, cwd=root).stderr.decode()
-    elsewhere = tmp_path / "site-packages" / "cornersmooth" / "optional_packages.py"
-    monkeypatch.setattr(optional_packages, "__file__", str(elsewhere))
+    elsewhere = tmp_path / "site-packages" / "cornersmooth" / "errors.py"
+    monkeypatch.setattr(errors, "__file__", str(elsewhere))
     assert "install it with: pip install 'cornersmooth[plot]'" in run(*words, cwd=tmp_path).stderr.decode()
 
 

@@ -7,8 +7,10 @@ Both carry a stable code. The library raises and returns them; only `cornersmoot
 from __future__ import annotations
 
 import os
+import shlex
 import traceback
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Literal
 
 Severity = Literal["note", "warning", "error"]
@@ -49,6 +51,15 @@ def message(
     brackets = "".join(f" ({part})" for part in (beside, times) if part)
     lines = [f"{place}: " * bool(place) + f"{severity}{number}: {what}{brackets}", f"hint: {hint or rest}"]
     return "\n".join(map(printable, lines if hint or rest else lines[:1]))
+
+
+def install_hint(extra: str) -> str:
+    """Say how to install an extra, which only some work needs: of the checkout that this runs from, or the package."""
+    checkout = Path(__file__).resolve().parents[2]
+    if (checkout / "pyproject.toml").is_file() and (checkout / "src" / "cornersmooth").is_dir():
+        here = "." if checkout == Path.cwd() else str(checkout)
+        return f"install it with: pip install -e {shlex.quote(f'{here}[{extra}]')}"
+    return f"install it with: pip install 'cornersmooth[{extra}]'"
 
 
 def internal_error(failure: Exception, source: str = "") -> str:

@@ -20,8 +20,7 @@ from distributed import Client
 from cornersmooth import __version__
 from cornersmooth.cli.files import STANDARD
 from cornersmooth.cli.job import Job, Outcome, run_job
-from cornersmooth.errors import SettingsError, message
-from cornersmooth.optional_packages import install_hint
+from cornersmooth.errors import SettingsError, install_hint, message
 from cornersmooth.output import make_folder, remove_leftovers, temporary_name
 
 #: seconds to wait for the scheduler to answer

@@ -1,4 +1,4 @@
-"""``cornersmooth filter``: finished NC programs in, the same with smooth runs out."""
+"""Finished NC programs: ``cornersmooth filter``, and what ``verify``, ``time`` and others do with them."""
 
 from __future__ import annotations
 
@@ -20,26 +20,34 @@ from cornersmooth.cli.files import (
     write_report,
 )
 from cornersmooth.cli.inputs import Input, find_inputs
-from cornersmooth.cli.programs import filter_form_of, how_read, show_wrong
 from cornersmooth.cli.shop import command_line, loosened
 from cornersmooth.cli.show import (
     INDENT,
+    more,
     print_heading,
     print_line,
     print_message,
     program_text,
+    say,
     say_json,
     say_line,
     warn,
 )
 from cornersmooth.cli.values import Given
-from cornersmooth.errors import CornersmoothError
+from cornersmooth.comparing import limits_machine
+from cornersmooth.errors import CornersmoothError, SettingsError
 from cornersmooth.filter import Filtered, filter_program, verify_programs
 from cornersmooth.filter.checking import Checked, measure
+from cornersmooth.filter.program import read_program
+from cornersmooth.filter.runs import ProgramReader
+from cornersmooth.filter.times import time_as_it_is
+from cornersmooth.filter.vocabulary import VOCABULARIES
 from cornersmooth.kinematics import Machine
 from cornersmooth.nc import Form
 from cornersmooth.nc_reader import Problem
+from cornersmooth.nc_reader.recognition import recognise_control
 from cornersmooth.output import FAILED, make_folder, open_output
+from cornersmooth.provenance import HEAD
 from cornersmooth.report import NcFile, report_json
 from cornersmooth.report.record import Kind, planned_times, record, sha256_of
 from cornersmooth.report.verdict import Judgement, Saving
@@ -50,8 +58,8 @@ from cornersmooth.verify import useful_processes
 #: names of NC programs, for folders
 PATTERNS = ("*.nc", "*.ngc", "*.mpf", "*.spf", "*.h", "*.tap", "*.cnc", "*.eia", "*.iso", "*.gcode")
 
-#: reasons shown without -v
-_SHOWN = 10
+#: reasons shown without -v, and problems shown
+_SHOWN, _WRONG_SHOWN = 10, 20
 
 
 def run_filter(given: Given) -> int:
@@ -261,3 +269,87 @@ def _judgement(found: Filtered, tolerance: float) -> Judgement:
     else:
         what = f"{what} {_measured(found.checked, tolerance)}"
     return Judgement(found.verdict, 0, 0, unverified, what)
+
+
+def filter_form_of(given: Given) -> Form:
+    """Form of the control that blocks are read and written in.
+
+    Raises SettingsError CS240: a control whose programs are not read as a filter.
+    """
+    control = given.load_control()
+    if control.dialect not in VOCABULARIES:
+        known = ", ".join(sorted(VOCABULARIES))
+        raise SettingsError("CS240", f"programs for {control.name} are not read as a filter", f"use one of {known}")
+    return given.choose_form()
+
+
+def how_read(given: Given) -> dict[str, Any]:
+    """What is to be known of a program that it does not say."""
+    return {"tip_from_start": given.tip_control, "inch": given.units == "inch"}
+
+
+def axes_of(given: Given) -> Machine:
+    """Machine under whose limits a program is planned."""
+    axes = limits_machine(given.load_limits(), given.load_machine())
+    if axes is None:
+        raise click.UsageError("programs are planned within limits of axes: name a machine with [dynamics]: --limits")
+    return axes
+
+
+def time_of_program(data: bytes, name: str, given: Given) -> int:
+    """Say the time of a program as it is and smoothed, or beside another one; return the exit code of ``time``."""
+    form, settings, axes = filter_form_of(given), given.settings(), axes_of(given)
+    how = {**how_read(given), "axes": axes, "processes": useful_processes()}
+    with told_of(name):
+        if given.text:
+            found = verify_programs(data, read_input(given.text)[0], form, settings, **how)
+        else:
+            found = filter_program(data, form, settings, verify=False, **how)
+        if found.seconds is None and not (found.checked and found.checked.wrong):  # nothing differs
+            alone = time_as_it_is(*read_program(data, form, settings, **how_read(given)), axes)
+            found = replace(found, seconds=(alone, alone))
+    if found.checked is not None and found.checked.wrong:
+        show_wrong(given.text, found.checked.wrong)
+        return 1
+    assert found.seconds is not None
+    before, after = found.seconds
+    whole = bool(form.table.lines.planner)
+    contents = {
+        "schema": "cornersmooth-time/1",
+        "seconds": {"unsmoothed": before, "as_written": after},
+        "unsmoothed": "the program as it is",
+        "counted": "program" if whole else "smoothed runs",
+        "cuts": found.cuts,
+        "smoothed": found.smoothed,
+    }
+    share = f" ({100.0 * (after / before - 1.0):+.1f} %)" if before else ""
+    what = "the whole program" if whole else "the runs that differ, without rapids"
+    lines = (
+        f"{before:>12.3f} s  {name} as it is",
+        f"{after:>12.3f} s  {given.text or 'smoothed'}{share}",
+        f"of {what}; {found.smoothed:,} of {found.cuts:,} cuts differ",
+    )
+    say(given, contents, lines)
+    return 0
+
+
+def describe_program(data: bytes, name: str) -> dict[str, Any]:
+    """Say what an NC program holds, as far as words tell that need no machine."""
+    control = recognise_control(data[:HEAD])
+    reading = ProgramReader(control if control in VOCABULARIES else "fanuc", None).read(data)
+    return {
+        "schema": "cornersmooth-info/2",
+        "name": name,
+        "format": "nc",
+        "looks_like": control or None,
+        "lines": len(reading.why),
+        "cuts": reading.cuts,
+    }
+
+
+def show_wrong(name: str, wrong: Sequence[Problem]) -> None:
+    """Print the first problems of a program, and how many more there are."""
+    for one in wrong[:_WRONG_SHOWN]:
+        print_message(one.message(f"{name}:{one.nc_line}"))
+    if len(wrong) > _WRONG_SHOWN:
+        print_line(f"{name}: {more(len(wrong) - _WRONG_SHOWN, 'problem')}")

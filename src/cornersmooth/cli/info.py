@@ -13,7 +13,7 @@ from cornersmooth.report.info import describe
 
 def run_info(given: Given) -> int:
     """Do the work of the command; return its exit code."""
-    from cornersmooth.cli.programs import describe_program
+    from cornersmooth.cli.filter import describe_program
 
     data, name, is_program = given.read()
     if is_program:

@@ -39,7 +39,7 @@ LAWS = tuple(_TITLES)
 
 def run_time(given: Given) -> int:
     """Do the work of the command; return its exit code."""
-    from cornersmooth.cli.programs import time_of_program
+    from cornersmooth.cli.filter import time_of_program
 
     inputs = [given.source, given.text] if given.text else [given.source]
     check_inputs(*inputs)

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.errors import SettingsError
-from cornersmooth.optional_packages import install_hint
+from cornersmooth.errors import SettingsError, install_hint
 from cornersmooth.report.csv_text import csv_text
 from cornersmooth.report.thinning import thinned
 from cornersmooth.surface import PassDifference, SurfaceMap
