@@ -303,26 +303,10 @@ COMPLETION = new_command(
 
 #: as the list of them shows them
 GROUPS = {
-    "Make programs": (
-        SMOOTH,
-        FILTER,
-    ),
-    "Check programs": (
-        VERIFY,
-        SURFACE,
-    ),
-    "Save time": (
-        COMPARE,
-        TIME,
-        SETUP,
-    ),
-    "Look up": (
-        INFO,
-        CONTROLS,
-        MACHINES,
-        CONFIG,
-        EXPLAIN,
-    ),
+    "Make programs": (SMOOTH, FILTER),
+    "Check programs": (VERIFY, SURFACE),
+    "Save time": (COMPARE, TIME, SETUP),
+    "Look up": (INFO, CONTROLS, MACHINES, CONFIG, EXPLAIN),
     "Shell": (COMPLETION,),
 }
 COMMANDS = {str(command.name): command for commands in GROUPS.values() for command in commands}
