@@ -10,7 +10,7 @@ import pytest
 
 import cornersmooth as cs
 from cornersmooth.filter import Filtered, filter_program, verify_programs
-from cornersmooth.filter.vocabulary import VOCABULARIES
+from cornersmooth.filter.state import VOCABULARIES
 from cornersmooth.verdict import Verdict
 from filter.programs import ISO, PROGRAMS, WORDS, N, X, Y, Z, cuts
 from oracle.command import BAD_INPUT, DONE, run

@@ -11,10 +11,9 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.errors import CornersmoothError
-from cornersmooth.filter.motion import Stretch, motion, program_of
+from cornersmooth.filter.motion import Job, Stretch, motion, motion_of_runs, program_of
 from cornersmooth.filter.runs import Reading, Run
 from cornersmooth.filter.state import State
-from cornersmooth.filter.writing import Job
 from cornersmooth.model import Program
 from cornersmooth.nc_reader import NcProgram, Problem
 from cornersmooth.nc_reader.block_tables import CHUNK
@@ -91,7 +90,7 @@ def _found(new: Reading, text: bytes, at: int, *, last: bool) -> int | None:
 def _first_other(old: Reading, new: Reading) -> Problem:
     """Say which of the lines before all runs is another one."""
     for line in range(len(old.why)):
-        if line >= len(new.why) or old.line(line) != new.line(line):
+        if line >= len(new.why) or old.lines(line, line + 1) != new.lines(line, line + 1):
             return _changed(line, f"line {line + 1} of the old program, outside of runs, is another one")
     return _changed(len(old.why), "there is more than in the old program")
 
@@ -142,10 +141,7 @@ def pair(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> tuple[
     after = [
         Stretch(place.run, _DISTANCES.sub(b"", new.lines(place.first, place.stop)), place.first + 1) for place in where
     ]
-    return (
-        motion([job.stretch(old, place.run) for place in where], job.own, job.spelling, job.settings),
-        motion(after, job.form, job.spelling, job.settings),
-    )
+    return motion_of_runs(job, old, [place.run for place in where]), motion(job, after, job.form)
 
 
 def measure(

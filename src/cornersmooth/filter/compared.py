@@ -26,29 +26,10 @@ def compare_filtered(
     processes: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Table:
-    """Smooth, verify and plan the runs of a program in every way.
+    """Smooth, verify and plan the runs of a program in every way; other parameters as of `filter_program`.
 
-    Parameters
-    ----------
-    data : bytes
-        The program.
-    tried : sequence of Candidate
-        At least one; their forms have the words of the program.
-    axes : Machine
-        Whose limits are kept.
-    tip_from_start, inch
-        As in `filter_program`.
-    processes : int, optional
-        As many as are useful by default; the rows do not depend on it.
-    progress : callable, optional
-        Called with (rows done, rows in all).
-
-    Raises
-    ------
-    SettingsError
-        CS265: the machine has no limits of axes.
-    InputError
-        CS266: no cut of the program can be smoothed; as `planned_times`.
+    `tried` has at least one, in forms with the words of the program; `progress` gets rows done and rows in all.
+    CS265: the machine has no limits of axes; CS266: no cut can be smoothed; as `planned_times`.
     """
     first = tried[0]
     job, old = read_program(data, first.form, first.settings, tip_from_start=tip_from_start, inch=inch)

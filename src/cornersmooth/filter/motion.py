@@ -3,21 +3,34 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cornersmooth.errors import InputError
-from cornersmooth.filter.runs import Run
+from cornersmooth.filter.runs import ProgramReader, Reading, Run
 from cornersmooth.filter.spelling import Spelling
 from cornersmooth.filter.state import INVERSE_TIME
 from cornersmooth.model import Floats, Move, Program, Statement
 from cornersmooth.nc.form import Form
-from cornersmooth.nc_reader import NcProgram, read_nc
+from cornersmooth.nc_reader import NcProgram
 from cornersmooth.nc_reader.elements import Element
-from cornersmooth.pipeline import reading_back
+from cornersmooth.pipeline import read_back
 from cornersmooth.settings import Settings
+
+
+@dataclass(frozen=True)
+class Job:
+    """What runs are smoothed for."""
+
+    reader: ProgramReader
+    form: Form  #: of the new blocks
+    own: Form  #: lines in the words that the program has
+    spelling: Spelling
+    settings: Settings
+    processes: int = 1
 
 
 @dataclass(frozen=True)
@@ -29,32 +42,34 @@ class Stretch:
     line: int  #: number of the first, from 1
 
 
-def motion(stretches: Sequence[Stretch], form: Form, spelling: Spelling, settings: Settings) -> NcProgram:
-    """Read stretches as the control runs them.
+def motion_of_runs(job: Job, reading: Reading, runs: Sequence[Run]) -> NcProgram:
+    """Motion of runs of a program itself, as `motion` reads it."""
+    stretches = []
+    for run in runs:
+        text = reading.lines(run.first, run.stop)
+        if not run.state.absolute:  # in places, with their own feeds
+            feeds = [re.search(rb"F[ \t]*[\d.]+", line.upper()) for line in text.splitlines()]
+            pairs = zip(in_places(job, run), feeds, strict=True)
+            text = b"".join(block + b" " + (feed[0] if feed else b"") + b"\n" for block, feed in pairs)
+        stretches.append(Stretch(run, text, run.first + 1))
+    return motion(job, stretches, job.own)
 
-    Returns
-    -------
-    NcProgram
-        A rapid to the start of each stretch, and what its blocks do; `line` is that of the program.
 
-    Raises
-    ------
-    InputError
-        The blocks are none that can be read.
+def motion(job: Job, stretches: Sequence[Stretch], form: Form) -> NcProgram:
+    """Read stretches as the control runs them: a rapid to the start of each, and what its blocks do.
+
+    `line` is that of the program. InputError where the blocks are none that can be read.
     """
-    inch = stretches[0].run.state.unit != 1.0
-    parts, lines = [_head(form, inch=inch)], [np.zeros(1, np.int64)]
-    lines[0] = np.zeros(parts[0].count(b"\n"), np.int64)
+    head = _head(form, inch=stretches[0].run.state.unit != 1.0)
+    parts, lines = [head], [np.zeros(head.count(b"\n"), np.int64)]
     modes = [0, *(stretch.run.state.feed_mode for stretch in stretches)]
     for stretch, before in zip(stretches, modes, strict=False):
-        start = _start(stretch.run, form, spelling, before)
+        start = _start(job, stretch.run, form, before)
         text = stretch.text if stretch.text.endswith(b"\n") else stretch.text + b"\n"
         parts += [start, text]
         first = np.full(start.count(b"\n"), -stretch.line, np.int64)
         lines += [first, stretch.line + np.arange(text.count(b"\n"))]
-    back = {name: value for name, value in reading_back(form).items() if name not in ("trusted", "accepted")}
-    nc = read_nc(b"".join(parts), **back, tolerance=settings.tolerance, axis_length=settings.axis_scale)
-    own = np.concatenate(lines)
+    nc, own = read_back(b"".join(parts), form, job.settings), np.concatenate(lines)
     nc.line[:] = own[nc.line - 1]
     problems = [replace(one, nc_line=int(own[one.nc_line - 1])) for one in nc.problems if own[one.nc_line - 1] > 0]
     return replace(nc, problems=tuple(problems))
@@ -63,10 +78,7 @@ def motion(stretches: Sequence[Stretch], form: Form, spelling: Spelling, setting
 def program_of(nc: NcProgram, marks: bool = False) -> Program:
     """Tool path of stretches; a comment ``RUN`` before each where marks are wanted.
 
-    Raises
-    ------
-    InputError
-        CS503 where a block is no line, or where the stretches are not begun by rapids.
+    CS503 where a block is no line, or where the stretches are not begun by rapids.
     """
     rapid = (nc.kind == Element.RAPID) | (nc.line < 0)
     if not rapid[:1].all() or not np.isin(nc.kind, (Element.RAPID, Element.LINE)).all():
@@ -85,9 +97,9 @@ def program_of(nc: NcProgram, marks: bool = False) -> Program:
     )
 
 
-def in_places(run: Run, form: Form, spelling: Spelling) -> bytes:
-    """Blocks of a run that says distances (G91), in places and each with its feed of the run."""
-    return b"".join(_block(place, run.state.axes, form, spelling, rapid=False) for place in run.place)
+def in_places(job: Job, run: Run) -> list[bytes]:
+    """Blocks that go to the places of a run, without line ends."""
+    return [_block(job, run, place, job.own, rapid=False) for place in run.place]
 
 
 def _head(form: Form, *, inch: bool) -> bytes:
@@ -99,24 +111,25 @@ def _head(form: Form, *, inch: bool) -> bytes:
     return "".join(f"{line}\n" for line in lines).encode()
 
 
-def _start(run: Run, form: Form, spelling: Spelling, before: int | None) -> bytes:
+def _start(job: Job, run: Run, form: Form, before: int | None) -> bytes:
     """Blocks that bring the machine to the start of a run and say what holds there; `before` is the feed mode."""
     state, words = run.state, form.table.words.feed_mode
-    lines = [_block(run.start, state.axes, form, spelling, rapid=True)]
+    lines = [_block(job, run, run.start, form, rapid=True)]
     if 2 in words and state.feed_mode != before:
-        lines.append(words[2 if state.feed_mode == INVERSE_TIME else 0].encode() + b"\n")
+        lines.append(words[2 if state.feed_mode == INVERSE_TIME else 0].encode())
     feed = b" F%.5f" % state.feed if state.feed_mode != INVERSE_TIME and not math.isnan(state.feed) else b""
     if state.motion == 1.0 or feed:  # a whole block, though nothing moves: it is read with those around it
-        lines.append(_block(run.start, state.axes, form, spelling, rapid=False).rstrip() + feed + b"\n")
-    return b"".join(lines)
+        lines.append(_block(job, run, run.start, form, rapid=False) + feed)
+    return b"".join(line + b"\n" for line in lines)
 
 
-def _block(place: Floats, axes: Sequence[str], form: Form, spelling: Spelling, *, rapid: bool) -> bytes:
+def _block(job: Job, run: Run, place: Floats, form: Form, *, rapid: bool) -> bytes:
     """Block that goes to a place."""
-    look, vector = form.mode.motion, axes[3:] == ("I", "J", "K")
+    look, axes, spelling = form.mode.motion, run.state.axes, job.spelling
+    vector = axes[3:] == ("I", "J", "K")
     other = place[3:] / np.linalg.norm(place[3:]) if vector else place[3:]
     words = [*"XYZ", *(form.mode.words if vector else axes[3:])]
     digits = [max(spelling.tip, 1)] * 3 + [max(spelling.other, form.table.digits.vector if vector else 1)] * len(other)
     numbers = zip(words, [*place[:3].tolist(), *other.tolist()], digits, strict=True)
     text = " ".join(f"{word}{value:{'+' if look.signs else ''}.{places}f}" for word, value, places in numbers)
-    return f"{look.rapid if rapid else look.line} {text}{look.rapid_end if rapid else ''}\n".encode()
+    return f"{look.rapid if rapid else look.line} {text}{look.rapid_end if rapid else ''}".encode()

@@ -11,10 +11,11 @@ import numpy as np
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.filter.checking import Checked, Place, check, pair, places
+from cornersmooth.filter.motion import Job
 from cornersmooth.filter.runs import Left, ProgramReader, Reading
 from cornersmooth.filter.spelling import SAMPLE, Spelling
 from cornersmooth.filter.times import planned_times
-from cornersmooth.filter.writing import Job, smoothed
+from cornersmooth.filter.writing import smoothed
 from cornersmooth.kinematics import Machine
 from cornersmooth.memory import return_free_memory
 from cornersmooth.nc import choose_form, fit_settings
@@ -146,7 +147,7 @@ def read_program(
     tcp = form.orientation != "machine"
     reader = ProgramReader(form.table.dialect, form.machine, tcp=tcp, tip_from_start=tip_from_start, inch=inch)
     old = reader.read(data)
-    cuts = (old.line(k) for run in old.runs for k in range(run.first, run.stop))
+    cuts = (old.lines(k, k + 1) for run in old.runs for k in range(run.first, run.stop))
     spelling = Spelling.of(islice(cuts, SAMPLE), len(reader.axes))
     if old.runs:
         spelling = _fine(spelling, form, settings, inch=old.runs[0].state.unit != 1.0)
@@ -154,13 +155,7 @@ def read_program(
 
 
 def _fine(spelling: Spelling, form: Form, settings: Settings, *, inch: bool) -> Spelling:
-    """Give the digits of the program, or where ε is finer than they can hold, those of the control.
-
-    Raises
-    ------
-    SettingsError
-        The form cannot hold what the settings ask for.
-    """
+    """Give the digits of the program, or where ε is finer than they can hold, those of the control."""
     try:
         fit_settings(settings, spelling.form(form, rounding=False), "inch" if inch else "mm")
     except SettingsError:
@@ -170,13 +165,7 @@ def _fine(spelling: Spelling, form: Form, settings: Settings, *, inch: bool) -> 
 
 
 def _own_form(form: Form) -> Form:
-    """Lines of the control with the words that the program has.
-
-    Raises
-    ------
-    SettingsError
-        CS241: a form whose words the program has not.
-    """
+    """Lines of the control with the words that the program has; CS241: it has not the words of the form."""
     line = next(name for name, one in form.table.forms.items() if not one.curve)
     own = choose_form(form.table, line, machine=form.machine, tcp=form.orientation != "machine")
     if own.orientation != form.orientation:

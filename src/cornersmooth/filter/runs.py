@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import re
+from bisect import bisect_right
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.filter.state import CORNER_SIGNS, CORNER_WORDS, INVERSE_TIME, State
-from cornersmooth.filter.vocabulary import ANGLES, ANY, COMPUTED, JUMP_SIGNS, JUMPS, NONE, VECTOR, VOCABULARIES
+from cornersmooth.filter.state import ANGLES, ANY, INVERSE_TIME, NONE, VECTOR, VOCABULARIES, State
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.block_tables import CHUNK, LetteredLines
@@ -23,7 +24,7 @@ from cornersmooth.nc_reader.line_patterns import LinePatterns, lines_of
 _HALF_TURN: Final = 180.0
 
 #: cuts of a run, at least: one alone has no corner
-LEAST: Final = 2
+_LEAST: Final = 2
 
 #: what `Reading.why` says of lines that are no cuts, and of plain cuts
 _NO_CUT, _CUT = 0, 1
@@ -31,9 +32,18 @@ _NO_CUT, _CUT = 0, 1
 #: lines before the first block: they name the program
 _TITLE: Final = re.compile(r"(?i)(%.*|[O:]\s*(\d+|<[^>]*>|[A-Z][^#\[(]*))")
 _WEAK_FEED: Final = re.compile(rb"(?i)F[ \t]*\d+(?![\d.])")
-#: numbers of lines, beside jumps and calls
-_TARGET: Final = re.compile(rb"(?i)(?:GOTO[BFCS]?|REPEATB?|LBL|(?<![A-Z])[NPQ])\s*(\d{1,9})")
 _MARK: Final = b"\xef\xbb\xbf"
+
+#: words beside an end that shape the corner there: it belongs to the blocks on both sides; and what is in each of them
+_CORNER_WORDS: Final = re.compile(rb"(?i),\s*[RC]\s*[\d.]|\b(?:RNDM?|CHF|CHR|FRCM?)\b")
+_CORNER_SIGNS: Final = (b",", b"RND", b"CHF", b"CHR", b"FRC")
+
+#: what sends a control to other lines of the program, and what is in each such line; numbers of lines beside it, and
+#: a jump to a line that the program works out
+_JUMPS: Final = re.compile(rb"(?i)(?:GOTO[BFCS]?|M9[6-9]|M198|G6[56]|THEN|REPEATB?|CALL|UNTIL)[^\n]*")
+_JUMP_SIGNS: Final = (b"GOTO", b"M9", b"M198", b"G6", b"THEN", b"REPEAT", b"CALL", b"UNTIL")
+_TARGET: Final = re.compile(rb"(?i)(?:GOTO[BFCS]?|REPEATB?|LBL|(?<![A-Z])[NPQ])\s*(\d{1,9})")
+_COMPUTED: Final = re.compile(rb"(?i)GOTO[BFCS]?\s*[^\d\s]|M9[6-9][^\n]*P\s*[#\[]")
 
 
 @dataclass(frozen=True)
@@ -84,10 +94,6 @@ class Reading:
     def __post_init__(self) -> None:
         self.why = np.zeros(len(self.start) - 1, np.uint16)
 
-    def line(self, number: int) -> bytes:
-        """Bytes of a line, its end included."""
-        return self.lines(number, number + 1)
-
     def lines(self, first: int, stop: int) -> bytes:
         """Bytes of lines that follow one another."""
         return self.data[int(self.start[first]) : int(self.start[stop])]
@@ -112,17 +118,8 @@ class Reading:
 class ProgramReader:
     """Reads programs of one control and machine.
 
-    Parameters
-    ----------
-    control : str
-    machine : Machine or None
-        That the rotary words are for; None for tool vectors.
-    tcp : bool
-        False where X Y Z are the machine's own axes.
-    tip_from_start : bool
-        Whether tool tip control is on already where the program begins.
-    inch : bool
-        Units where the program says none.
+    `machine` is that of the rotary words; None for tool vectors. Without `tcp` X Y Z are the machine's own axes.
+    `tip_from_start` says that tool tip control is on where the program begins, `inch` its units where it says none.
     """
 
     def __init__(
@@ -148,52 +145,38 @@ class ProgramReader:
         """Read a program, whatever it is; remember the state before some lines."""
         start = np.flatnonzero(np.frombuffer(data, np.uint8) == ord("\n")) + 1
         start = np.unique(np.concatenate(([0], start, [len(data)]))).astype(np.int64)
-        found = Reading(data, start, self._first.copy())
-        patterns = LinePatterns(self.lexer)
-        targets, corners = _targets(found), _near(_lines_with(CORNER_WORDS, CORNER_SIGNS, found), len(found.why))
+        found, asked, patterns = Reading(data, start, self._first.copy()), sorted(set(stops)), LinePatterns(self.lexer)
+        targets, corners = _targets(found), _near(_lines_with(_CORNER_WORDS, _CORNER_SIGNS, found), len(found.why))
         first, started = _begin(found), False
-        asked = np.array(sorted(set(stops)), np.int64)
         while first < len(found.why):
             stop = min(max(int(np.searchsorted(start, start[first] + CHUNK)), first + 1), len(found.why))
-            while stop < len(found.why) and found.line(stop - 1).rstrip().endswith(b"~"):
+            while stop < len(found.why) and found.lines(stop - 1, stop).rstrip().endswith(b"~"):
                 stop += 1
-            for item in self._items(found, first, stop, targets, patterns):
-                if isinstance(item[1], bytes):
-                    block = self.lexer.comment.sub("", item[1].decode("latin-1")).strip()
+            chunk = found.lines(first, stop).removeprefix(_MARK if first == 0 else b"")
+            chunk = chunk if chunk.endswith(b"\n") else chunk + b"\n"
+            text = self.lexer.unfolded(chunk)
+            lines = lines_of(text, patterns) or LetteredLines(text, self.lexer)
+            bulk = lines.bulk().copy()
+            bulk[[number - first for number in targets if first <= number < stop]] = False
+            if b"~" in chunk:
+                bulk[[k for k in range(stop - first) if b"~" in found.lines(first + k, first + k + 1)]] = False
+            ends = np.concatenate(([0], np.flatnonzero(np.frombuffer(text, np.uint8) == ord("\n")) + 1)).tolist()
+            columns = lines.columns(np.flatnonzero(bulk)) if bulk.any() else None
+            before = np.concatenate(([0], np.cumsum(bulk)))
+            for a, b in pairwise(np.flatnonzero(np.diff(bulk, prepend=~bulk[0], append=~bulk[-1])).tolist()):
+                if bulk[a] and columns is not None:
+                    started, own = True, slice(before[a], before[b])
+                    self._take_rows(found, first + a, {key: one[own] for key, one in columns.items()}, corners, asked)
+                    continue
+                for k in range(a, b):
+                    line, number = text[ends[k] : ends[k + 1]], first + k
+                    block = self.lexer.comment.sub("", line.decode("latin-1")).strip()
                     if block and (started or not _TITLE.fullmatch(block)):
                         started = True
-                        self._take_line(found, item[0], item[1], known=item[0] not in targets)
-                else:
-                    started = True
-                    self._take_rows(found, item[0], item[1], corners, asked)
-                if isinstance(item[1], bytes) and len(asked) and item[0] + 1 in asked:
-                    found.at[item[0] + 1] = found.state.copy()
+                        self._take_line(found, number, line, known=number not in targets)
+                    found.at |= {stop: found.state.copy() for stop in _within(asked, number, number + 1)}
             first = stop
         return found
-
-    def _items(
-        self, found: Reading, first: int, stop: int, targets: set[int], patterns: LinePatterns
-    ) -> Iterator[tuple[int, bytes] | tuple[int, dict[str, Floats]]]:
-        """Lines in order: the first of some motion blocks with their columns, and other lines as they are."""
-        chunk = found.lines(first, stop).removeprefix(_MARK if first == 0 else b"")
-        chunk = chunk if chunk.endswith(b"\n") else chunk + b"\n"
-        text = self.lexer.unfolded(chunk)
-        lines = lines_of(text, patterns) or LetteredLines(text, self.lexer)
-        bulk = lines.bulk().copy()
-        bulk[[number - first for number in targets if first <= number < stop]] = False
-        if b"~" in chunk:
-            bulk[[k for k in range(stop - first) if b"~" in found.line(first + k)]] = False
-        ends = np.concatenate(([0], np.flatnonzero(np.frombuffer(text, np.uint8) == ord("\n")) + 1))
-        columns = lines.columns(np.flatnonzero(bulk)) if bulk.any() else None
-        before = np.concatenate(([0], np.cumsum(bulk)))
-        edges = np.flatnonzero(np.diff(bulk, prepend=~bulk[0], append=~bulk[-1]))
-        for a, b in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
-            if bulk[a] and columns is not None:
-                own = slice(before[a], before[b])
-                yield first + a, {name: values[own] for name, values in columns.items()}
-                continue
-            for k in range(a, b):
-                yield first + k, text[int(ends[k]) : int(ends[k + 1])]
 
     def _take_line(self, found: Reading, number: int, text: bytes, *, known: bool) -> None:
         """Take a line that is no plain motion block."""
@@ -203,16 +186,17 @@ class ProgramReader:
         if why:
             found.why[number] = found.number(found.state.why_not(self.wanted) or why)
 
-    def _take_rows(self, found: Reading, first: int, columns: dict[str, Floats], corners: Bools, asked: Ints) -> None:
+    def _take_rows(
+        self, found: Reading, first: int, columns: dict[str, Floats], corners: Bools, asked: list[int]
+    ) -> None:
         """Take motion blocks; note the runs among them."""
         state, count = found.state, len(next(iter(columns.values())))
-        blank = np.full(count, np.nan)
+        blank, here = np.full(count, np.nan), slice(first, first + count)
         code, _ = _filled(columns.get("G", blank), state.motion)
         feed, _ = _filled(columns.get("F", blank), state.feed)
-        text = found.lines(first, first + count)
         if state.feed_mode == INVERSE_TIME:
             feed = columns.get("F", blank)
-        elif self._weak_feed and state.unit != 1.0 and _WEAK_FEED.search(text):
+        elif self._weak_feed and state.unit != 1.0 and _WEAK_FEED.search(found.lines(first, first + count)):
             feed = blank
         arc = (code == 2.0) | (code == 3.0)
         odd = np.zeros(count, np.bool_)
@@ -229,43 +213,42 @@ class ProgramReader:
             said |= ~np.isnan(words)
             place[0, k] = state.place[letter]
             place[1:, k] = self._places(words, state, letter, lost)
-        cut = (code == 1.0) & said
-        plain = cut & ~lost & np.isfinite(place[1:]).all(axis=1) & np.isfinite(place[:-1]).all(axis=1)
+        cut, known, moved = (code == 1.0) & said, np.isfinite(place), np.abs(np.diff(place, axis=0))
+        plain = cut & ~lost & (known[1:] & known[:-1]).all(axis=1)
         why = np.where(cut, found.number("the place before or after it is not known"), _NO_CUT).astype(np.uint16)
         why[plain & ~np.isfinite(feed)] = found.number("its feed is not known")
         plain &= np.isfinite(feed) & (feed > 0.0)
-        moved = np.abs(np.diff(place, axis=0))
-        still = plain & ~(moved[:, :3] > 0.0).any(axis=1)
-        why[still] = found.number("the tip stays where it is")
-        wide = plain & (moved[:, 3:] >= _HALF_TURN).any(axis=1) & (self.wanted != VECTOR)
-        why[wide] = found.number("a rotary axis turns by half a turn or more in it")
-        shaped = plain & corners[first : first + count]
-        why[shaped] = found.number("the program rounds its corner by words of its own")
+        left = np.zeros(count, np.bool_)
+        wide = (moved[:, 3:] >= _HALF_TURN).any(axis=1) & (self.wanted != VECTOR)
+        for rows, reason in (
+            (~(moved[:, :3] > 0.0).any(axis=1), "the tip stays where it is"),
+            (wide, "a rotary axis turns by half a turn or more in it"),
+            (corners[here], "the program rounds its corner by words of its own"),
+        ):
+            why[plain & rows] = found.number(reason)
+            left |= rows
+        plain &= ~left
         if (arc & (said | odd)).any():
             why[arc] = found.number("an arc")
-        plain &= ~(still | wide | shaped)
-        reason = state.why_not(self.wanted)
-        if reason:
+        if reason := state.why_not(self.wanted):
             why[cut | arc] = found.number(reason)
             plain[:] = False
+
+        def after(k: int) -> State:
+            return state.after(place[k], code[k - 1], feed[k - 1]) if k else state.copy()
+
         edges = np.flatnonzero(np.diff(plain, prepend=False, append=False))
         for a, b in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
-            if b - a < LEAST:
+            if b - a < _LEAST:
                 why[a:b] = found.number("a single cut between other blocks: it has no corner")
                 continue
             why[a:b] = _CUT
-            begin = state.after(place[a], code[a - 1], feed[a - 1]) if a else state.copy()
-            own = place[a : b + 1]
+            own, last = place[a : b + 1], float(feed[b - 1])
             kept = own[1:] if not state.absolute else own[-1:]
-            run = Run(first + a, first + b, begin, kept.copy(), own.min(axis=0), own.max(axis=0), float(feed[b - 1]))
-            found.runs.append(run)
-        found.why[first : first + count] = why
-        for stop in asked[
-            np.searchsorted(asked, first + 1) : np.searchsorted(asked, first + count, side="right")
-        ].tolist():
-            k = stop - first
-            found.at[stop] = state.after(place[k], code[k - 1], feed[k - 1])
-        found.state = state.after(place[-1], code[-1], feed[-1])
+            found.runs.append(Run(first + a, first + b, after(a), kept.copy(), own.min(axis=0), own.max(axis=0), last))
+        found.why[here] = why
+        found.at |= {stop: after(stop - first) for stop in _within(asked, first, first + count)}
+        found.state = after(count)
 
     def _places(self, words: Floats, state: State, letter: str, lost: Bools) -> Floats:
         """(n,) where an axis is after each block."""
@@ -279,6 +262,11 @@ class ProgramReader:
         return np.where((gone >= 0) & (gone >= last), np.nan, value)
 
 
+def _within(ascending: list[int], after: int, last: int) -> list[int]:
+    """Numbers above one bound and up to another."""
+    return ascending[bisect_right(ascending, after) : bisect_right(ascending, last)]
+
+
 def _filled(values: Floats, before: float) -> tuple[Floats, Ints]:
     """Give what was said last in each row, and in which row, -1 for before."""
     last = np.maximum.accumulate(np.where(np.isnan(values), -1, np.arange(len(values))))
@@ -286,17 +274,15 @@ def _filled(values: Floats, before: float) -> tuple[Floats, Ints]:
 
 
 def _lines_with(pattern: re.Pattern[bytes], signs: Sequence[bytes], found: Reading) -> Ints:
-    """Lines in which something occurs, of which one of some signs is a part."""
-    if not _any_in(signs, found.data):
-        return np.zeros(0, np.int64)
-    at = np.array([match.end() - 1 for match in pattern.finditer(found.data)], np.int64)
+    """Lines in which something occurs, as in `_matches`."""
+    at = np.array([match.end() - 1 for match in _matches(pattern, signs, found.data)], np.int64)
     return np.unique(np.searchsorted(found.start, at, side="right") - 1)
 
 
-def _any_in(signs: Sequence[bytes], data: bytes) -> bool:
-    """Whether any of some capitals is in a text, capital or not: fast where none is."""
+def _matches(pattern: re.Pattern[bytes], signs: Sequence[bytes], data: bytes) -> Iterable[re.Match[bytes]]:
+    """Where something occurs that has one of some signs in it, capital or not: fast where none is."""
     capitals = data.upper()
-    return any(sign in capitals for sign in signs)
+    return pattern.finditer(data) if any(sign in capitals for sign in signs) else ()
 
 
 def _near(lines: Ints, count: int) -> Bools:
@@ -309,13 +295,11 @@ def _near(lines: Ints, count: int) -> Bools:
 
 def _targets(found: Reading) -> set[int]:
     """Lines to which the program may jump: those of all numbers that stand beside jumps."""
-    if not _any_in(JUMP_SIGNS, found.data):
-        return set()
-    jumps = [match[0] for match in JUMPS.finditer(found.data)]
+    jumps = [match[0] for match in _matches(_JUMPS, _JUMP_SIGNS, found.data)]
     if not jumps:
         return set()
     numbers = {int(word) for jump in jumps for word in _TARGET.findall(jump)}
-    if COMPUTED.search(b"\n".join(jumps)):
+    if _COMPUTED.search(b"\n".join(jumps)):
         pattern = re.compile(rb"(?im)^[ \t/]*N[ \t]*\d+")
     else:
         some = b"|".join(b"0*%d" % number for number in sorted(numbers)) or rb"(?!)"

@@ -83,14 +83,9 @@ class Spelling:
         )
 
     def form(self, form: Form, *, rounding: bool) -> Form:
-        """Give a form without head and tail whose blocks look like these.
+        """Give a form of the control without head and tail whose blocks look like these.
 
-        Parameters
-        ----------
-        form : Form
-            Of the control.
-        rounding : bool
-            Whether words may say how far the control rounds corners: what holds after them is put back.
+        With `rounding`, words may say how far the control rounds corners: what holds after them is put back.
         """
         table = form.table
         program = replace(

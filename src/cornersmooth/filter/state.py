@@ -1,29 +1,72 @@
-"""What is surely known of a control between two blocks of a program: NaN and None stand for what is not."""
+"""What is surely known of a control between two blocks of a program: NaN and None stand for what is not.
+
+What words do is in ``words.toml``, for each control. A word that is not there is let through. What it may have changed
+counts as unknown until the program says it again.
+"""
 
 from __future__ import annotations
 
 import math
 import re
+import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from importlib import resources
 from typing import Any, Final
 
 from cornersmooth.errors import InputError
-from cornersmooth.filter.vocabulary import ANGLES, BOTH, NONE, VECTOR, Does, Vocabulary
 from cornersmooth.nc_reader.lexer import Lexer
 from cornersmooth.nc_reader.words import Line, Word
+
+
+class Does(StrEnum):
+    """What a word does; of several the first counts."""
+
+    ALL = "all"  #: it may have changed anything
+    LEVEL = "level"  #: ends a `FRAME`
+    NOTHING = "nothing"  #: nothing that bears on the motion
+    DWELL = "dwell"  #: the other words of the block are its own: a time, not a place or a feed
+    PLACE = "place"  #: the machine may be anywhere after it; places in its block are not those of the part
+    MACHINE = "machine"  #: the axes of its block go to places of the machine, all axes where it names none
+    MOVE = "move"  #: moves by a law that is not known here, and does so again in the blocks after it
+    LENGTH = "length"  #: X Y Z count anew, those of its block already
+    OFFSET = "offset"  #: the same for all axes
+    CHANGE = "change"  #: another tool
+    FRAME = "frame"  #: turns, scales or mirrors the places of the part
+
+
+#: kinds of tool tip control: which words the tool axis may have under it
+ANGLES, VECTOR, BOTH, NONE = "rotary words", "tool vectors", "rotary words and tool vectors", ""
+#: what a tool that never turns asks for
+ANY: Final = "any"
 
 #: feed modes by their G word
 PER_MINUTE, INVERSE_TIME, PER_REVOLUTION = 94, 93, 95
 
 #: G words of units, with millimetres per unit
-_UNITS: Final = {20.0: 25.4, 21.0: 1.0, 70.0: 25.4, 71.0: 1.0, 700.0: 25.4, 710.0: 1.0}
+_UNITS: Final = {"G20": 25.4, "G21": 1.0, "G70": 25.4, "G71": 1.0, "G700": 25.4, "G710": 1.0}
 
-#: words beside an end that shape the corner there: it belongs to the blocks on both sides
-CORNER_WORDS: Final = re.compile(rb"(?i),\s*[RC]\s*[\d.]|\b(?:RNDM?|CHF|CHR|FRCM?)\b")
+#: words that set one thing, and do nothing else
+_SETS: Final[Mapping[str, tuple[str, Any]]] = {
+    **{f"G{code}": ("motion", float(code)) for code in range(4)},
+    "G90": ("absolute", True),
+    "G91": ("absolute", False),
+    "G40": ("compensated", False),
+    **dict.fromkeys(("G41", "G42", "G41.1", "G42.1"), ("compensated", True)),
+    "M136": ("feed_mode", PER_REVOLUTION),
+    "M137": ("feed_mode", PER_MINUTE),
+}
 
-#: one of these is in every line with such words
-CORNER_SIGNS: Final = (b",", b"RND", b"CHF", b"CHR", b"FRC")
+#: words of Siemens under which the tool axis runs as its words say
+_EVEN: Final = {VECTOR: ("ORIVECT", "ORIPLANE", "ORIWKS"), ANGLES: ("ORIAXES", "ORIMKS")}
+
+#: what stands for what is not known
+_UNKNOWN: Final[Mapping[str, Any]] = {
+    **dict.fromkeys(("motion", "unit", "feed"), math.nan),
+    **dict.fromkeys(("absolute", "feed_mode", "tip", "compensated")),
+    **dict.fromkeys(("offset", "rounding"), ""),
+}
 
 _ASSIGNMENT: Final = re.compile(r"\s*(#|Q[LRS]?\d+\s*=|[A-Z_]\w*(\[[^]]*\])?\s*=(?!=)|DEF\s|FN ?[0-8] ?:)")
 #: a word whose number is worked out by the control
@@ -31,6 +74,40 @@ _WORKED_OUT: Final = re.compile(
     r"([A-Z]+\d*)\s*=?\s*[-+]?(?:#(?:<[^>]*>|\d+|\[[^]]*\])|\[[^]]*\]|Q[LRS]?\d+|"
     r"(?<==)(?:AC|IC|DC|ACP|ACN)\([^()]*\)|(?<==)[A-Z_$][^\s]*)"
 )
+#: parts of a motion block of Klartext that have several letters
+_SPELT: Final = re.compile(r"RAPID|LN|side|turn|circle|centre( .*)?|DC .*")
+
+
+@dataclass(frozen=True)
+class Vocabulary:
+    """What a control's words do; its fields are explained in ``words.toml``."""
+
+    patterns: Mapping[Does, str]
+    tip: Mapping[str, str]
+    ends: Mapping[str, str]
+    offsets: str
+    change_keeps_tip: bool
+
+    def does(self, word: str) -> Does:
+        """Say what a word such as ``G43.4`` does; words of group 01, of units, distances and feeds are not here."""
+        found = (does for does, pattern in self.patterns.items() if re.fullmatch(pattern, word))
+        return next(found, Does.PLACE if word.startswith("M") else Does.ALL)
+
+
+def _vocabularies() -> dict[str, Vocabulary]:
+    tables = tomllib.loads((resources.files("cornersmooth.filter") / "words.toml").read_text(encoding="utf-8"))
+    found = {}
+    for name, own in tables.items():  # what one is like comes before it
+        table = tables[name] = tables.get(own.get("like", ""), {}) | own
+        if "tip" in table:
+            patterns = {does: table[does] for does in Does if does in table}
+            patterns = {does: one if isinstance(one, str) else "|".join(one) for does, one in patterns.items()}
+            rest = table.get("ends", {}), table["offsets"], table.get("change_keeps_tip", False)
+            found[name] = Vocabulary(patterns, table["tip"], *rest)
+    return found
+
+
+VOCABULARIES: Final[Mapping[str, Vocabulary]] = _vocabularies()
 
 
 @dataclass
@@ -47,9 +124,8 @@ class State:
     feed: float = math.nan  #: as written
     feed_mode: int | None = PER_MINUTE
     tip: str | None = NONE  #: kind of tool tip control
-    even: bool = (
-        True  #: whether words of the tool axis run as they are by themselves: angles evenly, vectors on a circle
-    )
+    #: whether words of the tool axis run as they are by themselves: angles evenly, vectors on a circle
+    even: bool = True
     compensated: bool | None = False  #: whether the radius of the cutter is taken account of
     frames: frozenset[str] = frozenset()  #: words that turn or scale the places of the part
     offset: str = ""  #: work offset in force
@@ -69,36 +145,23 @@ class State:
 
     def lose_place(self, letters: Iterable[str] | None = None) -> None:
         """Take the places of some axes, or of all, as unknown."""
-        for letter in self.axes if letters is None else letters:
-            if letter in self.place:
-                self.place[letter] = math.nan
+        self.place |= dict.fromkeys(set(self.axes if letters is None else letters) & self.place.keys(), math.nan)
 
     def lose_all(self) -> None:
         """Take all as unknown."""
         self.lose_place()
-        self.motion = self.feed = self.unit = math.nan
-        self.absolute = self.feed_mode = self.tip = self.compensated = None
-        self.offset = self.rounding = ""
+        vars(self).update(_UNKNOWN)
 
     def or_not(self, other: State) -> None:
         """Take as unknown what another state, which may hold instead, has not the same."""
-        for name in (one.name for one in fields(State)):
-            mine, theirs = getattr(self, name), getattr(other, name)
-            if name == "place":
-                self.place = {k: v if v == theirs[k] else math.nan for k, v in mine.items()}
-            elif name == "frames":
-                self.frames = mine | theirs
-            elif mine != theirs and name not in ("vocabulary", "axes"):
-                lost: Any = math.nan if isinstance(mine, float) else "" if name in ("offset", "rounding") else None
-                setattr(self, name, bool(mine and theirs) if name == "even" else lost)
+        self.lose_place(letter for letter, value in self.place.items() if value != other.place[letter])
+        vars(self).update({name: none for name, none in _UNKNOWN.items() if vars(self)[name] != vars(other)[name]})
+        self.frames, self.even = self.frames | other.frames, self.even and other.even
 
     def why_not(self, wanted: str) -> str:
         """Say why cuts in this state are left as they are; empty where they need not be.
 
-        Parameters
-        ----------
-        wanted : str
-            Kind of tool tip control that must be on; `NONE` where it must be off, ``"any"`` where it is of no account.
+        `wanted` is the kind of tool tip control that must be on; `NONE` where it must be off, `ANY` for either.
         """
         if self.frames:
             return f"places of the part are turned, scaled or called by a macro ({', '.join(sorted(self.frames))})"
@@ -132,15 +195,17 @@ class State:
         return "the operator may skip the block" if why else ""
 
     def _take_line(self, line: Line) -> str:
-        words = line.words
-        if line.tape:
+        if line.tape or not line.words:
+            if line.tape:
+                self.lose_all()
+            return ""
+        first = line.words[0]
+        if first.name == "block":
+            self._take_block(first.text.upper())
+        elif first.name == "O" or (first.name == "L" and first.text != "L"):  # a call of Siemens
             self.lose_all()
-        elif words and words[0].name == "block":
-            self._take_block(words[0].text.upper())
-        elif words and (words[0].name == "O" or (words[0].name == "L" and words[0].text != "L")):  # a call of Siemens
-            self.lose_all()
-        elif words:
-            return self._take_words(words)
+        else:
+            return self._take_words(line.words)
         return ""
 
     def _take_words(self, words: Iterable[Word]) -> str:
@@ -150,34 +215,26 @@ class State:
         for word in words:
             if word.name in ("G", "M"):
                 done |= self._code(word, names)
-            elif len(word.name) > 1 and not self._spelt(word):
+            elif len(word.name) > 1 and not _SPELT.fullmatch(word.name):
                 done |= self._do(word.name + ("()" if re.search(r"\(\s*\)", word.text) else ""), alone=len(names) == 1)
-            elif word.name in "DTH=" and len(word.name) == 1:
+            elif word.name in ("D", "T", "H", "="):
                 does = self.vocabulary.does(word.name)
                 done |= {does} if does is not Does.ALL else {Does.LENGTH} if word.name in "DH" else set()
             else:
                 given[word.name] = word.value
         if self.rounding.startswith("G64") and {"P", "Q"} & names and "G" in names:
-            self.rounding = " ".join(
-                word.text for word in words if word.name in "PQ" or word.text[1:] in ("64", "64.0")
-            )
+            own = (word for word in words if word.name in "PQ" or word.text[1:] in ("64", "64.0"))
+            self.rounding = " ".join(word.text for word in own)
         if "L" in names or "LN" in names:  # Klartext says anew in each block what it is
             self.motion = 0.0 if "RAPID" in names else 1.0
         return self._move(given, done, names)
 
-    def _spelt(self, word: Word) -> bool:
-        """Whether a word of several letters is a part of a motion block of Klartext."""
-        return word.name in ("RAPID", "LN", "side", "turn", "circle", "centre") or word.name.startswith(
-            ("centre ", "DC ")
-        )
-
     def _move(self, given: Mapping[str, float], done: set[Does], names: set[str]) -> str:
         """Take the places and the feed of a block, after what its other words do."""
         axes = [letter for letter in self.axes if letter in given]
-        if done & {Does.DWELL}:
+        if Does.DWELL in done:
             return ""
-        if "F" in given:
-            self.feed = given["F"]
+        self.feed = given.get("F", self.feed)
         if Does.ALL in done:
             self.lose_all()
         if Does.MACHINE in done:
@@ -196,44 +253,34 @@ class State:
                 self.lose_place("IJK")
         if names & {"U", "V", "W", "circle"} or any(name.startswith("DC ") for name in names):
             self.lose_place()
-        foreign = (set("ABC") & given.keys()) - set(self.axes)
-        if foreign and "I" not in self.axes:
+        if "I" not in self.axes:
+            foreign = sorted((set("ABC") & given.keys()) - set(self.axes))
             self.frames |= {f"axis {letter}, which the machine has not" for letter in foreign}
         if "side" in names:
             self.compensated = given.get("side", 40.0) != 40.0
-        cuts = bool(axes) and self.motion in (1.0, 2.0, 3.0) and not done & {Does.MACHINE}
+        cuts = bool(axes) and self.motion in (1.0, 2.0, 3.0) and Does.MACHINE not in done
         return "other words in the block" if cuts else ""
 
     def _code(self, word: Word, names: set[str]) -> set[Does]:
         """Take a G or M word; return what it does beside changing the state."""
-        value, name = word.value, f"{word.name}{word.value:g}"
-        if word.name == "G" and "M128" in self.vocabulary.tip_control:  # a block of DIN/ISO among those of Klartext
+        name, words = f"{word.name}{word.value:g}", self.vocabulary
+        if word.name == "G" and "M128" in words.tip:  # a block of DIN/ISO among those of Klartext
             return {Does.ALL}
-        if word.name == "G" and value in (0.0, 1.0, 2.0, 3.0):
-            self.motion = value
-        elif (
-            word.name == "G"
-            and value in _UNITS
-            and not (value in (70.0, 71.0) and "TRAORI" not in self.vocabulary.tip_control)
-        ):
-            if self.unit != _UNITS[value]:
+        if name in _SETS:
+            setattr(self, *_SETS[name])
+        elif name in _UNITS and (name not in ("G70", "G71") or "TRAORI" in words.tip):
+            if self.unit != _UNITS[name]:
                 self.feed = math.nan
                 self.lose_place("XYZ")
-            self.unit = _UNITS[value]
-        elif name in ("G90", "G91"):
-            self.absolute = name == "G90"
+            self.unit = _UNITS[name]
         elif name in ("G93", "G94", "G95"):
-            self.feed = self.feed if self.feed_mode == int(value) else math.nan
-            self.feed_mode = int(value)
-        elif name in ("G40", "G41", "G42", "G41.1", "G42.1"):
-            self.compensated = name != "G40"
-        elif word.name == "G" and re.fullmatch(self.vocabulary.offsets, name):
+            self.feed = self.feed if self.feed_mode == int(word.value) else math.nan
+            self.feed_mode = int(word.value)
+        elif word.name == "G" and re.fullmatch(words.offsets, name):
             same, self.offset = name == self.offset and name != "G154" and "." not in name, name
             return set() if same else {Does.OFFSET}
         elif re.fullmatch(r"G6(0|1|4)(\.\d)?", name):
             self.rounding = word.text.replace(" ", "")
-        elif name == "M136" or name == "M137":
-            self.feed_mode = PER_REVOLUTION if name == "M136" else PER_MINUTE
         else:
             return self._do(f"{name} R" if name == "G10" and "R" in names else name)
         return set()
@@ -241,22 +288,20 @@ class State:
     def _do(self, name: str, *, alone: bool = False) -> set[Does]:
         """Do what a word says, by the vocabulary; `alone` where the block has no other."""
         words = self.vocabulary
-        if alone and name in ("ROT", "SCALE", "MIRROR", "TRANS") and "TRAORI" in words.tip_control:
+        if alone and name in ("ROT", "SCALE", "MIRROR", "TRANS") and "TRAORI" in words.tip:
             name = "ROT0"
         if name.startswith("ORI"):
-            kind = {"ORIVECT": VECTOR, "ORIPLANE": VECTOR, "ORIWKS": VECTOR, "ORIAXES": ANGLES, "ORIMKS": ANGLES}
-            wanted = VECTOR if "I" in self.axes else ANGLES
-            self.even = kind.get(name, "") == wanted
+            self.even = name in _EVEN[VECTOR if "I" in self.axes else ANGLES]
         does = words.does(name)
-        if name in words.tip_control:
-            self.tip = words.tip_control[name]
-            does = Does.LENGTH if does in (Does.LENGTH,) else Does.PLACE
-        if does is Does.CHANGE and not words.change_keeps_tip and name not in words.tip_control:
-            self.tip = None if self.tip else self.tip
+        if name in words.tip:
+            self.tip = words.tip[name]
+            does = does if does is Does.LENGTH else Does.PLACE
+        elif does is Does.CHANGE and not words.change_keeps_tip and self.tip:
+            self.tip = None
         if does is Does.FRAME:
             self.frames |= {name}
         elif does is Does.LEVEL:
-            ended = words.ends_frame.get(name, ".*")
+            ended = words.ends.get(name, ".*")
             self.frames = frozenset(one for one in self.frames if not re.fullmatch(ended, one))
         elif does is Does.MOVE:
             self.motion = math.nan
@@ -264,22 +309,22 @@ class State:
 
     def _take_block(self, text: str) -> None:
         """Take a whole block of Klartext."""
+        done = {Does.PLACE}
         if text.startswith("BEGIN PGM"):
             self.unit, self.absolute = 25.4 if text.endswith("INCH") else 1.0, True
-        elif text.startswith("FUNCTION RESET TCPM"):
+            return
+        if text.startswith("FUNCTION RESET TCPM"):
             self.tip = NONE
-            self.lose_place()
         elif text.startswith("FUNCTION TCPM"):
             law = VECTOR if "PATHCTRL VECTOR" in text else ANGLES if "PATHCTRL AXIS" in text else None
             plain = "F TCP" in text and "AXIS POS" in text and "REFPNT" not in text.replace("REFPNT TIP-TIP", "")
             self.tip = law if plain else None
-            self.lose_place()
         else:
             done = self._do(text)
-            if Does.ALL in done:
-                self.lose_all()
-            elif done - {Does.DWELL}:
-                self.lose_place()
+        if Does.ALL in done:
+            self.lose_all()
+        elif done - {Does.DWELL}:
+            self.lose_place()
 
     def _take_unread(self, text: bytes, lexer: Lexer) -> str:
         """Take a line that is not made of words alone: variables, jumps, what nobody knows."""

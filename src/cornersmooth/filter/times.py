@@ -11,9 +11,8 @@ from cornersmooth.feedrate import plan_text
 from cornersmooth.feedrate.linuxcnc import line_times
 from cornersmooth.feedrate.linuxcnc_program import axis_limits, program_lines
 from cornersmooth.filter.checking import Place, pair, shared
-from cornersmooth.filter.motion import motion
+from cornersmooth.filter.motion import Job, motion_of_runs
 from cornersmooth.filter.runs import Reading
-from cornersmooth.filter.writing import Job
 from cornersmooth.kinematics import Machine
 from cornersmooth.nc_reader import NcProgram
 from cornersmooth.saving import LINUXCNC
@@ -22,14 +21,8 @@ from cornersmooth.saving import LINUXCNC
 def planned_times(job: Job, old: Reading, new: Reading, where: Sequence[Place], axes: Machine) -> tuple[float, float]:
     """Time of what has changed, before and after, s, under the limits of the axes of a machine.
 
-    On LinuxCNC it is that of the whole program, by the law of its planner.
-
-    Raises
-    ------
-    InputError
-        The machine does not reach a pose; CS264: a program for LinuxCNC has arcs.
-    SettingsError
-        CS263: the machine does not say how fast its axes may go.
+    On LinuxCNC it is that of the whole program, by the law of its planner. Errors: a pose out of reach; CS264: a
+    program for LinuxCNC has arcs; CS263: the machine does not say how fast its axes may go.
     """
     if by_own_law(job):
         return _on_linuxcnc(old, axes), _on_linuxcnc(new, axes)
@@ -44,9 +37,9 @@ def time_as_it_is(job: Job, reading: Reading, axes: Machine) -> float:
         return _on_linuxcnc(reading, axes)
     if not reading.runs:
         raise no_runs()
-    where = [Place(run, run.first, run.stop) for run in reading.runs]
-    parts = ([job.stretch(reading, place.run) for place in own] for own in shared(reading, reading, where))
-    return sum(_planned(job, motion(part, job.own, job.spelling, job.settings), axes) for part in parts)
+    groups = shared(reading, reading, [Place(run, run.first, run.stop) for run in reading.runs])
+    parts = (motion_of_runs(job, reading, [place.run for place in own]) for own in groups)
+    return sum(_planned(job, nc, axes) for nc in parts)
 
 
 def no_runs() -> SettingsError:

@@ -49,20 +49,10 @@ def arc_lines(program: Program, settings: Settings) -> Ints:
 
 
 def arc_points(program: Program, rows: Ints, share: Floats) -> tuple[Floats, Floats]:
-    """Tips and tool axes on arcs.
+    """Tips (m, 3), mm, and unit tool axes (m, 3) on arcs.
 
-    Parameters
-    ----------
-    rows : (m,) int64
-        Rows of `Program.arcs`, one for each point.
-    share : (m,) float64
-        From 0 at the start of the arc to 1 at its end; ends are exact.
-
-    Returns
-    -------
-    tip : (m, 3) float64, mm
-    axis : (m, 3) float64
-        Unit vectors.
+    `rows` (m,) are those of `Program.arcs`, `share` (m,) is from 0 at the start of the arc to 1 at its end; ends are
+    exact.
     """
     pose, sweep, radius, side, closing = _swings(program, rows)
     swung = (np.cos(sweep * share) - 1.0)[:, None] * radius + np.sin(sweep * share)[:, None] * side
@@ -98,9 +88,7 @@ def _swings(program: Program, rows: Ints) -> tuple[Ints, Floats, Floats, Floats,
 def poses_and_arcs(program: Program, step: float) -> tuple[Ints, Floats, Floats]:
     """Poses of a program and places on its arcs, turns of `step` (rad) apart at most.
 
-    Returns
-    -------
-    The pose that each leads to (m,), tips (m, 3), mm, and unit axes (m, 3).
+    Gives the pose that each leads to (m,), tips (m, 3), mm, and unit axes (m, 3).
     """
     arcs, row = program.arcs, np.full(len(program), -1, np.int64)
     pieces = np.ones(len(program), np.int64)

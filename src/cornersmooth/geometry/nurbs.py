@@ -49,14 +49,7 @@ def rational_basis(u: Floats, weights: Floats) -> Floats:
 
 
 def leg_coefficients(u: Floats, weights: Floats, ratio: Floats | float) -> Floats:
-    """Coefficients (..., m, 3) of corner, incoming and outgoing leg in the points of curves.
-
-    Parameters
-    ----------
-    u : (..., m) float64
-    weights : (..., 2) float64
-    ratio : (...) float64
-    """
+    """Coefficients (..., m, 3) of corner, incoming and outgoing leg in the points of curves at parameters (..., m)."""
     shares = rational_basis(u, weights)
     ratio = np.asarray(ratio)[..., None]
     incoming = -shares[..., 0] - ratio * shares[..., 1]
@@ -150,14 +143,7 @@ def derivatives(points: Floats, weights: Floats, u: Floats) -> tuple[Floats, Flo
 def leg_derivatives(weights: Floats, ratio: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """First and second derivative by u, at u = 0, of the share of the leg that curves have passed, and of the weight.
 
-    Parameters
-    ----------
-    weights : (g, 5) float64
-    ratio : (g,) float64
-
-    Returns
-    -------
-    four (g,) float64
+    From weights (g, 5) and ratios (g,): four (g,).
     """
     share = np.stack((np.zeros_like(ratio), weights[:, 1] * (1.0 - ratio), weights[:, 2]), axis=1)
     (slope, bend), (weight_slope, weight_bend) = (

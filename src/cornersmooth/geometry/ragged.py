@@ -32,21 +32,7 @@ def batches(counts: Ints, size: int) -> Ints:
 
 
 def search(values: Floats, counts: Ints, row: Ints, place: Floats, side: Literal["left", "right"] = "left") -> Ints:
-    """`np.searchsorted` within rows.
-
-    Parameters
-    ----------
-    values : (n,) float64
-        From 0 on and ascending in each row.
-    counts : (k,) int64
-        Elements of each row, at least 1.
-    row, place : (m,) int64 and float64
-
-    Returns
-    -------
-    (m,) int64
-        Indices into `values`.
-    """
+    """`np.searchsorted` within rows: indices (m,) into values (n,), which are from 0 on and ascending in each row."""
     last = values[starts(counts)[1:] - 1]
     base = starts(np.floor(last).astype(np.int64) + 2)[:-1].astype(np.float64)
     inside = np.clip(place, -0.5, last[row] + 0.5)  # rows lie more than 1 apart

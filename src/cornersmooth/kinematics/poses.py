@@ -119,17 +119,7 @@ def _solve(frame: _Frame, axis: Floats, angles: Floats) -> Floats:
 
 
 def closest_second(machine: Machine, axis: Floats, first_angle: Floats) -> Floats:
-    """Second angle that brings the tool closest to `axis` while the first angle is given.
-
-    Parameters
-    ----------
-    axis : (n, 3) float64
-    first_angle : (n,) float64, degrees
-
-    Returns
-    -------
-    (n,) float64, degrees in (-180, 180]
-    """
+    """Second angles (n,), degrees in (-180, 180], nearest to axes (n, 3) at given first angles (n,)."""
     frame = _Frame.of(machine)
     first, _ = machine.axes
     turned = rotate(first.unit, -first.sign * radians(first_angle), axis)

@@ -46,20 +46,9 @@ def page_and_saving(
 ) -> tuple[str, Saving | None]:
     """Page of a file that was smoothed, written and verified, and the times that its verdict tells.
 
-    Parameters
-    ----------
-    source : bytes
-        The CL file, for its hash.
-    frame : Frame, optional
-        As in `postprocess`: a text that went to a stream is written once more for the page.
-    limits : Limits, optional
-        Of the planned speeds.
-    axes : Machine, optional
-        Whose limits the speeds are planned under, in place of those of the machine of the form.
-    timed : bool
-        Whether a time is said.
-    tool : Tool, optional
-        Instead of that of the file.
+    A program that went to a stream is written once more for it, in the same `frame`. Speeds are planned within
+    `limits`, and those of `axes` or of the machine of the form. `timed` says whether a time is said. `tool` replaces
+    that of the file.
     """
     form, settings = result.form, result.smoothed.settings
     limits, axes = limits or Limits(), form.machine if axes is None else axes

@@ -230,14 +230,9 @@ def _add_written(
 
 
 def _seen(corners: CornerList, places: Ints, count: int) -> Bools:
-    """(count,) rows of a path that belong to listed corners.
+    """(count,) rows of a path that belong to listed corners; `places` (n,) is the row of each pose, ascending.
 
     All of it about those out of tolerance, and about as many of the others as fit.
-
-    Parameters
-    ----------
-    places : (n,) int64
-        Row of each pose, ascending.
     """
     first = places[np.maximum(corners.pose - _BESIDE, 0)]
     # the vertex at a pose may count as the first point of the next move

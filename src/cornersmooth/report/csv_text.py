@@ -12,15 +12,7 @@ _BLOCK = 10_000
 
 
 def csv_text(forms: Mapping[str, str], count: int, columns: Callable[[slice], Iterable[NDArray[Any]]]) -> Iterator[str]:
-    """Header, then the rows.
-
-    Parameters
-    ----------
-    forms : mapping of str to str
-        How each column is written, as in ``{"x": "%.6f"}``.
-    columns : callable
-        Gives the columns of some rows.
-    """
+    """Header, then the rows: `columns` gives those of a slice, `forms` say how each is written (``{"x": "%.6f"}``)."""
     yield ",".join(forms) + "\n"
     form = ",".join(forms.values()) + "\n"
     for begin in range(0, count, _BLOCK):

@@ -50,19 +50,9 @@ def deviation_along(
     axis_tolerance: float | None = None,
     samples: int = 8,
 ) -> Distribution:
-    """Measure the deviation at equally spaced parameters of every path element, and at every original pose.
+    """Measure the deviation at `samples` even parameters of every path element, and at every original pose.
 
-    Parameters
-    ----------
-    program, tolerance, axis_length, axis_tolerance
-        As in `verify`.
-    samples : int
-        Poses per element.
-
-    Returns
-    -------
-    Distribution
-        At the poses of the original that come nearest to tip and axis point together.
+    It is that at the poses of the original that come nearest to tip and axis point together.
     """
     task = Task.of(program, tolerance, axis_length, axis_tolerance)
     parts = [Distribution(*np.zeros((6, 0)), *np.zeros((4, 0), np.int64))]

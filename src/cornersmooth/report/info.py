@@ -42,20 +42,7 @@ def spread(values: Floats) -> Record:
 
 
 def describe(program: Program, tolerance: float, axis_length: float) -> Record:
-    """Describe a program and what would limit the rounding of its corners; keys carry their unit.
-
-    Parameters
-    ----------
-    tolerance : float, mm
-        ε.
-    axis_length : float, mm
-        H.
-
-    Raises
-    ------
-    SettingsError
-        A tolerance or length out of bounds.
-    """
+    """Describe a program and what would limit the rounding of its corners at ε and H, mm; keys carry their unit."""
     settings = Settings(tolerance=tolerance, axis_length=axis_length)
     segments = _Segments.of(program)
     operations = find_operations(program)

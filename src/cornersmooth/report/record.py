@@ -58,24 +58,10 @@ def record(
     loosened: str = "",
     times: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
-    """Begin a report.
+    """Begin a report of a command on its input, as `cl_file` gives it, and the program that was written, if any.
 
-    Parameters
-    ----------
-    kind : {"smooth", "verify", "filter"}
-        Command that it is of.
-    source : mapping
-        The input, as `cl_file` gives it.
-    program : NcFile or None
-        None where no program was written.
-    settings : mapping
-        Names end with their unit.
-    command : str
-        Command line; empty for none.
-    loosened : str
-        What settings made looser than the default.
-    times : mapping, optional
-        As `planned_times` gives them.
+    Names of settings end with their unit. `loosened` says what settings made looser than the default, `times` is as
+    `planned_times` gives them.
     """
     from cornersmooth import __version__
 

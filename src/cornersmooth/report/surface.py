@@ -91,12 +91,8 @@ def _histogram(surface: SurfaceMap) -> Iterator[str]:
 def draw_surface(surface: SurfaceMap, form: str) -> bytes:
     """Picture as ``png``, ``svg`` or ``pdf``: map of the surface above, histogram below; same input, same bytes.
 
-    Overcut is orange, undercut blue. Needs matplotlib, which only the extra ``cornersmooth[plot]`` installs.
-
-    Raises
-    ------
-    SettingsError
-        CS262: matplotlib is not installed.
+    Overcut is orange, undercut blue. CS262: matplotlib is missing, which only the extra ``cornersmooth[plot]``
+    installs.
     """
     try:
         import matplotlib as mpl

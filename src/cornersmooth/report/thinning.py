@@ -8,20 +8,10 @@ from cornersmooth.model import Bools, Floats, Ints
 
 
 def thinned(points: Floats, weight: Floats, must: Bools, most: int) -> Ints:
-    """Rows (r,) of a path to keep, ascending; all of them where they are few enough.
+    """Rows (r,) of a path (n, 3) to keep, ascending: about so many at most, beside those that must stay.
 
     Of every group of neighbours its first and last point are kept, the one farthest from the chord between them, and
-    the one of the largest weight.
-
-    Parameters
-    ----------
-    points : (n, 3) float64
-    weight : (n,) float64
-        NaN counts as nothing.
-    must : (n,) bool
-        Rows that are kept whatever happens.
-    most : int
-        About so many rows beside those.
+    the one of the largest weight, where NaN counts as nothing.
     """
     n = len(points)
     if n <= most:

@@ -86,16 +86,9 @@ class Judgement:
 
 
 def judge(found: Verification | None, findings: Iterable[Finding] = (), unverified: str = "") -> Judgement:
-    """Give the verdict on a program.
+    """Give the verdict on a program from what verification found, and what was noticed on the way to the program.
 
-    Parameters
-    ----------
-    found : Verification or None
-        What verification found; None where nothing was measured.
-    findings : iterable of Finding
-        What was noticed on the way from the CL file to the program.
-    unverified : str
-        What was not looked at, where `found` does not say it.
+    `unverified` is what was not looked at, where `found` does not say it.
     """
     findings = tuple(findings)
     out = [finding for finding in findings if finding.leaves_out]
@@ -198,14 +191,8 @@ def limits_text(limits: Sequence[tuple[str, float]]) -> str:
 def times_text(seconds: Mapping[str, float], names: Sequence[str], limits: Sequence[tuple[str, float]] = ()) -> str:
     """Say what smoothing saves of the planned time, and what limits the motion then.
 
-    Parameters
-    ----------
-    seconds : mapping of str to float
-        Planned times, as `feedrate.Comparison` has them.
-    names : sequence of str
-        Methods, and the text as written, to choose the fastest from.
-    limits : sequence of (str, float), optional
-        Limits that the fastest reaches, and the part of the cutting time, as `feedrate.limiting` gives them.
+    Times are those of `feedrate.Comparison`, limits those of `feedrate.limiting`. The fastest is chosen from `names`:
+    methods, and the program as written.
     """
     stops, jumps = seconds["direct_exact_stop"], seconds["direct_velocity_jump"]
     best = min(names, key=lambda name: seconds[name])

@@ -28,13 +28,7 @@ def axis_steps(program: Program, moves: Bools, limit: float) -> tuple[Ints, Floa
 
 
 def refuse_flips(program: Program) -> None:
-    """Refuse a feed move, line or arc, whose axis turns by more than `cornersmooth.settings.FLIP_ANGLE`.
-
-    Raises
-    ------
-    InputError
-        CS183, at the first such move.
-    """
+    """Refuse a feed move, line or arc, whose axis turns by more than `cornersmooth.settings.FLIP_ANGLE`: CS183."""
     pose, turn = axis_steps(program, _feed_moves(program), FLIP_ANGLE)
     if len(pose):
         raise InputError(

@@ -84,16 +84,9 @@ class _Corners:
 def largest_blends(rows: Vertices, kept: Ints, limits: LineLimits, most: float, deviation: float) -> Floats:
     """Blend tolerances (k,), mm, with which what the control executes stays near the original motion.
 
-    `LineLimits.blend` is that at both ends and where the tip stands still, and the most where a line ends in any case.
-
-    Parameters
-    ----------
-    kept : (k,) int64
-        Rows at which lines end, from `fewest_lines`.
-    most : float, mm
-        Largest blend tolerance.
-    deviation : float, mm
-        What tip and axis point may be off the original motion while the control blends.
+    `kept` (k,) are the rows at which lines end, from `fewest_lines`; `most` is the largest tolerance, `deviation` what
+    tip and axis point may be off meanwhile, mm. `LineLimits.blend` is that at both ends and where the tip stands still,
+    and the most where a line ends in any case.
     """
     blends = np.full(len(kept), limits.blend)
     if len(kept) < 3:

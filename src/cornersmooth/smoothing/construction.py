@@ -133,12 +133,7 @@ class Construction(ABC):
     ) -> tuple[Floats, Floats]:
         """Inner points of straight remainders that are written as `number` lines of equal change of axis.
 
-        Returns
-        -------
-        fraction : (g, number - 1) float64
-            Where the tip is on its segment.
-        axis : (g, number - 1, 3) float64
-            Unit vectors.
+        Where the tip is on its segment (g, number - 1), and unit axes (g, number - 1, 3).
         """
 
     def axes(self, program: Program, corners: Corners, settings: Settings, rows: Ints, u: Floats) -> Floats | None:

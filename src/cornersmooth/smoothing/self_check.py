@@ -126,15 +126,9 @@ def distances(
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """How far sampled poses (g, m) are from the original motion through some poses (g, q) of a program, mm.
 
-    With `own_axis` the axis point is H times the axis wherever the tip is.
-
-    Returns
-    -------
-    tip, axis_point, together : (g, m) float64
-        From the path of the tip, from the path of the axis point, and of both from the pose that is nearest in six
-        dimensions.
-    backwards : (g,) float64
-        By how much that pose goes back along the original, at most.
+    Gives (g, m) distances from the path of the tip, from that of the axis point, and of both from the pose that is
+    nearest in six dimensions; and (g,) by how much that pose goes back along the original, at most. With `own_axis` the
+    axis point is H times the axis wherever the tip is.
     """
     own = tip, axis_length * axis if own_axis else tip + axis_length * axis
     tips, axes = program.tip[poses.T][:, :, None], program.axis[poses.T][:, :, None]

@@ -34,15 +34,7 @@ def matching_parameters(
 ) -> tuple[Floats, Floats]:
     """Parameters v(u) (g, m) with |Q(v) − P(u)| = H as nearly as possible, never decreasing, and what is missing, mm.
 
-    Parameters
-    ----------
-    tip_curve, axis_curve : (g, 5, 3) float64, mm
-        Control points of P and Q.
-    weights : (g, 2) float64
-    u : (m,) float64
-        Ascending parameters of the tip curve.
-    axis_length : float, mm
-        H.
+    Control points (g, 5, 3) are those of P and Q, u (m,) ascends.
     """
     tips = nurbs.evaluate(tip_curve, weights, u)
     grid = nurbs.evaluate(axis_curve, weights, _GRID)
@@ -138,12 +130,9 @@ def synchronisation_report(
     """How far the paper's synchronisation of g corners is from what it asks for, (g,) each.
 
     `tip_legs` and `axis_legs` (g, 3), mm, lead from the first control point to the corner and from there to the last
-    one; `lever` is H times the axis at the corner.
-
-    Returns
-    -------
-    Largest ``||Q−P|−H|`` over `REPORT_PARAMETERS` (mm); angles (rad) between the axis of the transition and that of the
-    straight motion before it and after it, and between the axis at u = ½ and that at the corner.
+    one; `lever` is H times the axis at the corner. Gives the largest ``||Q−P|−H|`` over `REPORT_PARAMETERS` (mm);
+    angles (rad) between the axis of the transition and that of the straight motion before it and after it, and between
+    the axis at u = ½ and that at the corner.
     """
     tip_curve = nurbs.five_points(np.zeros_like(lever), *tip_legs, ratio)
     axis_curve = nurbs.five_points(lever, *axis_legs, ratio)

@@ -34,15 +34,9 @@ Cutter = Callable[[Floats, Floats], Floats]
 
 
 def distance_to_motion(points: Floats, motion: RuledMotion, tool: Tool, edge: float, *, reach: float) -> Floats:
-    """Signed distances (k,), mm, of points (k, 3) to a tool's swept volume: negative inside.
+    """Signed distances (k,), mm, of points (k, 3) to a tool's swept volume: negative inside, NaN beyond `reach`.
 
-    Parameters
-    ----------
-    points : (k, 3) float64, mm
-    edge : float, mm
-        Length of the cutting edge; what is higher over the tip does not cut.
-    reach : float, mm
-        Distances up to this are found; others are NaN.
+    What is higher over the tip than the cutting `edge`, mm, does not cut.
     """
     found = np.full(len(points), np.nan)
     if not len(motion) or not len(points):

@@ -42,17 +42,10 @@ class EnvelopePoints:
 def envelope_points(
     motion: RuledMotion, tool: Tool, edge: float, *, levels: int = 7, stations: int = 2000
 ) -> EnvelopePoints:
-    """Points on the envelope of a motion.
+    """Points on the envelope of a motion, up to the cutting `edge`, mm, over the tip.
 
-    Parameters
-    ----------
-    edge : float, mm
-        Length of the cutting edge: heights over the tip up to which the surface is looked at.
-    levels : int
-        Points on the flank, and as many on the corner arc where there is one.
-    stations : int
-        Places along the path, about so many: middles of segments, and the corners between them, where the normal is
-        that halfway between both sides.
+    There are `levels` points on the flank, and as many on a corner arc, at about `stations` places along the path:
+    middles of segments, and the corners between them, where the normal is that halfway between both sides.
     """
     out, up, drop = _levels(tool, edge, levels)
     middle, corner = _stations(motion, stations)

@@ -110,21 +110,9 @@ def measure_surface(
     levels: int = 7,
     stations: int = 2000,
 ) -> SurfaceMap:
-    """Measure what the written motion leaves of the surface that the original one makes.
+    """Measure what the written motion leaves of the surface that the original one makes; the rest as `envelope_points`.
 
-    Parameters
-    ----------
-    tolerance : float, mm
-        ε.
-    edge : float, mm
-        Length of the cutting edge.
-    levels, stations
-        As in `envelope_points`.
-
-    Raises
-    ------
-    SettingsError
-        CS271: nothing is cut.
+    CS271: nothing is cut.
     """
     original, written = original_cuts(program), written_cuts(nc)
     if not len(original):

@@ -45,21 +45,9 @@ class PassDifference:
 def neighbouring_passes(
     original: RuledMotion, written: RuledMotion, radius: float, within: float, *, stations: int = 2000
 ) -> PassDifference | None:
-    """Compare what neighbouring passes are off.
+    """Compare what neighbouring passes are off at about so many places; None where no pass has a neighbour.
 
-    Parameters
-    ----------
-    radius : float, mm
-        Of the tool's corner.
-    within : float, mm
-        Passes farther apart are no neighbours.
-    stations : int
-        Places along the path, about so many.
-
-    Returns
-    -------
-    PassDifference or None
-        None where no pass has a neighbour.
+    It looks at the centre of the tool's corner radius, mm; passes farther apart than `within`, mm, are no neighbours.
     """
     path, own = _Path.of(original, radius), _Path.of(written, radius)
     segment = np.unique(np.linspace(0, len(original) - 1, min(stations, len(original))).astype(np.int64))

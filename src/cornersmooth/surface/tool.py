@@ -52,10 +52,7 @@ class Tool:
     ) -> Tool:
         """Tool of a diameter, measured where side and bottom line would meet; a ball where the radius is half of it.
 
-        Raises
-        ------
-        SettingsError
-            CS270: such a tool cannot be.
+        CS270: such a tool cannot be.
         """
         if corner_radius > 0.5 * diameter * (1.0 + 1e-9):
             raise SettingsError(
@@ -79,21 +76,10 @@ class Tool:
         return text + (f", tip angle {self.tip_angle:g}°" if self.tip_angle else "")
 
     def profile(self, sine: Floats, height: Floats) -> tuple[Floats, Floats, Floats]:
-        """Points of the corner arc, then of the side line.
+        """Points of the corner arc, then of the side line: ρ and h, mm, and sine of the drop of the outward normal.
 
-        Parameters
-        ----------
-        sine : (c,) float64
-            Where on the arc: 1 at its lowest, the taper's sine at its upper end; drop of the outward normal.
-        height : (s,) float64, mm
-            Heights over the tip on the side line, above its lower end.
-
-        Returns
-        -------
-        out, up : (c + s,) float64, mm
-            ρ and h.
-        drop : (c + s,) float64
-            Sine of the angle by which the outward normal points below the horizontal.
+        `sine` (c,) says where on the arc: 1 at its lowest point, the taper's sine at its upper end. `height` (s,) is
+        that of points of the side line over the tip, mm.
         """
         side = math.radians(self.taper)
         cosine = np.sqrt(1.0 - sine * sine)

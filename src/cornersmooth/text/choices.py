@@ -14,14 +14,10 @@ Bytes = NDArray[np.uint8]
 
 
 class Choices:
-    """One text for each of m rows.
+    """One text for each of m rows; `ids` (m,) or () say which.
 
-    Parameters
-    ----------
-    ids : (m,) or () int
-        Which text each row has.
-    align_right : bool
-        Fill up on the left rather than on the right: zero bytes that are together are dropped together.
+    Texts are filled up on the right, or with `align_right` on the left: zero bytes that are together are dropped
+    together.
     """
 
     def __init__(self, texts: Sequence[bytes], ids: ArrayLike, count: int, *, align_right: bool) -> None:

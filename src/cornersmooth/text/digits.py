@@ -17,12 +17,9 @@ Table = NDArray[np.unsignedinteger[Any]]
 
 @cache
 def whole_table(digits: int) -> Table:
-    """Digits before the point, of a group of 1, 2 or 4.
+    """(3, 10**digits) digits before the point, of a group of 1, 2 or 4.
 
-    Returns
-    -------
-    (3, 10**digits)
-        By what stands around the group: row 0 drops all leading zeros, row 1 keeps the last digit, row 2 keeps all.
+    By what stands around the group: row 0 drops all leading zeros, row 1 keeps the last digit, row 2 keeps all.
     """
     shown = _characters(digits)
     significant = np.logical_or.accumulate(shown != ord("0"), axis=1)
@@ -34,12 +31,9 @@ def whole_table(digits: int) -> Table:
 
 @cache
 def part_table(digits: int, point: bool) -> Table:
-    """Digits after the point, of a group of 1 to 4; `point` puts the point in front of them.
+    """(2, 10**digits) digits after the point, of a group of 1 to 4; `point` puts the point in front of them.
 
-    Returns
-    -------
-    (2, 10**digits)
-        Row 0 keeps all digits, row 1 drops trailing zeros.
+    Row 0 keeps all digits, row 1 drops trailing zeros.
     """
     shown = _characters(digits)
     significant = np.logical_or.accumulate(shown[:, ::-1] != ord("0"), axis=1)[:, ::-1]

@@ -48,15 +48,7 @@ _EXACT: Final = 2.0**53
 
 
 class NumberError(ValueError):
-    """A field is empty or is not a finite decimal number.
-
-    Parameters
-    ----------
-    what : str
-        What is wrong, with the field as written.
-    offset : int
-        Byte offset of the field in the text that was parsed, from 0.
-    """
+    """A field is empty or is no finite decimal number: what is wrong with it, and its byte offset, from 0."""
 
     def __init__(self, what: str, offset: int) -> None:
         self.what = what
@@ -69,24 +61,10 @@ class NumberError(ValueError):
 
 
 def parse_numbers(data: bytes) -> Floats:
-    """Read all numbers of a text, each bit for bit what `float` makes of it.
+    """(m,) all numbers of a text, each bit for bit what `float` makes of it.
 
     Numbers stand between any mix of blanks, tabs, line ends and single commas. Exponents may be written with D.
-
-    Parameters
-    ----------
-    data : bytes
-        Digits, ``+ - .``, ``e E d D`` and separators only. A comma needs a number on both sides.
-
-    Returns
-    -------
-    (m,) float64
-        Negative zero keeps its sign.
-
-    Raises
-    ------
-    NumberError
-        For an empty field beside a comma, a field that is no number, or one that float64 cannot hold.
+    NumberError for an empty field beside a comma, a field that is no number, or one that float64 cannot hold.
     """
     text = np.frombuffer(data, np.uint8)
     # every separator is at or below the comma: never fewer places than numbers, and untouched ones cost no memory

@@ -67,33 +67,11 @@ class RowFormat:
         suffix_id: ArrayLike,
         left_out: Bools | None = None,
     ) -> tuple[bytes, Ints]:
-        """Write rows: prefix, words with their numbers, suffix.
+        """Write rows: prefix, words with their numbers, suffix. Give the text, and where rows start and the last ends.
 
-        Parameters
-        ----------
-        ticks : (m, c) int64
-            Numbers in steps of their last digit, from `to_ticks`.
-        prefix, suffix : sequence of bytes
-            Texts to choose from; a suffix carries the line end.
-        prefix_id, suffix_id : (m,) or () int
-            Which of them each row has.
-        left_out : (m, c) bool, optional
-            Words that a row has not. Where its prefix is empty, too, the row begins without a blank.
-
-        Returns
-        -------
-        text : bytes
-        offsets : (m+1,) int64
-            Where each row starts in it; the last is its length.
-
-        Raises
-        ------
-        OutputError
-            CS301 for ticks beyond `TICK_LIMIT`.
-        ValueError
-            For ticks of another shape, zero bytes in texts, or words too many or too long for `WIDEST`.
-        IndexError
-            For an id without a text.
+        `ticks` (m, c) are numbers in steps of their last digit, from `to_ticks`. Prefixes and suffixes, which carry the
+        line end, are chosen by ids (m,) or (). Words that a row has not are `left_out` (m, c); where its prefix is
+        empty, too, the row begins without a blank. CS301 for ticks beyond `TICK_LIMIT`.
         """
         ticks = np.asarray(ticks, np.int64)
         if ticks.ndim != 2 or ticks.shape[1] != len(self.words):
@@ -194,14 +172,9 @@ def _count_by_row(used: NDArray[np.uint64]) -> Ints:
 
 
 def interleave(which: Ints, texts: Sequence[tuple[bytes, Ints]]) -> bytes:
-    """Put texts of rows together in order.
+    """Put texts of rows together in order: `which` (n,) is the text that has each row.
 
-    Parameters
-    ----------
-    which : (n,) int64
-        Text that has each row.
-    texts : sequence of (bytes, (m + 1,) int64)
-        Each with its m rows, and where these begin in it and end.
+    Texts come with the places (m + 1,) where their rows begin and end.
     """
     edges = [0, *(1 + np.flatnonzero(which[1:] != which[:-1])).tolist(), len(which)]
     at = [0] * len(texts)

@@ -29,25 +29,9 @@ _SPLITTER: Final = 134217729.0
 def to_ticks(values: ArrayLike, decimals: int | Sequence[int]) -> Ints:
     """Round to the integer n for which ``n * 10**-decimals`` is what ``'%.{decimals}f' % value`` prints.
 
-    The exact binary value is rounded, exact ties to even. This is the only rounding of numbers for output.
-
-    Parameters
-    ----------
-    values : (...) float64
-    decimals : int or sequence of int
-        For all values, or one for each column of the last axis; from 0 to `MOST_DECIMALS`.
-
-    Returns
-    -------
-    (...) int64
-        Of the same shape. Negative values that round to zero give 0.
-
-    Raises
-    ------
-    OutputError
-        CS301 for a value that is not finite or has more than `TICK_LIMIT` ticks.
-    ValueError
-        For decimals out of range, or another number of them than columns.
+    The exact binary value is rounded, exact ties to even. This is the only rounding of numbers for output. Decimals, up
+    to `MOST_DECIMALS`, are for all values, or one for each column of the last axis. CS301 for a value that is not
+    finite or has more than `TICK_LIMIT` ticks.
     """
     numbers = np.asarray(values, np.float64)
     places = np.asarray(decimals)
@@ -114,19 +98,8 @@ def _unprintable(values: Floats, scale: Floats) -> OutputError:
 def format_number(value: float, decimals: int, *, trim: bool = False, plus: bool = False) -> str:
     """Write one number as `RowFormat` writes it: rounded by `to_ticks`, never as ``-0`` or with an exponent.
 
-    Parameters
-    ----------
-    decimals : int
-        Digits after the point; 0 writes no point unless `trim`.
-    trim : bool
-        Drop trailing zeros but keep the point: ``"12."``, ``"0.5"``.
-    plus : bool
-        Write ``+`` before numbers that are not negative.
-
-    Raises
-    ------
-    OutputError
-        CS301, as `to_ticks`.
+    0 decimals write no point unless `trim`, which drops trailing zeros but keeps the point: ``"12."``, ``"0.5"``.
+    `plus` writes ``+`` before numbers that are not negative. CS301, as `to_ticks`.
     """
     if not abs(value) * 10.0**decimals < TICK_LIMIT:
         to_ticks(value, decimals)  # says what is wrong

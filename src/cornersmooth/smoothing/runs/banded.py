@@ -118,14 +118,9 @@ def keep_in_planes(bands: Floats, right: Floats, normal: Floats) -> None:
 
 
 def solve_blocks(bands: Floats, right: Floats, coupled: Floats) -> Floats:
-    """Solve with 3 by 3 blocks for a right side (3, c); what is not free gets 0.
+    """Solve with 3 by 3 blocks for a right side (3, c); what is not free gets 0, by the `couplings` (c, 4).
 
-    Parameters
-    ----------
-    bands : (c, 4, 6) float64
-        Symmetric blocks xx, yy, zz, xy, xz, yz; column o of row j couples control points j and j + o.
-    coupled : (c, 4) float64
-        What `couplings` gives for the control points that are free.
+    Bands (c, 4, 6) are symmetric blocks xx, yy, zz, xy, xz, yz; column o of row j couples control points j and j + o.
     """
     bands *= coupled[:, :, None]
     bands[:, 0, :3] += 1.0 - coupled[:, :1]

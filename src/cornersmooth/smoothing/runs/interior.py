@@ -88,16 +88,9 @@ class Task:
 def smoothest(task: Task, off: Floats, jerk: Floats, enough: float, begin: float) -> Floats:
     """Change of the control points (c, 3) that makes the windows as smooth as their bounds allow.
 
-    Parameters
-    ----------
-    off : (m, 3) float64
-        Deviations at the samples to begin with.
-    jerk : (spans, 3) float64
-        Third derivatives to begin with.
-    enough : float
-        Bound of what is left to gain, over the objective, that ends the steps.
-    begin : float
-        The same at the beginning, as far as it is known: `COLD` or `WARM`.
+    It begins with deviations (m, 3) at the samples and third derivatives (spans, 3). The bound of what is left to gain,
+    over the objective, is `begin` at the beginning, as far as it is known (`COLD` or `WARM`), and ends the steps at
+    `enough`.
     """
     off, jerk = np.ascontiguousarray(off.T), np.ascontiguousarray(jerk.T)
     change = np.zeros((3, len(task.windows.free)))

@@ -30,13 +30,7 @@ _BLOCK = 32768
 def bounds(
     splines: Splines, control: Floats, lines: Polylines, pieces: Pieces, axis_length: float, enough: tuple[float, float]
 ) -> Floats:
-    """(p, 2) mm: bounds of the deviation of tip and axis point on every piece.
-
-    Parameters
-    ----------
-    enough : (float, float), mm
-        Pieces whose bounds are larger are looked at more closely.
-    """
+    """(p, 2) mm: bounds of the deviation of tip and axis point on every piece; above `enough` it looks closely."""
     proven = np.zeros((len(pieces.span), 2))
     for begin in range(0, len(proven), _BLOCK):
         rows = np.arange(begin, min(begin + _BLOCK, len(proven)))

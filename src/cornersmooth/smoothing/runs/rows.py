@@ -193,18 +193,9 @@ def section_rows(runs: Runs, program: Program) -> SectionRows:
 def clamped(
     splines: Splines, control: Floats, run: Ints, begin: Floats, end: Floats
 ) -> tuple[Ints, Ints, Floats, Floats]:
-    """Parts of splines as curves of their own, clamped at both ends, in path order.
+    """Parts of splines, `run` (k,) from `begin` to `end`, as curves of their own, clamped at both ends, in path order.
 
-    Parameters
-    ----------
-    control : (c, d) float64
-    run, begin, end : (k,) int64 and float64
-        Which spline each part is of, and from where to where.
-
-    Returns
-    -------
-    (m,), (m,), (m,), (m, d)
-        Of each control point: its part, its number from 1 on, the knot that goes with it from 0 on, itself.
+    Of each control point (m,): its part, its number from 1 on, the knot that goes with it from 0 on, itself (m, d).
     """
     # distinct knots of every part: its ends and the spline's knots between
     inside = search(splines.knot, splines.count, run, begin, side="right")

@@ -64,20 +64,10 @@ def solve_runs(
     *,
     processes: int = 1,
 ) -> RunCurves:
-    """Find the smoothest pair of splines for every run.
+    """Find the smoothest pair of splines for every run of 3 distinct poses or more.
 
-    Parameters
-    ----------
-    lines : Polylines
-        Runs of 3 distinct poses or more.
-    tolerances : (float, float), mm
-        Of the tip and of the axis point at constant H.
-    axis_length : float, mm
-        H.
-    progress : callable, optional
-        Called with (poses done, poses in all).
-    processes : int
-        Processes that work; the result does not depend on it.
+    Tolerances are those of the tip and of the axis point at constant H, mm. `progress` is called with (poses done,
+    poses in all). The result does not depend on the number of processes.
     """
     splines, rough = fit(lines, tolerances)
     pieces = Pieces.of(splines, lines)
@@ -207,8 +197,6 @@ def _touched(splines: Splines, pieces: Pieces, control: Ints) -> Ints:
 def measured(curves: RunCurves) -> tuple[Floats, Floats, Floats, Floats]:
     """Curves at the n poses of their runs, (n,) each.
 
-    Returns
-    -------
     Deviation of the tip and of the axis point at common parameters (mm), deviation of the axis (rad), and the largest
     curvature of the tip's curve in the halves of the segments beside the pose (1/mm).
     """
