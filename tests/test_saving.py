@@ -10,7 +10,7 @@ import pytest
 import cornersmooth
 from cornersmooth.feedrate import Limits, direct
 from cornersmooth.kinematics import load_machine
-from cornersmooth.kinematics.dynamics import Dynamics
+from cornersmooth.kinematics.machine import Dynamics
 from cornersmooth.model import Move, Program, Statement
 from cornersmooth.nc import choose_form, fit_settings
 from cornersmooth.saving import planned_saving

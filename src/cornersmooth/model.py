@@ -349,8 +349,8 @@ class Corners:
     #: (k,): Distance of the second control point from the corner over that of the first; 2/3 in the paper.
     ratio: Floats
     #: (k,), mm: Largest distance between both motions at a common parameter: at the tip, and at b = tip + H·axis. The
-    #: paths themselves are at least as near (`smoothing.path_distance`). With an axis tolerance the latter is what the
-    #: axis turns, at `Settings.axis_scale` from the tip.
+    #: paths themselves are at least as near (`report.corners.path_distances`). With an axis tolerance the latter is
+    #: what the axis turns, at `Settings.axis_scale` from the tip.
     tip_error: Floats
     axis_error: Floats
     #: (k,), rad: Largest angle between the axis on the transition and on the original motion at the common parameter.

@@ -100,7 +100,7 @@ def test_errors_of_times_say_the_file_and_the_line(tmp_path: Path) -> None:
 
 
 def test_compare_looks_at_a_part_of_a_long_program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cornersmooth.filter.compared.MOST_POSES", 30)
+    monkeypatch.setattr("cornersmooth.filter.program.MOST_POSES", 30)
     control, machine, text = PROGRAMS["fanuc words"]
     head, _, rest = text.partition("G0 X0.")
     cuts, _, tail = ("G0 X0." + rest).partition("G0 Z50.")

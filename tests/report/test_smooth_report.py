@@ -110,7 +110,7 @@ def test_a_program_without_corners_has_an_empty_report():
 def test_the_worst_corners_are_found_some_at_a_time(monkeypatch, count):
     """By the distances of all corners."""
     from cornersmooth.report import corners
-    from cornersmooth.smoothing.path_distance import path_distances
+    from cornersmooth.report.corners import path_distances
 
     monkeypatch.setattr(corners, "_TOGETHER", 3)
     steps = np.random.default_rng(count).normal(size=(count, 3))

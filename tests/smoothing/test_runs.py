@@ -22,13 +22,12 @@ from cornersmooth.model import Move, Status
 from cornersmooth.nc import choose_form
 from cornersmooth.nc_reader import read_nc
 from cornersmooth.smoothing import global_runs
-from cornersmooth.smoothing.runs.banded import Gather, couplings, keep_in_planes, solve_blocks
+from cornersmooth.smoothing.runs.banded import Gather, Windows, couplings, keep_in_planes, solve_blocks
 from cornersmooth.smoothing.runs.fitting import fit
 from cornersmooth.smoothing.runs.interior import COLD, Task, smoothest
 from cornersmooth.smoothing.runs.polylines import Pieces, Polylines, Samples
 from cornersmooth.smoothing.runs.rows import largest_curvature
 from cornersmooth.smoothing.runs.solving import RunCurves, solve_runs
-from cornersmooth.smoothing.runs.windows import Windows
 from cornersmooth.vectors import unit
 from oracle.share import covering_share, how_many
 from smoothing.runs_oracle import deviation, random_runs, spline_of, through

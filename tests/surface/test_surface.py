@@ -10,17 +10,13 @@ import pytest
 
 import cornersmooth
 from cornersmooth.errors import SettingsError
+from cornersmooth.geometry.tool import Tool, parse_tool, tools_of
 from cornersmooth.nc import choose_form, fit_settings
-from cornersmooth.surface import (
-    Tool,
-    distance_to_motion,
-    envelope_points,
-    measure_surface,
-    neighbouring_passes,
-    original_cuts,
-    parse_tool,
-    tools_of,
-)
+from cornersmooth.surface import measure_surface
+from cornersmooth.surface.distance import distance_to_motion
+from cornersmooth.surface.envelope import envelope_points
+from cornersmooth.surface.motion import original_cuts
+from cornersmooth.surface.passes import neighbouring_passes
 from oracle.share import how_many, share
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -220,7 +216,7 @@ def brute_force(point, motion, tool, edge):
 )
 def test_distribution_of_real_paths_agrees_with_brute_force(name, tolerance, request):
     from cornersmooth.nc_reader import read_nc
-    from cornersmooth.surface import written_cuts
+    from cornersmooth.surface.motion import written_cuts
 
     if name == "impeller":
         path, height = Path(__file__).parents[2] / "samples" / "impeller.cls", 12.0

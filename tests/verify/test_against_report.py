@@ -16,9 +16,9 @@ from cornersmooth.model import Program
 from cornersmooth.nc import choose_form, fit_settings, write
 from cornersmooth.nc_reader import read_nc
 from cornersmooth.report import report
+from cornersmooth.report.corners import path_distances
 from cornersmooth.settings import LARGEST_CHORD, Settings
 from cornersmooth.smoothing import smooth
-from cornersmooth.smoothing.path_distance import path_distances
 from cornersmooth.verify import verify
 from oracle.share import covering_share, how_many, share
 

@@ -26,7 +26,7 @@ _OWN = frozenset(("as_json", "csv", "verbose", "quiet", "force", "machine", "lim
 def run_compare(given: Given) -> int:
     """Do the work of the command; return its exit code."""
     from cornersmooth.cli.filter import axes_of, how_read
-    from cornersmooth.filter.compared import compare_filtered
+    from cornersmooth.filter.program import compare_filtered
 
     source = given.source
     check_inputs(source)

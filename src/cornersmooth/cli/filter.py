@@ -40,8 +40,8 @@ from cornersmooth.filter import Filtered, filter_program, verify_programs
 from cornersmooth.filter.checking import Checked, measure
 from cornersmooth.filter.program import read_program
 from cornersmooth.filter.runs import ProgramReader
-from cornersmooth.filter.times import time_as_it_is
 from cornersmooth.filter.state import VOCABULARIES
+from cornersmooth.filter.times import time_as_it_is
 from cornersmooth.kinematics import Machine
 from cornersmooth.nc import Form
 from cornersmooth.nc_reader import Problem

@@ -97,7 +97,7 @@ def _spindle(text: str) -> tuple[float, str]:
 
 
 def _tool(text: str) -> Any:
-    from cornersmooth.surface.tool import parse_tool
+    from cornersmooth.geometry.tool import parse_tool
 
     return parse_tool(text)
 

@@ -12,11 +12,12 @@ from cornersmooth.cli.files import STANDARD, check_inputs, check_reports, read_i
 from cornersmooth.cli.show import say
 from cornersmooth.cli.values import Given
 from cornersmooth.errors import SettingsError
+from cornersmooth.geometry.tool import Tool, tools_of
 from cornersmooth.model import Program
 from cornersmooth.nc_reader import read_nc
 from cornersmooth.report import report_json
 from cornersmooth.report.surface import draw_surface, surface_csv, surface_lines
-from cornersmooth.surface import SurfaceMap, Tool, measure_surface, tools_of
+from cornersmooth.surface import SurfaceMap, measure_surface
 from cornersmooth.verdict import Verdict
 from cornersmooth.verify import verify
 

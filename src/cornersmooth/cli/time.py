@@ -18,7 +18,7 @@ from cornersmooth.feedrate import BlockLimits, Comparison, axis_peaks, compare, 
 from cornersmooth.feedrate.compare import slowest, stops, turning_seconds
 from cornersmooth.feedrate.reached import peaks
 from cornersmooth.kinematics import machine_names
-from cornersmooth.kinematics.dynamics import LINEAR
+from cornersmooth.kinematics.machine import LINEAR
 from cornersmooth.methods import METHODS
 from cornersmooth.model import Move, Program
 from cornersmooth.nc import fit_settings
@@ -66,7 +66,7 @@ def run_time(given: Given) -> int:
         for path in given.reports:
             write_report(path, [page])
     if given.csv:
-        from cornersmooth.report.timelaw import timelaw_csv
+        from cornersmooth.report.csv_text import timelaw_csv
 
         write_report(given.csv, timelaw_csv(compared.laws[given.law]))
     say(given, compared.as_dict(), _tables(compared, bool(given.verbose)))

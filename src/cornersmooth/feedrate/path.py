@@ -21,7 +21,7 @@ from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.rational_curves import STANDSTILL, WHOLE, end_tangents
 from cornersmooth.model import Bools, Corners, FeedMode, Floats, Ints, Move, Program, Runs, Status
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing.neighbours import find_neighbours
+from cornersmooth.smoothing.construction import find_neighbours
 from cornersmooth.vectors import angle_between, norm, unit
 
 #: angles below this are no motion of the axis, rad

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cornersmooth.feedrate.timelaw import TimeLaw
-from cornersmooth.kinematics.dynamics import LINEAR
+from cornersmooth.kinematics.machine import LINEAR
 from cornersmooth.model import Bools, Floats
 
 #: part of a limit from which it counts as reached

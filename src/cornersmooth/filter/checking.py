@@ -22,7 +22,7 @@ from cornersmooth.settings import Settings
 from cornersmooth.vectors import unit
 from cornersmooth.verify import Verification, verify
 
-#: words that are the same number, and directions that are the same in six digits
+#: numbers that are the same, and parts of directions, in six digits
 _SAME, _SAME_DIRECTION = 1e-9, 2e-6
 
 #: of the tolerance: rotary words are read as lines, which may be off by a part of it before and after; `verify` takes
@@ -169,9 +169,9 @@ def _left_otherwise(run: Run, state: State) -> str:
     """Say what holds after the blocks of a run that does not after the run; empty where all is the same."""
     place = [state.place[letter] for letter in state.axes]
     there, wanted = np.array(place), run.place[-1].copy()
-    if state.axes[3:] == ("I", "J", "K"):  # only the direction counts, in its printed digits
-        there[3:], wanted[3:] = unit(there[3:]), unit(wanted[3:])
-    room = np.where(np.arange(len(there)) < 3, _SAME, _SAME_DIRECTION if len(there) > 5 else _SAME)
+    room = np.full(len(there), _SAME)
+    if len(there) > 5:  # of vectors only the direction counts, in its printed digits
+        there[3:], wanted[3:], room[3:] = unit(there[3:]), unit(wanted[3:]), _SAME_DIRECTION
     if not (np.abs(there - wanted) <= room).all():
         return f"the run ends at {_told(state.axes, place)}, not at {_told(state.axes, run.place[-1].tolist())}"
     mine = (state.absolute, state.feed_mode, state.unit, state.motion)

@@ -1,28 +1,34 @@
-"""A finished program in, the same with smooth runs out; and any two programs compared."""
+"""A finished program in, the same with smooth runs out; any two programs compared, and all ways to smooth one."""
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from itertools import islice
 from typing import Final
 
 import numpy as np
 
-from cornersmooth.errors import SettingsError
+from cornersmooth.comparing import MOST_POSES, Candidate, Row, Table, law_of_lines, rows_of
+from cornersmooth.errors import CornersmoothError, SettingsError
 from cornersmooth.filter.checking import Checked, Place, check, pair, places
 from cornersmooth.filter.motion import Job
 from cornersmooth.filter.runs import Left, ProgramReader, Reading
 from cornersmooth.filter.spelling import SAMPLE, Spelling
-from cornersmooth.filter.times import planned_times
+from cornersmooth.filter.times import by_own_law, no_runs, planned_times, time_as_it_is
 from cornersmooth.filter.writing import smoothed
 from cornersmooth.kinematics import Machine
 from cornersmooth.memory import return_free_memory
 from cornersmooth.nc import choose_form, fit_settings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc_reader import NcProgram
+from cornersmooth.saving import Timing
 from cornersmooth.settings import Settings
 from cornersmooth.verdict import Verdict
+
+#: how many times more cuts than poses of CL files are looked at where times need no plan
+_BY_LAW: Final = 10
 
 #: words that say the units of a program
 _UNITS: Final = re.compile(rb"(?i)G(20|21|70|71|700|710)(?!\d)|BEGIN PGM")
@@ -231,3 +237,54 @@ def _result(
         seconds=planned_times(job, old, new, where, axes) if axes is not None and where else None,
         motions=pair(job, old, new, drawn) if paths and where else None,
     )
+
+
+def compare_filtered(
+    data: bytes,
+    tried: Sequence[Candidate],
+    axes: Machine,
+    *,
+    tip_from_start: bool = False,
+    inch: bool = False,
+    processes: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Table:
+    """Smooth, verify and plan the runs of a program in every way; other parameters as of `filter_program`.
+
+    `tried` has at least one, in forms with the words of the program; `progress` gets rows done and rows in all.
+    CS265: the machine has no limits of axes; CS266: no cut can be smoothed; as `planned_times`.
+    """
+    form, settings, how = tried[0].form, tried[0].settings, {"tip_from_start": tip_from_start, "inch": inch}
+    job, old = read_program(data, form, settings, **how)
+    timing = Timing.of(form, settings, axes=axes)
+    if timing is None:
+        raise SettingsError("CS265", "no limits of axes are known", "name a machine that has [dynamics] with --limits")
+    most = MOST_POSES * (_BY_LAW if by_own_law(job) else 1)
+    if not old.runs:
+        raise no_runs()
+    cuts = sum(map(len, old.runs))
+    left_all_but(old, most)
+    share, before = sum(map(len, old.runs)) / cuts, time_as_it_is(job, old, axes)
+
+    def work(candidate: Candidate) -> Row:
+        row = Row.of(candidate)
+        try:
+            found = filter_program(data, candidate.form, candidate.settings, **how, axes=axes, most=most)
+        except CornersmoothError as failure:
+            return replace(row, verdict=getattr(failure, "what", str(failure)))
+        saved = 0.0 if found.seconds is None else found.seconds[0] - found.seconds[1]
+        assert found.checked is not None
+        point = found.checked.axis_point
+        return replace(
+            row,
+            verdict=str(found.verdict),
+            blocks=found.new_lines,
+            bytes=len(found.data),
+            seconds=before - saved,
+            saved=saved,
+            tip=found.checked.tip,
+            axis_point=None if point != point else point,
+        )
+
+    rows = rows_of(tried, work, processes, progress)
+    return Table(before, "the program as it is", share, law_of_lines(timing), rows)

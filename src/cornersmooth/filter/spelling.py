@@ -39,47 +39,34 @@ class Spelling:
     @classmethod
     def of(cls, cuts: Iterable[bytes], words: int) -> Spelling:
         """See how cuts are spelt; `words` is the number of words of the axes that a full block has."""
-        decimals: dict[bool, list[int]] = {True: [], False: []}
-        feeds: list[bytes] = []
-        signs = spaced = short = zeros = numbered = count = missing = 0
-        line, end = "", b"\n"
-        for raw in cuts:
-            text = raw.upper()
-            end = b"\r\n" if raw.endswith(b"\r\n") else b"\n"
-            match = _LINE_NUMBER.match(text)
-            numbered += match is not None
-            text = text[match.end() if match else 0 :]
-            said = 0
-            for word, number in _WORD.findall(text):
-                if word == b"F":
-                    feeds.append(number)
-                elif word == b"G":
-                    line = f"G{number.decode()}" if float(number) == 1.0 and not line else line
-                else:
-                    said += 1
-                    decimals[word in _AXES].append(len(number.partition(b".")[2]))
-                    signs += number.startswith(b"+")
-                    digits = number.lstrip(b"+-")
-                    short += digits.startswith(b".") and digits != b"."
-                    zeros += digits.startswith(b"0.") and len(digits) > 2
-            spaced += text.strip().count(b" ") + text.count(b"\t") > 0
-            missing += said < words
-            count += 1
-        tip, other = (max(decimals[key], default=0) for key in (True, False))
-        same = all(k == tip for k in decimals[True]) and all(k == other for k in decimals[False])
+        raw = list(cuts)
+        heads = [_LINE_NUMBER.match(line) for line in map(bytes.upper, raw)]
+        texts = [line.upper()[head.end() if head else 0 :] for line, head in zip(raw, heads, strict=True)]
+        blocks = [_WORD.findall(text) for text in texts]
+        every = [pair for block in blocks for pair in block]
+        feeds = [number for word, number in every if word == b"F"]
+        line = next((f"G{number.decode()}" for word, number in every if word == b"G" and float(number) == 1.0), "")
+        places = [(word, number.lstrip(b"+-")) for word, number in every if word not in (b"F", b"G")]
+        tips = [_decimals(number) for word, number in places if word in _AXES]
+        others = [_decimals(number) for word, number in places if word not in _AXES]
+        signs = sum(number.startswith(b"+") for word, number in every if word not in (b"F", b"G"))
+        short = sum(number.startswith(b".") and number != b"." for _, number in places)
+        zeros = sum(number.startswith(b"0.") and len(number) > 2 for _, number in places)
+        spaced = sum(text.strip().count(b" ") + text.count(b"\t") > 0 for text in texts)
+        missing = sum(sum(word not in (b"F", b"G") for word, _ in block) < words for block in blocks)
         return cls(
-            tip=tip,
-            other=other,
-            feed=max((len(number.partition(b".")[2]) for number in feeds), default=0),
-            signs=2 * signs > len(decimals[True]),
-            spaces=2 * spaced > count,
+            tip=max(tips, default=0),
+            other=max(others, default=0),
+            feed=max(map(_decimals, feeds), default=0),
+            signs=2 * signs > len(tips),
+            spaces=2 * spaced > len(raw),
             leading_zeros=zeros >= short,
-            trailing_zeros=same,
+            trailing_zeros=len(set(tips)) < 2 and len(set(others)) < 2,
             feed_point=not feeds or any(b"." in number for number in feeds),
-            modal=2 * missing > count,
+            modal=2 * missing > len(raw),
             line=line,
-            numbered=2 * numbered > count,
-            end=end,
+            numbered=2 * sum(head is not None for head in heads) > len(raw),
+            end=b"\r\n" if raw and raw[-1].endswith(b"\r\n") else b"\n",
         )
 
     def form(self, form: Form, *, rounding: bool) -> Form:
@@ -118,6 +105,10 @@ class Spelling:
         if mode.motion.line == "G1" and self.line:
             motion = replace(motion, line=self.line)
         return replace(mode, on=(), off=(), within_on=(), within_off=(), begin=None, tool_end=None, motion=motion)
+
+
+def _decimals(number: bytes) -> int:
+    return len(number.partition(b".")[2])
 
 
 def numbers_of(lines: Iterable[bytes]) -> list[bytes]:

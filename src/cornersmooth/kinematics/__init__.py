@@ -1,7 +1,6 @@
 """Machines: their axes and limits, the tool axis that rotary angles give and the angles that give it, positions."""
 
-from cornersmooth.kinematics.dynamics import Dynamics, Travel
-from cornersmooth.kinematics.machine import Machine, RotaryAxis, endless, with_dynamics
+from cornersmooth.kinematics.machine import Dynamics, Machine, RotaryAxis, Travel, endless, with_dynamics
 from cornersmooth.kinematics.machine_tables import load_machine, machine_names, machine_table, parse_machine
 from cornersmooth.kinematics.poses import Solutions, solutions, tool_axis
 from cornersmooth.kinematics.position import (

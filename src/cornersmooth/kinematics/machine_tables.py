@@ -6,8 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from cornersmooth.kinematics.dynamics import LINEAR, Dynamics, Travel
-from cornersmooth.kinematics.machine import Machine, RotaryAxis
+from cornersmooth.kinematics.machine import LINEAR, Dynamics, Machine, RotaryAxis, Travel
 from cornersmooth.tables import Shelf, Table
 
 _SHELF = Shelf(

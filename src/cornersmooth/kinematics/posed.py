@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from cornersmooth.errors import SettingsError
-from cornersmooth.kinematics.dynamics import LINEAR
-from cornersmooth.kinematics.machine import Machine
+from cornersmooth.kinematics.machine import LINEAR, Machine
 from cornersmooth.kinematics.poses import Solutions, solutions, tool_axis, wrap
 from cornersmooth.kinematics.position import machine_position, nose_position
 from cornersmooth.model import Floats

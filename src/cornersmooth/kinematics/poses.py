@@ -58,7 +58,7 @@ def solutions(machine: Machine, axis: Floats) -> Solutions:
     """
     if len(machine.names) < 2:
         return _with_one_axis(machine, axis)
-    frame = _Frame.of(machine)
+    frame = _Frame(machine)
     n = len(axis)
     angles, distance, beyond = np.empty((n, 2, 2)), np.empty(n), np.empty(n)
     for begin in range(0, n, CHUNK):
@@ -89,7 +89,7 @@ def pole_distance(machine: Machine, axis: Floats) -> Floats:
     """Angle between tool axes and the nearest pole, as in `Solutions`: (n, 3) -> (n,) degrees."""
     if len(machine.names) < 2:
         return np.full(len(axis), np.inf)
-    frame = _Frame.of(machine)
+    frame = _Frame(machine)
     x, y, z = (axis @ frame.first).T
     return frame.pole_distance(np.arctan2(np.hypot(x, y), z))
 
@@ -120,7 +120,7 @@ def _solve(frame: _Frame, axis: Floats, angles: Floats) -> Floats:
 
 def closest_second(machine: Machine, axis: Floats, first_angle: Floats) -> Floats:
     """Second angles (n,), degrees in (-180, 180], nearest to axes (n, 3) at given first angles (n,)."""
-    frame = _Frame.of(machine)
+    frame = _Frame(machine)
     first, _ = machine.axes
     turned = rotate(first.unit, -first.sign * radians(first_angle), axis)
     x, y, _z = (turned @ frame.second).T
@@ -157,7 +157,7 @@ def passes_pole(machine: Machine, start: Floats, end: Floats, cone: float) -> Bo
         return passes
     step = end - start
     step = norm(step) + np.radians(cone) + ROUNDING
-    for pole in _Frame.of(machine).poles(machine):
+    for pole in _Frame(machine).poles(machine):
         # On a way that is shorter than the distance of its start nothing comes near: chords obey the triangle too.
         near = np.flatnonzero(2.0 - 2.0 * (start @ pole) <= step * step)
         if len(near):
@@ -179,7 +179,7 @@ def angle_between(one: Floats, other: Floats) -> Floats:
 
 def pole_angle(machine: Machine, axis: Floats) -> Floats:
     """Second angle that the machine has at the pole nearest to each axis: (n, 3) -> (n,) degrees in (-180, 180]."""
-    poles = np.array(_Frame.of(machine).poles(machine))
+    poles = np.array(_Frame(machine).poles(machine))
     angles = closest_second(machine, poles, np.zeros(len(poles)))
     return angles[np.argmax(axis @ poles.T, axis=1)]
 
@@ -204,24 +204,17 @@ def rotate(direction: Floats, angle: Floats, vectors: Floats) -> Floats:
     return along + (vectors - along) * cosine + (vectors @ across) * sine
 
 
-@dataclass(frozen=True)
 class _Frame:
     """What the triangle needs of a machine: its constant sides, and a frame about each rotary axis."""
 
-    first: Floats  # columns: towards a₂, across, a₁
-    second: Floats  # columns: towards a₁, across, a₂
-    sigma: float
-    rho: float
-    zero: float  # azimuth of k₀ about a₂, rad
-    signs: tuple[float, float]
-
-    @classmethod
-    def of(cls, machine: Machine) -> _Frame:
+    def __init__(self, machine: Machine) -> None:
         one, two = (axis.unit for axis in machine.axes)
-        first, second = _columns(one, two), _columns(two, one)
-        x, y, _ = machine.tool @ second
-        signs = machine.axes[0].sign, machine.axes[1].sign
-        return cls(first, second, _angle(one, two), _angle(machine.tool, two), float(np.arctan2(y, x)), signs)
+        self.first = _columns(one, two)  # columns: towards a₂, across, a₁
+        self.second = _columns(two, one)  # columns: towards a₁, across, a₂
+        self.sigma, self.rho = _angle(one, two), _angle(machine.tool, two)
+        x, y, _ = machine.tool @ self.second
+        self.zero = float(np.arctan2(y, x))  # azimuth of k₀ about a₂, rad
+        self.signs = machine.axes[0].sign, machine.axes[1].sign
 
     @property
     def pole_ahead(self) -> bool:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cornersmooth.errors import InputError
-from cornersmooth.kinematics.dynamics import LINEAR
-from cornersmooth.kinematics.machine import Machine
+from cornersmooth.kinematics.machine import LINEAR, Machine
 from cornersmooth.kinematics.poses import radians, rotate
 from cornersmooth.model import Floats, Ints
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from cornersmooth.kinematics.dynamics import LINEAR
+from cornersmooth.kinematics.machine import LINEAR
 from cornersmooth.model import MM_PER_UNIT, Units
 from cornersmooth.nc.control import STEPS, Blocks, Mode
 from cornersmooth.nc.findings import Findings

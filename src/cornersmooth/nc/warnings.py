@@ -17,7 +17,7 @@ from cornersmooth.nc.form import Form
 from cornersmooth.nc.run import Run
 from cornersmooth.rotary import rapid_moves
 from cornersmooth.settings import FLIP_ANGLE
-from cornersmooth.smoothing.axis_steps import axis_steps
+from cornersmooth.smoothing import axis_steps
 from cornersmooth.vectors import dot
 
 #: cosine of the angle from hole to hole beyond which the tool turns between them

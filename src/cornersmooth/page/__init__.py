@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from cornersmooth.page.document import page
 from cornersmooth.page.pages import BEGINNING, page_and_saving, surface_text, times_page, verified_page
-from cornersmooth.page.scene import Story, Subject
+from cornersmooth.page.scene import Story, Subject, page
 
 __all__ = ["BEGINNING", "Story", "Subject", "page", "page_and_saving", "surface_text", "times_page", "verified_page"]

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from cornersmooth.model import Floats, Ints, LimitedBy, Program, SmoothProgram, Status
+from cornersmooth.model import Bools, Floats, Ints, LimitedBy, Program, SmoothProgram, Status
 from cornersmooth.report.corners import corner_table
 from cornersmooth.slices import some_rows
 from cornersmooth.smoothing.sharp import other_corners, sharp_rows
@@ -56,7 +57,6 @@ class CornerList:
 def smoothed_corners(smoothed: SmoothProgram, found: Verification | None, *, dense: bool) -> CornerList:
     """Corners of a program that was smoothed here."""
     corners, tolerance = smoothed.corners, smoothed.settings.tolerance
-    status = corners.status
     off = np.maximum(corners.tip_error, corners.axis_error)
     if found is not None:
         measured = np.fmax(found.pose_tip, found.pose_axis_point)[corners.pose]
@@ -65,40 +65,35 @@ def smoothed_corners(smoothed: SmoothProgram, found: Verification | None, *, den
     sharp = np.zeros(len(corners), np.bool_)
     sharp[sharp_rows(smoothed)] = True
     sharp &= ~out
-    idle = ~corners.rounded & ~sharp & ~out
     others = other_corners(smoothed.program, smoothed.settings.axis_length)
     kind = np.where(out, 0, np.where(sharp, 1, 1 + corners.limited_by.astype(np.int64)))
-    kind[~out & (status == Status.IN_RUN)] = len(KINDS) - 1
-    counts = {name: int(np.count_nonzero((kind == index) & ~idle)) for index, name in enumerate(KINDS)}
-    counts["straight"] = int(np.count_nonzero(idle))
+    kind[~out & (corners.status == Status.IN_RUN)] = len(KINDS) - 1
+    counts = _counts(kind, ~corners.rounded & ~sharp & ~out)
     counts[KINDS[1]] += len(others.pose)
     rounded = np.flatnonzero(corners.rounded & ~out)
     rounded = rounded[np.argsort(-off[rounded], kind="stable")][:_MOST_ROUNDED]
     rows = np.concatenate((np.flatnonzero(out), np.flatnonzero(sharp), rounded))
-    table = corner_table(smoothed, rows, dense=dense)
-    tip, axis = np.asarray(table["tip_error_mm"], np.float64), np.asarray(table["axis_error_mm"], np.float64)
-    nothing = np.zeros(len(others.pose))
-    tip, axis = np.append(tip, nothing), np.append(axis, nothing)
-    pose = np.append(corners.pose[rows], others.pose)
+    table, nothing = corner_table(smoothed, rows, dense=dense), np.zeros(len(others.pose))
+    tip, axis = (np.append(table[name], nothing) for name in ("tip_error_mm", "axis_error_mm"))
+    pose, own = np.append(corners.pose[rows], others.pose), corners.smoothed[rows]
     if found is not None:
         tip = np.where(np.isfinite(found.pose_tip[pose]), found.pose_tip[pose], tip)
         axis = np.where(np.isfinite(found.pose_axis_point[pose]), found.pose_axis_point[pose], axis)
-    reason = np.where(corners.smoothed[rows], len(Status) - 1 + corners.limited_by[rows], status[rows]).astype(np.int64)
-    listed = CornerList(
+    reason = np.where(own, len(Status) - 1 + corners.limited_by[rows], corners.status[rows]).astype(np.int64)
+    return _ranked(
         pose,
         kind=np.append(kind[rows], np.ones(len(others.pose), np.int64)),
         reason=np.append(reason, others.status),
         reasons=(*(each.key.replace("_", " ") for each in Status), *(each.key for each in LimitedBy if each)),
         turn=np.append(table["tip_angle_deg"], others.tip_turn),
         axis_turn=np.append(table["axis_angle_deg"], others.axis_turn),
-        length=np.append(np.asarray(table["tip_length_in_mm"]) + np.asarray(table["tip_length_out_mm"]), nothing),
+        length=np.append(table["tip_length_in_mm"] + table["tip_length_out_mm"], nothing),
         tip_off=tip,
         axis_off=axis,
         cl_line=smoothed.program.line[pose],
         nc_line=np.zeros(len(pose), np.int64) if found is None else found.pose_nc_line[pose],
         counts=counts,
     )
-    return _ranked(listed)
 
 
 def measured_corners(program: Program, found: Verification) -> CornerList:
@@ -112,19 +107,16 @@ def measured_corners(program: Program, found: Verification) -> CornerList:
     off = np.fmax(found.pose_tip[pose], found.pose_axis_point[pose])
     out = off > found.tolerance
     straight = (np.maximum(turn, axis_turn) < _STRAIGHT) & ~out
-    exact = ~out & ~(off > _EXACT * found.tolerance)
-    kind = np.where(out, 0, np.where(exact, 1, len(KINDS) - 1))
-    counts = {name: int(np.count_nonzero((kind == index) & ~straight)) for index, name in enumerate(KINDS)}
-    counts["straight"] = int(np.count_nonzero(straight))
+    kind = np.where(out, 0, np.where(off > _EXACT * found.tolerance, len(KINDS) - 1, 1))
     listed = np.flatnonzero(~straight)
     rounded = listed[kind[listed] == len(KINDS) - 1]
     drop = rounded[np.argsort(-off[rounded], kind="stable")][_MOST_ROUNDED:]
     rows = np.setdiff1d(listed, drop, assume_unique=True)
     own = pose[rows]
-    listed_corners = CornerList(
+    return _ranked(
         own,
         kind=kind[rows],
-        reason=np.where(kind[rows] == 0, 0, np.where(kind[rows] == 1, 1, 2)).astype(np.int64),
+        reason=np.minimum(kind[rows], 2),
         reasons=("off the path", "passed exactly", "rounded"),
         turn=turn[rows],
         axis_turn=axis_turn[rows],
@@ -133,9 +125,14 @@ def measured_corners(program: Program, found: Verification) -> CornerList:
         axis_off=found.pose_axis_point[own],
         cl_line=program.line[own],
         nc_line=found.pose_nc_line[own],
-        counts=counts,
+        counts=_counts(kind, straight),
     )
-    return _ranked(listed_corners)
+
+
+def _counts(kind: Ints, straight: Bools) -> dict[str, int]:
+    """How many corners are of each kind, the straight ones apart."""
+    counts = {name: int(np.count_nonzero((kind == index) & ~straight)) for index, name in enumerate(KINDS)}
+    return counts | {"straight": int(np.count_nonzero(straight))}
 
 
 def _turns(points: Floats, pose: Ints) -> Floats:
@@ -145,8 +142,9 @@ def _turns(points: Floats, pose: Ints) -> Floats:
     return np.degrees(np.where(moving, angle_between(before, after), 0.0))
 
 
-def _ranked(listed: CornerList) -> CornerList:
-    """The corners in the order of what matters, without the least of very many sharp ones."""
+def _ranked(pose: Ints, **columns: Any) -> CornerList:
+    """Corners in the order of what matters, without the least of very many sharp ones."""
+    listed = CornerList(pose, **columns)
     rank = np.minimum(listed.kind, 2)
     by = np.where(rank == 1, np.maximum(listed.turn, listed.axis_turn), np.fmax(listed.tip_off, listed.axis_off))
     order = np.lexsort((listed.pose, -np.nan_to_num(by), rank))

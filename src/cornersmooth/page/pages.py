@@ -12,17 +12,16 @@ from typing import TYPE_CHECKING, Any
 
 from cornersmooth.errors import Finding
 from cornersmooth.feedrate import Comparison, Limits, TimeLaw
+from cornersmooth.geometry.tool import Tool
 from cornersmooth.kinematics import Machine, with_dynamics
 from cornersmooth.model import Program
 from cornersmooth.nc import Frame, choose_form, write
 from cornersmooth.nc_reader import NcProgram
-from cornersmooth.page.document import page
-from cornersmooth.page.scene import Story, Subject
+from cornersmooth.page.scene import Story, Subject, page
 from cornersmooth.report.surface import passes_text
 from cornersmooth.report.verdict import Judgement, Saving, first_line, judge, times_text, trusted_blocks
 from cornersmooth.saving import planned_saving
 from cornersmooth.settings import Settings
-from cornersmooth.surface.tool import Tool
 from cornersmooth.verdict import Verdict
 from cornersmooth.verify import Verification
 

@@ -16,6 +16,7 @@ from cornersmooth.nc_reader import NcProgram
 from cornersmooth.report.paths import OriginalPath, WrittenPath
 from cornersmooth.rotary import rapid_moves, rotary_angles
 from cornersmooth.settings import Settings
+from cornersmooth.vectors import norm
 
 #: moves up to which a motion is planned: some 10 s of work
 MOST_MOVES = 100_000
@@ -42,35 +43,35 @@ class Planned:
 def plan_all(
     program: Program,
     original: OriginalPath,
+    written: WrittenPath,
+    nc: NcProgram,
     *,
-    written: WrittenPath | None,
-    nc: NcProgram | None,
     limits: Limits,
     machine: Machine | None,
     settings: Settings,
-    known: Mapping[str, TimeLaw] | None = None,
+    known: Mapping[str, TimeLaw],
 ) -> Planned:
     """Plan what can be planned; laws that are `known` already are taken over."""
-    laws: dict[str, TimeLaw] = dict(known or {})
+    laws = dict(known)
     ways: dict[str, tuple[Floats, Floats]] = {}
     left_out: list[str] = []
     seconds = None
     machine = with_dynamics(machine)
     try:
-        for name, moves in (("direct", len(program)), ("written", 0 if nc is None else len(nc))):
-            if name in laws or (name == "written" and nc is None):
+        for name, moves in (("direct", len(program)), ("written", len(nc))):
+            if name in laws:
                 continue
             if moves > MOST_MOVES:
                 left_out.append(f"The {name} path has {moves:,} moves; its speed is planned up to {MOST_MOVES:,}.")
             elif name == "direct":
                 machine = _that_follows(machine, program, settings)
                 laws[name] = direct(program, limits, "velocity_jump", settings=settings, machine=machine)
-            elif nc is not None:
+            else:
                 laws[name] = plan_text(nc, limits, settings=settings, machine=machine)
     except SettingsError as refused:
         left_out.append(f"No speed is planned: {refused.what}" + (f" (line {refused.line})." if refused.line else "."))
     for name, law in laws.items():
-        if name == "written" and written is not None and nc is not None:
+        if name == "written":
             at = _coordinates(law, nc, written, settings.axis_length)
             ways[name] = at, written.way
             seconds = law.times_at(at)
@@ -95,10 +96,13 @@ def _that_follows(machine: Machine | None, program: Program, settings: Settings)
 
 def feed_seconds(written: WrittenPath, rapid: float) -> Floats:
     """When points are passed at programmed feed, without any acceleration; `rapid` is in mm/min."""
-    step = np.zeros(len(written))
-    step[1:] = np.linalg.norm(np.diff(written.tip, axis=0), axis=1)
     feed = np.where(written.rapid | ~(written.feed > 0.0), rapid, written.feed)
-    return np.cumsum(60.0 * step / feed)
+    return np.cumsum(60.0 * _steps(written) / feed)
+
+
+def _steps(written: WrittenPath) -> Floats:
+    """(m,) mm: way of the tip to each point from the one before."""
+    return norm(np.diff(written.tip, axis=0, prepend=written.tip[:1]))
 
 
 def clock(planned: Planned, name: str, ways: Floats) -> Floats:
@@ -172,15 +176,12 @@ def _coordinates(law: TimeLaw, nc: NcProgram, written: WrittenPath, axis_length:
     """Path coordinates (m,) of the points of the written path, ascending."""
     last = np.searchsorted(written_motion(nc, "", axis_length).element, np.arange(len(nc)), side="right") - 1
     reached = np.maximum.accumulate(law.edge[np.searchsorted(law.path.move, last, side="right")])
-    element = written.element
-    step = np.zeros(len(element))
-    step[1:] = np.linalg.norm(np.diff(written.tip, axis=0), axis=1)
     # within an element in proportion to the way; to the share where the tip stands still
-    gone = np.cumsum(step)
+    element, gone = written.element, np.cumsum(_steps(written))
     ends = np.flatnonzero(np.append(element[1:] != element[:-1], True))
-    end = gone[ends][np.searchsorted(element[ends], element)]
-    begin = np.concatenate(([0.0], gone[ends]))[np.searchsorted(element[ends], element)]
-    length = end - begin
+    own = np.searchsorted(element[ends], element)
+    begin = np.concatenate(([0.0], gone[ends]))[own]
+    length = gone[ends][own] - begin
     share = np.divide(gone - begin, length, out=written.share.copy(), where=length > 0.0)
     before = np.concatenate(([0.0], reached))[element]
     return np.maximum.accumulate(before + share * (reached[element] - before))

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cornersmooth.feedrate import Limits, TimeLaw
+from cornersmooth.geometry.tool import Tool, tools_of
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import Bools, Floats, Ints, Program, SmoothProgram
 from cornersmooth.nc_reader import NcProgram
 from cornersmooth.page.corners import KINDS, CornerList, measured_corners, smoothed_corners
-from cornersmooth.page.packing import Pack
+from cornersmooth.page.document import Pack, document
 from cornersmooth.page.planned_speeds import (
     NOT_PLANNED,
     Planned,
@@ -28,7 +29,6 @@ from cornersmooth.page.planned_speeds import (
 from cornersmooth.report.paths import OriginalPath, WrittenPath, original_path, written_path
 from cornersmooth.report.thinning import thinned
 from cornersmooth.settings import Settings
-from cornersmooth.surface.tool import Tool, tools_of
 from cornersmooth.verdict import Verdict
 from cornersmooth.verify import Verification
 
@@ -86,6 +86,11 @@ class Subject:
     surface: SurfaceMap | None = None
 
 
+def page(subject: Subject, story: Story) -> str:
+    """Page of a path, as text to be written in UTF-8; same input, same text: no dates, no paths."""
+    return document(*scene(subject, story))
+
+
 def scene(subject: Subject, story: Story) -> tuple[dict[str, Any], Pack]:
     """Plain values and arrays of a page."""
     program, settings = subject.program, subject.settings
@@ -104,15 +109,19 @@ def scene(subject: Subject, story: Story) -> tuple[dict[str, Any], Pack]:
         else plan_all(
             program,
             original,
-            written=written,
-            nc=subject.nc,
+            written,
+            subject.nc,
             limits=subject.limits,
             machine=subject.machine,
             settings=settings,
             known=subject.laws,
         )
     )
-    corners = _corners(subject)
+    if subject.smoothed is not None:
+        corners = smoothed_corners(subject.smoothed, subject.verification, dense=subject.dense)
+    else:
+        assert subject.verification is not None
+        corners = measured_corners(program, subject.verification)
     centre = 0.5 * (program.tip.min(axis=0) + program.tip.max(axis=0)) if len(program) else np.zeros(3)
     pack = Pack()
     seconds = planned.seconds
@@ -120,8 +129,8 @@ def scene(subject: Subject, story: Story) -> tuple[dict[str, Any], Pack]:
     if seconds is None:
         seconds = feed_seconds(written, subject.limits.rapid)
     # the point of the written path that is the last on the move into each pose
-    places = np.searchsorted(np.maximum.accumulate(written.pose), np.arange(len(program)), side="right") - 1
-    places = np.maximum(places, 0)
+    reached = np.maximum.accumulate(written.pose)
+    places = np.maximum(np.searchsorted(reached, np.arange(len(program)), side="right") - 1, 0)
     if subject.verification is not None:
         # what is measured from the original poses belongs to the points that are reached there
         found = subject.verification
@@ -131,8 +140,7 @@ def scene(subject: Subject, story: Story) -> tuple[dict[str, Any], Pack]:
     _add_original(pack, original, program, corners, centre)
     _add_written(pack, written, planned, seconds, corners, places, settings, centre)
     charts = _add_charts(pack, original, written, planned, seconds)
-    if corners is not None:
-        _add_corners(pack, corners, program, original, centre)
+    _add_corners(pack, corners, program, original, centre)
     meta: dict[str, Any] = {
         "schema": SCHEMA,
         "title": story.title,
@@ -150,9 +158,7 @@ def scene(subject: Subject, story: Story) -> tuple[dict[str, Any], Pack]:
         "timed": timed,
         "way": float(original.way[-1]) if len(original.way) else 0.0,
         "totals": {name: law.total for name, law in planned.laws.items()},
-        "corners": None
-        if corners is None
-        else {"kinds": list(KINDS), "reasons": list(corners.reasons), "counts": corners.counts},
+        "corners": {"kinds": list(KINDS), "reasons": list(corners.reasons), "counts": corners.counts},
         "charts": charts,
         "tools": _tools(subject, seconds, written),
     }
@@ -161,21 +167,12 @@ def scene(subject: Subject, story: Story) -> tuple[dict[str, Any], Pack]:
     return meta, pack
 
 
-def _corners(subject: Subject) -> CornerList | None:
-    if subject.smoothed is not None:
-        return smoothed_corners(subject.smoothed, subject.verification, dense=subject.dense)
-    return None if subject.verification is None else measured_corners(subject.program, subject.verification)
-
-
-def _add_original(
-    pack: Pack, original: OriginalPath, program: Program, corners: CornerList | None, centre: Floats
-) -> None:
+def _add_original(pack: Pack, original: OriginalPath, program: Program, corners: CornerList, centre: Floats) -> None:
     must = original.breaks | original.rapid
     must[:-1] |= original.rapid[1:] | original.breaks[1:]
     if len(must) > MOST_POINTS and must.sum() > MOST_POINTS:
         must = original.breaks.copy()
-    if corners is not None:
-        must |= _seen(corners, np.arange(len(program)), len(program))[original.pose]
+    must |= _seen(corners, np.arange(len(program)), len(program))[original.pose]
     rows = thinned(original.tip, np.zeros(len(must)), must, MOST_POINTS)
     pack.add("o_tip", original.tip[rows] - centre, "f4")
     pack.add("o_axis", original.axis[rows], "f4", _FINE)
@@ -189,7 +186,7 @@ def _add_written(
     written: WrittenPath,
     planned: Planned,
     seconds: Floats,
-    corners: CornerList | None,
+    corners: CornerList,
     places: Ints,
     settings: Settings,
     centre: Floats,
@@ -199,13 +196,9 @@ def _add_written(
     must[:-1] |= written.rapid[1:]
     if must.sum() > MOST_POINTS:
         must[:] = False
-    must |= larger > settings.tolerance
-    kind = np.full(len(written), 255, np.uint8)
-    if corners is not None:
-        seen = _seen(corners, places, len(written))
-        must |= seen
-        most -= min(int(seen.sum()), most // 2) if len(written) > most else 0
-        kind[:] = _kinds(written, corners, places)
+    seen, kind = _seen(corners, places, len(written)), _kinds(written, corners, places)
+    must |= (larger > settings.tolerance) | seen
+    most -= min(int(seen.sum()), most // 2) if len(written) > most else 0
     rows = thinned(written.tip, larger, must, most)
     speed = np.full(len(written), np.nan)
     if planned.seconds is not None:
@@ -251,7 +244,7 @@ def _kinds(written: WrittenPath, corners: CornerList, places: Ints) -> Ints:
     half = 0.5 * np.nan_to_num(corners.length, nan=0.0)
     low = np.searchsorted(written.way, written.way[at] - half - _NO_WAY)
     high = np.maximum(np.searchsorted(written.way, written.way[at] + half + _NO_WAY, side="right"), at + 1)
-    for rank in np.argsort(-corners.kind.astype(np.int64), kind="stable")[::1].tolist():
+    for rank in np.argsort(-corners.kind, kind="stable").tolist():
         kind[low[rank] : high[rank]] = corners.kind[rank]
     return kind
 
@@ -354,7 +347,6 @@ def _tools(subject: Subject, seconds: Floats, written: WrittenPath) -> list[dict
 def _add_surface(pack: Pack, surface: SurfaceMap, centre: Floats) -> dict[str, Any]:
     known = np.flatnonzero(surface.known)
     points = surface.points
-    span = float(np.abs(surface.off[known]).max(initial=0.0)) or surface.tolerance
     edges, counts = surface.histogram()
     keep = thinned(points.point[known], np.abs(surface.off[known]), np.zeros(len(known), np.bool_), MOST_POINTS)
     rows = known[keep]
@@ -365,7 +357,7 @@ def _add_surface(pack: Pack, surface: SurfaceMap, centre: Floats) -> dict[str, A
     pack.add("s_level", 2 * points.level[rows] + points.side[rows], "u1")
     pack.add("h_edges", edges, "f4")
     pack.add("h_counts", counts, "f4")
-    return {"span": span, **surface.as_dict()}
+    return {"span": surface.span, **surface.as_dict()}
 
 
 def _thinning_note(points: int, original: OriginalPath) -> list[str]:

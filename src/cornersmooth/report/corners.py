@@ -1,4 +1,4 @@
-"""The report's table of corners, one row a corner (docs/smooth.md)."""
+"""The report's table of corners, one row a corner (docs/smooth.md), and how far the path is from each."""
 
 from __future__ import annotations
 
@@ -8,16 +8,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cornersmooth.geometry import nurbs
+from cornersmooth.methods import METHODS
 from cornersmooth.model import Corners, Floats, Ints, LimitedBy, SmoothProgram, Status, Trait
 from cornersmooth.smoothing.construction import RUN_CURVATURE, construction_of, legs_at
-from cornersmooth.smoothing.path_distance import path_distances
-from cornersmooth.vectors import angle_between, norm
+from cornersmooth.smoothing.sampling import nodes
+from cornersmooth.smoothing.segments import lines_of
+from cornersmooth.vectors import angle_between, dot, norm, square, unit
 
-Column = Floats | Ints | NDArray[np.str_]
+Column = NDArray[Any]
 
 #: parameters at which the curvature of a transition is looked at; it peaks at or near the middle
 _CURVATURE_AT = np.array([0.2, 0.3, 0.38, 0.44, 0.48, 0.5, 0.52, 0.56, 0.62, 0.7, 0.8])
 
+#: corners looked at together
+_BATCH = 2048
+
+#: lines per half that stand for a curve: their distance is larger than that of the curve by 1e-4 of it at most
+_FINE = 64
+
+#: parameters beside the middle, and the cosine between the path there and the way to the corner below which the middle
+#: is the nearest point
+_MIDDLE = np.array([0.5 - 1e-5, 0.5, 0.5 + 1e-5])
+_SQUARE = 1e-5
 
 #: corners that a report lists as the worst
 _WORST = 20
@@ -132,3 +144,51 @@ def worst_corners(smoothed: SmoothProgram, *, dense: bool = True) -> WorstCorner
     seen = rows[order[: len(larger)]]
     best = np.lexsort((seen, -larger))[:_WORST]
     return WorstCorners(float(tip.max(initial=0.0)), float(axis_point.max(initial=0.0)), seen[best])
+
+
+def path_distances(smoothed: SmoothProgram, rows: Ints, *, dense: bool) -> tuple[Floats, Floats]:
+    """Distances (g,) of tip path and axis-point path from the original ones at some corners, mm; 0 where not smoothed.
+
+    That is what a measurement of the program finds. `Corners.tip_error` and `Corners.axis_error` compare both motions
+    at a common parameter. Where the legs are unequal, the curve passes the corner nearest beside u = ½. The distance
+    from the corner itself decides, as the path runs on the inner side of it and turns in one sense. For the paper's
+    method they are the errors by its equation (10). With `dense`, transitions are written as lines.
+    """
+    corners, settings = smoothed.corners, smoothed.settings
+    errors = corners.tip_error[rows].copy(), corners.axis_error[rows].copy()
+    if not METHODS[settings.method].one_parameter:
+        return errors
+    # with a tolerance of its own the axis has no path
+    found = errors if settings.axis_tolerance is None else errors[:1]
+    for begin in range(0, len(rows), _BATCH):
+        chosen = begin + np.flatnonzero(corners.smoothed[rows[begin : begin + _BATCH]])
+        aslant = np.zeros(len(chosen), np.bool_)
+        for point, _, _ in _seen_from_corners(smoothed, rows[chosen], _MIDDLE)[: len(found)]:
+            along, off = point[:, 3] - point[:, 1], point[:, 2]
+            aslant |= np.abs(dot(along, off)) > _SQUARE * norm(along) * norm(off)
+        chosen = chosen[aslant]
+        number = lines_of(smoothed, rows[chosen]) if dense else np.full(len(chosen), _FINE)
+        for lines in np.unique(number):
+            some = chosen[number == lines]
+            seen = _seen_from_corners(smoothed, rows[some], nodes(int(lines)))
+            for error, (point, tip, lever) in zip(found, seen, strict=False):
+                error[some] = np.minimum(error[some], _passing(point, tip, lever))
+    return errors
+
+
+def _seen_from_corners(smoothed: SmoothProgram, rows: Ints, u: Floats) -> tuple[tuple[Floats, Floats, Floats], ...]:
+    """Tips and axis points (g, 1 + m, 3) on transitions, less those of the corners, each with its tips and levers."""
+    program, pose, height = smoothed.program, smoothed.corners.pose[rows], smoothed.settings.axis_length
+    tips, levers = construction_of(smoothed.settings.method).points(smoothed, rows, u)
+    tips, levers = tips - program.tip[pose][:, None], height * unit(levers)
+    tops = tips - height * program.axis[pose][:, None]
+    return (tips, tips, np.zeros_like(tips)), (tops + levers, tops, levers)
+
+
+def _passing(point: Floats, tip: Floats, lever: Floats) -> Floats:
+    """(g,) least distance from 0 of lines through points (g, m, 3); the control turns the lever between their ends."""
+    start, way = point[:, :-1], np.diff(point, axis=1)
+    size = square(way)
+    share = np.clip(np.divide(-dot(start, way), size, out=np.zeros_like(size), where=size > 0), 0.0, 1.0)[..., None]
+    turned = unit(lever[:, :-1] + share * np.diff(lever, axis=1)) * norm(lever[:, :1])[..., None]
+    return norm(tip[:, :-1] + share * np.diff(tip, axis=1) + turned).min(axis=1)

@@ -11,12 +11,12 @@ import numpy as np
 
 from cornersmooth.cl.operations import Operation, find_operations
 from cornersmooth.geometry.arcs import arc_radii
+from cornersmooth.geometry.tool import tools_of
 from cornersmooth.model import Bools, Corners, FeedMode, Floats, Move, Program, Status
 from cornersmooth.report.corners import counts_of
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing.axis_steps import axis_step_findings
+from cornersmooth.smoothing import axis_step_findings
 from cornersmooth.smoothing.construction import construction_of
-from cornersmooth.surface.tool import tools_of
 from cornersmooth.vectors import angle_between, dot, norm
 
 SCHEMA: Final = "cornersmooth-info/2"

@@ -71,13 +71,10 @@ class WrittenPath:
 def original_path(program: Program) -> OriginalPath:
     """Polyline of a program."""
     pose, tip, axis = poses_and_arcs(program, _ARC_CHORD)
-    breaks = np.zeros(len(pose), np.bool_)
-    breaks[:1] = True
-    breaks[1:] = (program.kind[pose[:-1]] == Move.FROM) & (program.kind[pose[1:]] != Move.ARC)
-    step = np.zeros(len(pose))
-    step[1:] = np.linalg.norm(np.diff(tip, axis=0), axis=1)
-    step[breaks] = 0.0
-    rapid = np.isin(program.kind[pose], (Move.RAPID, Move.HOLE))
+    kind = program.kind[pose]
+    breaks = np.append(True, (kind[:-1] == Move.FROM) & (kind[1:] != Move.ARC))[: len(pose)]
+    step = np.where(breaks, 0.0, norm(np.diff(tip, axis=0, prepend=tip[:1])))
+    rapid = np.isin(kind, (Move.RAPID, Move.HOLE))
     last = np.flatnonzero(np.append(pose[1:] != pose[:-1], True))[: len(program)]
     return OriginalPath(tip, axis, pose, rapid, breaks, np.cumsum(step)[last])
 
@@ -113,7 +110,6 @@ def written_path(
     own = np.flatnonzero(along.element >= 0)
     row[along.element[own] * samples + np.round(along.fraction[own] * samples).astype(np.int64) - 1] = own
     at = row[element * samples + np.round(share * samples).astype(np.int64) - 1]
-    del row
     there = at >= 0
     rows = at[there]
     pose = np.zeros(len(element), np.int64)
@@ -181,8 +177,7 @@ def _distance(program: Program, points: Floats, pose: Ints, share: Floats, heigh
 
 def _continued(place: Floats, tip: Floats, original: OriginalPath) -> Floats:
     """Places on the original for all points: between known ones in proportion to the way, and never falling."""
-    length = np.zeros(len(tip))
-    np.cumsum(np.linalg.norm(np.diff(tip, axis=0), axis=1), out=length[1:])
+    length = np.cumsum(norm(np.diff(tip, axis=0, prepend=tip[:1])))
     known = np.flatnonzero(np.isfinite(place))
     end = float(original.way[-1]) if len(original.way) else 0.0
     if not len(known):
@@ -199,12 +194,10 @@ def _curvature(tip: Floats, end: Bools, rapid: Bools) -> Floats:
     """Turn of the path at its vertices over the way that goes with each, 1/mm; on a line that of its end."""
     vertex = np.flatnonzero(end)
     step = np.diff(tip[vertex], axis=0)
-    length = np.linalg.norm(step, axis=1)
+    length = norm(step)
     found = np.zeros(len(vertex))
     if len(vertex) > 2:
         moving = (length[:-1] > 0.0) & (length[1:] > 0.0) & ~rapid[vertex[1:-1]] & ~rapid[vertex[2:]]
         turn = np.where(moving, angle_between(step[:-1], step[1:]), 0.0)
         found[1:-1] = np.divide(2.0 * turn, length[:-1] + length[1:], out=np.zeros_like(turn), where=moving)
-    whole = np.zeros(len(tip))
-    whole[:] = found[np.minimum(np.searchsorted(vertex, np.arange(len(tip))), max(len(vertex) - 1, 0))]
-    return whole
+    return found[np.minimum(np.searchsorted(vertex, np.arange(len(tip))), max(len(vertex) - 1, 0))]

@@ -79,11 +79,9 @@ def passes_text(passes: PassDifference | None) -> str:
 
 
 def _histogram(surface: SurfaceMap) -> Iterator[str]:
-    off = surface.off[surface.known]
-    span = float(np.abs(off).max(initial=0.0)) or surface.tolerance
-    counts, edges = np.histogram(off, bins=_CLASSES, range=(-span, span))
+    edges, counts = surface.histogram(_CLASSES)
     most = max(int(counts.max(initial=0)), 1)
-    for count, low, high in zip(counts.tolist(), edges[:-1].tolist(), edges[1:].tolist(), strict=True):
+    for count, low, high in zip(counts.astype(int).tolist(), edges[:-1].tolist(), edges[1:].tolist(), strict=True):
         bar = "#" * -(-count * _BAR // most)
         yield f"{low:>10.5f} to {high:>9.5f} mm {count:>8}  {bar}".rstrip()
 
@@ -103,7 +101,7 @@ def draw_surface(surface: SurfaceMap, form: str) -> bytes:
     figure: Any = Figure(figsize=(8.0, 9.0), layout="constrained")
     known = np.flatnonzero(surface.known)
     off, point = surface.off[known], surface.points.point[known]
-    span = float(np.abs(off).max(initial=0.0)) or surface.tolerance
+    span = surface.span
     rows = thinned(point, np.abs(off), np.zeros(len(off), np.bool_), _POINTS)
     colours = LinearSegmentedColormap.from_list("overcut", _COLOURS)
     above, below = figure.subfigures(2, 1, height_ratios=(2.0, 1.0))

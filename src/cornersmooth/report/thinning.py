@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.vectors import norm
 
 
 def thinned(points: Floats, weight: Floats, must: Bools, most: int) -> Ints:
@@ -22,11 +23,8 @@ def thinned(points: Floats, weight: Floats, must: Bools, most: int) -> Ints:
     group = np.arange(n) // size
     start = points[first][group]
     chord = (points[last] - points[first])[group]
-    length = np.maximum(np.linalg.norm(chord, axis=1), 1e-12)
-    arm = points - start
-    off = np.linalg.norm(np.cross(arm, chord), axis=1) / length
-    flat = np.linalg.norm(chord, axis=1) < 1e-9
-    off[flat] = np.linalg.norm(arm[flat], axis=1)
+    length, arm = norm(chord), points - start
+    off = np.where(length < 1e-9, norm(arm), norm(np.cross(arm, chord)) / np.maximum(length, 1e-12))
     keep = must.copy()
     keep[first] = keep[last] = True
     for values in (off, np.nan_to_num(weight, nan=-1.0)):

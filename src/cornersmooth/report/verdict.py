@@ -32,9 +32,9 @@ def sharp_corners(smoothed: SmoothProgram) -> tuple[int, list[dict[str, Any]]]:
     """
     rows, others = sharp_rows(smoothed), other_corners(smoothed.program, smoothed.settings.axis_length)
     table = corner_table(smoothed, rows[:_LISTED])
-    pose = np.concatenate((np.asarray(table["corner"]), others.pose[:_LISTED]))
-    tip = np.concatenate((np.asarray(table["tip_angle_deg"], np.float64), others.tip_turn[:_LISTED]))
-    axis = np.concatenate((np.asarray(table["axis_angle_deg"], np.float64), others.axis_turn[:_LISTED]))
+    pose = np.append(table["corner"], others.pose[:_LISTED])
+    tip = np.append(table["tip_angle_deg"], others.tip_turn[:_LISTED])
+    axis = np.append(table["axis_angle_deg"], others.axis_turn[:_LISTED])
     status = [*table["status"].tolist(), *(Status(code).key for code in others.status[:_LISTED])]
     turn, line = np.where(tip < STRAIGHT_ON, axis, tip), smoothed.program.line[pose]
     return len(rows) + len(others.pose), [

@@ -1,18 +1,21 @@
-"""Rounding the corners of a program: `smooth` is the whole of it."""
+"""Rounding the corners of a program: `smooth` is the whole of it. Moves that turn the axis too far are found here."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
-from cornersmooth.model import Program, SmoothProgram
-from cornersmooth.settings import Settings
-from cornersmooth.smoothing.axis_steps import axis_step_findings, refuse_flips
+from cornersmooth.errors import Finding, InputError
+from cornersmooth.model import Bools, Floats, Ints, Move, Program, SmoothProgram
+from cornersmooth.settings import FLIP_ANGLE, Settings
 from cornersmooth.smoothing.construction import construction_of
+from cornersmooth.vectors import dot, norm
 
-__all__ = ["smooth"]
+#: angles nearer to a limit are at the limit, degrees
+_ROUNDING = 1e-9
 
 
 def smooth(
@@ -22,26 +25,9 @@ def smooth(
     progress: Callable[[int, int], None] | None = None,
     processes: int = 1,
 ) -> SmoothProgram:
-    """Round every corner of the program within the tolerance.
+    """Round every corner of the program within the tolerance; parameters as of `pipeline.smooth`.
 
-    Parameters
-    ----------
-    settings : Settings, optional
-        Defaults: ε 0.01 mm, H 10 mm; without a form the method "auto" is the proportional one.
-    progress : callable, optional
-        Called now and then with (corners done, corners in all).
-    processes : int
-        Processes that a method that takes long may work in; the result does not depend on it.
-
-    Returns
-    -------
-    SmoothProgram
-        Also where nothing can be rounded; every corner has a status that says why not.
-
-    Raises
-    ------
-    InputError
-        CS183: the tool axis turns by nearly half a turn in one feed move.
+    Corners that stay sharp have a status that says why. CS183: the axis turns by nearly half a turn in one feed move.
     """
     settings = (Settings() if settings is None else settings).with_method()
     refuse_flips(program)
@@ -50,3 +36,45 @@ def smooth(
         turned = settings.axis_scale * 2.0 * np.sin(smoothed.corners.orientation_error / 2.0)
         smoothed = replace(smoothed, corners=replace(smoothed.corners, axis_error=turned))
     return replace(smoothed, findings=(*smoothed.findings, *axis_step_findings(program, settings)))
+
+
+def axis_steps(program: Program, moves: Bools, limit: float) -> tuple[Ints, Floats]:
+    """Poses (k,) that `moves` (n,) end in which turn the tool axis by more than a limit, and these turns; degrees."""
+    axis, stated = program.axis, program.kind == Move.FROM
+    far = moves[1:] & ~stated[1:] & ~stated[:-1]
+    far &= dot(axis[1:], axis[:-1]) < math.cos(math.radians(limit)) + _ROUNDING  # a first look: the cosine is coarse
+    pose = 1 + np.flatnonzero(far)
+    here, there = axis[pose - 1], axis[pose]
+    turn = np.degrees(2.0 * np.arctan2(norm(there - here), norm(there + here)))
+    beyond = turn > limit + _ROUNDING
+    return pose[beyond], turn[beyond]
+
+
+def refuse_flips(program: Program) -> None:
+    """Refuse a feed move, line or arc, whose axis turns by more than `cornersmooth.settings.FLIP_ANGLE`: CS183."""
+    pose, turn = axis_steps(program, _feed_moves(program), FLIP_ANGLE)
+    if len(pose):
+        raise InputError(
+            "CS183",
+            f"the tool axis turns by {turn[0]:.4g} deg in one move, and which way a control turns is not defined",
+            "insert a pose in between",
+            file=program.source.name,
+            line=int(program.line[pose[0]]) or None,
+        )
+
+
+def axis_step_findings(program: Program, settings: Settings) -> tuple[Finding, ...]:
+    """Feed moves whose axis turns by more than `Settings.max_axis_step`: no corner beside them is rounded."""
+    pose, turn = axis_steps(program, _feed_moves(program), settings.max_axis_step)
+    if not len(pose):
+        return ()
+    text = (
+        f"the tool axis turns by more than {settings.max_axis_step:g} deg in one move, by {turn.max():.4g} deg at "
+        "most, and corners beside it stay sharp; insert poses in between"
+    )
+    return (Finding("CS184", "warning", int(program.line[pose[0]]), text, len(pose)),)
+
+
+def _feed_moves(program: Program) -> Bools:
+    """Poses that are reached in a cut: (n,) bool."""
+    return (program.kind == Move.LINEAR) | (program.kind == Move.ARC)

@@ -15,10 +15,10 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cornersmooth.geometry.ragged import ranges
 from cornersmooth.methods import AUTO, DEFAULT_METHOD, METHODS
-from cornersmooth.model import Corners, FeedMode, Floats, Ints, Move, Program, SmoothProgram, Status
+from cornersmooth.model import Bools, Corners, FeedMode, Floats, Ints, Move, Program, SmoothProgram, Status
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing.neighbours import find_neighbours
 from cornersmooth.vectors import norm
 
 #: called with what is done, and with what there is in all: corners, or poses of runs
@@ -170,14 +170,15 @@ def place_corners(
     status[around.duplicate[pose]] = Status.DUPLICATE
 
     k = len(pose)
-    whole = Placed(
-        status=status,
-        limited_by=np.zeros(k, np.uint8),
-        **{name: np.zeros(k) for name in _MEASURES},
-        extra={name: np.full(k, np.nan) for name in construction.extra},
-    )
+    measures = {name: np.zeros(k) for name in _MEASURES}
     if METHODS[settings.method].one_parameter:  # the same fractions on both curves: one array
-        whole.axis_trim_in, whole.axis_trim_out = whole.trim_in, whole.trim_out
+        measures |= {"axis_trim_in": measures["trim_in"], "axis_trim_out": measures["trim_out"]}
+    weights = np.broadcast_to(np.array(settings.weights), (k, 2))
+    ratio = np.broadcast_to(np.float64(settings.ratio), (k,))
+    extra = {name: np.full(k, np.nan) for name in construction.extra}
+    found = Corners(
+        pose, before, after, status, np.zeros(k, np.uint8), weights=weights, ratio=ratio, extra=extra, **measures
+    )
 
     def settle(start: int) -> int:
         rows = start + np.flatnonzero(status[start : start + BATCH] == Status.SMOOTHED)
@@ -185,18 +186,16 @@ def place_corners(
             legs = legs_at(program, settings.axis_length, pose[rows], before[rows], after[rows])
             part = construction.place(legs, settings)
             for name in ("status", "limited_by", *_MEASURES):
-                getattr(whole, name)[rows] = getattr(part, name)
+                getattr(found, name)[rows] = getattr(part, name)
             for name, values in part.extra.items():
-                whole.extra[name][rows] = values
+                extra[name][rows] = values
         return min(start + BATCH, k)
 
     with ThreadPoolExecutor(THREADS) as pool:  # numpy leaves the interpreter free; batches share no rows
         for done in (pool.map if k > BATCH else map)(settle, range(0, k, BATCH)):
             if progress is not None:
                 progress(done, k)
-    weights = np.broadcast_to(np.array(settings.weights), (k, 2))
-    ratio = np.broadcast_to(np.float64(settings.ratio), (k,))
-    return Corners(pose=pose, before=before, after=after, weights=weights, ratio=ratio, **vars(whole))
+    return found
 
 
 def _surroundings(program: Program, settings: Settings, pose: Ints, after: Ints) -> NDArray[np.uint8]:
@@ -230,3 +229,49 @@ def with_rows(corners: Corners, others: Corners, rows: Ints) -> Corners:
     names = (item.name for item in fields(Corners) if item.name != "extra")
     columns: dict[str, Any] = {name: taken(getattr(corners, name), getattr(others, name)) for name in names}
     return Corners(**columns, extra=extra)
+
+
+@dataclass(frozen=True)
+class Neighbours:
+    """Distinct neighbours of each of n poses inside its chain."""
+
+    previous: Ints  # the pose that the linear move into it starts from, -1 where it is not reached inside a chain
+    following: Ints  # the next distinct pose of an inner pose of a chain, else -1
+    inner: Bools  # inner poses of chains, repeated ones included: the corners
+    duplicate: Bools  # repeats the pose before it in the same chain, but for a hole
+
+
+def find_neighbours(program: Program, axis_length: float, distance: float) -> Neighbours:
+    """Distinct neighbours of all poses; poses within `distance` (mm, tip and axis point) of each other are one.
+
+    A run of poses that creep on by less than `distance` each but by more in total is not merged.
+    """
+    n, own = len(program), np.arange(len(program))
+    chains = program.chains
+    length = chains[:, 1] - chains[:, 0]
+    members = ranges(chains[:, 0] + 1, length)  # reached by a linear move inside a chain
+    first, last = np.full((2, n), -1, np.int64)
+    first[members], last[members] = np.repeat(chains[:, 0], length), np.repeat(chains[:, 1], length)
+    inner = (first >= 0) & (own != last)
+
+    duplicate = first >= 0
+    duplicate[1:] &= _closer(program, own[1:], own[:-1], axis_length, distance)
+    duplicate[1:] &= program.kind[:-1] != Move.HOLE  # the tool has left the hole, and comes back to its pose
+    representative = np.maximum.accumulate(np.where(duplicate, 0, own))
+    repeats = np.flatnonzero(duplicate)
+    away = repeats[~_closer(program, repeats, representative[repeats], axis_length, distance)]
+    duplicate[repeats[np.isin(representative[repeats], representative[away])]] = False  # those creep
+    representative = np.maximum.accumulate(np.where(duplicate, 0, own))
+
+    previous, following = np.full((2, n), -1, np.int64)
+    previous[members] = np.maximum(representative[members - 1], first[members])
+    distinct = np.minimum.accumulate(np.where(duplicate, n, own)[::-1])[::-1]
+    following[inner] = distinct[np.flatnonzero(inner) + 1]
+    following[following > last] = -1
+    return Neighbours(previous, following, inner, duplicate)
+
+
+def _closer(program: Program, one: Ints, other: Ints, axis_length: float, distance: float) -> Bools:
+    step = program.tip[one] - program.tip[other]
+    turn = axis_length * (program.axis[one] - program.axis[other])
+    return (norm(step) <= distance) & (norm(step + turn) <= distance)

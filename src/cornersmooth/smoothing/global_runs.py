@@ -12,8 +12,7 @@ from cornersmooth.model import Bools, Corners, Floats, Ints, LimitedBy, Program,
 from cornersmooth.processes import map_in_processes
 from cornersmooth.settings import Settings
 from cornersmooth.slices import joined_rows, some_runs
-from cornersmooth.smoothing.construction import RUN_CURVATURE, Progress, place_corners, with_rows
-from cornersmooth.smoothing.neighbours import find_neighbours
+from cornersmooth.smoothing.construction import RUN_CURVATURE, Progress, find_neighbours, place_corners, with_rows
 from cornersmooth.smoothing.proportional import Proportional
 from cornersmooth.smoothing.runs.polylines import Polylines
 from cornersmooth.smoothing.runs.rows import TURNING

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,29 +47,37 @@ def keep(length: Floats, rows: Ints, measure: Callable[[Floats, Ints], Floats], 
     return length[rows]
 
 
-@dataclass(frozen=True)
 class Wanted:
     """What g corners ask for, and how far transitions are from the original motion as functions of their length, mm.
 
     Methods take the lengths of all corners, or of some with their rows.
     """
 
-    legs: Legs
-    settings: Settings
-    status: NDArray[np.uint8]  # as far as the geometry of the corner decides it
-    length_in: Floats  # m(D⁻), mm
-    length_out: Floats
-    by_tolerance: Floats  # lengths that the tolerances allow, mm
-    bend_tip: Floats  # (U⁺ − U⁻)_A
-    bend_turn: Floats  # (U⁺ − U⁻)_B − (U⁺ − U⁻)_A
-    factor: float
-    half_cosine: Floats
-    per_length: tuple[Floats, Floats, Floats]  # deviation over length: tip, axis point, axis point less tip
+    def __init__(self, legs: Legs, settings: Settings) -> None:
+        self.legs, self.settings, self.axis_length = legs, settings, settings.axis_length
+        axis_in, axis_out = legs.tip_in + legs.turn_in, legs.tip_out + legs.turn_out
+        self.length_in = np.sqrt((square(legs.tip_in) + square(axis_in)) / 2.0)  # m(D⁻), mm
+        self.length_out = np.sqrt((square(legs.tip_out) + square(axis_out)) / 2.0)
+        per_in, per_out = 1.0 / self.length_in[:, None], 1.0 / self.length_out[:, None]
+        self.bend_tip = legs.tip_out * per_out - legs.tip_in * per_in  # (U⁺ − U⁻)_A
+        self.bend_turn = legs.turn_out * per_out - legs.turn_in * per_in  # (U⁺ − U⁻)_B − (U⁺ − U⁻)_A
+        self.factor = float(nurbs.deviation_factor(np.array(settings.weights), settings.ratio))
+        # deviation over length: tip, axis point, axis point less tip
+        bends = self.bend_tip, self.bend_tip + self.bend_turn, self.bend_turn
+        self.per_tip, per_axis, self.per_turn = (self.factor * norm(bend) for bend in bends)
+        #: lengths that the tolerances allow, mm
+        self.by_tolerance = np.minimum(
+            divide(settings.tip_tolerance, self.per_tip), divide(settings.axis_point_tolerance, per_axis)
+        )
+        self.half_cosine = half_cosine(legs, settings.axis_length)
 
-    @property
-    def axis_length(self) -> float:
-        """H, mm."""
-        return self.settings.axis_length
+        self.room = np.minimum(self.length_in, self.length_out) / 2.0
+        flat_tip = self.per_tip * self.room <= settings.tip_resolution / 2.0
+        flat_axis = per_axis * self.room <= max(settings.tip_resolution, settings.axis_point_resolution) / 2.0
+        #: as far as the geometry of the corner decides it
+        self.status = np.where(flat_tip & flat_axis, Status.STRAIGHT, Status.SMOOTHED).astype(np.uint8)
+        cosine = (dot(legs.tip_in, legs.tip_out) + dot(axis_in, axis_out)) / (2.0 * self.length_in * self.length_out)
+        refuse_turns(self.status, cosine, self.half_cosine, settings)
 
     def middle(self, length: Floats, rows: Ints | slice = slice(None)) -> Floats:
         """|b′−b| at u = ½, where b is the axis point of the corner itself, mm."""
@@ -111,63 +118,6 @@ class Wanted:
         return largest
 
 
-def wanted(legs: Legs, settings: Settings) -> Wanted:
-    """Measure g corners."""
-    axis_in, axis_out = legs.tip_in + legs.turn_in, legs.tip_out + legs.turn_out
-    length_in = np.sqrt((square(legs.tip_in) + square(axis_in)) / 2.0)
-    length_out = np.sqrt((square(legs.tip_out) + square(axis_out)) / 2.0)
-    per_in, per_out = 1.0 / length_in[:, None], 1.0 / length_out[:, None]
-    bend_tip = legs.tip_out * per_out - legs.tip_in * per_in
-    bend_turn = legs.turn_out * per_out - legs.turn_in * per_in
-    factor = float(nurbs.deviation_factor(np.array(settings.weights), settings.ratio))
-    per_tip, per_axis, per_turn = (factor * norm(v) for v in (bend_tip, bend_tip + bend_turn, bend_turn))
-    by_tolerance = np.minimum(divide(settings.tip_tolerance, per_tip), divide(settings.axis_point_tolerance, per_axis))
-    cosines = half_cosine(legs, settings.axis_length)
-
-    status = np.full(len(length_in), Status.SMOOTHED, np.uint8)
-    halves = np.minimum(length_in, length_out) / 2.0
-    flat_tip = per_tip * halves <= settings.tip_resolution / 2.0
-    flat_axis = per_axis * halves <= max(settings.tip_resolution, settings.axis_point_resolution) / 2.0
-    status[flat_tip & flat_axis] = Status.STRAIGHT
-    cosine = (dot(legs.tip_in, legs.tip_out) + dot(axis_in, axis_out)) / (2.0 * length_in * length_out)
-    refuse_turns(status, cosine, cosines, settings)
-    lengths = length_in, length_out, by_tolerance
-    return Wanted(legs, settings, status, *lengths, bend_tip, bend_turn, factor, cosines, (per_tip, per_axis, per_turn))
-
-
-def place_proportional(asked: Wanted, settings: Settings) -> Placed:
-    """Give g corners the transition lengths they ask for, up to half of the shorter segment."""
-    room = np.minimum(asked.length_in, asked.length_out) / 2.0
-    status = asked.status
-    per_tip, _, per_turn = asked.per_length
-    limited_by = np.where(asked.by_tolerance <= room, LimitedBy.TOLERANCE, LimitedBy.SEGMENT).astype(np.uint8)
-    length = np.minimum(room, asked.by_tolerance)
-
-    # The construction runs on chords of the sphere, the tolerance is about b = tip + H·axis at constant H. The bound
-    # |b′−b| ≤ |A′−A| + H|O′−O| proves most corners; the others are evaluated and shortened until they keep it.
-    axis_length = settings.axis_length
-    shortest_lever = axis_length * asked.half_cosine - length * per_turn  # below |B−A| of both motions
-    bound = length * (per_tip + divide(axis_length * per_turn, np.maximum(shortest_lever, 0.0)))
-    doubtful = (status == Status.SMOOTHED) & (bound > settings.axis_point_tolerance * (1.0 + EXACT))
-    peaks = _largest_in_the_middle(asked, length, length * per_turn)
-    probed = np.flatnonzero(doubtful & ~peaks)
-    for rows, measure, share in (
-        (np.flatnonzero(doubtful & peaks), asked.middle, 1.0),
-        (probed, asked.probe, 1.0 - BETWEEN_PROBES),
-    ):
-        shortened = keep(length, rows, measure, share * settings.axis_point_tolerance)
-        limited_by[rows[shortened < length[rows]]] = LimitedBy.TOLERANCE
-        length[rows] = shortened
-    status[(status == Status.SMOOTHED) & (length <= 4.0 * settings.tip_resolution)] = Status.TOO_SHORT
-
-    sharp = status != Status.SMOOTHED
-    length[sharp], limited_by[sharp] = 0.0, LimitedBy.NOTHING
-    axis_error = asked.middle(length)
-    axis_error[probed] = np.maximum(axis_error[probed], asked.probe(length[probed], probed))
-    trims = length / asked.length_in, length / asked.length_out
-    return Placed(status, limited_by, *trims, *trims, per_tip * length, axis_error, asked.middle_turn(length))
-
-
 def _largest_in_the_middle(asked: Wanted, length: Floats, turned: Floats) -> NDArray[np.bool_]:
     """Rows whose deviation at constant H is surely largest at u = ½; `turned` is (Q−P)−(B−A) there, mm.
 
@@ -188,8 +138,35 @@ class Proportional(Construction):
     """Tip and axis-point segment are trimmed by the same fraction, and one parameter drives both curves."""
 
     def place(self, legs: Legs, settings: Settings) -> Placed:
-        """Give every corner the length that the tolerances and its segments allow."""
-        return place_proportional(wanted(legs, settings), settings)
+        """Give every corner the length that the tolerances and its segments allow: half of the shorter one at most."""
+        asked = Wanted(legs, settings)
+        room, status, per_tip, per_turn = asked.room, asked.status, asked.per_tip, asked.per_turn
+        limited_by = np.where(asked.by_tolerance <= room, LimitedBy.TOLERANCE, LimitedBy.SEGMENT).astype(np.uint8)
+        length = np.minimum(room, asked.by_tolerance)
+
+        # The construction runs on chords of the sphere, the tolerance is about b = tip + H·axis at constant H.
+        # The bound |b′−b| ≤ |A′−A| + H|O′−O| proves most corners; the others are shortened until they keep it.
+        axis_length = settings.axis_length
+        shortest_lever = axis_length * asked.half_cosine - length * per_turn  # below |B−A| of both motions
+        bound = length * (per_tip + divide(axis_length * per_turn, np.maximum(shortest_lever, 0.0)))
+        doubtful = (status == Status.SMOOTHED) & (bound > settings.axis_point_tolerance * (1.0 + EXACT))
+        peaks = _largest_in_the_middle(asked, length, length * per_turn)
+        probed = np.flatnonzero(doubtful & ~peaks)
+        for rows, measure, share in (
+            (np.flatnonzero(doubtful & peaks), asked.middle, 1.0),
+            (probed, asked.probe, 1.0 - BETWEEN_PROBES),
+        ):
+            shortened = keep(length, rows, measure, share * settings.axis_point_tolerance)
+            limited_by[rows[shortened < length[rows]]] = LimitedBy.TOLERANCE
+            length[rows] = shortened
+        status[(status == Status.SMOOTHED) & (length <= 4.0 * settings.tip_resolution)] = Status.TOO_SHORT
+
+        sharp = status != Status.SMOOTHED
+        length[sharp], limited_by[sharp] = 0.0, LimitedBy.NOTHING
+        axis_error = asked.middle(length)
+        axis_error[probed] = np.maximum(axis_error[probed], asked.probe(length[probed], probed))
+        trims = length / asked.length_in, length / asked.length_out
+        return Placed(status, limited_by, *trims, *trims, per_tip * length, axis_error, asked.middle_turn(length))
 
     def points(self, smoothed: SmoothProgram, rows: Ints, u: Floats) -> tuple[Floats, Floats]:
         """Both curves at the same parameters."""

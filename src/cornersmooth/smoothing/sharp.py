@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from cornersmooth.geometry.arcs import arc_tangents
 from cornersmooth.model import Floats, Ints, Move, Program, SmoothProgram, Status, Trait
 from cornersmooth.smoothing.construction import BATCH, legs_at
-from cornersmooth.smoothing.proportional import wanted
+from cornersmooth.smoothing.proportional import Wanted
 from cornersmooth.vectors import angle_between
 
 #: degrees below which the path goes straight on: numbers of arcs are rounded in CL files
@@ -32,7 +32,7 @@ def sharp_rows(smoothed: SmoothProgram) -> Ints:
     straight = [np.zeros(0, np.bool_)]
     for part in np.split(known, np.arange(BATCH, len(known), BATCH)):
         legs = legs_at(program, settings.axis_length, corners.pose[part], corners.before[part], corners.after[part])
-        measured = wanted(legs, settings)
+        measured = Wanted(legs, settings)
         straight.append(measured.status == Status.STRAIGHT)
     turns[turns] = ~np.concatenate(straight)
     return rows[turns]

@@ -11,9 +11,10 @@ from collections.abc import Callable
 import numpy as np
 from scipy.spatial import cKDTree
 
+from cornersmooth.geometry.tool import Tool
 from cornersmooth.model import Floats, Ints
 from cornersmooth.surface.motion import Parts, RuledMotion
-from cornersmooth.surface.tool import Tool
+from cornersmooth.vectors import dot, norm
 
 #: pairs of point and part that are looked at together
 _TOGETHER = 1_000_000
@@ -108,6 +109,5 @@ def _golden(points: Floats, parts: Parts, cutter: Cutter, part: Ints, low: Float
 def _distances(points: Floats, parts: Parts, cutter: Cutter, part: Ints, share: Floats) -> Floats:
     tip, axis = parts.at(part, share)
     arm = points - tip
-    up = np.einsum("ij,ij->i", arm, axis)
-    out = np.linalg.norm(arm - up[:, None] * axis, axis=1)
-    return cutter(out, up)
+    up = dot(arm, axis)
+    return cutter(norm(arm - up[:, None] * axis), up)

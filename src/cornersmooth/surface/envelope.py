@@ -15,9 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cornersmooth.geometry.tool import Tool
 from cornersmooth.model import Floats, Ints
 from cornersmooth.surface.motion import RuledMotion
-from cornersmooth.surface.tool import Tool
+from cornersmooth.vectors import dot, norm
 
 #: a step that is shorter, mm, has no direction
 _NO_WAY = 1e-12
@@ -56,7 +57,7 @@ def envelope_points(
         before = _normals(motion, corner - 1, np.ones(len(corner)), out, up, drop)
         after = _normals(motion, corner, np.zeros(len(corner)), out, up, drop)
         both = before + after
-        size = np.linalg.norm(both, axis=-1, keepdims=True)
+        size = norm(both)[..., None]
         sides.append(np.divide(both, size, out=np.full_like(both, np.nan), where=size > 1e-6))
         place.append(motion.at(corner, np.zeros(len(corner))))
         order.append(2 * corner - 1)
@@ -110,19 +111,18 @@ def _normals(motion: RuledMotion, segment: Ints, share: Floats, out: Floats, up:
     tip, axis = motion.tip[segment], motion.axis[segment]
     way = tip[:, 1] - tip[:, 0]
     leaning = axis[:, 0] + share[:, None] * (axis[:, 1] - axis[:, 0])
-    length = np.linalg.norm(leaning, axis=1, keepdims=True)
+    length = norm(leaning)[:, None]
     o = leaning / length
     turn = (axis[:, 1] - axis[:, 0]) / length
-    turn = turn - np.einsum("ij,ij->i", turn, o)[:, None] * o
+    turn = turn - dot(turn, o)[:, None] * o
     cosine = np.sqrt(1.0 - drop * drop)
     lever = (cosine * up + out * drop)[:, None]
     wanted = cosine[:, None] * way[:, None] + lever * turn[:, None]  # (s, l, 3)
-    along = drop * np.einsum("ij,ij->i", way, o)[:, None]
-    flat = wanted - np.einsum("slj,sj->sl", wanted, o)[..., None] * o[:, None]
-    size = np.linalg.norm(flat, axis=-1)
-    moving = size > _NO_WAY
-    ahead = np.divide(flat, size[..., None], out=np.full_like(flat, np.nan), where=moving[..., None])
-    share_ahead = np.divide(along, size, out=np.full_like(size, np.nan), where=moving)
+    along = drop * dot(way, o)[:, None]
+    flat = wanted - dot(wanted, o[:, None])[..., None] * o[:, None]
+    size = norm(flat)
+    size = np.where(size > _NO_WAY, size, np.nan)
+    ahead, share_ahead = flat / size[..., None], along / size
     with np.errstate(invalid="ignore"):
         share_aside = np.sqrt(1.0 - share_ahead**2)  # NaN where the whole circle goes ahead or behind
     left = np.cross(o[:, None], ahead)

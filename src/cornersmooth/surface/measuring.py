@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from cornersmooth.errors import SettingsError
+from cornersmooth.geometry.tool import Tool
 from cornersmooth.model import Bools, Floats, Program
 from cornersmooth.nc_reader import NcProgram
 from cornersmooth.slices import some_rows
@@ -15,7 +16,6 @@ from cornersmooth.surface.distance import distance_to_motion
 from cornersmooth.surface.envelope import EnvelopePoints, envelope_points
 from cornersmooth.surface.motion import original_cuts, written_cuts
 from cornersmooth.surface.passes import PassDifference, neighbouring_passes
-from cornersmooth.surface.tool import Tool
 
 #: a point deeper than this inside the original volume, mm, is cut away by another part of the path
 BURIED = 1e-3
@@ -52,21 +52,19 @@ class SurfaceMap:
         return np.isfinite(self.off)
 
     @property
+    def span(self) -> float:
+        """What scales reach to on both sides, mm: the largest distance, or the tolerance where all are 0."""
+        return float(np.abs(self.off[self.known]).max(initial=0.0)) or self.tolerance
+
+    @property
     def kept(self) -> bool:
         """Whether every point is known to be within the tolerance, give or take 1e-9 mm of arithmetic."""
         return bool((np.abs(self.off) <= self.tolerance + 1e-9).all())
 
-    def histogram(self) -> tuple[Floats, Floats]:
+    def histogram(self, classes: int = _CLASSES) -> tuple[Floats, Floats]:
         """Edges of equal classes, mm, and how many points are in each."""
-        off = self.off[self.known]
-        span = float(np.abs(off).max(initial=0.0)) or self.tolerance
-        counts, edges = np.histogram(off, bins=_CLASSES, range=(-span, span))
+        counts, edges = np.histogram(self.off[self.known], bins=classes, range=(-self.span, self.span))
         return edges, counts.astype(np.float64)
-
-    def worst(self, sign: int) -> int | None:
-        """Row of the largest overcut (sign −1) or undercut (+1); None without any."""
-        rows = np.flatnonzero(self.known & (sign * self.off > 0.0))
-        return int(rows[np.argmax(np.abs(self.off[rows]))]) if len(rows) else None
 
     def as_dict(self) -> dict[str, Any]:
         """Everything but the points, plain; keys carry their unit."""
@@ -87,8 +85,9 @@ class SurfaceMap:
         }
         contents["neighbouring_passes"] = self.passes and asdict(self.passes)
         for name, sign in (("overcut", -1), ("undercut", 1)):
-            own = np.abs(off[sign * off > 0.0])
-            row = self.worst(sign)
+            rows = np.flatnonzero(self.known & (sign * self.off > 0.0))
+            own = np.abs(self.off[rows])
+            row = int(rows[np.argmax(own)]) if len(rows) else None
             contents[name] = {
                 "points": len(own),
                 "max_mm": float(own.max(initial=0.0)),

@@ -12,6 +12,7 @@ from cornersmooth.model import Bools, Floats, Ints, Move, Program
 from cornersmooth.nc_reader import NcProgram
 from cornersmooth.nc_reader.elements import Element
 from cornersmooth.nc_reader.tool import directions, written_at
+from cornersmooth.vectors import norm, unit
 
 #: largest turn of an arc within one segment, rad: off the arc by its radius times 3e-7
 _ARC_STEP = 1.5e-3
@@ -38,7 +39,7 @@ class RuledMotion:
         tip, axis = self.tip[segment], self.axis[segment]
         place = tip[:, 0] + share[:, None] * (tip[:, 1] - tip[:, 0])
         leaning = axis[:, 0] + share[:, None] * (axis[:, 1] - axis[:, 0])
-        return place, leaning / np.linalg.norm(leaning, axis=1, keepdims=True)
+        return place, unit(leaning)
 
     def parts(self, longest: float, height: float, aside: float) -> Parts:
         """Cut into parts in which the tip and the point at `height` move about `longest` mm at most.
@@ -47,14 +48,13 @@ class RuledMotion:
         """
         step = self.tip[:, 1] - self.tip[:, 0]
         top = step + height * (self.axis[:, 1] - self.axis[:, 0])
-        size = np.maximum(np.linalg.norm(step, axis=1), np.linalg.norm(top, axis=1))
-        count = np.maximum(np.ceil(size / longest), 1.0).astype(np.int64)
+        count = np.maximum(np.ceil(np.maximum(norm(step), norm(top)) / longest), 1.0).astype(np.int64)
         segment, number = spread(count)
         low, high = number / count[segment], (number + 1) / count[segment]
         ends = [self.at(segment, share) for share in (low, high)]
         turn = ends[1][1] - ends[0][1]
-        ways = [np.linalg.norm(ends[1][0] - ends[0][0] + up * turn, axis=1) for up in (0.0, height)]
-        return Parts(self, segment, low, high, np.maximum(*ways) + aside * np.linalg.norm(turn, axis=1))
+        ways = [norm(ends[1][0] - ends[0][0] + up * turn) for up in (0.0, height)]
+        return Parts(self, segment, low, high, np.maximum(*ways) + aside * norm(turn))
 
 
 @dataclass(frozen=True)
@@ -111,6 +111,5 @@ def _segments(tip: Floats, axis: Floats, line: Ints, cutting: Bools) -> RuledMot
     # nothing between two segments but poses that repeat
     travelled = np.cumsum(moved & ~cutting)
     joined[1:] = travelled[end[1:]] == travelled[end[:-1]]
-    return RuledMotion(
-        np.stack((tip[end - 1], tip[end]), axis=1), np.stack((axis[end - 1], axis[end]), axis=1), line[end], joined
-    )
+    tips, axes = (np.stack((each[end - 1], each[end]), axis=1) for each in (tip, axis))
+    return RuledMotion(tips, axes, line[end], joined)

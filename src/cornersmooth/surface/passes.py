@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.surface.motion import RuledMotion
-from cornersmooth.vectors import dot, norm
+from cornersmooth.vectors import dot, norm, square, unit
 
 #: ends of segments near a place that are looked at
 _NEAREST = 48
@@ -49,7 +49,7 @@ def neighbouring_passes(
 
     It looks at the centre of the tool's corner radius, mm; passes farther apart than `within`, mm, are no neighbours.
     """
-    path, own = _Path.of(original, radius), _Path.of(written, radius)
+    path, own = _Path(original, radius), _Path(written, radius)
     segment = np.unique(np.linspace(0, len(original) - 1, min(stations, len(original))).astype(np.int64))
     here = (path.start[segment] + path.end[segment]) / 2.0
     along = (path.length[segment] + path.length[segment + 1]) / 2.0
@@ -62,12 +62,11 @@ def neighbouring_passes(
     here, way, place, other = here[found], path.way[segment[found]], place[found], other[found]
     across = np.cross(way, place - here)
     size = norm(across)
-    off = [own.off(points, ways) for points, ways in ((here, way), (place, path.way[other]))]
-    known = (size > 0.0) & np.isfinite(off[0]).all(axis=1) & np.isfinite(off[1]).all(axis=1)
-    if not known.any():
+    apart = own.off(here, way) - own.off(place, path.way[other])
+    rows = np.flatnonzero((size > 0.0) & np.isfinite(apart).all(axis=1))
+    if not len(rows):
         return None
-    rows = np.flatnonzero(known)
-    difference = np.abs(dot(off[0][rows] - off[1][rows], across[rows] / size[rows, None]))
+    difference = np.abs(dot(apart[rows], across[rows] / size[rows, None]))
     worst = rows[np.argmax(difference)]
     row = segment[found[worst]]
     return PassDifference(
@@ -81,24 +80,14 @@ def neighbouring_passes(
     )
 
 
-@dataclass(frozen=True)
 class _Path:
     """Chords of the looked-at point, m of them, their directions, and the length of the path up to each (m + 1,)."""
 
-    start: Floats
-    end: Floats
-    way: Floats
-    length: Floats
-    tree: cKDTree
-
-    @classmethod
-    def of(cls, motion: RuledMotion, radius: float) -> _Path:
-        start, end = (motion.tip[:, k] + radius * motion.axis[:, k] for k in (0, 1))
-        step = end - start
-        size = norm(step)
-        way = step / np.where(size > 0.0, size, 1.0)[:, None]
-        length = np.concatenate(([0.0], np.cumsum(size)))
-        return cls(start, end, way, length, cKDTree(np.concatenate((start, end))))
+    def __init__(self, motion: RuledMotion, radius: float) -> None:
+        self.start, self.end = (motion.tip[:, k] + radius * motion.axis[:, k] for k in (0, 1))
+        self.way = unit(self.end - self.start)
+        self.length = np.concatenate(([0.0], np.cumsum(norm(self.end - self.start))))
+        self.tree = cKDTree(np.concatenate((self.start, self.end)))
 
     def _feet(self, points: Floats) -> tuple[Ints, Floats, Floats, Floats, Bools]:
         """Chords (q, c) near points (q, 3), feet on them, distances, lengths up to feet, and which are inside."""
@@ -106,13 +95,12 @@ class _Path:
         chord = self.tree.query(points, k=count)[1].reshape(len(points), count) % len(self.start)
         step = self.end[chord] - self.start[chord]
         gone = points[:, None] - self.start[chord]
-        square = np.maximum((step * step).sum(axis=-1), 1e-300)
-        share = (gone * step).sum(axis=-1) / square
+        size = np.maximum(square(step), 1e-300)
+        share = dot(gone, step) / size
         inside = (share >= -1e-9) & (share <= 1.0 + 1e-9)
         share = np.clip(share, 0.0, 1.0)
         foot = self.start[chord] + share[..., None] * step
-        distance = np.sqrt(((foot - points[:, None]) ** 2).sum(axis=-1))
-        return chord, foot, distance, self.length[chord] + share * np.sqrt(square), inside
+        return chord, foot, norm(foot - points[:, None]), self.length[chord] + share * np.sqrt(size), inside
 
     def nearest(self, points: Floats, ways: Floats, along: Floats, within: float) -> tuple[Floats, Ints]:
         """Feet (q, 3) on the nearest parallel pass and their chords, -1 for none."""

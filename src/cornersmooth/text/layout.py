@@ -1,28 +1,70 @@
 """Where each character of a row goes: columns of a byte matrix, wide enough for every row of a call.
 
-A number is written from right to left, a group of digits at a time. Zero bytes are no characters.
+A number is written from right to left, a group of up to four digits at a time, copied from tables of digits as one
+element each. Zero bytes are no characters: rows are squeezed when they are complete.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.text.digits import Table, part_table, whole_table
+from cornersmooth.model import Bools, Ints
 
-Ints = NDArray[np.int64]
 Bytes = NDArray[np.uint8]
-Bools = NDArray[np.bool_]
+#: entries are unsigned integers of as many bytes as the group has characters
+Table = NDArray[np.unsignedinteger[Any]]
 
 #: digits in a full group
 GROUP = 4
 
 #: row widths are multiples of so many bytes, for what looks at rows by words
 WORD = 8
+
+
+@cache
+def whole_table(digits: int) -> Table:
+    """(3, 10**digits) digits before the point, of a group of 1, 2 or 4.
+
+    By what stands around the group: row 0 drops all leading zeros, row 1 keeps the last digit, row 2 keeps all.
+    """
+    shown = _characters(digits)
+    significant = np.logical_or.accumulate(shown != ord("0"), axis=1)
+    bare = np.where(significant, shown, 0)
+    units = bare.copy()
+    units[:, -1] = shown[:, -1]
+    return _pack(bare, units, shown)
+
+
+@cache
+def part_table(digits: int, point: bool) -> Table:
+    """(2, 10**digits) digits after the point, of a group of 1 to 4; `point` puts the point in front of them.
+
+    Row 0 keeps all digits, row 1 drops trailing zeros.
+    """
+    shown = _characters(digits)
+    significant = np.logical_or.accumulate(shown[:, ::-1] != ord("0"), axis=1)[:, ::-1]
+    trimmed = np.where(significant, shown, 0)
+    if point:
+        shown, trimmed = (np.insert(group, 0, ord("."), axis=1) for group in (shown, trimmed))
+    return _pack(shown, trimmed)
+
+
+def _characters(digits: int) -> NDArray[np.uint8]:
+    """(10**digits, digits) ASCII digits of 0, 1, 2, ..."""
+    power = 10 ** np.arange(digits)[::-1]
+    return (np.arange(10**digits)[:, None] // power % 10 + ord("0")).astype(np.uint8)
+
+
+def _pack(*groups: NDArray[np.uint8]) -> Table:
+    stacked = np.ascontiguousarray(np.stack(groups), np.uint8)
+    packed: Table = stacked.view(f"u{stacked.shape[-1]}")[..., 0]
+    packed.flags.writeable = False
+    return packed
 
 
 def put(matrix: Bytes, column: int, values: NDArray[Any]) -> None:

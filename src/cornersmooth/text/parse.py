@@ -12,13 +12,9 @@ import math
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.text.eight_digits import DIGITS, LAST_DIGITS, Bytes, Words, join_digits, words_of
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 #: bytes taken at a time: the block and the arrays made from it stay in the second-level cache
 BLOCK: Final = 1 << 16

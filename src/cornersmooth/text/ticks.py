@@ -7,12 +7,10 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from cornersmooth.errors import OutputError
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from cornersmooth.model import Floats, Ints
 
 #: largest number of ticks, and the most decimals: within them a product with a power of ten is known to a fraction of
 #: a tick, so that a tie can be told

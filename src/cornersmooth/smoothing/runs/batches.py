@@ -20,11 +20,10 @@ from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.geometry.ragged import ranges, spread, starts
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.slices import some_rows
-from cornersmooth.smoothing.runs.banded import TAPS, Gather
+from cornersmooth.smoothing.runs.banded import TAPS, Gather, Windows
 from cornersmooth.smoothing.runs.fitting import holding_poses
 from cornersmooth.smoothing.runs.interior import COLD, WARM, Task, smoothest
 from cornersmooth.smoothing.runs.polylines import Pieces, Polylines, Samples
-from cornersmooth.smoothing.runs.windows import Windows
 from cornersmooth.vectors import dot, norm
 
 #: share of the tolerance that the samples may use
@@ -135,7 +134,7 @@ def solve_windows(
     may be left to gain, over the objective, in each round, and `near` whether `control` is near the solution.
     """
     moved = control[windows.control].copy()
-    there = _Places.of(problem, windows, tight)
+    there = _Places(problem, windows, tight)
     width = problem.splines.width[windows.span]
     rough = problem.rough[windows.control]
     run = problem.splines.control_run[windows.control]
@@ -161,26 +160,12 @@ def solve_windows(
     return moved
 
 
-@dataclass(frozen=True)
 class _Places:
     """Samples of some windows and how far they may be off, in units of the tolerances."""
 
-    problem: Problem
-    windows: Windows
-    target: Floats
-    near: Gather
-    smooth: Gather
-    axis: Floats
-    short: Floats  # length of the lever over H
-    limit: Floats  # (m, 2)
-    rough: Floats  # (m, 6)
-    normal: Floats  # (m, 3) of the plane of the axes, or 0
-    penalty: Floats
-    sample_window: Ints
-
-    @classmethod
-    def of(cls, problem: Problem, windows: Windows, tight: Floats) -> _Places:
+    def __init__(self, problem: Problem, windows: Windows, tight: Floats) -> None:
         splines, pieces = problem.splines, problem.pieces
+        self.problem, self.windows = problem, windows
         number = problem.first_piece[windows.span + 1] - problem.first_piece[windows.span]
         rows = ranges(problem.first_piece[windows.span], number)
         own = some_rows(pieces, rows)
@@ -189,20 +174,22 @@ class _Places:
         begins = np.concatenate(([True], samples.piece[1:] != samples.piece[:-1]))
         before = np.where(begins, np.maximum(rows - 1, 0)[samples.piece], rows[samples.piece])
         tight = tight * np.stack((np.ones(len(pieces.span)), problem.room[pieces.segment]), axis=1)
-        limit = SHARE * np.minimum(tight[rows][samples.piece], tight[before])  # a piece ends where the next begins
-        near = Gather(windows.local[span], samples.basis, len(windows.control))
-        smooth = Gather(windows.local, splines.third[windows.span], len(windows.control))
+        # a piece ends where the next begins
+        self.limit = SHARE * np.minimum(tight[rows][samples.piece], tight[before])  # (m, 2)
+        self.near = Gather(windows.local[span], samples.basis, len(windows.control))
+        self.smooth = Gather(windows.local, splines.third[windows.span], len(windows.control))
+        self.target = samples.target
         lever = samples.target[:, 3:] - samples.target[:, :3]
         length = norm(lever)
-        rough = (near.apply(problem.rough[windows.control]) - samples.target) / np.repeat(problem.tolerances, 3)
-        axis, short = lever / length[:, None], length / problem.axis_length
-        normal = problem.normal[splines.span_run[windows.span[span]]]
-        window = windows.span_window[span]
+        off = self.near.apply(problem.rough[windows.control]) - samples.target
+        self.rough = off / np.repeat(problem.tolerances, 3)  # (m, 6)
+        self.axis, self.short = lever / length[:, None], length / problem.axis_length  # the lever's length over H
+        self.normal = problem.normal[splines.span_run[windows.span[span]]]  # (m, 3) of the plane of the axes, or 0
+        self.sample_window = windows.span_window[span]
         length_of_samples = (own.high - own.low)[samples.piece] / np.bincount(samples.piece)[samples.piece]
-        share = length_of_samples / np.bincount(windows.span_window, splines.width[windows.span])[window]
-        penalty = PENALTY * share * problem.sampled[windows.span[span]]
-        places = samples.target, near, smooth, axis, short, limit, rough, normal, penalty
-        return cls(problem, windows, *places, window)
+        length_of_windows = np.bincount(windows.span_window, splines.width[windows.span])
+        share = length_of_samples / length_of_windows[self.sample_window]
+        self.penalty = PENALTY * share * problem.sampled[windows.span[span]]
 
     def deviation(self, moved: Floats, part: int) -> Floats:
         """(m, 3) of tip or axis point from control points (c, 6)."""

@@ -8,9 +8,8 @@ from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.geometry.ragged import ranges, spread
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.slices import some_rows
-from cornersmooth.smoothing.runs.banded import Gather, applied, solve_scalar
+from cornersmooth.smoothing.runs.banded import Gather, Windows, applied, solve_scalar
 from cornersmooth.smoothing.runs.polylines import Pieces, Polylines, Samples
-from cornersmooth.smoothing.runs.windows import Windows
 
 #: share of the tolerances that the fit may use. Less in spans that hold poses: the knots of neighbouring passes differ,
 #: and must not show.

@@ -14,8 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.smoothing.runs.banded import Gather, couplings, keep_in_planes, solve_blocks
-from cornersmooth.smoothing.runs.windows import Windows
+from cornersmooth.smoothing.runs.banded import Gather, Windows, couplings, keep_in_planes, solve_blocks
 
 #: steps at most, and the share of the way to the bounds that each may go
 STEPS, BACK_OFF = 40, 0.95

@@ -1,4 +1,14 @@
-"""Runs solved and proved: knots by fitting, control points by the interior-point method, bounds for every piece."""
+"""Runs solved and proved: knots by fitting, control points by the interior-point method, bounds for every piece.
+
+Bounds are of the deviation at common parameters over whole stretches, not at samples: between neighbouring knots and
+poses the curve less the original motion is one cubic in each coordinate, and a cubic stays within the hull of its
+Bernstein points. For the tip that is all. The axis point b = tip + H·axis is measured at constant H: with ΔA, ΔB the
+deviations of both curves, δ = ΔB − ΔA, and O, l direction and length of the original lever,
+
+    b′ − b = ΔA + (H/l′)·(δ − O(O·δ)) − (H/l′)·q·O        l′ = |l·O + δ|,   0 ≤ q ≤ |δ|²/(2(l + O·δ))
+
+With O and H/l taken from the middle of the stretch this is a cubic again; what it leaves out is bounded.
+"""
 
 from __future__ import annotations
 
@@ -11,13 +21,11 @@ from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.geometry.ragged import batches, spread, starts
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.processes import map_in_processes
-from cornersmooth.slices import some_rows
+from cornersmooth.smoothing.runs.banded import Windows
 from cornersmooth.smoothing.runs.batches import Problem, solve_windows
 from cornersmooth.smoothing.runs.fitting import fit
 from cornersmooth.smoothing.runs.polylines import Pieces, Polylines
-from cornersmooth.smoothing.runs.proof import bounds
 from cornersmooth.smoothing.runs.rows import largest_curvature, points_at
-from cornersmooth.smoothing.runs.windows import Windows
 from cornersmooth.vectors import angle_between, norm
 
 #: spans of a window that are its own, and spans beside them that settle down to what the neighbour finds
@@ -42,6 +50,15 @@ MENDINGS, MENDED = 5, 16
 #: of control points over which the rest of the way is gone
 BLENDS = (0.9, 0.75, 0.5, 0.0)
 FADE = 8
+
+#: parts that every stretch is looked at in, first and where that is not enough
+PARTS, MORE_PARTS = 2, 12
+
+#: places of the Bernstein points of a straight motion
+_THIRDS = np.arange(4) / 3.0
+
+#: stretches looked at together
+_BLOCK = 32768
 
 
 @dataclass(frozen=True)
@@ -79,7 +96,7 @@ def solve_runs(
     changed = np.arange(len(pieces.span))
     limits = np.array(tolerances)
     for number in range(MENDINGS + 1):
-        proven[changed] = bounds(splines, control, lines, some_rows(pieces, changed), axis_length, tolerances)
+        proven[changed] = bounds(problem, control, changed)
         failed = np.flatnonzero((proven > limits).any(axis=1))
         if not len(failed) or number == MENDINGS:
             break
@@ -99,7 +116,7 @@ def solve_runs(
         share = _fade(splines, pieces.span[failed], part)[:, None]
         control = rough + share * (control - rough)
         changed = _touched(splines, pieces, np.flatnonzero(share[:, 0] < 1.0))
-        proven[changed] = bounds(splines, control, lines, some_rows(pieces, changed), axis_length, tolerances)
+        proven[changed] = bounds(problem, control, changed)
     worst = np.zeros((len(lines.count), 2))
     np.maximum.at(worst, run, proven)
     tip, axis = worst[:, 0], worst[:, 1]
@@ -208,3 +225,57 @@ def measured(curves: RunCurves) -> tuple[Floats, Floats, Floats, Floats]:
     off = tip - lines.point[:, :3]
     top = off + size * axis - lever
     return norm(off), norm(top), angle_between(axis, lever / size), largest_curvature(lines, splines, curves.control)
+
+
+def bounds(problem: Problem, control: Floats, rows: Ints) -> Floats:
+    """(p, 2) mm: bounds of the deviation of tip and axis point on some pieces; those beyond the tolerances closely."""
+    proven = np.zeros((len(rows), 2))
+    for begin in range(0, len(rows), _BLOCK):
+        some = np.arange(begin, min(begin + _BLOCK, len(rows)))
+        proven[some] = _bound(problem, control, rows[some], PARTS)
+        doubtful = some[(proven[some] > problem.tolerances).any(axis=1)]
+        if len(doubtful):
+            proven[doubtful] = np.minimum(proven[doubtful], _bound(problem, control, rows[doubtful], MORE_PARTS))
+    return proven
+
+
+def _bound(problem: Problem, control: Floats, rows: Ints, parts: int) -> Floats:
+    lines, pieces, largest = problem.lines, problem.pieces, np.zeros((len(rows), 2))
+    span, segment = pieces.span[rows], pieces.segment[rows]
+    hull = problem.splines.bezier(control, span, pieces.low[rows], pieces.high[rows])
+    start, step = lines.point[segment], lines.point[segment + 1] - lines.point[segment]
+    length = lines.s[segment + 1] - lines.s[segment]
+    low, width = (pieces.low[rows] - lines.s[segment]) / length, (pieces.high[rows] - pieces.low[rows]) / length
+    original = start[:, None] + (low[:, None] + width[:, None] * _THIRDS)[:, :, None] * step[:, None]
+    whole_off, whole_levers = hull - original, original[:, :, 3:] - original[:, :, :3]
+    ends = np.arange(parts + 1) / parts
+    whole = Splines(np.array([0.0, 1.0]), np.array([2]))
+    for cut in whole.bernstein(np.zeros(parts, np.int64), ends[:-1], ends[1:]):
+        off, levers = cut @ whole_off, cut @ whole_levers
+        np.maximum(largest[:, 0], _longest(off[:, :, :3]), out=largest[:, 0])
+        np.maximum(largest[:, 1], _axis_bound(off, levers, problem.axis_length), out=largest[:, 1])
+    return largest
+
+
+def _axis_bound(off: Floats, levers: Floats, axis_length: float) -> Floats:
+    """(g,) bounds from Bernstein points (g, 4, 6) of the deviation and levers (g, 4, 3) on the stretch."""
+    tip, swing = off[:, :, :3], off[:, :, 3:] - off[:, :, :3]
+    middle = (levers[:, 0] + levers[:, 3]) / 2.0
+    size = np.sqrt((middle**2).sum(axis=1))
+    direction = middle / size[:, None]
+    half_way = np.sqrt(((levers[:, 3] - levers[:, 0]) ** 2).sum(axis=1)) / 2.0
+    factor = axis_length / size
+    across = swing - (swing @ direction[:, :, None]) * direction[:, None]
+    first = _longest(tip + factor[:, None, None] * across)
+    # every lever of the stretch is within half_way of the one in the middle
+    largest = _longest(swing)
+    shortest = np.maximum(size - half_way - largest, 1e-9 * axis_length)
+    turned = np.minimum(half_way / size, 1.0)  # sine of the angle to the middle, at most
+    steepest = axis_length / shortest
+    rest = (steepest * turned + (steepest - axis_length / (size + half_way + largest))) * largest
+    return first + rest + steepest * largest**2 / (2.0 * shortest)
+
+
+def _longest(vectors: Floats) -> Floats:
+    """(g,) length of the longest of the vectors (g, k, 3)."""
+    return np.sqrt((vectors**2).sum(axis=2).max(axis=1))
