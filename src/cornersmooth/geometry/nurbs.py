@@ -64,14 +64,6 @@ def full_weights(weights: Floats) -> Floats:
     return np.stack((one, w1, w2, w1, one), axis=-1)
 
 
-def trimmed_legs(values: Floats, corners: Corners, rows: Ints) -> tuple[Floats, Floats, Floats]:
-    """Values (n, 3) of a program at some corners, and their legs into and out of them, trimmed: (g, 3) each."""
-    here = values[corners.pose[rows]]
-    leg_in = (here - values[corners.before[rows]]) * corners.trim_in[rows, None]
-    leg_out = (values[corners.after[rows]] - here) * corners.trim_out[rows, None]
-    return here, leg_in, leg_out
-
-
 def control_points(
     program: Program, corners: Corners, rows: Ints | Bools | slice, axis_length: float
 ) -> tuple[Floats, Floats]:

@@ -154,15 +154,13 @@ def tools_of(program: Program) -> list[tuple[int, Tool, int]]:
 
 
 def _tool(statement: Statement, unit: float) -> Tool | None:
+    numbers = [float(value) for value in statement.args if isinstance(value, (int, float))]
     if statement.word == "CUTTER":
-        numbers = [float(value) for value in statement.args if isinstance(value, (int, float))]
         return _apt_cutter(numbers, unit)
     if statement.word == "TLDATA":
-        numbers = [float(value) for value in statement.args if isinstance(value, (int, float))]
         if not numbers:
             return None
-        numbers += [0.0] * (5 - len(numbers))
-        diameter, radius, length, taper, tip = numbers[:5]
+        diameter, radius, length, taper, tip = [*numbers, *[0.0] * 5][:5]
         # the last two numbers of a drill are its flute length and number, not angles
         angles = (taper, tip) if "MILL" in statement.args[:1] else (0.0, 0.0)
         return Tool.of(diameter * unit, radius * unit, angles[0], length * unit, angles[1])

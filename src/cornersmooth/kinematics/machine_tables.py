@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from functools import partial
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from cornersmooth.kinematics.machine import LINEAR, Dynamics, Machine, RotaryAxis, Travel
 from cornersmooth.tables import Shelf, Table
+
+Row = TypeVar("Row")
 
 _SHELF = Shelf(
     "machine",
@@ -57,15 +59,16 @@ def parse_machine(text: str | Table, *, file: str = "<machine>", name: str = "ma
         if "axis" not in table:
             raise _SHELF.wrong("no rotary axis is described", "write [[axis]], or axis = [] for a machine without")
         axes = tuple(_axis(entry, f"axis {number}") for number, entry in enumerate(entries, start=1))
-        position = partial(_position, names=(*LINEAR, *sorted(axis.name for axis in axes)))
+        names = [axis.name for axis in axes]
+        position = _named((*LINEAR, *sorted(names)), lambda name, value, at: (name, _SHELF.number(value, at)))
         return _SHELF.record(
             Machine,
             {"name": name} | {key: value for key, value in table.items() if key != "axis"},
             "",
             given={"axes": axes},
             preferred=_preferred,
-            dynamics=partial(_dynamics, names=(*LINEAR, *(axis.name for axis in axes))),
-            travel=_travel,
+            dynamics=_named((*LINEAR, *names), _dynamics),
+            travel=_named(LINEAR, _travel),
             tool_lengths=_tool_lengths,
             home=position,
             tool_change=position,
@@ -84,28 +87,22 @@ def _tool_lengths(given: Any, where: str) -> tuple[tuple[int, float], ...]:
     return tuple((int(name), _SHELF.number(value, f"{where}.{name}")) for name, value in given.items())
 
 
-def _position(given: Any, where: str, names: tuple[str, ...]) -> tuple[tuple[str, float], ...]:
-    """Position of any axes, in the order of their names."""
-    _SHELF.check_keys(_SHELF.table(given, where), names, f"{where}.")
-    return tuple((name, _SHELF.number(given[name], f"{where}.{name}")) for name in names if name in given)
+def _named(names: Sequence[str], read: Callable[[str, Any, str], Row]) -> Callable[[Any, str], tuple[Row, ...]]:
+    """Reader of a table by names of axes: a row of each that it has, in the order of the names."""
+
+    def rows(given: Any, where: str) -> tuple[Row, ...]:
+        _SHELF.check_keys(_SHELF.table(given, where), names, f"{where}.")
+        return tuple(read(name, given[name], f"{where}.{name}") for name in names if name in given)
+
+    return rows
 
 
-def _travel(given: Any, where: str) -> tuple[Travel, ...]:
-    _SHELF.check_keys(_SHELF.table(given, where), LINEAR, f"{where}.")
-    hint = "write {} = [lowest, highest] in mm"
-    return tuple(
-        Travel(name, *_SHELF.numbers(given[name], f"{where}.{name}", count=2, hint=hint.format(name)))
-        for name in LINEAR
-        if name in given
-    )
+def _travel(name: str, value: Any, where: str) -> Travel:
+    return Travel(name, *_SHELF.numbers(value, where, count=2, hint=f"write {name} = [lowest, highest] in mm"))
 
 
-def _dynamics(given: Any, where: str, names: tuple[str, ...]) -> tuple[Dynamics, ...]:
-    """Limits of the axes in the order of their names."""
-    _SHELF.check_keys(_SHELF.table(given, where), names, f"{where}.")
-    return tuple(
-        _SHELF.record(Dynamics, given[name], f"{where}.{name}", given={"name": name}) for name in names if name in given
-    )
+def _dynamics(name: str, value: Any, where: str) -> Dynamics:
+    return _SHELF.record(Dynamics, value, where, given={"name": name})
 
 
 def _preferred(value: Any, where: str) -> tuple[str, float]:

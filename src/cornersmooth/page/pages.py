@@ -51,20 +51,20 @@ def page_and_saving(
     """
     form, settings = result.form, result.smoothed.settings
     limits, axes = limits or Limits(), form.machine if axes is None else axes
-    subject = _subject(result, limits, axes, tool, frame=frame)
     badge, saving = result.verdict, None
     if timed and badge not in (Verdict.FAILED, Verdict.NOT_VERIFIED):
         saving = planned_saving(result.program, settings, form, limits, axes)
-    story = Story(
+    made = _told(
+        _subject(result, limits, axes, tool, frame=frame),
         _name(result.path) or result.program.source.name,
         first_line(result.report(), saving),
         badge,
-        _head(subject, form.table.name, form.name, form.machine),
-        _problems(result.verification, result.findings),
-        [*_input_facts(result.program, source), *_settings_facts(settings), *_limit_facts(limits, axes)],
-        _notes(result.findings),
+        (form.table.name, form.name, form.machine),
+        findings=result.findings,
+        facts=_settings_facts(settings),
+        source=source,
     )
-    return page(subject, story), saving
+    return made, saving
 
 
 def _subject(
@@ -143,15 +143,13 @@ def verified_page(
     )
     findings = (*program.findings, *trusted_blocks(found))
     judgement = judge(found, findings) if judgement is None else judgement
-    measured = _measured_facts(found, origin.split()[0])
-    facts = [*_input_facts(program, source, origin), *measured, *_limit_facts(limits, machine)]
-    text = judgement.text
+    facts, text = _measured_facts(found, origin.split()[0]), judgement.text
     if surface is not None:
         text += "; " + surface_text(surface)
-        facts[-1:-1] = [("tool", surface.tool.describe()), ("cutting edge", f"{surface.edge:g} mm")]
-    head = _head(subject, control, form, machine, origin)
-    told = _problems(found, findings), facts, _notes(findings), origin.split()[0]
-    return page(subject, Story(_name(name) or program.source.name, text, judgement.verdict, head, *told))
+        facts += [("tool", surface.tool.describe()), ("cutting edge", f"{surface.edge:g} mm")]
+    title = _name(name) or program.source.name
+    written = control, form, machine
+    return _told(subject, title, text, judgement.verdict, written, findings, facts, source, origin)
 
 
 def times_page(compared: Comparison, *, source: bytes = b"", tool: Tool | None = None) -> str:
@@ -163,16 +161,11 @@ def times_page(compared: Comparison, *, source: bytes = b"", tool: Tool | None =
     laws = {"direct": compared.laws["direct_velocity_jump"]}
     subject, found = _subject(result, compared.limits, compared.machine, tool, laws=laws), result.verification
     assert found is not None
-    facts = [
-        *_input_facts(program, source),
-        *_settings_facts(result.smoothed.settings),
-        *((f"time, {name.replace('_', ' ')}", f"{law.total:.3f} s") for name, law in compared.laws.items()),
-        *_limit_facts(compared.limits, compared.machine),
-    ]
+    times = ((f"time, {name.replace('_', ' ')}", f"{law.total:.3f} s") for name, law in compared.laws.items())
+    facts = [*_settings_facts(result.smoothed.settings), *times]
     text = times_text(compared.seconds, [name for name in compared.laws if not name.startswith("direct")])
-    head = _head(subject, form.table.name, form.name, compared.machine)
-    told = _problems(found, program.findings), facts, _notes(program.findings)
-    return page(subject, Story(program.source.name, text, found.verdict, head, *told))
+    written = form.table.name, form.name, compared.machine
+    return _told(subject, program.source.name, text, found.verdict, written, program.findings, facts, source)
 
 
 #: problems and findings that a page lists
@@ -193,20 +186,34 @@ def _name(path: str | None) -> str:
     return os.path.basename(path or "")
 
 
-def _head(
-    subject: Subject, control: str, form: str, machine: Machine | None, origin: str = "CL file"
-) -> list[tuple[str, str]]:
-    """Labels and values of what is always in sight; what is not known is left out."""
-    settings, own = subject.settings, subject.settings.axis_tolerance
-    facts = [
-        (origin, subject.program.source.name),
+def _told(
+    subject: Subject,
+    title: str,
+    text: str,
+    badge: Verdict,
+    written: tuple[str, str, Machine | None],
+    findings: Iterable[Finding],
+    facts: Iterable[tuple[str, str]],
+    source: bytes,
+    origin: str = "CL file",
+) -> str:
+    """Page of a subject, for a control, form and machine; what is not known is left out of what is always in sight."""
+    settings, own, given = subject.settings, subject.settings.axis_tolerance, subject.program.source
+    control, form, machine = written
+    head = [
+        (origin, given.name),
         ("control", control),
         ("form", form),
         ("machine", machine.name if machine else ""),
         ("tolerance", f"{settings.tolerance:g} mm"),
         ("axis length", f"{settings.axis_length:g} mm") if own is None else ("axis tolerance", f"{own:g}°"),
     ]
-    return [(label, value) for label, value in facts if value]
+    head = [(label, value) for label, value in head if value]
+    inputs = [(origin, f"{given.name}: {given.dialect}, {len(subject.program):,} poses, {subject.program.units}")]
+    inputs += [(f"SHA-256 of the {origin}", hashlib.sha256(source).hexdigest())] if source else []
+    every, findings = [*inputs, *facts, *_limit_facts(subject.limits, subject.machine)], tuple(findings)
+    problems = _problems(subject.verification, findings)
+    return page(subject, Story(title, text, badge, head, problems, every, _notes(findings), origin.split()[0]))
 
 
 def _problems(found: Verification | None, findings: Iterable[Finding]) -> list[dict[str, Any]]:
@@ -230,27 +237,16 @@ def _text(finding: Finding) -> str:
     return finding.text + (f" ({finding.count:,} times)" if finding.count > 1 else "")
 
 
-def _input_facts(program: Program, source: bytes, origin: str = "CL file") -> list[tuple[str, str]]:
-    given = program.source
-    facts = [(origin, f"{given.name}: {given.dialect}, {len(program):,} poses, {program.units}")]
-    return facts + ([(f"SHA-256 of the {origin}", hashlib.sha256(source).hexdigest())] if source else [])
-
-
 def _settings_facts(settings: Settings) -> list[tuple[str, str]]:
-    return [
-        ("method", settings.method),
-        ("reversals", f"sharp above {settings.reversal_angle:g}°"),
-    ]
+    return [("method", settings.method), ("reversals", f"sharp above {settings.reversal_angle:g}°")]
 
 
 def _measured_facts(found: Verification, whose: str) -> list[tuple[str, str]]:
+    point = found.axis_point
     return [
         ("tip, largest", f"{found.tip.value:.6g} mm at {whose} line {found.tip.cl_line}"),
-        *(
-            [("axis point, largest", f"{found.axis_point.value:.6g} mm at {whose} line {found.axis_point.cl_line}")]
-            if found.axis_tolerance is None
-            else []
-        ),
+        *[("axis point, largest", f"{point.value:.6g} mm at {whose} line {point.cl_line}")]
+        * (not found.axis_tolerance),
         ("tool axis, largest", f"{found.orientation.value:.4g}° at {whose} line {found.orientation.cl_line}"),
         ("blocks", f"{found.blocks:,}"),
     ]

@@ -170,13 +170,16 @@ class Proportional(Construction):
 
     def points(self, smoothed: SmoothProgram, rows: Ints, u: Floats) -> tuple[Floats, Floats]:
         """Both curves at the same parameters."""
-        program, settings = smoothed.program, smoothed.settings
+        corners, settings = smoothed.corners, smoothed.settings
         shares = nurbs.leg_coefficients(np.concatenate(([0.0], u)), np.array(settings.weights), settings.ratio)
-        tips, levers = (
-            shares @ np.stack(nurbs.trimmed_legs(values, smoothed.corners, rows), axis=1)
-            for values in (program.tip, program.axis)
-        )
-        return tips, levers
+        pose, before, after = corners.pose[rows], corners.before[rows], corners.after[rows]
+        trim_in, trim_out = corners.trim_in[rows, None], corners.trim_out[rows, None]
+        legs = np.empty((2, len(rows), 3, 3))
+        for own, values in zip(legs, (smoothed.program.tip, smoothed.program.axis), strict=True):
+            own[:, 0] = here = values[pose]
+            np.multiply(here - values[before], trim_in, out=own[:, 1])
+            np.multiply(values[after] - here, trim_out, out=own[:, 2])
+        return shares @ legs[0], shares @ legs[1]
 
     def divide(
         self, program: Program, settings: Settings, remainders: Remainders, number: int

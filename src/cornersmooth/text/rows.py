@@ -122,7 +122,7 @@ class RowFormat:
             empty = np.array([not text for text in prefix])[np.broadcast_to(prefix_id, m)]
             blank = np.array([word[:1] == b" " for word in self.words])
             first = np.argmin(left_out, axis=1)
-            drop = _Drop(left_out, np.where(empty & blank[first], first, -1))
+            drop = left_out, np.where(empty & blank[first], first, -1)
         blocks = list(_write_blocks(ticks, layout, heads, tails, drop))
         offsets = np.zeros(m + 1, np.int64)
         np.cumsum(np.concatenate([lengths for _, lengths in blocks]), out=offsets[1:])
@@ -150,20 +150,6 @@ class RowFormat:
         return layout
 
 
-@dataclass(frozen=True)
-class _Drop:
-    """What rows have not: (m, c) words, and the blank of a word (m,), -1 for none."""
-
-    words: Bools
-    blank: Ints
-
-    def clear(self, start: int, stop: int, block: Bytes, layout: Layout) -> None:
-        """Take it out of rows `start` to `stop`, which are laid out."""
-        for column, (first, last) in enumerate(layout.spans):
-            block[self.words[start:stop, column], first:last] = 0
-            block[self.blank[start:stop] == column, first] = 0
-
-
 def _by_column(extreme: np.ufunc, ticks: Ints) -> list[int]:
     """Smallest or largest of each column; many rows side by side take a tenth of the time of one below the other."""
     m, columns = ticks.shape
@@ -175,9 +161,12 @@ def _by_column(extreme: np.ufunc, ticks: Ints) -> list[int]:
 
 
 def _write_blocks(
-    ticks: Ints, layout: Layout, heads: Choices, tails: Choices, drop: _Drop | None
+    ticks: Ints, layout: Layout, heads: Choices, tails: Choices, drop: tuple[Bools, Ints] | None
 ) -> Iterator[tuple[bytes, Ints]]:
-    """Write rows a block at a time; give the text of each block and the sizes of its rows."""
+    """Write rows a block at a time; give the text of each block and the sizes of its rows.
+
+    `drop` is what rows have not: (m, c) words, and the blank of a word (m,), -1 for none.
+    """
     m, width = len(ticks), len(layout.template)
     matrix = np.repeat(layout.template[None, :], min(BLOCK, m), axis=0)
     for start in range(0, m, BLOCK):
@@ -189,7 +178,10 @@ def _write_blocks(
         for column, cell in enumerate(layout.cells):
             cell.write(ticks[start:stop, column], block)
         if drop is not None:
-            drop.clear(start, stop, block, layout)
+            words, blank = (part[start:stop] for part in drop)
+            for column, (first, last) in enumerate(layout.spans):
+                block[words[:, column], first:last] = 0
+                block[blank == column, first] = 0
         tails.write(start, stop, block, layout.tail)
         used = block != 0
         # compress takes the same time for every pattern; a Boolean index is slower for many short runs
