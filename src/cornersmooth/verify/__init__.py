@@ -16,7 +16,7 @@ what is decided     where
 both as polylines   `cl_motion`, `motions`; how far they leave their chords, proved: `bending`
 run beside another  `passage`: by a `chain` of nearest places, where that fails exactly (`around`, `free_space`)
 stretch by stretch  `stops`: which elements reach them; `batches` cuts long stretches and decides; `match`: its places
-holes               `holes`; poses that are named by their digits: `exact_poses`; tool changes: package `statements`
+holes               `holes`; poses that are named by their digits: `motions`; tool changes: package `statements`
 what parts          `deviation`: the lines and the distances, which `distances` measures; poses that must be exact
 feeds               `feeds`; where a vertex may be besides its place: `reachable`
 words               `word_check`, `word_states` by `nc_reader.word_list`; `word_places`: where, for `statements`

@@ -101,16 +101,10 @@ class Around:
         return float(min(there, np.nextafter(end, start)) if place < k + 1 else there)
 
     def goal(self, known: Floats, last: int, stop: int | None) -> float | None:
-        """Go along the rows to one behind the `last` that has a known place, or to the end; None where that fails.
+        """Go along the rows to one after the `last` that the chain does not prove, or to the end; None if that fails.
 
-        Parameters
-        ----------
-        known : (k,) float64
-            Places of the rows by the chain, NaN where it does not prove them.
-        last : int
-            The last row that it does not prove, counted in these.
-        stop : int or None
-            Vertex of the path where the last row has to end; None where it may be anywhere; -1 where it must be known.
+        Of the rows places (k,) by the chain are `known`, else NaN. The last row has to end at vertex `stop` of the
+        path, anywhere if that is None, at a known place if it is -1.
         """
         final, end = len(self.places) - 2, len(self.at) - 1
         self.reached = [self.space.along(0, self.inward(self.start))]

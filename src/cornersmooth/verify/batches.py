@@ -38,13 +38,7 @@ _STRETCH: Final = np.dtype(
 
 
 class Batches:
-    """Makes batches of the elements of a text, as they come. Elements are counted in the whole text.
-
-    Parameters
-    ----------
-    events : sequence of Event
-        Words of the text, which grow as it is read.
-    """
+    """Makes batches of the elements of a text, as they come, counted in the whole text; its `events` grow along."""
 
     def __init__(self, task: Task, events: Sequence[Event]) -> None:
         self.task, self._events = task, events

@@ -220,14 +220,7 @@ def points_at(path: Floats, place: Floats, first: int = 0) -> Floats:
 def chain(own: Floats, bend: Floats, path: Path, radius: float, sections: Sections) -> Chain:
     """Go along the own polyline, and take for each vertex the nearest place around where it should be.
 
-    Parameters
-    ----------
-    own : (3h, n) float64, mm
-    bend : (n - 1,) float64, mm
-        Of each segment of it.
-    radius : float, mm
-    sections : Sections
-        The first begins at the first vertex, and is free there.
+    It has vertices (3h, n) and bends (n - 1,), mm. The first section begins at the first vertex, and is free there.
     """
     count = own.shape[1]
     step = own[:, 1:] - own[:, :-1]
@@ -298,14 +291,9 @@ def _places(own: Floats, gone: Floats, path: Path, radius: float, where: tuple[S
 
 
 def passed(own: Floats, step: Floats, path: Floats, place: Floats) -> tuple[Ints, Ints, Floats]:
-    """Vertices of the path that are passed on the steps of a chain, in order.
+    """Rows where steps begin, vertices of the path that are passed on them, in order, and fractions of the steps (k,).
 
-    Returns
-    -------
-    row, vertex : (k,) int64
-        The row that the step begins at.
-    share : (k,) float64
-        Fraction of the step, ascending along each: as near to the vertex as that allows.
+    The latter ascend along each step: as near to the vertex as that allows.
     """
     vertex = np.arange(int(place[0]) + 1, int(place[-1]) + 1)
     row = np.clip(np.searchsorted(place, vertex, side="left") - 1, 0, max(len(place) - 2, 0))

@@ -13,10 +13,9 @@ import numpy as np
 
 from cornersmooth.model import Floats, Ints
 from cornersmooth.verify.chain import points_at
-from cornersmooth.verify.exact_poses import digit_errors
 from cornersmooth.verify.findings import AXIS_OFF, Findings, Violation, Where
 from cornersmooth.verify.match import Match
-from cornersmooth.verify.motions import inner_points
+from cornersmooth.verify.motions import digit_errors, inner_points
 from cornersmooth.verify.nearest import COLUMNS, Metric, larger_square, nearest_places, on_segments
 from cornersmooth.verify.passage import AROUND, LONGER, MOST_BREAKS, Break
 from cornersmooth.verify.task import ARITHMETIC, Task

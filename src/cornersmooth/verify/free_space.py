@@ -42,12 +42,7 @@ def largest_square(away: Floats) -> Floats:
 def free_interval(point: Floats, start: Floats, way: Floats, radius: Floats) -> tuple[Floats, Floats]:
     """Fractions of segments at which every triple is within a radius of a point; the first is larger where none is.
 
-    Parameters
-    ----------
-    point, start, way : (3h, ...) float64, mm
-        Segments lead from `start` to ``start + way``.
-    radius : (...) float64, mm
-        Nothing is within a negative one.
+    Points, starts and ways of segments are (3h, ...), radii (...), mm. Nothing is within a negative one.
     """
     square = np.where(radius < 0.0, -1.0, radius * radius)
     low, high = np.asarray(0.0), np.asarray(1.0)
@@ -174,13 +169,7 @@ class FreeSpace:
         return list(zip(*(values.tolist() for values in (*up, *right)), strict=True))
 
     def between(self, rows: list[Reached], place: float) -> list[Reached]:
-        """What of rows can be reached, and the place in the last of them from there.
-
-        Parameters
-        ----------
-        rows : list of Reached
-            Forward from some place, row by row of this free space; the last holds `place`.
-        """
+        """What of rows, forward from some place, can be reached, and from there the place in the last of them."""
         first, stop = min(map(min, rows)), max(map(max, rows)) + 1
         part = self.part(slice(0, len(rows)), slice(first, stop)).reversed()
         # nothing is proved here, and what is free at one point only should not be lost by rounding

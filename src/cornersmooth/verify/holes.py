@@ -12,7 +12,7 @@ from cornersmooth.nc_reader.elements import Element, Problem
 from cornersmooth.nc_reader.tool import directions, leads_somewhere
 from cornersmooth.statements.cycles import Drilling
 from cornersmooth.verify.cl_motion import Original
-from cornersmooth.verify.exact_poses import digit_errors
+from cornersmooth.verify.motions import digit_errors
 from cornersmooth.verify.task import ARITHMETIC
 
 #: elements that are compared with a pose together, as the next ones will be wanted, too
@@ -20,12 +20,7 @@ _WINDOW = 16
 
 
 class HoleLines:
-    """Compares ends of elements with poses and holes of the CL file.
-
-    Parameters
-    ----------
-    axis_length, tolerance : float, mm
-    """
+    """Compares ends of elements with poses and holes of the CL file; lengths in mm."""
 
     def __init__(self, original: Original, ahead: Ahead, axis_length: float, tolerance: float) -> None:
         self.ahead, self.axis_length = ahead, axis_length

@@ -11,13 +11,13 @@ from typing import Final
 
 import numpy as np
 
-from cornersmooth.model import Floats, Ints
+from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.curves import groups
 from cornersmooth.nc_reader.elements import Element, Elements
 from cornersmooth.nc_reader.tool import directions, written_at
 from cornersmooth.verify.bending import arc_bend, curve_bend, turn_bend, wound_bend
 from cornersmooth.verify.cl_motion import UNBOUND, divided, parts_of
-from cornersmooth.verify.task import Task, side_by_side
+from cornersmooth.verify.task import ARITHMETIC, Task, side_by_side
 
 #: bend of a step of the written motion, in tolerances (speed only: steps that are not proved are divided)
 WRITTEN_SHARE: Final = 1.0 / 32.0
@@ -38,14 +38,7 @@ class Motion:
 
 
 def written_motion(nc: Elements, tolerance: float, axis_length: float, *, own_axis: bool) -> Motion:
-    """Make the polyline of elements; the first of them only says where the motion begins.
-
-    Parameters
-    ----------
-    tolerance, axis_length : float, mm
-    own_axis : bool
-        Whether the axis point is measured from the tip (see `Task`).
-    """
+    """Make the polyline of elements; the first of them only says where the motion begins. Lengths in mm; see `Task`."""
     second = nc.second - nc.tip if nc.second_is == "point" else nc.second
     bend = np.zeros(len(nc))
     bend[1:] = axis_length * turn_bend(second[:-1], second[1:])
@@ -112,3 +105,24 @@ def inner_points(nc: Elements, motion: Motion, task: Task, number: Floats, first
     start = np.where(motion.owner[before] == owner, motion.fraction[before], 0.0)
     share = start + (number - before) * (motion.fraction[after] - start)
     return task.six(*written_at(nc, owner + first, share))
+
+
+def digit_errors(nc: Elements, element: Ints, tip: Floats, axis: Floats, axis_length: float) -> tuple[Bools, Floats]:
+    """(k,) whether ends of elements name poses exactly, and the larger distance, mm, of tips or of axis points.
+
+    Exactly: every printed number is the pose's, rounded to the printed digits.
+    """
+    off = nc.tip[element] - tip
+    second = nc.second[element]
+    near = np.abs(off) <= (nc.tip_step / 2 + nc.tip_room[element] + ARITHMETIC)[:, None]
+    exact: Bools = np.logical_and.reduce(near, axis=1)
+    if nc.second_is == "vector":
+        side = second - axis
+        room = (nc.second_step / 2 + nc.second_room[element] + ARITHMETIC)[:, None]
+    else:  # only the direction of the axis point counts, and the tip's own rounding turns it too
+        side = second - nc.tip[element]
+        side -= np.linalg.norm(side, axis=1)[:, None] * axis
+        room = np.sqrt(3) * (nc.second_step + nc.tip_step) / 2 + ARITHMETIC
+    exact &= (np.abs(side) <= room).all(axis=1)
+    turned = off + axis_length * (directions(nc, nc.tip[element], second) - axis)
+    return exact, np.maximum(np.linalg.norm(off, axis=1), np.linalg.norm(turned, axis=1))

@@ -27,25 +27,9 @@ def larger_square(away: Floats) -> Floats:
 def nearest_places(
     point: Floats, vertices: Floats, middle: Ints, reach: int, low: Ints, high: Ints, metric: Metric = "both"
 ) -> Floats:
-    """Nearest places on a polyline among the segments around given ones.
+    """(k,) nearest places of points (k, 6) on a polyline of vertices (v, 6): segment plus fraction.
 
-    Parameters
-    ----------
-    point : (k, 6) float64
-        Tip and axis point.
-    vertices : (v, 6) float64
-        Segment j runs from vertex j to j + 1.
-    middle : (k,) int64
-        Segment around which to look.
-    reach : int
-        Segments on either side.
-    low, high : (k,) int64
-        First and last segment allowed.
-
-    Returns
-    -------
-    (k,) float64
-        Segment plus fraction.
+    They are looked for `reach` segments on either side of `middle`, from `low` to `high`, all (k,).
     """
     columns = COLUMNS[metric]
     steps = np.array([0, *(sign * k for k in range(1, reach + 1) for sign in (-1, 1))])

@@ -25,8 +25,8 @@ from cornersmooth.nc_reader.elements import Elements, Problem
 from cornersmooth.nc_reader.tool import beyond_digits, directions, moving_rapids
 from cornersmooth.statements.cycles import Drilling, drillings
 from cornersmooth.statements.tool_changes import ToolChanges
-from cornersmooth.verify.exact_poses import digit_errors
 from cornersmooth.verify.holes import HoleLines
+from cornersmooth.verify.motions import digit_errors
 from cornersmooth.verify.nearest import COLUMNS, on_segments
 from cornersmooth.verify.task import Task
 
@@ -47,24 +47,12 @@ _ELSEWHERE: Final = "motion that the CL file does not have"
 
 
 class Step(NamedTuple):
-    """A stop that is reached.
+    """A stop that is reached."""
 
-    Parameters
-    ----------
-    move : int
-        The move that ends there.
-    element : int
-        The element that ends there; the first one of a hole; the first feed move out of a hole.
-    opens : bool
-        Whether feed moves may follow, rather than a hole.
-    last : int
-        Last move before the next stop.
-    """
-
-    move: int
-    element: int
-    opens: bool
-    last: int
+    move: int  #: the move that ends there
+    element: int  #: the element that ends there; the first one of a hole; the first feed move out of a hole
+    opens: bool  #: whether feed moves may follow, rather than a hole
+    last: int  #: last move before the next stop
 
 
 class Part(NamedTuple):
@@ -97,13 +85,7 @@ class _Trace:
 
 
 class Stops:
-    """Finds the elements that reach the stops of the CL file, and checks them and the holes.
-
-    Parameters
-    ----------
-    ahead : Ahead
-        At least one element.
-    """
+    """Finds the elements, at least one, that reach the stops of the CL file, and checks them and the holes."""
 
     def __init__(self, task: Task, ahead: Ahead, changes: ToolChanges) -> None:
         self._task, self._ahead, self._changes = task, ahead, changes

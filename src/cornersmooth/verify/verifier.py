@@ -27,11 +27,11 @@ from cornersmooth.settings import BOUNDS
 from cornersmooth.statements.comparison import KINDS
 from cornersmooth.statements.left_out import gone_over, may_be_left_out
 from cornersmooth.verify.batches import Batches
+from cornersmooth.verify.cl_motion import half_turns
 from cornersmooth.verify.continuity import measure_continuity
 from cornersmooth.verify.deviation import check_breaks, measure_original, measure_written
 from cornersmooth.verify.feeds import check_feeds
 from cornersmooth.verify.findings import Findings, Where, problems_of
-from cornersmooth.verify.half_turns import half_turns
 from cornersmooth.verify.match import Batch, Match
 from cornersmooth.verify.own_rapids import OwnRapids
 from cornersmooth.verify.result import Verification
@@ -164,13 +164,7 @@ class Verifier:
             self._text.close()
 
     def result(self) -> Verification:
-        """Say what was found; the text must be complete.
-
-        Raises
-        ------
-        InputError
-            Where the text cannot be read.
-        """
+        """Say what was found; the text must be complete. Errors as above."""
         if isinstance(self._text, Source):
             self._text.finish()
         found: Verification = self._work() if self._helper is None else self._helper.result()
@@ -222,7 +216,7 @@ class Verifier:
         switches, scale = word_list(options.control).switches, self._program.mm_per_unit
         positions = MachinePositions(machine, scale, switches=switches, tcp=options.tcp)
         check = WordCheck(options.control, options.dialect.lexer, options.tolerance / scale, *self._own, positions)
-        own_rapids = OwnRapids(task)
+        own_rapids = OwnRapids(task.original)
         reader.retracts.added, reader.retracts.asked = own_rapids.added, own_rapids.goes_to
         lines = reader.lines(text)
         chunks = reader.chunks(check.watch(lines) if self._words else lines)
@@ -324,17 +318,7 @@ def _own_table(kinds: Set[str]) -> str:
 
 @taking_what(Verifier)
 def verify(*args: Any, **how: Any) -> Verification:
-    """Measure an NC text, that is whole, against the CL program it was made from.
-
-    Parameters
-    ----------
-    As `Verifier`.
-
-    Raises
-    ------
-    InputError, SettingsError
-        As `Verifier`.
-    """
+    """Measure an NC text, that is whole, against the CL program it was made from; all as `Verifier`."""
     with Verifier(*args, **how) as verifier:
         return verifier.result()
 

@@ -33,21 +33,11 @@ _MOST_WEIGHTS: Final = 100
 
 
 class WordCheck:
-    """Looks at all blocks of a program in order.
+    """Looks at all blocks of a program in order; ε in units of the program.
 
-    Parameters
-    ----------
-    tolerance : float
-        ε in units of the program.
-    trusted : iterable of str
-        Blocks that belong where they are because the user says so, any number where they have braces; names of states
-        that the program leaves to him, and `FRAME` where the blocks around the motion are his.
-    accepted : set of str
-        Words in these that move nothing because the user says so.
-    weights : iterable of float, optional
-        Those that control points of curves have; None where they may have any.
-    positions : MachinePositions, optional
-        Those of the machine's file.
+    Trusted blocks belong where they are because the user says so, any number where they have braces; so do names of
+    states that the program leaves to him, and `FRAME` where the blocks around the motion are his. Words in these that
+    are accepted move nothing. Control points of curves have one of the weights; any where these are None.
     """
 
     def __init__(

@@ -55,17 +55,11 @@ def _named(match: Match, vertex: int, length: float) -> Ints:
 
 
 class WordPlaces:
-    """Takes down what is known of the elements that have words behind them, while they are read; then compares these.
-
-    Attributes
-    ----------
-    margin : float, mm
-        What printed digits account for.
-    """
+    """Takes down what is known of the elements that have words behind them as they are read; then compares these."""
 
     def __init__(self, batches: Batches, events: list[Event]) -> None:
         self._batches, self._task, self._events = batches, batches.task, events
-        self.margin = 0.0
+        self.margin = 0.0  # what printed digits account for, mm
         self._rooms: dict[int, float] = {}  # how far the lengths at the ends of elements are uncertain, mm
         self._still: set[int] = set()  # rapids that lead nowhere
         # CL path lengths, mm, where elements end and begin, as far as they are known
@@ -102,17 +96,9 @@ class WordPlaces:
     ) -> tuple[list[Problem], set[int]]:
         """What words say wrongly, and the NC lines of those where the CL file has GOHOME.
 
-        Parameters
-        ----------
-        found : Findings
-            Of all batches.
-        means : mapping
-            As of `NcProgram`.
-        own : frozenset of str
-            Kinds of statements that the user says in words of his own.
-        clamps : set of float
-            M words that clamp a rotary axis or let it turn: they stand where the machine wants them, not where AUXFUN
-            has them.
+        Of all batches it is known what was `found`, of the control what its words mean (see `NcProgram`). The user says
+        some kinds of statements in words of his `own`. M words that clamp a rotary axis or let it turn stand where the
+        machine wants them, not where AUXFUN has them.
         """
         batches, path, original = self._batches, self._task.path, self._task.original
         program = original.program

@@ -80,12 +80,7 @@ class _Held:
 class WordStates:
     """Follows the states of one program.
 
-    Parameters
-    ----------
-    left : set of str
-        States, blocks and kinds of words that are the user's own; `FRAME` where the blocks around the motion are.
-    positions : MachinePositions
-        Those of the machine's file, which may say where the program ends, and its rotary axes.
+    States, blocks and kinds of words that are `left` are the user's own; `FRAME`: the blocks around the motion are.
     """
 
     def __init__(self, listed: WordList, positions: MachinePositions, left: Set[str]) -> None:
@@ -270,18 +265,9 @@ class WordStates:
     def motion(
         self, line: int, words: Mapping[str, float], code: float, *, moves: bool = False, drills: bool = False
     ) -> None:
-        """Look at what holds where the tool moves.
+        """Look at what holds where the tool moves by the words of a block, and by the G word of group 01 in force.
 
-        Parameters
-        ----------
-        words : mapping
-            Of the block.
-        code : float
-            G word of group 01 in force.
-        moves : bool
-            Whether the tool moves along Z whatever the words are.
-        drills : bool
-            Whether they are those of a cycle of the control: no place to which the tool goes at once.
+        `moves`: along Z, whatever the words are; `drills`: in a cycle of the control, so it does not go there at once.
         """
         down, first = moves or "Z" in words, self._first is None
         if self._stopped is not None:
