@@ -124,9 +124,9 @@ class Event:
 
     element: int  #: index of the path element it stands before (the number of elements after the last one)
     line: int  #: NC line, from 1
-    letter: str  #: ``"T"``, ``"S"``, ``"M"``, ``"G"``, ``"H"``, ``"D"``, or ``"("`` for a comment
+    letter: str  #: ``"T"``, ``"S"``, ``"M"``, ``"G"``, ``"H"`` or ``"D"``
     value: float  #: the number of the word; for ``G4`` the dwell in milliseconds is in `text`
-    text: str = ""  #: the word as written; the comment's text
+    text: str = ""  #: the word as written
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,9 +15,6 @@ from cornersmooth.nc_reader.words import Line
 if TYPE_CHECKING:
     from cornersmooth.nc_reader.reader import Reader
 
-#: how a comment begins that says that a hole is left out on purpose
-NOT_DRILLED: Final = "NOT DRILLED"
-
 #: share of a peck that the tool stays above the last depth when it comes back
 _ABOVE: Final = 0.05
 

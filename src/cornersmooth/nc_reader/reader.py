@@ -66,7 +66,6 @@ class Reader:
         self.ready: list[Elements] = []
         self.events: list[Event] = []
         self.late: list[Event] = []
-        self.comments: list[tuple[int, str]] | None = None
         self.problems: list[Problem] = []
         self._told: set[str] = set()  # texts of problems that are told once for each tilted plane
         self.lever, self._given_lever = 0.0, lever
@@ -128,8 +127,6 @@ class Reader:
         """Take a line of another kind."""
         if line.words:
             self.blocks += 1
-        if self.comments is not None:
-            self.comments.extend((line.number, text) for text in line.comments)
         row = self.dialect.row(line) if line.words else None
         if row is not None:
             self.waiting.append((line.number, row))

@@ -7,11 +7,9 @@ import os
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-import numpy as np
-
 from cornersmooth.errors import SettingsError
 from cornersmooth.nc_reader.dialects import CONTROLS, Dialect, dialect_of
-from cornersmooth.nc_reader.elements import Elements, Event, NcProgram
+from cornersmooth.nc_reader.elements import Elements, NcProgram
 from cornersmooth.nc_reader.reader import Reader
 from cornersmooth.nc_reader.rotary import Rotary
 from cornersmooth.nc_reader.source import Source, readable_twice
@@ -132,19 +130,12 @@ def read_nc(
     SettingsError
         CS204 for an unknown control, CS215 for positions of a machine that is not named.
     """
-    return read_styled(
-        data, ReadingOptions.of(control, machine, tcp=tcp, tolerance=tolerance, axis_length=axis_length), name
-    )
-
-
-def read_styled(data: bytes | str | os.PathLike[str], options: ReadingOptions, name: str | None = None) -> NcProgram:
-    """Read an NC text; see `read_nc`."""
+    options = ReadingOptions.of(control, machine, tcp=tcp, tolerance=tolerance, axis_length=axis_length)
     label = name if name is not None or isinstance(data, bytes) else str(data)
     source = Source(readable_twice(data))
     try:
         source.finish()
         reader = Reader(label, options, options.steps(source.head(DIGITS_SAMPLE)))
-        reader.comments = []
         return program_of(reader, list(reader.chunks(reader.lines(source))))
     finally:
         source.close()
@@ -153,14 +144,9 @@ def read_styled(data: bytes | str | os.PathLike[str], options: ReadingOptions, n
 def program_of(reader: Reader, parts: list[Elements]) -> NcProgram:
     """Put together what was given out, and what the text says beside the motion."""
     elements = Elements.joined(parts) if parts else reader.nothing
-    comments = reader.comments or []
-    place = np.searchsorted(elements.line, [number for number, _ in comments])
-    events = reader.events + [
-        Event(int(element), number, "(", 0.0, text) for element, (number, text) in zip(place, comments, strict=True)
-    ]
     return NcProgram(
         **vars(elements),
-        events=tuple(sorted(events, key=lambda event: event.line)),
+        events=tuple(sorted(reader.events, key=lambda event: event.line)),
         problems=tuple(reader.problems),
         units=reader.units,
         blocks=reader.blocks,

@@ -72,11 +72,10 @@ def said(events: Sequence[Event], places: Sequence[Place], means: Means) -> list
     tokens: list[Token] = []
     chosen: float | None = None
     moment = element = 0
-    spoken = [(event, place) for event, place in zip(events, places, strict=True) if event.letter != "("]
-    words = [(event.letter, event.value) for event, _ in spoken]
-    elements = [event.element for event, _ in spoken]
+    words = [(event.letter, event.value) for event in events]
+    elements = [event.element for event in events]
     ends = [word == _CHANGE or (word[0] == "M" and of_m(word[1], means)[0] == "end") for word in words]
-    for k, (event, place) in enumerate(spoken):
+    for k, (event, place) in enumerate(zip(events, places, strict=True)):
         letter, value = words[k]
         moment, element = moment + (event.element != element), event.element
         meaning: tuple[str, float | str] | None = None

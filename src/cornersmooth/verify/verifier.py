@@ -18,14 +18,13 @@ from cornersmooth.nc_reader.elements import Elements, Event, NcProgram, Problem
 from cornersmooth.nc_reader.machine_positions import MachinePositions
 from cornersmooth.nc_reader.needed_states import CONTROL_WORDS
 from cornersmooth.nc_reader.reader import Reader
-from cornersmooth.nc_reader.reading import DIGITS_SAMPLE, ReadingOptions, program_of, read_styled
+from cornersmooth.nc_reader.reading import DIGITS_SAMPLE, ReadingOptions, program_of
 from cornersmooth.nc_reader.rotary import sagitta
 from cornersmooth.nc_reader.source import Source, readable_twice
 from cornersmooth.nc_reader.word_list import word_list
 from cornersmooth.processes import Helper, can_fork, map_in_processes
 from cornersmooth.settings import BOUNDS
 from cornersmooth.statements.comparison import KINDS
-from cornersmooth.statements.left_out import gone_over, may_be_left_out
 from cornersmooth.verify.batches import Batches
 from cornersmooth.verify.cl_motion import half_turns
 from cornersmooth.verify.continuity import measure_continuity
@@ -144,8 +143,7 @@ class Verifier:
         said = () if machine is None else (word for axis in machine.axes for word in axis.clamp or ())
         self._clamps = frozenset(float(word[1:]) for word in said)
         self._options = ReadingOptions.of(control, machine, tcp=tcp, tolerance=tolerance, axis_length=axis_length)
-        self._given = nc if isinstance(nc, NcProgram) else readable_twice(nc)
-        self._text = self._given if isinstance(self._given, NcProgram) else Source(self._given)
+        self._text = nc if isinstance(nc, NcProgram) else Source(readable_twice(nc))
         self._name = None if isinstance(nc, NcProgram | bytes) else str(nc)
         self._helper: Helper | None = None
 
@@ -170,9 +168,7 @@ class Verifier:
         found: Verification = self._work() if self._helper is None else self._helper.result()
         if found.motions_part and self._axis_tolerance is None:
             found = self._each_alone(found)
-        if found.passed or not (self._skip_cycles and may_be_left_out(self._program)):
-            return found
-        return self._gone_over() or found
+        return found
 
     def _each_alone(self, together: Verification) -> Verification:
         """What is found with tips and axis points on their own, where that tells more than both together."""
@@ -182,21 +178,6 @@ class Verifier:
         found = self._work()
         self._apart = not found.motions_part or (together.only_apart and not found.only_apart)
         return replace(found, apart=True) if self._apart else together
-
-    def _gone_over(self) -> Verification | None:
-        """What is found with holes that the text leaves out as rapids over them, if all is right then."""
-        given, program = self._given, self._program
-        nc = given if isinstance(given, NcProgram) else read_styled(given, self._options, self._name)
-        for stays in (False, True):
-            if (other := gone_over(program, nc, stays=stays)) is None:
-                break
-            self._program = other
-            if isinstance(self._text, Source):
-                self._text.begin_again()
-            if (found := self._work()).passed:
-                count = int(np.count_nonzero(program.kind != other.kind))
-                return replace(found, left_out=found.left_out + count)
-        return None
 
     def _work(self) -> Verification:
         """Read and measure the text as far as it goes."""
