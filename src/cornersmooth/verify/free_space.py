@@ -92,6 +92,13 @@ class FreeSpace:
         bend = np.maximum(self.own_bend[np.clip(rows - 1, 0, last)], self.own_bend[np.clip(rows, 0, last)])
         return self.radius - bend[:, None] - self.path_bend[segments]
 
+    def is_free(self, row: int) -> bool:
+        """Whether anything of a row is free."""
+        part = slice(0, self.path.shape[1] - 1)
+        way, radius = np.diff(self.path, axis=1), self.row_radius(slice(row, row + 1), part)[0]
+        low, high = free_interval(self.own[:, row, None], self.path[:, part], way, radius)
+        return bool((low <= high).any())
+
     def along(self, row: int, place: float) -> Reached:
         """What is reached of a row from one place of it on, if it is free: that, and what is beyond without a break."""
         count = self.path.shape[1] - 1
@@ -198,15 +205,3 @@ def lowest(reached: Reached) -> float:
     """First place that is reached; before the vertex at the end of a segment that is not passed."""
     k = min(reached)
     return min(k + reached[k][0], float(np.nextafter(k + 1.0, 0.0)))
-
-
-def is_all(space: FreeSpace, row: int, reached: Reached, segments: slice) -> bool:
-    """Whether all that is free of a row on some segments is reached; a hair less will do: who asks wants to give up."""
-    start = space.path[:, segments]
-    way = space.path[:, segments.start + 1 : segments.stop + 1] - start
-    radius = space.row_radius(slice(row, row + 1), segments)[0]
-    low, high = free_interval(space.own[:, row, None], start, way, radius)
-    free = np.flatnonzero(low <= high)
-    found = [reached.get(segments.start + k, (np.inf, -np.inf)) for k in free.tolist()]
-    inside = [one <= low[k] + _HAIR and other >= high[k] - _HAIR for k, (one, other) in zip(free, found, strict=True)]
-    return all(inside) and len(free) >= len(reached)

@@ -3,8 +3,8 @@
 That is the Fréchet distance of two polylines, decided. A `chain` of nearest places proves it nearly everywhere; where
 it does not, what can be reached is worked out exactly (`free_space`), from a few rows before.
 
-The answer has three values. A place where the motions part is a `Break`: it is proved where all that is free of a row
-before it was reached, and yet nothing behind it is; else what lies too far back may lead on, and it is *not proved*.
+The answer has three values. A place where the motions part is a `Break`: it is proved where all was looked at from
+where the motion is known to begin; else what lies too far back may lead on, and it is *not proved*.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 from cornersmooth.model import Floats, Ints
 from cornersmooth.verify.around import Around, Inner
 from cornersmooth.verify.chain import Path, Sections, chain, points_at
-from cornersmooth.verify.free_space import free_interval, is_all, largest_square, lowest
+from cornersmooth.verify.free_space import free_interval, largest_square, lowest
 
 #: rows before one that is not proved from which on it is worked out exactly, one after the other; farther back nothing
 #: is looked at, and the answer is NOT VERIFIED
@@ -26,8 +26,7 @@ LOOK_BACK: Final = (3, 32, 256, 2048)
 #: rows within which the first two of them must come back to the chain (speed only)
 _SOON: Final = 64
 
-#: radii of path length within which all that is free of a row must have been reached to prove a break: where a path
-#: comes back to the same place after a longer way the answer may be NO where it should be NOT VERIFIED
+#: radii of path length around a break where it is looked for what is off, and where to go on (which faults are named)
 AROUND: Final = 200.0
 
 #: parts that a bent step is divided into where it is not proved, as often as its bend is not tiny, in radii
@@ -210,11 +209,10 @@ class Walk:
                 continue
             if around.reached[-1] and until < end:
                 continue
-            proved = begin == known or self._all_known(around, section)
             reached = begin + around.row_reached
             row = max(reached, first)  # the chain has proved what is before that
-            found = Break(row, around.farthest(), proved and row == reached)
-            if proved or begin == 0:
+            found = Break(row, around.farthest(), begin == known and row == reached)
+            if begin in (known, 0) or not around.space.is_free(len(around.reached) - 1):
                 break
         return found
 
@@ -234,32 +232,6 @@ class Walk:
         self._place[begin : end + 1] = [around.outward(lowest(between[k])) for k in around.at[:count].tolist()]
         self._place[end] = goal
         return end
-
-    def _all_known(self, around: Around, section: int) -> bool:
-        """Whether all that is free of one of some rows was reached."""
-        path, first, stop = self.path, int(self._begin[section]), int(self._stop[section])
-        for row in range(len(around.reached) - 1, -1, -1):
-            reached = around.reached[row]
-            if reached:
-                here, beyond = path.length_at(around.outward(float(min(reached)))), AROUND * self.radius
-                low, high = np.searchsorted(path.length, (here - beyond, here + beyond)).tolist()
-                low, high = max(low - 1, first), min(high + 1, stop)
-                low_here, high_here = (np.searchsorted(around.places, at) for at in (low, high))
-                inside = slice(int(low_here), min(int(high_here), len(around.places) - 1))
-                point = around.space.own[:, row]
-                beside = slice(low, around.base), slice(around.top, high)
-                if is_all(around.space, row, reached, inside) and not any(self._free(point, k) for k in beside):
-                    return True
-        return False
-
-    def _free(self, point: Floats, segments: slice) -> bool:
-        """Whether any of some segments of the path is near a point (3h,)."""
-        if segments.start >= segments.stop:
-            return False
-        start = self.path.points[segments].T
-        way = self.path.points[segments.start + 1 : segments.stop + 1].T - start
-        low, high = free_interval(point[:, None], start, way, np.asarray(self.radius))
-        return bool((low <= high).any())
 
     def _break(self, section: int, found: Break) -> int:
         """Take down a break, and find where to go on: the section that it is in, or the next."""
