@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from cornersmooth.verify import passage as module
 from cornersmooth.verify.chain import Path, Sections
+from cornersmooth.verify.cl_motion import UNBOUND
 from cornersmooth.verify.passage import Walk
 from oracle.free_space import passes
 from verify.whole_passage import CHUNK, passage
@@ -123,6 +124,19 @@ def test_bent_motions_pass_only_where_they_keep_the_radius(seed, radius, divided
     elif divided and chunk == CHUNK:
         close = 0.99 * radius - bend.max() / 400
         assert not passes(dense.tolist(), path.tolist(), close)
+
+
+def test_a_step_without_a_bend_is_not_divided():
+    """Where the axis turns over, dividing proves nothing: it would be millions of parts."""
+    path, asked = straight(3), []
+
+    def inner(number):
+        asked.extend(number)
+        return path[1] + (number - 1)[:, None] * (path[2] - path[1])
+
+    found = passage(path, path, 0.1, own_bend=np.array([0.0, UNBOUND]), inner=inner)
+    assert not found.passed
+    assert len(asked) < 1000
 
 
 def straight(n: int) -> np.ndarray:

@@ -17,6 +17,7 @@ import numpy as np
 from cornersmooth.model import Floats, Ints
 from cornersmooth.verify.around import Around, Inner
 from cornersmooth.verify.chain import Path, Sections, chain, points_at
+from cornersmooth.verify.cl_motion import UNBOUND
 from cornersmooth.verify.free_space import free_interval, largest_square, lowest
 
 #: rows before one that is not proved from which on it is worked out exactly, one after the other; farther back nothing
@@ -167,7 +168,7 @@ class Walk:
         """Put points into bent steps, from a row on, to some vertices and beside them; say whether there were any."""
         steps = np.unique(np.concatenate((bad - 2, bad - 1, bad)))
         steps = steps[(steps >= row) & (steps < len(self._own) - 1)]
-        steps = steps[self._bend[steps] > _TINY * self.radius]
+        steps = steps[(self._bend[steps] > _TINY * self.radius) & (self._bend[steps] < UNBOUND)]
         if not len(steps):
             return False
         share = np.arange(1, PARTS) / PARTS
