@@ -3,8 +3,9 @@
 That is the Fréchet distance of two polylines, decided. A `chain` of nearest places proves it nearly everywhere; where
 it does not, what can be reached is worked out exactly (`free_space`), from a few rows before.
 
-The answer has three values. A place where the motions part is a `Break`: it is proved where all was looked at from
-where the motion is known to begin; else what lies too far back may lead on, and it is *not proved*.
+The answer has three values. A place where the motions part is a `Break`: it is proved where nothing is near a vertex,
+or all was looked at from where the motion is known to begin; else what lies too far back may lead on, and it is *not
+proved*.
 """
 
 from __future__ import annotations
@@ -212,8 +213,9 @@ class Walk:
                 continue
             reached = begin + around.row_reached
             row = max(reached, first)  # the chain has proved what is before that
-            found = Break(row, around.farthest(), begin == known and row == reached)
-            if begin in (known, 0) or not around.space.is_free(len(around.reached) - 1):
+            proved = begin == known or not around.space.is_free(len(around.reached) - 1)
+            found = Break(row, around.farthest(), proved and row == reached)
+            if proved or begin == 0:
                 break
         return found
 
