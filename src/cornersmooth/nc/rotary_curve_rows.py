@@ -2,15 +2,10 @@
 
 All angles are those that lines would have (`rotary_rows`), chosen with the whole program in view. Curves, and sections
 of long ones, whose angles a spline follows within the tolerance take the place of their lines.
-
-A segment whose angles may run evenly from pose to pose within the tolerance does so: a corner between two of them is
-rounded in its angles exactly as it is in its tip. On all others the joints have the angles of the ruled motion, and the
-curve goes on with the rate of the straight line beside it.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -20,37 +15,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cornersmooth.errors import SettingsError
-from cornersmooth.geometry import nurbs
 from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.geometry.ragged import batches, ranges, search, spread, starts
 from cornersmooth.kinematics import Machine
 from cornersmooth.kinematics.poses import angle_between, continued, pole_distance
 from cornersmooth.methods import DEFAULT_METHOD, METHODS
-from cornersmooth.model import Bools, Corners, Floats, Ints, Move, Runs, SmoothProgram
+from cornersmooth.model import Bools, Floats, Ints, Runs, SmoothProgram
+from cornersmooth.nc.corner_joints import SHARE, STEPS, Joints
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
-from cornersmooth.nc.rotary_rows import largest_turn, rotary_rows
+from cornersmooth.nc.rotary_rows import rotary_rows
 from cornersmooth.nc.rotary_words import RotaryWay, machine_of, rotary_way
 from cornersmooth.nc.tools import ToolTravel
 from cornersmooth.rotary.branch_choice import LIMIT_SLACK
-from cornersmooth.rotary.curve_angles import CurveAngles, Curves, Guide, curve_angles
-from cornersmooth.rotary.subdivision import insertions, runs_evenly
-from cornersmooth.settings import WEIGHT_DECIMALS, Settings
+from cornersmooth.rotary.curve_angles import CurveAngles, Curves, Guide, curve_angles, joined
+from cornersmooth.settings import WEIGHT_DECIMALS
 from cornersmooth.slices import joined_rows, some_rows, some_runs
-from cornersmooth.smoothing.construction import construction_of
 from cornersmooth.smoothing.runs.rows import STEPS_PER_UNIT, clamped, moves_at, section_ends
 from cornersmooth.smoothing.sampling import Rows, dense_rows, nodes
-from cornersmooth.smoothing.segments import Segments, lines_of, segments_of
+from cornersmooth.smoothing.segments import lines_of
 from cornersmooth.vectors import norm, unit
-
-#: share of what rotary axes may take of ε that a curve may use: the rest is for the digits of its control points
-_SHARE = 0.95
-
-#: share of that which even angles may take on the segments beside a corner
-_EVEN_SHARE = 0.9
-
-#: steps of the parameter of a corner, and those that three decimals hold as the parameter 1 / 8
-_STEPS = float(1 << 15)
 
 #: the first rotary axis may turn fast where the pole is nearer than so many times the axis step, and so many degrees
 _NEAR_POLE, _NEAR_POLE_DEGREES = 5.0, 1.0
@@ -63,16 +47,17 @@ _TOGETHER = 1 << 13
 class _Sections:
     """Sections of curves with angles: k of them, in the order of the curves; m rows."""
 
+    curves: Curves
+
     number: NDArray[np.int8]  #: (m,) of each control point in its section, from 1 on
     points: Floats  #: (m, 5): tip, mm, and both angles, degrees
     spline: Floats  #: (m, 3) as in `Rows`
     count: Ints  #: (k,) rows
     move: Ints  #: (k,)
-    curve: Ints  #: (k,)
+    curve: Ints  #: (k,) of `curves`
     #: begin, end: (k,), steps
     begin: Floats
     end: Floats
-    axis: Floats  #: (k, 2, 3) tool axes there, where no row of the way may be
     good: Bools  #: (k,) within the tolerance, and within the limits of the axes
 
     @cached_property
@@ -94,11 +79,6 @@ class _Places:
         """Rows where each curve begins and ends: (r,) each."""
         first = np.flatnonzero(self.s == 0.0)
         return self.row[first], self.row[np.append(first[1:], len(self.row)) - 1]
-
-    def some(self, begin: int, end: int) -> _Places:
-        """Those on some of the curves, which are counted from 0 on."""
-        own = slice(*np.searchsorted(self.curve, (begin, end)).tolist())
-        return _Places(self.curve[own] - begin, self.row[own], self.s[own])
 
 
 @dataclass(frozen=True)
@@ -164,35 +144,6 @@ def _way(smoothed: SmoothProgram, form: Form, findings: Findings) -> RotaryWay:
     return way
 
 
-def _left_to_axes(settings: Settings, form: Form, taken: Floats) -> Floats:
-    """What ε leaves to rotary axes where so much of it, mm, is taken at the axis point: degrees."""
-    left = settings.tolerance - math.sqrt(3.0) / 2.0 * settings.tip_resolution - taken
-    return _SHARE * np.degrees(left / settings.axis_scale) - form.angle_rounding
-
-
-@dataclass(frozen=True)
-class _Legs:
-    """The segments into each corner, then those out of it: m legs of m / 2 corners."""
-
-    inward: Bools
-    #: of, to: poses at both ends
-    of: Ints
-    to: Ints
-    joint: Ints  #: row of the way
-    line: Bools  #: whether a part of the segment is written as a line
-    #: entry, leave: fractions of the segment between which straight motion is left
-    entry: Floats
-    leave: Floats
-
-    @classmethod
-    def of_corners(cls, corners: Corners, segments: Segments, begin: Ints, end: Ints) -> _Legs:
-        """Legs of corners whose curves lie between these rows."""
-        of, to = np.concatenate((corners.before, corners.pose)), np.concatenate((corners.pose, corners.after))
-        inward, line, joint = np.arange(len(to)) < len(corners), segments.has_line[to], np.concatenate((begin, end))
-        entry, leave = segments.entry[to], segments.exit[to]
-        return cls(inward, of, to, joint, line, entry, leave)
-
-
 def _near_pole(smoothed: SmoothProgram, machine: Machine) -> Bools:
     """(k,) corners on which the first rotary axis may turn fast."""
     axis, corners = smoothed.program.axis, smoothed.corners
@@ -206,8 +157,8 @@ class _Work:
     """The way, and its curves: those of all corners, then those of all runs."""
 
     smoothed: SmoothProgram
-    form: Form
-    way: RotaryWay  #: angles and axes at joints, and tolerances change in place
+    way: RotaryWay
+    joints: Joints
     corner: Ints  #: rows of `Corners` that are smoothed
     #: pose, length, order: (r,); of each curve its first, and its longest parameter, steps; the curves in path order
     pose: Ints
@@ -215,57 +166,20 @@ class _Work:
     order: Ints
     row: Ints  #: rows of the way on curves, but for those where they start
     first: Ints  #: (r + 1,) which of these are those of each curve, in path order
-    segments: Segments
-    least: float  #: degrees that rotary axes may take of ε in any case
-    #: angles, last: (n, 2), degrees, and (n,); at each pose, NaN where none is written, and the row of the way there
-    angles: Floats
-    last: Ints
-    turns: Ints  #: (rows of the way + 1,) how often solution and turn may have changed before each
-    allowed: Floats  #: (n,), degrees; on the straight motion to each pose and on curves beside it
 
     @classmethod
     def of(cls, smoothed: SmoothProgram, form: Form, way: RotaryWay) -> _Work:
         """Work out what concerns all curves."""
-        program, settings, runs, n = smoothed.program, smoothed.settings, smoothed.runs, len(smoothed.program)
-        corners, corner = smoothed.corners, np.flatnonzero(smoothed.corners.smoothed)
-        poses, lengths = corners.pose[corner], np.full(len(corner), _STEPS)
+        runs, corner = smoothed.runs, np.flatnonzero(smoothed.corners.smoothed)
+        poses, lengths = smoothed.corners.pose[corner], np.full(len(corner), STEPS)
         if runs is not None:
             poses = np.concatenate((poses, runs.pose[starts(runs.count)[:-1]]))
             lengths = np.concatenate((lengths, runs.knot[starts(runs.knot_count)[1:] - 1]))
         row = np.flatnonzero(~np.isnan(way.place) & ~way.left)
         first = np.append(np.flatnonzero(np.diff(way.place[row], prepend=2.0) <= 0.0), len(row))
         assert len(first) == len(poses) + 1
-        least = form.rotary_tolerance(settings.tolerance, settings.axis_scale)
-        straight = float(_left_to_axes(settings, form, np.zeros(1))[0])
-        tolerance = np.where(np.isnan(way.place) & (program.kind[way.move] == Move.LINEAR), straight, way.tolerance)
-        # the last row of the move to a corner is in the middle of its curve
-        angles, branch, last = np.full((n, 2), np.nan), np.full(n, -1), np.zeros(n, np.int64)
-        angles[way.move], branch[way.move], last[way.move] = way.angles, way.branch, np.arange(len(way.move))
-        allowed = np.full(n, straight)
-        for begin in range(0, len(corner), _TOGETHER):
-            own = corner[begin : begin + _TOGETHER]
-            pose = corners.pose[own]
-            angles[pose], _ = continued(machine_of(form), program.axis[pose], angles[pose], branch[pose], least / 2)
-            taken = np.maximum(_left_to_axes(settings, form, corners.axis_error[own]), least)
-            for beside in (pose, corners.after[own]):
-                np.minimum.at(allowed, beside, taken)
-        return cls(
-            smoothed,
-            form,
-            replace(way, tolerance=tolerance),
-            corner,
-            poses,
-            lengths,
-            np.argsort(poses),
-            row,
-            first,
-            segments_of(smoothed, dense=False),
-            least,
-            angles,
-            last,
-            np.concatenate(([0], np.cumsum(way.free))),
-            allowed,
-        )
+        joints = Joints.of(smoothed, form, way, corner)
+        return cls(smoothed, joints.way, joints, corner, poses, lengths, np.argsort(poses), row, first)
 
     def parts(self) -> Iterator[_Part]:
         """All rows, from that which the part before ends with, and sections of some curves."""
@@ -281,23 +195,26 @@ class _Work:
     def _part(self, one: int, other: int, begin: int, end: int) -> _Part:
         """Curves from one on, in path order, to before another, and the rows of the way that are with them."""
         own = np.sort(self.order[one:other])
-        rows, poses, count = self._places(own, one), self.pose[own], int(np.searchsorted(own, len(self.corner)))
-        made, kept = [], np.zeros(len(own), np.bool_)
-        if count:
-            corners, some = some_rows(self.smoothed.corners, self.corner[own[:count]]), rows.some(0, count)
-            fitted, kept[:count] = self._fitted(self._corners(corners, some), some)
-            made.append(self._whole(fitted, poses[:count][kept[:count]], np.flatnonzero(kept)))
-        if count < len(own):
-            assert self.smoothed.runs is not None
-            chosen = np.isin(np.arange(len(self.smoothed.runs)), own[count:] - len(self.corner))
-            runs, some = some_runs(self.smoothed.runs, chosen), rows.some(count, len(own))
-            fitted, kept[count:] = self._fitted(self._runs(runs, some), some)
-            made.append(self._cut(fitted, some_runs(runs, kept[count:]), count + np.flatnonzero(kept[count:])))
-        sections = joined_rows(made)
-        lost = np.concatenate((poses[~kept], sections.move[~sections.good]))
-        kept[sections.curve[~sections.good]] = False
-        lines, before = self._lines(self.corner[own[:count]], np.flatnonzero(~kept[:count]), rows)
-        way, section = self._with_sections(rows, sections, lines, before, begin, end)
+        rows, count = self._places(own, one), int(np.searchsorted(own, len(self.corner)))
+        runs = self.smoothed.runs if count < len(own) else None
+        joints = [row[:count] for row in rows.ends]
+        corners = some_rows(self.smoothed.corners, self.corner[own[:count]])
+        made = [self.joints.curves(corners, *joints)] if count else []
+        if runs is not None:
+            runs = some_runs(runs, np.isin(np.arange(len(runs)), own[count:] - len(self.corner)))
+            made.append(self._runs(runs, rows))
+        curves = joined(made)
+        kept = self._suits(curves, rows)
+        fitted = curve_angles(
+            curves.some(kept), self._machine, self._guide(rows).some(kept), cone=self.joints.least / 2
+        )
+        whole = self.pose[own[:count]][kept[:count]]
+        sections = self._sections(fitted, whole, None if runs is None else some_runs(runs, kept[count:]))
+        lost = np.concatenate((self.pose[own[~kept]], sections.move[~sections.good]))
+        number = np.flatnonzero(kept)  # of the curves that have sections
+        kept[number[sections.curve[~sections.good]]] = False
+        lines, before = self._lines(curves, self.corner[own[:count]], np.flatnonzero(~kept[:count]), rows)
+        way, section = self._with_sections(rows, number, sections, lines, before, begin, end)
         return _Part(way, section, sections, lost, end)
 
     def _places(self, curves: Ints, one: int) -> _Places:
@@ -309,52 +226,45 @@ class _Work:
         whole = np.rint(s)  # as poses and knots are
         return _Places(curve, at, np.where(np.abs(s - whole) < 1e-6, whole, s))
 
-    def _fitted(self, curves: Curves, rows: _Places) -> tuple[CurveAngles, Bools]:
-        """Angles of the curves that begin where a row ends and in which no solution may change, and which these are."""
+    def _suits(self, curves: Curves, rows: _Places) -> Bools:
+        """(r,) curves that begin where a row ends, and in which no solution may change."""
         begin, end = rows.ends
         settings, way = self.smoothed.settings, self.way
         control = curves.points[curves.splines.control_first[:-1]]
         off = norm(way.tip[begin] - control[:, :3]) + norm(unit(way.axis[begin]) - unit(control[:, 3:6]))
         near = off <= max(settings.shortest_line, settings.duplicate_distance)
-        kept = (begin >= 0) & near & (self.turns[end + 1] == self.turns[begin + 1])
         way.tolerance[rows.row[rows.s > 0.0]] = curves.tolerance[rows.curve[rows.s > 0.0]]
-        return curve_angles(curves.some(kept), self._machine, self._guide(rows).some(kept), cone=self.least / 2), kept
+        suits: Bools = (begin >= 0) & near & (self.joints.turns[end + 1] == self.joints.turns[begin + 1])
+        return suits
 
     @property
     def _machine(self) -> Machine:
-        return machine_of(self.form)
+        return machine_of(self.joints.form)
 
     def _guide(self, rows: _Places) -> Guide:
         at = np.maximum(rows.row, 0)  # there is no row where the program begins with a curve
         return Guide(rows.curve, rows.s, self.way.angles[at], self.way.branch[at].astype(np.int64))
 
-    def _lines(self, corner: Ints, lost: Ints, rows: _Places) -> tuple[RotaryWay, Ints]:
-        """Rows of the curves that are lost, where the way has two lines for each, and the rows that they come after."""
-        smoothed, first = self.smoothed, np.flatnonzero(rows.s == 0.0)
+    def _lines(self, curves: Curves, corner: Ints, lost: Ints, rows: _Places) -> tuple[RotaryWay, Ints]:
+        """Rows of corners that are lost, where the way has two lines for each, and the rows that they come after."""
         lost = lost[np.bincount(rows.curve)[lost] == 3]
-        numbers, u = lines_of(smoothed, corner[lost]), np.zeros(0)
-        curve, s = np.zeros(0, np.int64), np.zeros(0)
-        tip, axis = np.zeros((2, 0, 3))
-        for number in np.unique(numbers).tolist():
-            which, u = lost[numbers == number], nodes(number)
-            u = u[(u != 0.5) & (u != 1.0)]
-            points, levers = construction_of(smoothed.settings.method).points(smoothed, corner[which], u)
-            curve, s = np.append(curve, np.repeat(which, len(u))), np.append(s, np.tile(u * _STEPS, len(which)))
-            tip, axis = np.vstack((tip, points[:, 1:].reshape(-1, 3))), np.vstack((axis, levers[:, 1:].reshape(-1, 3)))
-        order = np.lexsort((s, curve))
-        curve, s, axis, later = curve[order], s[order], unit(axis[order]), s[order] > _STEPS / 2.0
-        angles, branch = continued(self._machine, axis, *self._guide(rows).between(curve, s), self.least / 2)
-        corners, place = some_rows(smoothed.corners, corner[curve]), first[curve] + later
-        none = np.zeros(len(s), np.bool_)
+        inner = [nodes(lines)[:-1] for lines in lines_of(self.smoothed, corner[lost]).tolist()]
+        curve, u = np.repeat(lost, [len(each) for each in inner]), np.concatenate([*inner, np.zeros(0)])
+        curve, u = curve[u != 0.5], u[u != 0.5]
+        s, later = u * STEPS, u > 0.5
+        points = curves.splines.points(curves.points, curves.splines.span_at(curve, s), s)
+        axis, corners = unit(points[:, 3:6]), some_rows(self.smoothed.corners, corner[curve])
+        angles, branch = continued(self._machine, axis, *self._guide(rows).between(curve, s), self.joints.least / 2)
+        place, none = np.flatnonzero(rows.s == 0.0)[curve] + later, np.zeros(len(s), np.bool_)
         return RotaryWay(
-            tip=tip[order],
+            tip=points[:, :3] / points[:, 6:],
             axis=axis,
             move=np.where(later, corners.after, corners.pose),
             angles=angles,
             branch=branch.astype(np.int8),
             free=none,
             left=none,
-            place=s / _STEPS,
+            place=u,
             tolerance=self.way.tolerance[rows.row[place + 1]],
         ), rows.row[place]
 
@@ -362,140 +272,50 @@ class _Work:
         """Curves of runs, which end exactly where their rows do."""
         own, lever = runs.control[:, :3], runs.control[:, 3:] - runs.control[:, :3]
         ends = np.full((2, len(runs), 3, 2), np.nan)
-        ends[:, :, 0] = self.way.angles[np.stack(rows.ends)]
+        ends[:, :, 0] = self.way.angles[np.stack(rows.ends)[:, -len(runs) :]]
         points = np.hstack((own, lever, np.ones((len(own), 1))))
-        return Curves(Splines(runs.knot, runs.knot_count), points, ends, np.full(len(runs), _SHARE * self.least))
+        return Curves(Splines(runs.knot, runs.knot_count), points, ends, np.full(len(runs), SHARE * self.joints.least))
 
-    def _corners(self, corners: Corners, rows: _Places) -> Curves:
-        """Curves of some corners; joints of even segments are put on their lines."""
-        program, settings, way, count = self.smoothed.program, self.smoothed.settings, self.way, len(corners)
-        legs = _Legs.of_corners(corners, self.segments, *rows.ends)
-        from_angles, to_angles, even = self._pose_angles(legs)
-        of, to = legs.of[even], legs.to[even]
-        even[even] = runs_evenly(
-            self._machine,
-            program.axis[of],
-            program.axis[to],
-            from_angles[even],
-            to_angles[even],
-            _EVEN_SHARE * self.allowed[to],
-        )
-        # without a line both curves meet where the first one ends; even ones differ by less than the shortest line
-        share = np.where(legs.inward & (legs.line | even), legs.leave, legs.entry)[:, None]
-        turn = to_angles - from_angles
-        angles = np.where(even[:, None], from_angles + share * turn, way.angles[legs.joint])
-        way.angles[legs.joint] = angles
-        # not of unit length: the ruled motion between these is that between the poses, at its own rate
-        way.axis[legs.joint] = program.axis[legs.of] * (1.0 - share) + program.axis[legs.to] * share
-        # rates by the fraction of the segment: of even motion, of the line beside, of the parabola through the joint
-        before, behind = (angles - from_angles) / share, (to_angles - angles) / (1.0 - share)
-        rate, bent = before * (1.0 - share) + behind * share, 2.0 * (behind - before)
-        rate[even], bent[even | legs.line] = turn[even], 0.0
-        beside = np.flatnonzero(legs.line & ~even)
-        rate[beside] = self._line_rates(some_rows(legs, beside))
-        # by the parameter of the curve, times its weight
-        weight = nurbs.full_weights(corners.weights)
-        slope, bend, weight_slope, weight_bend = (
-            np.tile(part, 2)[:, None] for part in nurbs.leg_derivatives(weight, corners.ratio)
-        )
-        sign = np.where(legs.inward, 1.0, -1.0)[:, None]
-        gone = np.concatenate((corners.trim_in, corners.trim_out))[:, None] * slope
-        one = rate * gone
-        two = sign * one * bend / slope + bent * gone**2
-        jets = angles, sign * weight_slope * angles + one, weight_bend * angles + 2.0 * sign * weight_slope * one + two
-        ends = np.stack([jet.reshape(2, count, 2) / _STEPS**order for order, jet in enumerate(jets)], axis=2)
-        tip, axis_point = nurbs.control_points(program, corners, slice(None), settings.axis_length)
-        points = np.concatenate((tip, axis_point - tip, np.ones_like(tip[..., :1])), axis=2) * weight[:, :, None]
-        splines = Splines(np.tile((0.0, _STEPS / 2, _STEPS), count), np.full(count, 3))
-        tolerance = np.maximum(_left_to_axes(settings, self.form, corners.axis_error), _SHARE * self.least)
-        return Curves(splines, points.reshape(-1, 7), ends, tolerance)
-
-    def _pose_angles(self, legs: _Legs) -> tuple[Floats, Floats, Bools]:
-        """Angles (m, 2) at both ends of legs, and whether one follows from the other in a cut."""
-        program, machine = self.smoothed.program, self._machine
-        from_angles, stated = self.angles[legs.of], np.isnan(self.angles[legs.of, 0])  # no row leads to such a pose
-        near, axis = self.way.angles[legs.joint[stated]], program.axis[legs.of[stated]]
-        from_angles[stated], _ = continued(machine, axis, near, np.full(len(near), -1), self.least / 2)
-        follows = self.turns[self.last[legs.to] + 1] == self.turns[self.last[legs.of] + 1]
-        return from_angles, self.angles[legs.to], follows & ~stated
-
-    def _line_rates(self, legs: _Legs) -> Floats:
-        """(m, 2) degrees by the fraction of the segment: rates of lines beside joints, as they will be divided."""
-        row = legs.joint - legs.inward
-        if not len(row):
-            return np.zeros((0, 2))
-        first, last = int(row.min()), int(row.max())
-        way, rapid = some_rows(self.way, slice(first, last + 2)), np.ones(last + 2 - first, np.bool_)
-        rapid[row + 1 - first] = False
-        more = insertions(
-            self._machine,
-            way.tip,
-            way.axis,
-            way.angles,
-            tolerance=way.tolerance,
-            rapid=rapid,
-            max_step=largest_turn(self.smoothed.settings),
-            line=self.smoothed.program.line[way.move],
-            file=self.smoothed.program.source.name,
-        )
-        segment = more.segment + first
-        nearest = np.where(
-            legs.inward, np.searchsorted(segment, row, side="right") - 1, np.searchsorted(segment, row, side="left")
-        )
-        share, other = 1.0 - legs.inward, self.way.angles[row + ~legs.inward]
-        found = np.isin(row, segment)
-        share[found], other[found] = more.fraction[nearest[found]], more.angles[nearest[found]]
-        place = legs.entry + share * (legs.leave - legs.entry)
-        return (other - self.way.angles[legs.joint]) / (place - np.where(legs.inward, legs.leave, legs.entry))[:, None]
-
-    def _whole(self, fitted: CurveAngles, pose: Ints, number: Ints) -> _Sections:
-        """Whole curves of corners as sections; r curves at poses."""
-        splines = fitted.curves.splines
-        owner, place = spread(splines.count + 2)
-        narrowest = np.minimum.reduceat(splines.width, splines.span_first[:-1]) if len(pose) else np.zeros(0)
-        own, begin, axis = np.arange(len(pose)), np.zeros(len(pose)), np.zeros((len(pose), 2, 3))
-        rows = owner, place + 1, splines.first_knots, fitted.control
-        steps = np.minimum(_STEPS, 8.0 * narrowest)
-        return self._written(fitted, rows, steps, pose, number, own, begin, begin + _STEPS, axis)
-
-    def _cut(self, fitted: CurveAngles, runs: Runs, number: Ints) -> _Sections:
-        """Sections of runs."""
-        splines = fitted.curves.splines
-        run, begin, end = section_ends(runs, splines, self.smoothed.program)
-        rows, steps = clamped(splines, fitted.control, run, begin, end), np.full(len(run), STEPS_PER_UNIT)
-        axis = np.stack([unit(fitted.curves.lever(run, s)) for s in (begin, end)], axis=1)
-        return self._written(fitted, rows, steps, moves_at(runs, run, end), number[run], run, begin, end, axis)
-
-    def _written(
-        self,
-        fitted: CurveAngles,
-        rows: tuple[Ints, Ints, Floats, Floats],
-        steps: Floats,
-        move: Ints,
-        curve: Ints,
-        run: Ints,
-        begin: Floats,
-        end: Floats,
-        axis: Floats,
-    ) -> _Sections:
-        """Sections as they are written, so many steps as the parameter 1; `rows` are as `clamped` gives them."""
-        (owner, number, knot, points), splines, limits = rows, fitted.curves.splines, self._machine.limits
+    def _sections(self, fitted: CurveAngles, corner: Ints, runs: Runs | None) -> _Sections:
+        """Curves of corners at poses as a whole, and sections of the runs after them, as they are written."""
+        splines, limits, count = fitted.curves.splines, self._machine.limits, len(corner)
+        narrowest = np.minimum.reduceat(splines.width, splines.span_first[:-1]) if len(splines.count) else np.zeros(0)
+        curve, begin, end, move = np.arange(count), np.zeros(count), np.full(count, STEPS), corner
+        steps = np.minimum(STEPS, 8.0 * narrowest[:count])
+        if runs is not None:
+            own = Splines(splines.knot[splines.first[count] :], splines.count[count:])
+            run, *ends = section_ends(runs, own, self.smoothed.program)
+            curve, move = np.append(curve, count + run), np.append(move, moves_at(runs, run, ends[1]))
+            begin, end = np.append(begin, ends[0]), np.append(end, ends[1])
+            steps = np.append(steps, np.full(len(run), STEPS_PER_UNIT))
+        if runs is None:
+            owner, place = spread(splines.count + 2)
+            number, knot, points = place + 1, splines.first_knots, fitted.control
+        else:
+            owner, number, knot, points = clamped(splines, fitted.control, curve, begin, end)
         counts = np.bincount(owner, minlength=len(curve))
         spline = np.zeros((len(owner), 3))
         spline[:, 0], spline[np.cumsum(counts) - 1, 2] = knot / steps[owner], (end - begin) / steps
         spline[:, 1] = _written_weights(points[:, 5], owner, len(curve))
         points = points[:, :5] / points[:, 5:]
         # spans that a section has a part of
-        first = search(splines.knot, splines.count, run, begin, side="right") - 1 - run
-        last = search(splines.knot, splines.count, run, end) - 1 - run
+        first = search(splines.knot, splines.count, curve, begin, side="right") - 1 - curve
+        last = search(splines.knot, splines.count, curve, end) - 1 - curve
         beyond = np.concatenate(([0], np.cumsum(~(fitted.error <= fitted.curves.tolerance[splines.span_run]))))
         good = beyond[last + 1] == beyond[first]
         outside = np.maximum(limits[:, 0] - points[:, 3:], points[:, 3:] - limits[:, 1]).max(axis=1)
         good[owner[outside > LIMIT_SLACK]] = False
-        return _Sections(number.astype(np.int8), points, spline, counts, move, curve, begin, end, axis, good)
+        return _Sections(fitted.curves, number.astype(np.int8), points, spline, counts, move, curve, begin, end, good)
 
     def _with_sections(
-        self, rows: _Places, sections: _Sections, lines: RotaryWay, before: Ints, first: int, last: int
+        self,
+        rows: _Places,
+        curve: Ints,
+        sections: _Sections,
+        lines: RotaryWay,
+        before: Ints,
+        first: int,
+        last: int,
     ) -> tuple[RotaryWay, Ints]:
         """Rows of the way, good sections in the place of those within, and the section that ends in each, -1 for none.
 
@@ -507,7 +327,7 @@ class _Work:
         base = starts(np.floor(rows.s[starts(counts)[1:] - 1]).astype(np.int64) + 2)[:-1].astype(np.float64)
         keys = rows.s + base[rows.curve]
         chosen = np.flatnonzero(sections.good)
-        shift = base[sections.curve]
+        shift = base[curve[sections.curve]]
         begin, end = (sections.begin + shift)[chosen], (sections.end + shift)[chosen]
         # rows strictly within
         of = np.searchsorted(begin, keys, side="left") - 1
@@ -527,11 +347,11 @@ class _Work:
         path.angles[at] = sections.points[point[meets], 3:]
         section[at[ends[meets]]] = number[meets & ends]
         new = np.flatnonzero(~meets)
-        after = row[known[new] - 1]
+        after, s = row[known[new] - 1], np.where(ends, sections.end[number], sections.begin[number + ~ends])[new]
         none = np.zeros(len(new), np.bool_)
         more = RotaryWay(
             tip=sections.points[point[new], :3],
-            axis=sections.axis[number[new] + ~ends[new], ends[new].astype(np.int64)],
+            axis=unit(sections.curves.lever(sections.curve[number[new] + ~ends[new]], s)),
             move=sections.move[number[new]],
             angles=sections.points[point[new], 3:],
             branch=np.zeros(len(new), np.int8),

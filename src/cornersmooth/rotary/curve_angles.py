@@ -11,6 +11,7 @@ What is not within the tolerance then is for lines to follow.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -65,6 +66,15 @@ class Curves:
         splines = Splines(self.splines.knot[np.repeat(kept, count)], count[kept])
         points = self.points[np.repeat(kept, count + 2)]
         return Curves(splines, points, self.ends[:, kept], self.tolerance[kept])
+
+
+def joined(parts: Sequence[Curves]) -> Curves:
+    """Some curves after others."""
+    knots, counts = (
+        np.concatenate(column) for column in zip(*((p.splines.knot, p.splines.count) for p in parts), strict=True)
+    )
+    points, tolerance = np.concatenate([p.points for p in parts]), np.concatenate([p.tolerance for p in parts])
+    return Curves(Splines(knots, counts), points, np.concatenate([p.ends for p in parts], axis=1), tolerance)
 
 
 @dataclass(frozen=True)
