@@ -179,17 +179,16 @@ def test_stops_after_the_last_break_it_names(monkeypatch):
 
 
 def test_what_lies_too_far_back_is_not_proved(monkeypatch):
-    """The motion stands where both ways of a path to and fro are near, and must have gone the later one."""
+    """The motion stands where all ways of a path to and fro are near, and then goes to and fro once more than it."""
     path = np.zeros((4, 3))
     path[:, 0] = 0, 5, 0, 5
     path[2:, 1] = 0.5
     stand = np.repeat([[2.5, -0.1, 0.0]], 40, axis=0)
-    own = np.concatenate(([path[0]], stand, [[2.5, 5.0, 0.0]], path[-1:]))
+    own = np.concatenate(([path[0]], stand, path[1:], path[2:]))
     monkeypatch.setattr(module, "LOOK_BACK", (3, 8))
-    monkeypatch.setattr(module, "AROUND", 100.0)
     found = passage(own, path, 1.0)
     assert not found.passed
-    assert found.breaks[0].row == 41
+    assert found.breaks[0].row == 44
     assert not found.breaks[0].proved
     monkeypatch.setattr(module, "LOOK_BACK", (3, 2048))
     assert passage(own, path, 1.0).breaks[0].proved
