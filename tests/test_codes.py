@@ -12,7 +12,7 @@ from types import ModuleType
 
 import pytest
 
-from cornersmooth.cli.explain import _one, codes
+from cornersmooth.cli.lookup import _one, codes
 from oracle.command import run
 from writing import faults, plain, sentences, words
 

@@ -229,6 +229,7 @@ CONTROLS = new_command(
       cornersmooth controls siemens --table > mine.toml
       cornersmooth controls mine.toml
     """,
+    module="lookup",
 )
 
 MACHINES = new_command(
@@ -250,7 +251,7 @@ MACHINES = new_command(
       cornersmooth machines mine.toml --pose A30,C45
       cornersmooth machines mine.toml --json
     """,
-    module="controls",
+    module="lookup",
 )
 
 CONFIG = new_command(
@@ -268,6 +269,7 @@ CONFIG = new_command(
       cornersmooth config
       cornersmooth config jobs/part.cls
     """,
+    module="lookup",
 )
 
 EXPLAIN = new_command(
@@ -283,6 +285,7 @@ EXPLAIN = new_command(
       cornersmooth explain CS337
       cornersmooth explain 337 --json
     """,
+    module="lookup",
 )
 
 COMPLETION = new_command(
@@ -298,7 +301,7 @@ COMPLETION = new_command(
       eval "$(cornersmooth completion zsh)"     # in ~/.zshrc, behind compinit
       cornersmooth completion fish | source     # in ~/.config/fish/config.fish
     """,
-    module="config",
+    module="lookup",
 )
 
 #: as the list of them shows them
