@@ -20,7 +20,7 @@ import pytest
 from cornersmooth import Settings, __version__, choose_form, output
 from cornersmooth.cli.cluster import _proof_of_sharing, do
 from cornersmooth.cli.job import Job
-from cornersmooth.cli.values import Given
+from cornersmooth.cli.options import Options
 from cornersmooth.nc import Frame
 from interruptions import cl_text
 from oracle.command import DONE, SCRIPT, USAGE, command, environment, run, wait_for
@@ -158,7 +158,7 @@ def test_what_a_killed_run_has_left_goes_with_the_next(tmp_path: Path) -> None:
     for process, host in ((done.pid, name), (os.getpid(), name), (done.pid, "cluster-elsewhere")):
         (tmp_path / f".{host}.{process}-{end}").touch()
     target = str(tmp_path / "one.nc")
-    job = Job("one.cls", target, (), "one", Given(directory="out"), Settings(), choose_form(), Frame())
+    job = Job("one.cls", target, (), "one", Options(directory="out"), Settings(), choose_form(), Frame())
     with _proof_of_sharing([job]) as proof:
         assert Path(proof).exists()
         left = {path.name for path in tmp_path.iterdir()} - {Path(proof).name}
@@ -180,7 +180,7 @@ def test_what_cannot_work_is_refused(folder: Path, tmp_path: Path, words: tuple[
 
 
 def test_workers_that_do_not_fit_say_so(tmp_path: Path) -> None:
-    job = Job("a.cls", "out/a.nc", (), "a", Given(directory="out"), Settings(), choose_form(), Frame())
+    job = Job("a.cls", "out/a.nc", (), "a", Options(directory="out"), Settings(), choose_form(), Frame())
     assert "does not see out" in do(job, "/", "out/none", __version__).message
     found = do(job, "/", "", "0.0")
     assert (found.status, found.message.startswith("a.cls: error: ")) == ("error", True)

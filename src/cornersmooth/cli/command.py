@@ -19,7 +19,6 @@ import click
 from cornersmooth.cli import shop
 from cornersmooth.cli.options import FLAGS, HEADINGS, Options
 from cornersmooth.cli.parameters import ControlName, MachineName, Path
-from cornersmooth.cli.values import Given
 
 #: epilogs of commands that read no input, of those that do, and of those that write programs, too
 EXIT_CODES: Final = "Exit codes: 0 done; 2 wrong usage or configuration; 4 output cannot be written."
@@ -105,7 +104,7 @@ def new_command(
 
     def called(**given: Any) -> int:
         run = getattr(import_module(f"cornersmooth.cli.{module or name}"), f"run_{name}")
-        return int(run(Given(**{key: value for key, value in given.items() if value is not None})))
+        return int(run(Options(**{key: value for key, value in given.items() if value is not None})))
 
     return Command(name, params=params, callback=called, help=help, epilog=epilog)
 

@@ -13,8 +13,8 @@ import click
 
 from cornersmooth.cl import read
 from cornersmooth.cli.files import check_inputs, check_path, told_of, write_report
+from cornersmooth.cli.options import Options
 from cornersmooth.cli.show import progress_bar, say
-from cornersmooth.cli.values import Given
 from cornersmooth.comparing import Row, Table, candidates, compare_programs
 from cornersmooth.feedrate import BlockLimits
 from cornersmooth.report.verdict import limits_text
@@ -23,7 +23,7 @@ from cornersmooth.report.verdict import limits_text
 _OWN = frozenset(("as_json", "csv", "verbose", "quiet", "force", "machine", "limits", "source", "look_ahead"))
 
 
-def run_compare(given: Given) -> int:
+def run_compare(given: Options) -> int:
     """Do the work of the command; return its exit code."""
     from cornersmooth.cli.filter import axes_of, how_read
     from cornersmooth.filter.program import compare_filtered
@@ -102,7 +102,7 @@ def _cells(row: Row) -> tuple[str, ...]:
     )
 
 
-def _command(given: Given, row: Row, machine: Any, command: str, suffix: str) -> str:
+def _command(given: Options, row: Row, machine: Any, command: str, suffix: str) -> str:
     """Options that were typed, and those of the row; a machine is called as the user has called it."""
     context, typed = click.get_current_context(), []
     for option in context.command.params:

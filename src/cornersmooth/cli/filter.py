@@ -20,6 +20,7 @@ from cornersmooth.cli.files import (
     write_report,
 )
 from cornersmooth.cli.inputs import Input, find_inputs
+from cornersmooth.cli.options import Options
 from cornersmooth.cli.shop import command_line, loosened
 from cornersmooth.cli.show import (
     INDENT,
@@ -33,7 +34,6 @@ from cornersmooth.cli.show import (
     say_line,
     warn,
 )
-from cornersmooth.cli.values import Given
 from cornersmooth.comparing import limits_machine
 from cornersmooth.errors import CornersmoothError, SettingsError
 from cornersmooth.filter import Filtered, filter_program, verify_programs
@@ -62,7 +62,7 @@ PATTERNS = ("*.nc", "*.ngc", "*.mpf", "*.spf", "*.h", "*.tap", "*.cnc", "*.eia",
 _SHOWN, _WRONG_SHOWN = 10, 20
 
 
-def run_filter(given: Given) -> int:
+def run_filter(given: Options) -> int:
     """Do the work of the command; return its exit code."""
     form, settings = filter_form_of(given), given.settings()
     check_endings("report", given.reports, ".json or .html")
@@ -91,7 +91,7 @@ def _pages(reports: Iterable[str]) -> bool:
     return any(suffix_of(path) == ".html" for path in reports)
 
 
-def _filter(job: Input, form: Form, settings: Settings, given: Given) -> int:
+def _filter(job: Input, form: Form, settings: Settings, given: Options) -> int:
     """Filter one program; return the exit code."""
     data, name = read_input(job.source)
     axes = given.load_limits()
@@ -142,7 +142,7 @@ def _filter(job: Input, form: Form, settings: Settings, given: Given) -> int:
     return int(bad)
 
 
-def verify_with_program(source: str, old: bytes, given: Given) -> int:
+def verify_with_program(source: str, old: bytes, given: Options) -> int:
     """Compare an NC program with what was made of it; return the exit code of ``verify``."""
     new, name = read_input(given.text)
     settings, form = given.settings(), filter_form_of(given)
@@ -229,7 +229,7 @@ def _measured(found: Checked, tolerance: float) -> str:
     return f"within {tolerance:g} mm: tip {found.tip:.4g} mm{point}"
 
 
-def _show(name: str, contents: Mapping[str, Any], found: Filtered, given: Given) -> None:
+def _show(name: str, contents: Mapping[str, Any], found: Filtered, given: Options) -> None:
     """Print the verdict, what was measured, and what was left as it is."""
     verdict, _, what = contents["verdict_text"].partition(": ")
     print_heading(
@@ -271,7 +271,7 @@ def _judgement(found: Filtered, tolerance: float) -> Judgement:
     return Judgement(found.verdict, 0, 0, unverified, what)
 
 
-def filter_form_of(given: Given) -> Form:
+def filter_form_of(given: Options) -> Form:
     """Form of the control that blocks are read and written in.
 
     Raises SettingsError CS240: a control whose programs are not read as a filter.
@@ -283,12 +283,12 @@ def filter_form_of(given: Given) -> Form:
     return given.choose_form()
 
 
-def how_read(given: Given) -> dict[str, Any]:
+def how_read(given: Options) -> dict[str, Any]:
     """What is to be known of a program that it does not say."""
     return {"tip_from_start": given.tip_control, "inch": given.units == "inch"}
 
 
-def axes_of(given: Given) -> Machine:
+def axes_of(given: Options) -> Machine:
     """Machine under whose limits a program is planned."""
     axes = limits_machine(given.load_limits(), given.load_machine())
     if axes is None:
@@ -296,7 +296,7 @@ def axes_of(given: Given) -> Machine:
     return axes
 
 
-def time_of_program(data: bytes, name: str, given: Given) -> int:
+def time_of_program(data: bytes, name: str, given: Options) -> int:
     """Say the time of a program as it is and smoothed, or beside another one; return the exit code of ``time``."""
     form, settings, axes = filter_form_of(given), given.settings(), axes_of(given)
     how = {**how_read(given), "axes": axes, "processes": useful_processes()}

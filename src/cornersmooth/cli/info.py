@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from typing import Any
 
 from cornersmooth.cl import read
+from cornersmooth.cli.options import Options
 from cornersmooth.cli.show import say, say_line, told_finding
-from cornersmooth.cli.values import Given
 from cornersmooth.report.info import describe
 
 
-def run_info(given: Given) -> int:
+def run_info(given: Options) -> int:
     """Do the work of the command; return its exit code."""
     from cornersmooth.cli.filter import describe_program
 

@@ -11,8 +11,8 @@ from typing import NoReturn
 import click
 
 from cornersmooth.cli.files import STANDARD, check_path
+from cornersmooth.cli.options import Options
 from cornersmooth.cli.show import print_line
-from cornersmooth.cli.values import Given
 from cornersmooth.errors import SettingsError
 
 #: names of CL files, for folders
@@ -35,7 +35,7 @@ class Input:
         return tuple(path for path in (self.target, *self.reports) if path != STANDARD)
 
 
-def find_inputs(given: Given, patterns: tuple[str, ...] = PATTERNS, suffix: str | None = None) -> list[Input]:
+def find_inputs(given: Options, patterns: tuple[str, ...] = PATTERNS, suffix: str | None = None) -> list[Input]:
     """Files that were named, and in batches those of the folders that were, with all below, in alphabetical order.
 
     In folders they are like the patterns where ``--glob`` does not say. NC files have the suffix, or that of the input.
@@ -56,7 +56,7 @@ def find_inputs(given: Given, patterns: tuple[str, ...] = PATTERNS, suffix: str 
     return found
 
 
-def _check_together(given: Given) -> None:
+def _check_together(given: Options) -> None:
     folder, inputs = given.directory, given.inputs
     if given.quiet and given.verbose:
         raise click.UsageError("-q and -v exclude each other")
@@ -72,7 +72,7 @@ def _check_together(given: Given) -> None:
         raise click.UsageError("standard input goes with no other input")
 
 
-def _files(name: str, given: Given, patterns: tuple[str, ...]) -> list[tuple[str, str]]:
+def _files(name: str, given: Options, patterns: tuple[str, ...]) -> list[tuple[str, str]]:
     """Files that a name stands for, and their stems."""
     if name == STANDARD:
         return [(name, "stdin")]

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, BinaryIO, cast
 from cornersmooth import __version__
 from cornersmooth.cli.files import Beginning, check_path, read_input, suffix_of, target_of, write_report
 from cornersmooth.cli.inputs import Input
+from cornersmooth.cli.options import Options
 from cornersmooth.cli.show import more
-from cornersmooth.cli.values import Given
 from cornersmooth.errors import EXIT_INTERNAL, CornersmoothError, VerdictError, internal_error, message, printable
 from cornersmooth.kinematics import Machine
 from cornersmooth.memory import return_large_arrays
@@ -45,7 +45,7 @@ _PROBLEMS_SHOWN = 5
 class Job(Input):
     """What to do with one input; every field survives the way to another process."""
 
-    given: Given
+    given: Options
     settings: Settings
     form: Form
     frame: Frame

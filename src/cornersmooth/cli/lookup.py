@@ -15,8 +15,8 @@ import click
 
 from cornersmooth.cli import shop
 from cornersmooth.cli.commands import COMMANDS
+from cornersmooth.cli.options import Options
 from cornersmooth.cli.show import say, say_json
-from cornersmooth.cli.values import Given
 from cornersmooth.errors import InputError
 
 #: what the modes of a form are called for people
@@ -29,7 +29,7 @@ _MODES = {
 }
 
 
-def run_controls(given: Given) -> int:
+def run_controls(given: Options) -> int:
     """Do the work of the command; return its exit code."""
     from cornersmooth.nc import control_names, control_table, load_control
 
@@ -43,7 +43,7 @@ def run_controls(given: Given) -> int:
     return 0
 
 
-def _check_table(given: Given, kind: str) -> None:
+def _check_table(given: Options, kind: str) -> None:
     """Refuse a table of nothing, and one beside other things."""
     if given.name is None:
         raise click.UsageError(f"--table needs the name of a {kind}")
@@ -79,7 +79,7 @@ def _told(before: str, item: dict[str, Any]) -> str:
     return f"{before}{item['name']}: {item['description']}" if item["description"] else f"{before}{item['name']}"
 
 
-def run_machines(given: Given) -> int:
+def run_machines(given: Options) -> int:
     """Do the work of the command; return its exit code."""
     from cornersmooth.kinematics import load_machine, machine_names, machine_table
     from cornersmooth.kinematics.posed import Posed, parse_pose
@@ -108,7 +108,7 @@ def run_machines(given: Given) -> int:
 _DEFAULT: Final = re.compile(r"\[default: ([^]]+)\]")
 
 
-def run_config(given: Given) -> int:
+def run_config(given: Options) -> int:
     """Do the work of the command; return its exit code."""
     smooth = COMMANDS["smooth"]
     source = given.source
@@ -137,7 +137,7 @@ def _shown(value: object) -> str:
     return ", ".join(map(str, value)) if isinstance(value, tuple) else str(value)
 
 
-def run_completion(given: Given) -> int:
+def run_completion(given: Options) -> int:
     """Do the work of the command; return its exit code."""
     from click.shell_completion import get_completion_class
 
@@ -168,7 +168,7 @@ KINDS: Final = {
 _WIDTH: Final = 80
 
 
-def run_explain(given: Given) -> int:
+def run_explain(given: Options) -> int:
     """Do the work of the command; return its exit code."""
     known, code = codes(), given.name
     if code is not None:

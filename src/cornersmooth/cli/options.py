@@ -1,13 +1,14 @@
-"""Every option of every command, once: what it is called, what it may be, and what its help says."""
+"""Every option of every command, once: what it is called, what it may be, what its help says, what it stands for."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
 from functools import partial
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import click
 
+from cornersmooth.cli.files import read_input
 from cornersmooth.cli.parameters import (
     ControlName,
     Duration,
@@ -20,7 +21,17 @@ from cornersmooth.cli.parameters import (
     ToolShape,
     Weights,
 )
+from cornersmooth.errors import SettingsError
 from cornersmooth.methods import AUTO, METHODS
+
+if TYPE_CHECKING:
+    from cornersmooth.feedrate import Limits
+    from cornersmooth.kinematics import Machine
+    from cornersmooth.nc import Control, Form
+    from cornersmooth.settings import Settings
+
+#: arguments of `cornersmooth.read` that options give
+_ARGUMENTS = "format dialect units arc_rule operation lenient tool_number spindle".split()
 
 Count = Annotated[int, click.IntRange(min=1)]
 Units = Literal["mm", "inch"]
@@ -42,6 +53,14 @@ HEADINGS = "Everyday,Output,Control,Program,Curves,Lines,Holes and planes,Limits
 _everyday, _output, _control, _program, _curves, _lines, _holes, _limits, _reading, _verification, _batches = (
     partial(option, heading) for heading in HEADINGS
 )
+
+
+#: of plans, in the order of the helps, and of a plan whose feeds are written
+LIMITS = (
+    "feed accel jerk centripetal period rapid rapid_accel rapid_jerk angular_feed angular_accel angular_jerk "
+    "vector_jerk turn_speed turn_accel turn_jerk"
+)
+PLANNED = "accel jerk centripetal period"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -295,6 +314,108 @@ class Options:
         "Have a Dask cluster do the files of a batch: tcp://HOST:8786, or the scheduler's file. See docs/batch.md.",
     )
 
+    def load_control(self) -> Control:
+        """Control of that name, of that file, or of the shop settings."""
+        from cornersmooth.nc import load_control
+
+        control: str | Control = self.control
+        return load_control(control) if isinstance(control, str) else control
+
+    def load_machine(self) -> Machine | None:
+        """Machine of that name, of that file, or of the shop settings; None where none is named."""
+        return _machine(self.machine)
+
+    def load_limits(self) -> Machine | None:
+        """Machine whose limits count, in place of those of the machine of the words."""
+        return _machine(self.limits)
+
+    def choose_form(self) -> Form:
+        """Form of the control that the options ask for."""
+        from cornersmooth.nc import choose_form
+
+        return choose_form(
+            self.load_control(),
+            self.form,
+            machine=self.load_machine(),
+            tcp=not self.no_tcp,
+            extras=self.extras,
+            digits=self.digits,
+            rewind=self.rewind or 0.0,
+            planes=self.planes == "tilted",
+        )
+
+    def settings(self) -> Settings:
+        """How to smooth; options that a command does not have keep their defaults."""
+        from cornersmooth.settings import Settings
+
+        self.check_axis()
+        names = (item.name for item in fields(Settings) if hasattr(self, item.name))
+        return Settings(**{name: getattr(self, name) for name in names})
+
+    def check_axis(self) -> None:
+        """Refuse a length and a tolerance of the axis in one command: the one takes the place of the other."""
+        if self.axis_tolerance is not None and typed("axis_length") and typed("axis_tolerance"):
+            raise click.UsageError("--axis-tolerance takes the place of -H/--axis-length: give one of them")
+
+    def path_limits(self, names: str = LIMITS) -> Limits:
+        """What the machine can do."""
+        from cornersmooth.feedrate import Limits
+
+        return Limits(**{name: getattr(self, name) for name in names.split()})
+
+    def planned_limits(self) -> Limits | None:
+        """Limits of the plan whose feeds are written; None where they are the programmed ones (and UsageError)."""
+        if self.feed_from_plan:
+            return self.path_limits(PLANNED)
+        for name in filter(typed, PLANNED.split()):
+            raise click.UsageError(f"--{name} is for --feed-from-plan")
+        return None
+
+    def reading(self) -> dict[str, Any]:
+        """Keyword arguments of `cornersmooth.read`."""
+        return {name: getattr(self, name) for name in _ARGUMENTS} | {"size_limit": not self.no_size_limit}
+
+    def read(self) -> tuple[bytes, str, bool]:
+        """Contents and name of the input, and whether it is an NC program; options of the other kind are refused."""
+        from cornersmooth.nc_reader.recognition import first_block
+        from cornersmooth.provenance import HEAD
+
+        data, name = read_input(self.source, size_limit=not self.no_size_limit)
+        program = first_block(data[:HEAD]) is not None
+        for param in click.get_current_context().command.params:
+            option = str(param.name)
+            if not typed(option) or not getattr(self, option):
+                continue
+            if program and option in {"feed", *_ARGUMENTS} - {"units"}:
+                what = f"{param.opts[-1]} is for CL files, and the input is an NC program; leave it out"
+                raise click.UsageError(what)
+            if not program and option == "tip_control":
+                raise click.UsageError("--tip-control is for NC programs, and the input is a CL file; leave it out")
+        return data, name, program
+
+    def reading_back(self) -> dict[str, Any]:
+        """Keyword arguments of `nc_reader.read_nc` for a program that somebody wrote (SettingsError CS204)."""
+        from cornersmooth.nc_reader import CONTROLS
+
+        control = self.load_control()
+        if control.dialect not in CONTROLS:
+            raise SettingsError(
+                "CS204", f"{control.name} is like no control that can be read", 'say like = "fanuc" or another in it'
+            )
+        return {"control": control.dialect, "machine": self.load_machine(), "tcp": not self.no_tcp}
+
+
+def _machine(machine: Any) -> Machine | None:
+    from cornersmooth.kinematics import load_machine
+
+    return load_machine(machine) if isinstance(machine, str) and machine else machine or None
+
+
+def typed(name: str) -> bool:
+    """Whether an option of the command that runs was given on the command line."""
+    context = click.get_current_context(silent=True)
+    return context is not None and context.get_parameter_source(name) == click.core.ParameterSource.COMMANDLINE
+
 
 #: of each option, the long one last
 FLAGS = {
@@ -312,13 +433,7 @@ def under(*headings: str) -> str:
 
 #: options that several commands have
 CURVES, LINES = under("Curves"), under("Lines")
-LIMITS = (
-    "feed accel jerk centripetal period rapid rapid_accel rapid_jerk angular_feed angular_accel angular_jerk "
-    "vector_jerk turn_speed turn_accel turn_jerk"
-)
 READING = "format dialect units arc_rule operation lenient no_size_limit"
 WRITING = f"control machine {under('Control', 'Program', 'Holes and planes')}"
-#: of a plan whose feeds are written
-PLANNED = "accel jerk centripetal period"
 #: the feed of commands that only plan
 FEED_OF_ALL = {"heading": "Limits", "help": "Feed of all feed moves instead of the programmed ones."}

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 from cornersmooth.cl import read
 from cornersmooth.cli.files import read_input
+from cornersmooth.cli.options import Options
 from cornersmooth.cli.show import progress_bar, say
-from cornersmooth.cli.values import Given
 from cornersmooth.model import Floats
 from cornersmooth.nc import choose_form
 from cornersmooth.processes import useful_processes
@@ -17,7 +17,7 @@ from cornersmooth.setup import Rating, Setups, find_setups
 _WORTH = 0.1
 
 
-def run_setup(given: Given) -> int:
+def run_setup(given: Options) -> int:
     """Do the work of the command; return its exit code."""
     machine = given.load_limits()
     form = choose_form(given.load_control(), given.form, machine=machine)

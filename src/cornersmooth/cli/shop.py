@@ -146,12 +146,6 @@ def loosened(tolerance: float | None) -> str:
     return f"the tolerance {tolerance:g} mm is larger than the default {least:g} mm: {where}"
 
 
-def typed(name: str) -> bool:
-    """Whether an option of the command that runs was given on the command line."""
-    context = click.get_current_context(silent=True)
-    return context is not None and context.get_parameter_source(name) == click.core.ParameterSource.COMMANDLINE
-
-
 def origin(ctx: click.Context, name: str) -> str:
     """Where the value of an option is from, in words."""
     source = ctx.get_parameter_source(name)

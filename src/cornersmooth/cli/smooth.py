@@ -14,6 +14,7 @@ from cornersmooth.cli.batch import Batch, batch_report, end_lines, interrupted_l
 from cornersmooth.cli.files import STANDARD, check_endings, check_inputs, check_path, read_lines
 from cornersmooth.cli.inputs import find_inputs
 from cornersmooth.cli.job import Job, Outcome, run_job
+from cornersmooth.cli.options import Options
 from cornersmooth.cli.shop import command_line, loosened
 from cornersmooth.cli.show import (
     more,
@@ -26,7 +27,6 @@ from cornersmooth.cli.show import (
     show_verdict,
     warn,
 )
-from cornersmooth.cli.values import Given
 from cornersmooth.errors import printable
 from cornersmooth.nc import Frame, fit_settings
 from cornersmooth.output import make_folder
@@ -36,7 +36,7 @@ from cornersmooth.verdict import Verdict
 _NAMED = 3
 
 
-def run_smooth(given: Given) -> int:
+def run_smooth(given: Options) -> int:
     """Do the work of the command; return its exit code."""
     jobs = _make_jobs(given)
     if len(jobs) == 1 and not given.directory:
@@ -110,7 +110,7 @@ def _tell(outcome: Outcome, told: bool = False) -> None:
         show_findings(job.source, findings, given.verbose)
 
 
-def _make_jobs(given: Given) -> list[Job]:
+def _make_jobs(given: Options) -> list[Job]:
     """One job for every input, all of them checked for names that clash."""
     folder = given.directory
     _check_usage(given)
@@ -142,7 +142,7 @@ def _make_jobs(given: Given) -> list[Job]:
     return jobs
 
 
-def _check_usage(given: Given) -> None:
+def _check_usage(given: Options) -> None:
     """Refuse options that do not go together."""
     folder = given.directory
     check_endings("report", given.reports, ".json, .csv or .html")
@@ -157,7 +157,7 @@ def _check_usage(given: Given) -> None:
         raise click.UsageError("--feed must be a positive number of mm/min")
 
 
-def _frame(given: Given) -> Frame:
+def _frame(given: Options) -> Frame:
     """What stands around the motion, with the texts of header and footer."""
     return Frame(
         given.program_name,

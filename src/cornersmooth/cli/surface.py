@@ -9,8 +9,8 @@ import click
 
 from cornersmooth.cl import read
 from cornersmooth.cli.files import STANDARD, check_inputs, check_reports, read_input, suffix_of, write_report
+from cornersmooth.cli.options import Options
 from cornersmooth.cli.show import say
-from cornersmooth.cli.values import Given
 from cornersmooth.errors import SettingsError
 from cornersmooth.geometry.tool import Tool, tools_of
 from cornersmooth.model import Program
@@ -22,7 +22,7 @@ from cornersmooth.verdict import Verdict
 from cornersmooth.verify import verify
 
 
-def run_surface(given: Given) -> int:
+def run_surface(given: Options) -> int:
     """Do the work of the command; return its exit code."""
     source, text = given.source, given.text
     if source == text == STANDARD:
@@ -68,7 +68,7 @@ def _tool(program: Program, asked: Tool | None) -> Tool:
 
 
 def _report(
-    form: str, program: Program, source: bytes, written: bytes | str, nc: Any, found: SurfaceMap, given: Given
+    form: str, program: Program, source: bytes, written: bytes | str, nc: Any, found: SurfaceMap, given: Options
 ) -> Iterator[str | bytes]:
 
     if form == ".json":

@@ -10,8 +10,8 @@ import numpy as np
 
 from cornersmooth.cl import read
 from cornersmooth.cli.files import check_inputs, check_path, check_reports, read_head, write_report
+from cornersmooth.cli.options import Options
 from cornersmooth.cli.show import print_message, progress_bar, say
-from cornersmooth.cli.values import Given
 from cornersmooth.comparing import law_of_lines
 from cornersmooth.errors import message
 from cornersmooth.feedrate import BlockLimits, Comparison, axis_peaks, compare, limiting, plan_text
@@ -37,7 +37,7 @@ _TITLES = {
 LAWS = tuple(_TITLES)
 
 
-def run_time(given: Given) -> int:
+def run_time(given: Options) -> int:
     """Do the work of the command; return its exit code."""
     from cornersmooth.cli.filter import time_of_program
 
@@ -73,7 +73,7 @@ def run_time(given: Given) -> int:
     return 0
 
 
-def _compare(data: bytes, name: str, given: Given) -> Comparison:
+def _compare(data: bytes, name: str, given: Options) -> Comparison:
 
     machine, axes = given.load_machine(), given.load_limits()
     axes = machine if axes is None else axes
@@ -97,7 +97,7 @@ def _compare(data: bytes, name: str, given: Given) -> Comparison:
         return compared.with_text(law)
 
 
-def _by_own_law(data: bytes, name: str, given: Given) -> int:
+def _by_own_law(data: bytes, name: str, given: Options) -> int:
     """Times of a control that plans lines by a law of its own."""
     program = without_holes(read(data, name=name, **given.reading()).with_feed(given.feed))
     form = given.choose_form()
@@ -119,7 +119,7 @@ def _by_own_law(data: bytes, name: str, given: Given) -> int:
     return 0
 
 
-def _as_text_was_made(given: Given) -> Given:
+def _as_text_was_made(given: Options) -> Options:
     """Options to read the text by: the machine of its own option, else of its head, else the one planned for."""
     made = read_provenance(read_head(given.text))
     machine = given.text_machine or given.machine

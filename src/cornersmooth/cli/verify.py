@@ -21,9 +21,9 @@ from cornersmooth.cli.files import (
     suffix_of,
     write_report,
 )
-from cornersmooth.cli.shop import command_line, loosened, typed
+from cornersmooth.cli.options import Options, typed
+from cornersmooth.cli.shop import command_line, loosened
 from cornersmooth.cli.show import more, print_line, print_message, say_json, say_line, show_findings, warn
-from cornersmooth.cli.values import Given
 from cornersmooth.errors import SettingsError
 from cornersmooth.kinematics import machine_names
 from cornersmooth.memory import return_large_arrays
@@ -51,7 +51,7 @@ _REWINDS_SHOWN = 5
 _ALIKE = 1e-9
 
 
-def run_verify(given: Given) -> int:
+def run_verify(given: Options) -> int:
     """Do the work of the command; return its exit code."""
     source, text = given.source, given.text
     if source == text == STANDARD:
@@ -165,7 +165,7 @@ def run_verify(given: Given) -> int:
 class _Head:
     """What was taken from the head of a program."""
 
-    given: Given  #: with what took the place of options that were not typed
+    given: Options  #: with what took the place of options that were not typed
     taken: tuple[str, ...] = ()  #: the words of it
     loose: tuple[str, ...] = ()  #: what is not verified because the program itself loosens the check
     weights: tuple[float, ...] | None = None  #: Weights of its curves; None for any.
@@ -174,7 +174,7 @@ class _Head:
     problem: Problem | None = None
 
 
-def _take_over(given: Given, nc: bytes | str | os.PathLike[str], source: bytes) -> _Head:
+def _take_over(given: Options, nc: bytes | str | os.PathLike[str], source: bytes) -> _Head:
     """Take what the head of a program says of how it was made for options that were not typed."""
     head = read_head(nc)
     made = read_provenance(head)
@@ -207,10 +207,10 @@ def _take_over(given: Given, nc: bytes | str | os.PathLike[str], source: bytes) 
     return _Head(now, tuple(taken), tuple(_loose(given, now, set(words))), made.weights, made.form, problem=problem)
 
 
-def _loose(before: Given, given: Given, taken: set[str]) -> Iterator[str]:
+def _loose(before: Options, given: Options, taken: set[str]) -> Iterator[str]:
     """Say where words of the head make the check looser than the options and settings do without them."""
 
-    def lever(options: Given) -> float:
+    def lever(options: Options) -> float:
         """Distance from the tip at which the axis is off by the tolerance where it is off by what it may."""
         own = options.axis_tolerance
         return float(options.axis_length if own is None else length_of(options.tolerance, own))
@@ -228,7 +228,7 @@ def _loose(before: Given, given: Given, taken: set[str]) -> Iterator[str]:
         yield "feeds: that they may be lower is the program's own word: name it with --planned-feeds"
 
 
-def _recognised(given: Given, head: bytes) -> _Head:
+def _recognised(given: Options, head: bytes) -> _Head:
     """Take the control that a program looks like, where none was named, and say so."""
     looks = recognise_control(head)
     source = click.get_current_context().get_parameter_source("control")
