@@ -10,6 +10,7 @@ import os
 import shlex
 import traceback
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -101,7 +102,7 @@ class CornersmoothError(Exception):
 
     def __reduce__(self) -> tuple[object, ...]:
         """Survive the trip between worker processes with every field."""
-        return _rebuild, (type(self), self.code, self.what, self.hint, self.file, self.line)
+        return partial(type(self), file=self.file, line=self.line), (self.code, self.what, self.hint)
 
     @property
     def place(self) -> str:
@@ -111,12 +112,6 @@ class CornersmoothError(Exception):
     def __str__(self) -> str:
         """Text of the message, as `message` gives it."""
         return message("error", self.what, code=self.code, place=self.place, hint=self.hint)
-
-
-def _rebuild(
-    cls: type[CornersmoothError], code: str, what: str, hint: str, file: str | None, line: int | None
-) -> CornersmoothError:
-    return cls(code, what, hint, file=file, line=line)
 
 
 class InputError(CornersmoothError):

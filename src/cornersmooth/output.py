@@ -79,8 +79,9 @@ def check_output(
         raise OutputError("CS402", f"there is no folder {folder}", "make it first", file=path)
     if force or force is None or not os.path.isfile(path):
         return bool(force)
-    if ours and _begins_with(path, ours):
-        return True
+    with contextlib.suppress(OSError), open(path, "rb") as stream:
+        if ours and stream.read(len(ours)) == ours:
+            return True
     raise OutputError("CS403", "exists already", "use --force to replace it", file=path)
 
 
@@ -319,9 +320,3 @@ def _same(source: str | os.PathLike[str] | int, path: str) -> bool:
         return os.path.samestat(os.stat(source), os.stat(path))
     except OSError:
         return not isinstance(source, int) and os.path.realpath(source) == os.path.realpath(path)
-
-
-def _begins_with(path: str, ours: bytes) -> bool:
-    with contextlib.suppress(OSError), open(path, "rb") as stream:
-        return stream.read(len(ours)) == ours
-    return False

@@ -52,11 +52,6 @@ class Provenance:
         lines.append(" ".join(([f"SHA256={self.sha256}"] if self.sha256 else []) + [f"CL={self.source}"]))
         return tuple(lines)
 
-    @property
-    def weights_word(self) -> str:
-        """Weights as they are written; nothing where all are 1."""
-        return _weights_word(self.weights)
-
 
 def read_provenance(text: bytes) -> Provenance | None:
     """How a text was made, as its beginning says; None where it says nothing that can be understood."""
@@ -86,7 +81,8 @@ def _number(value: float | None) -> str:
     return "" if value is None else f"{value:.9g}"
 
 
-def _weights_word(weights: tuple[float, ...] | None) -> str:
+def weights_word(weights: tuple[float, ...] | None) -> str:
+    """Weights as they are written; nothing where all are 1."""
     if weights is None:
         return "any"
     others = sorted(set(weights) - {1.0})
@@ -107,7 +103,7 @@ _FIELDS: Final[tuple[tuple[str, str, Callable[[Any], str], Callable[[str], Any]]
     ("FORM", "form", str, str),
     ("MACHINE", "machine", str, str),
     ("TCP", "tcp", lambda on: "" if on else "no", lambda word: word != "no"),
-    ("WEIGHTS", "weights", _weights_word, _weights),
+    ("WEIGHTS", "weights", weights_word, _weights),
     ("FEEDS", "planned_feeds", lambda on: "plan" if on else "", lambda word: word == "plan"),
     ("OFFSET", "work_offset", str, str),
     ("OPERATION", "operation", lambda number: f"{number}" if number else "", int),

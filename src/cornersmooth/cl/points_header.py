@@ -87,8 +87,6 @@ def from_header(text: str, file: str, line: int) -> Columns:
     twice = sorted({name for name in plain if name and plain.count(name) > 1})
     if twice:
         raise error("CS156", file, line, why=f"{twice[0]!r} stands there twice")
-    if quaternion := _quaternion(plain):
-        raise error("CS165", file, line, names=", ".join(quaternion))
     tip = _find(_TIPS, plain)
     if tip is None:
         raise error("CS156", file, line, why=f"no x, y and z in {text.strip()[:60]!r}")
@@ -98,9 +96,13 @@ def from_header(text: str, file: str, line: int) -> Columns:
     feed = next((left.index(name) for name in _FEEDS if name in left), None)
     rapid = next((left.index(name) for name in _RAPIDS if name in left), None)
     used = {*tip, *(second or ()), feed, rapid}
-    unused = tuple(names[c].strip() for c, name in enumerate(left) if name and c not in used and name not in _COUNTERS)
+    rest = [c for c, name in enumerate(left) if name and c not in used and name not in _COUNTERS]
+    unused = tuple(names[c].strip() for c in rest)
     if unused and second is None:  # an axis in a spelling we do not know must not become +Z in silence
         raise error("CS156", file, line, why=f"no tool axis in {', '.join(unused)}")
+    axis = [left[c] for c in second or ()]
+    if scalar := _scalar([left[c] for c in rest], set(axis)):
+        raise error("CS165", file, line, names=", ".join((*axis, scalar)))
     units = _units(names, (*tip, *(second if second and meaning == "points" else ())), feed, file, line)
     says: Rapid = "word" if rapid is None else _RAPIDS[left[rapid]]
     name = "" if rapid is None else names[rapid].strip()
@@ -122,27 +124,10 @@ def _plain(names: list[str]) -> list[str]:
     return [re.sub(r"[^a-z0-9]", "", _UNIT.sub("", name.lower().strip(" \"'"))) for name in names]
 
 
-def _quaternion(names: list[str]) -> list[str]:
-    """Names of the four parts of a quaternion, in any spelling; empty where there is none.
-
-    The scalar is w beside x, y, z (qw, ow, quat_w) or i, j, k, or a fourth name that begins with q; or the parts are
-    counted from 0 or from 1.
-    """
-    for name in names:
-        for vector in ("xyz", "ijk", "123"):
-            parts = [name, *(name.replace("w", part) for part in vector)]
-            if "w" in name and all(part in names for part in parts) and not {"u", "v", "w"} <= set(names):
-                return parts
-    for stem in {name[:-1] for name in names if name[-1:] in ("0", "4")}:
-        for first in (0, 1):
-            parts = [f"{stem}{count}" for count in range(first, first + 4)]
-            counted = [name for name in names if name[:-1] == stem and name[-1:].isdigit()]
-            if stem[:1] in ("q", "e", "o", "r") and sorted(counted) == parts:
-                return parts
-    parts = [name for name in names if name.startswith("q")]
-    if "qx" in names:
-        parts += [name for name in names if name in ("w", "s", "scalar", "real")]
-    return parts if len(parts) > 3 else []
+def _scalar(names: list[str], axis: set[str]) -> str:
+    """Name of the scalar part of a quaternion, whose other parts pass for an axis; empty where there is none."""
+    parts = ("s", "scalar", "real", "q0", "q4") if "qx" in axis else ()
+    return next((name for name in names if name in ("w", *parts) or name.replace("w", "x") in axis), "")
 
 
 def _find(spellings: tuple[str, ...], names: list[str]) -> Triple | None:

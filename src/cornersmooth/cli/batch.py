@@ -143,19 +143,13 @@ def line_of(outcome: Outcome) -> str:
     head, _, what = outcome.verdict_text.partition(": ")
     if outcome.status == "skipped":
         return f"skipped   {name}: {outcome.skipped}" + (f"; {outcome.verdict_text}" if what else "")
+    summary, own_axis = outcome.contents["summary"], outcome.contents["settings"]["axis_tolerance_deg"] is not None
+    second = "tool axis {max_orientation_error_deg:.4f}°" if own_axis else "axis point {max_axis_error_mm:.4f} mm"
     return (
         f"{head:<8}  {name}: {what}; {row['smoothed']} of {row['corners']} corners, "
-        f"tip {row['max_tip_error_mm']:.4f} mm, {_second(outcome.contents)}, "
+        f"tip {row['max_tip_error_mm']:.4f} mm, {second.format(**summary)}, "
         f"{row['blocks']} blocks, {row['seconds']:.1f} s"
     )
-
-
-def _second(contents: Mapping[str, Any]) -> str:
-    """What is told of the axis."""
-    summary = contents["summary"]
-    if contents["settings"]["axis_tolerance_deg"] is not None:
-        return f"tool axis {summary['max_orientation_error_deg']:.4f}°"
-    return f"axis point {summary['max_axis_error_mm']:.4f} mm"
 
 
 def end_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:

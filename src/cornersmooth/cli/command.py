@@ -9,7 +9,6 @@ import os
 import sys
 from collections.abc import Mapping
 from dataclasses import fields
-from functools import cache
 from importlib import import_module
 from types import NoneType
 from typing import Any, Final, Literal, get_args, get_origin, get_type_hints
@@ -26,6 +25,9 @@ EXIT_CODES_OF_READERS: Final = EXIT_CODES.replace("; 4", "; 3 input cannot be re
 EXIT_CODES_OF_WRITERS: Final = EXIT_CODES_OF_READERS.replace(
     "0 done;", "0 done; 1 the program FAILED, or is not PASSED under --strict;"
 )
+#: what options may be
+_TYPES: Final = get_type_hints(Options, include_extras=True)
+
 #: room for the names of options
 _NAMES: Final = 26
 
@@ -109,11 +111,6 @@ def new_command(
     return Command(name, params=params, callback=called, help=help, epilog=epilog)
 
 
-@cache
-def _types() -> dict[str, Any]:
-    return get_type_hints(Options, include_extras=True)
-
-
 def _option(name: str, changes: Mapping[str, Any]) -> click.Option:
     """Option of a field: its type says what it may be."""
     item = next(item for item in fields(Options) if item.name == name)
@@ -121,7 +118,7 @@ def _option(name: str, changes: Mapping[str, Any]) -> click.Option:
     for word in given.pop("spelled").split():
         if not word.startswith("-"):
             given["metavar"] = word
-    hint: Any = _types()[name]
+    hint: Any = _TYPES[name]
     if NoneType in get_args(hint):
         hint = get_args(hint)[0]
     if get_origin(hint) is tuple:

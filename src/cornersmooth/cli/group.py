@@ -22,12 +22,6 @@ from cornersmooth.output import ClosedPipe, reason
 EXIT_INTERRUPTED = 130
 
 
-def _pages() -> Path:
-    """The folder of the documents: in the package, or beside its source."""
-    package = Path(__file__).resolve().parent.parent
-    return next((path for path in (package / "docs", package.parents[1] / "docs") if path.is_dir()), package)
-
-
 #: as of a program that is ended by the signal of a closed pipe: who reads has enough
 EXIT_CLOSED_PIPE = 141
 
@@ -53,8 +47,10 @@ class _Group(click.Group):
         """List the commands."""
         for heading, commands in GROUPS.items():
             write_part(formatter, heading, [(str(one.name), one.get_short_help_str(150)) for one in commands])
+        package = Path(__file__).resolve().parent.parent
+        pages = next((path for path in (package / "docs", package.parents[1] / "docs") if path.is_dir()), package)
         with formatter.section("Pages that helps name"):
-            formatter.write_dl([("docs/", str(_pages()))])
+            formatter.write_dl([("docs/", str(pages))])
 
 
 @click.group(

@@ -80,7 +80,7 @@ def progress_bar(quiet: bool, *, rate: bool = False) -> Iterator[Progress | None
 def show_findings(source: str, findings: Sequence[dict[str, Any]], verbose: int) -> None:
     """Print the findings of one file, each on its line: first what is to be checked, all of it."""
     told = [finding for finding in findings if finding["code"] != NOT_VERIFIED]  # the first line says it
-    ranked = sorted(told, key=_rank)
+    ranked = sorted(told, key=lambda one: (not one["to_check"], ("error", "warning", "note").index(one["severity"])))
     if not verbose:
         ranked = [finding for finding in ranked if finding["severity"] != "note"]
     count = max(_FINDINGS_SHOWN, sum(finding["to_check"] for finding in ranked))
@@ -95,10 +95,6 @@ def told_finding(source: str, finding: Mapping[str, Any]) -> str:
     """Give the message of a finding in the table of a report."""
     place = f"{source}:{finding['line']}" if finding["line"] else source
     return message(finding["severity"], finding["text"], code=finding["code"], place=place, count=finding["count"])
-
-
-def _rank(finding: dict[str, Any]) -> int:
-    return 0 if finding["to_check"] else ("error", "warning", "note").index(finding["severity"]) + 1
 
 
 def show_verdict(contents: Mapping[str, Any], saving: Saving | None = None) -> None:

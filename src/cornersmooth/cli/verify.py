@@ -31,7 +31,7 @@ from cornersmooth.nc import control_names, own_words
 from cornersmooth.nc_reader import NcProgram, Problem, read_nc
 from cornersmooth.nc_reader.recognition import recognise_control
 from cornersmooth.nc_reader.source import readable_twice
-from cornersmooth.provenance import read_provenance
+from cornersmooth.provenance import read_provenance, weights_word
 from cornersmooth.report import NcFile, findings_table, report_json
 from cornersmooth.report.record import cl_file, record, sha256_of
 from cornersmooth.report.verdict import judge, trusted_blocks
@@ -199,7 +199,7 @@ def _take_over(given: Options, nc: bytes | str | os.PathLike[str], source: bytes
         for name, (word, value) in words.items()
         if value not in (None, False)
     ]
-    taken += [] if made.weights_word == "" else [f"WEIGHTS={made.weights_word}"]
+    taken += [f"WEIGHTS={word}" for word in [weights_word(made.weights)] if word]
     problem = None
     if made.sha256 and made.sha256 != hashlib.sha256(source).hexdigest():
         text = "the program was made from another CL file, or that has changed since: its SHA-256 is another"
