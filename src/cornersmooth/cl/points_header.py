@@ -126,8 +126,9 @@ def _plain(names: list[str]) -> list[str]:
 
 def _scalar(names: list[str], axis: set[str]) -> str:
     """Name of the scalar part of a quaternion, whose other parts pass for an axis; empty where there is none."""
-    parts = ("s", "scalar", "real", "q0", "q4") if "qx" in axis else ()
-    return next((name for name in names if name in ("w", *parts) or name.replace("w", "x") in axis), "")
+    q = "qx" in axis
+    also = [name for name in names if q and (name.startswith("q") or name in ("s", "scalar", "real"))]
+    return next((name for name in names if name == "w" or name in also or name.replace("w", "x") in axis), "")
 
 
 def _find(spellings: tuple[str, ...], names: list[str]) -> Triple | None:
