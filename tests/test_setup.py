@@ -17,6 +17,7 @@ from cornersmooth.feedrate import Limits, plan_text
 from cornersmooth.kinematics import Machine, load_machine, parse_machine
 from cornersmooth.setup import Setup, find_setups
 from oracle.command import BAD_INPUT, DONE, USAGE, run
+from oracle.files import beginning
 
 IMPELLER = Path(__file__).parents[1] / "samples" / "impeller.cls"
 
@@ -91,7 +92,9 @@ def test_setups_beyond_the_travel_are_left_out() -> None:
 
 
 def test_command_saves_a_tenth_and_says_what_is_the_users(tmp_path: Path) -> None:
-    told = run("setup", IMPELLER, "--limits", "table-ac", "--plans", "1", "--tilt", "30", "--json", cwd=tmp_path)
+    source = tmp_path / "impeller.cls"
+    source.write_bytes(beginning(IMPELLER, 205))
+    told = run("setup", source, "--limits", "table-ac", "--plans", "1", "--tilt", "30", "--json", cwd=tmp_path)
     assert told.returncode == DONE
     found = json.loads(told.stdout)
     best = found["best"][0]

@@ -32,7 +32,7 @@ def test_json(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     part = tmp_path / "part.cls"
-    part.write_bytes(beginning(IMPELLER, 205))
+    part.write_bytes(beginning(IMPELLER, 45))
     assert run(["time", str(part), "-e", "0.02"]) == 0
     text = capsys.readouterr().out
     for words in ("direct, exact stop", "as written", "at constant feed"):
@@ -154,7 +154,7 @@ def test_a_text_is_read_before_anything_is_planned(
 def test_the_program_of_the_options_is_planned(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """What smooth writes with the same options takes the time that is said without it."""
     part, nc = tmp_path / "part.cls", tmp_path / "part.mpf"
-    part.write_bytes(re.sub(rb"FEDRAT/[^\n]*\n", b"", beginning(IMPELLER, 205)))
+    part.write_bytes(re.sub(rb"FEDRAT/[^\n]*\n", b"", beginning(IMPELLER, 45)))
     options = ["--control", "siemens", "-f", "g1", "--feed", "900"]
     assert run(["smooth", str(part), *options, "-o", str(nc), "-q"]) == 0
     told = []

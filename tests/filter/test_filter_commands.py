@@ -101,12 +101,12 @@ def test_errors_of_times_say_the_file_and_the_line(tmp_path: Path) -> None:
 
 def test_compare_looks_at_a_part_of_a_long_program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cornersmooth.filter.program.MOST_POSES", 30)
-    control, machine, text = PROGRAMS["fanuc words"]
-    head, _, rest = text.partition("G0 X0.")
-    cuts, _, tail = ("G0 X0." + rest).partition("G0 Z50.")
-    part = tmp_path / "part.nc"
-    part.write_text(head + "".join(f"{cuts}G0 Z20.\n" for _ in range(5)) + "G0 Z50." + tail)
-    table = json.loads(run("compare", part, "--control", control, "--machine", machine, "--json").stdout)
+    monkeypatch.setattr("cornersmooth.filter.program._BY_LAW", 1)
+    part = written(tmp_path, name_of(LINUXCNC[1], LINUXCNC[3]))
+    head, _, rest = part.read_text().partition("G0 X0")
+    cuts, _, tail = ("G0 X0" + rest).partition("G0 Z50")
+    part.write_text(head + "".join(f"{cuts}G0 Z20\n" for _ in range(5)) + "G0 Z50" + tail)
+    table = json.loads(run("compare", part, *LINUXCNC, "--json").stdout)
     assert table["share_of_poses"] == pytest.approx(0.2)
 
 

@@ -132,7 +132,7 @@ def test_filter_counts_cuts_and_compares(part: Path) -> None:
         ("filter a.nc -o o.nc --json", "cornersmooth-report/2"),
         ("verify part.cls a.nc --json", "cornersmooth-report/2"),
         ("verify a.nc a.nc --json", "cornersmooth-report/2"),
-        ("compare part.cls --limits table-ac --json -q", "cornersmooth-compare/1"),
+        ("compare part.cls --control linuxcnc --machine xyzac-trt --json -q", "cornersmooth-compare/1"),
         ("time part.cls --limits table-ac --json", "cornersmooth-time/1"),
         ("setup part.cls --limits table-ac --plans 1 --json -q", "cornersmooth-setup/1"),
         ("surface part.cls a.nc --tool 10 --json", "cornersmooth-surface/1"),

@@ -2,20 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 import cornersmooth
-from cornersmooth.kinematics import load_machine
 from cornersmooth.model import Program
-from cornersmooth.nc import choose_form, fit_settings
-from cornersmooth.saving import Timing, written_text
 from cornersmooth.settings import FINEST_CHORD, Settings
 from cornersmooth.smoothing.segments import lines_per_half
-
-SAMPLE = Path(__file__).parents[2] / "samples" / "impeller.cls"
 
 
 def halves(feed: float, **more: float) -> tuple[int, float]:
@@ -40,15 +33,3 @@ def test_lines_are_divided_for_jumps_and_none_is_passed_sooner_than_the_control_
     for feed, block_time in ((60.0, 1e-7), (60.0 * 1000.0, 1.0), (np.nan, 1e-7)):
         assert halves(feed, block_time=block_time)[0] == by_chord
     assert halves(60.0 * 1000.0, block_time=1e-7, chord_tolerance=0.004)[0] == pytest.approx(finest, abs=1)
-
-
-def test_the_sample_gains_as_documented() -> None:
-    """On table-ac, where lines by the chord alone took 103 s."""
-    machine, program = load_machine("table-ac"), cornersmooth.read(SAMPLE)
-    form = choose_form(machine=machine)
-    settings = fit_settings(Settings(tolerance=0.01), form, program.units)
-    text = written_text(program, settings, form)
-    timing = Timing.of(form, settings)
-    assert timing is not None
-    assert timing.written(text, program)[0] <= 88.0
-    assert text.count(b"\n") < 5500

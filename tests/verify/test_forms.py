@@ -157,7 +157,7 @@ def test_rotary_words_want_their_machine() -> None:
 
 def test_wrong_machine_is_found() -> None:
     case = Case("fanuc", "g1", "table-ac")
-    program = chains_for(case, case.choose(), 1, count=4)
+    program = chains_for(case, case.choose(), 1, count=2)
     text, _ = written(program, case.choose(), Settings(tolerance=0.02))
     first, second = load_machine("table-ac").axes
     mirrored = replace(load_machine("table-ac"), axes=(first, replace(second, positive="table")))
