@@ -78,8 +78,10 @@ def section(control: str) -> Iterator[str]:
     if "like" in table:
         yield f"What is not named here is as for {table['like']}."
     if said := table.get("means"):
-        words = (f"{shown(word)} {text or 'nothing'}" for word, text in said.items())
-        yield f"Beside the motion: {', '.join(words)}. Words of spindle and coolant are compared with the statements."
+        yield "Words of spindle and coolant are compared with the statements. These words have a meaning beside"
+        yield "the motion:\n"
+        yield "| word | meaning |\n|---|---|"
+        yield from (f"| {shown(word)} | {text or 'nothing'} |" for word, text in said.items())
     rows = [(entry, kind) for kind in ("word", "block") for entry in table.get(kind, ())]
     if rows:
         yield "\n| word | what it is | state | where it may stand |\n|---|---|---|---|"

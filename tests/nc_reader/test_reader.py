@@ -57,6 +57,13 @@ def test_inches_become_millimetres():
     assert nc.second_step == pytest.approx(1e-7)
 
 
+def test_the_centre_of_an_arc_is_no_tool_vector():
+    lines = b"G0 X0. Y0. Z3.0000\nG1 Z0. F100.\nG2 X10. Y0. %s\nM30\n"
+    with_radius, with_centre = (read_nc(HEAD + lines % word, control="fanuc") for word in (b"R5.", b"I5.0000 J0.0000"))
+    assert with_centre.problems == ()
+    assert with_centre.second_step == with_radius.second_step == 0.0
+
+
 def test_curve():
     nc = read_nc(HEAD + START + CURVE + b"G1 X2.0000 Y3.0000 Z0.0000 U2.0000 V3.0000 W10.0000\n")
     assert nc.problems == ()

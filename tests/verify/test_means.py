@@ -34,14 +34,14 @@ GOTO/20,9,50
 FINI
 """
 
-#: air: its word in the table of the writer, what the reader's list says, blocks of the program in their order
+#: a coolant that no CAM system has: its word in the writer's table, what the reader's list says, blocks of the program
 AIR = {
-    "fanuc": ('AIR = ["M77"]', {"M77": "coolant AIR"}, ["M77", "M8", "M77", "M9"]),
-    "siemens": ('AIR = ["M78"]', {"M78": "coolant AIR"}, ["M78", "M8", "M78", "M9"]),
+    "fanuc": ('XAIR = ["M977"]', {"M977": "coolant XAIR"}, ["M977", "M8", "M977", "M9"]),
+    "siemens": ('XAIR = ["M978"]', {"M978": "coolant XAIR"}, ["M978", "M8", "M978", "M9"]),
     "haas": (
-        'AIR = ["M83"]',
-        {"M83": "coolant AIR", "M84": "coolant OFF AIR"},
-        ["M83", "M84", "M8", "M9", "M83", "M84"],
+        'XAIR = ["M983"]',
+        {"M983": "coolant XAIR", "M984": "coolant OFF XAIR"},
+        ["M983", "M984", "M8", "M9", "M983", "M984"],
     ),
 }
 
@@ -55,7 +55,7 @@ def _with_air(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         text = written(self, name)
         entry = AIR[name][0] if name in AIR else ""
         text = text.replace("coolant = {", f"coolant = {{ {entry},") if entry else text
-        return text.replace("coolant_off = {", 'coolant_off = { AIR = ["M84"],')
+        return text.replace("coolant_off = {", 'coolant_off = { XAIR = ["M984"],')
 
     def means(control: str) -> dict[str, object]:
         found = listed(control)
@@ -85,7 +85,7 @@ def _lines(control: str, cl: str) -> tuple[list[str], dict[str, object]]:
 @pytest.mark.usefixtures("_with_air")
 @pytest.mark.parametrize("control", AIR)
 def test_a_new_coolant_of_a_control(control: str) -> None:
-    cl = CL.format("COOLNT/AIR", "COOLNT/AIR")
+    cl = CL.format("COOLNT/XAIR", "COOLNT/XAIR")
     lines, how = _lines(control, cl)
     program = read(cl.encode(), name="air.cls")
     words = {"M8", "M9", *AIR[control][1]}
@@ -100,9 +100,9 @@ def test_a_new_coolant_of_a_control(control: str) -> None:
 @pytest.mark.usefixtures("_with_air")
 @pytest.mark.parametrize("control", ["fanuc", "siemens", "heidenhain"])
 def test_the_number_of_one_control_is_another_word_on_the_next(control: str) -> None:
-    cl = CL.format("AUXFUN/77", "COOLNT/ON")
+    cl = CL.format("AUXFUN/977", "COOLNT/ON")
     lines, how = _lines(control, cl)
-    without = [line for line in lines if not line.endswith("M77")]
+    without = [line for line in lines if not line.endswith("M977")]
     assert len(without) == len(lines) - 1
     text = "\n".join(without) + "\n"
     code = "CS553" if control == "fanuc" else "CS558"
@@ -112,5 +112,5 @@ def test_the_number_of_one_control_is_another_word_on_the_next(control: str) -> 
 
 @pytest.mark.usefixtures("_with_air")
 def test_what_a_control_has_no_word_for_is_not_missing() -> None:
-    lines, _ = _lines("heidenhain", CL.format("COOLNT/AIR", "COOLNT/AIR"))
-    assert any("COOLNT/AIR" in line for line in lines)
+    lines, _ = _lines("heidenhain", CL.format("COOLNT/XAIR", "COOLNT/XAIR"))
+    assert any("COOLNT/XAIR" in line for line in lines)

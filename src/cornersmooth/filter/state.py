@@ -17,6 +17,7 @@ from typing import Any, Final
 
 from cornersmooth.errors import InputError
 from cornersmooth.nc_reader.lexer import Lexer
+from cornersmooth.nc_reader.word_list import word_list
 from cornersmooth.nc_reader.words import Line, Word
 
 
@@ -102,6 +103,9 @@ def _vocabularies() -> dict[str, Vocabulary]:
         if "tip" in table:
             patterns = {does: table[does] for does in Does if does in table}
             patterns = {does: one if isinstance(one, str) else "|".join(one) for does, one in patterns.items()}
+            means = word_list(name).means.items()
+            quiet = (re.escape(word) for word, (kind, _) in means if kind in ("spindle", "coolant", "stop"))
+            patterns[Does.NOTHING] = "|".join((patterns[Does.NOTHING], *quiet))
             rest = table.get("ends", {}), table["offsets"], table.get("change_keeps_tip", False)
             found[name] = Vocabulary(patterns, table["tip"], *rest)
     return found
