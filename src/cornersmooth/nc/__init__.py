@@ -31,8 +31,7 @@ from cornersmooth.nc.planes import Planes, check_travel_in_planes, check_travel_
 from cornersmooth.nc.program_frame import POINT_APPROACH, Frame, Stream
 from cornersmooth.nc.rotary_curve_rows import rotary_curve_rows
 from cornersmooth.nc.rotary_rows import rotary_rows
-from cornersmooth.nc.rotary_words import rotary_way
-from cornersmooth.nc.run_reach import within_reach
+from cornersmooth.nc.rotary_words import rotary_way, within_reach
 from cornersmooth.nc.statement_writer import StatementWriter
 from cornersmooth.nc.warnings import add_warnings
 from cornersmooth.settings import Settings

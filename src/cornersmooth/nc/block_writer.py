@@ -17,9 +17,8 @@ from cornersmooth.kinematics import machine_position, tool_axis
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program
 from cornersmooth.nc.circles import FIRST_PLANE, Circles
 from cornersmooth.nc.control import INVERSE_TIME
-from cornersmooth.nc.curve_blocks import Curves, RowWriter, SplineShare, bezier_points, curves_for
+from cornersmooth.nc.curve_blocks import Curves, RowWriter, bezier_points, curves_for
 from cornersmooth.nc.findings import Findings
-from cornersmooth.nc.first_block import UPRIGHT
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.planes import Plane
 from cornersmooth.nc.program_frame import BLEND_STEP, blend_word
@@ -53,7 +52,6 @@ class BlockWriter:
     _curves: Curves = field(init=False)
     _blank: str = field(init=False)
     _leaves_out: bool = field(init=False)
-    _share: SplineShare | None = field(init=False)
     _modulo: list[int] = field(init=False)  #: columns of modulo axes
     _closing: bytes = field(init=False)
     _blend_in_force: int = field(init=False)  # in steps of its last digit
@@ -73,8 +71,7 @@ class BlockWriter:
         radius = f"{self._blank}{motion.radius}".encode()
         said = 2 if motion.arc_directions else 3
         self._arc_format = self._row_format((*spaced[:said], radius), decimals[:said] + decimals[:1])
-        self._curves = curves_for(self.form, self.program.units)
-        self._share = SplineShare(self.program.line, self.findings) if self.form.curve == "bspline" else None
+        self._curves = curves_for(self.form, self.program, self.findings)
         self._blend_in_force = self._usual_blend
 
     def _addresses(self, columns: Sequence[int]) -> tuple[tuple[bytes, ...], bytes]:
@@ -119,7 +116,7 @@ class BlockWriter:
             endless = np.isinf(low)[order]
             zero[endless] = 360 * degree * np.round(ticks[3:][endless] / (360 * degree))
         zero_block, start_block = (
-            self._rapid(words, slice(3, None)) for words in (np.append(np.zeros(3, np.int64), zero), ticks)
+            self.rapid(words, chosen=slice(3, None)) for words in (np.append(np.zeros(3, np.int64), zero), ticks)
         )
         return {"rotary_zero": (zero_block,), "rotary_start": (start_block,)}
 
@@ -131,16 +128,6 @@ class BlockWriter:
         found = np.zeros((len(ticks), 2))
         found[:, : len(order)] = ticks[:, order] / 10.0**self.form.table.digits.angle
         return found
-
-    def approach(self, ticks: Ints) -> list[str]:
-        """Blocks that bring the tool over a row of ticks, at the height where it is.
-
-        None where it goes there in one block: a tilted tool under tool tip control, or in a tilted plane
-        (`first_block`), and words of a second point, which would turn the tool elsewhere without Z.
-        """
-        if self.form.orientation == "point" or self.tool_axis(ticks)[2] < UPRIGHT:
-            return []
-        return [self._rapid(ticks, np.arange(len(ticks)) != 2)]
 
     def tool_axis(self, ticks: Ints) -> Floats:
         """(3,) tool axis of a row of ticks, in the coordinates in which X and Y are given while the tool is high."""
@@ -184,20 +171,16 @@ class BlockWriter:
             return unit(ends[0] - ends[1])
         return self.tool_axis(ticks)
 
-    def rapid(self, ticks: Ints, words: str = "") -> str:
-        """Rapid block of a row of ticks, after words of other kinds."""
-        return f"{words}{self._blank}" * bool(words) + self._rapid(ticks, slice(None))
-
-    def _rapid(self, ticks: Ints, chosen: slice | Bools) -> str:
-        """Rapid block of some words of a row."""
-        motion = self.form.mode.motion
+    def rapid(self, ticks: Ints, words: str = "", chosen: slice | Bools = slice(None)) -> str:
+        """Rapid block of some words of a row of ticks, all by default, after words of other kinds."""
+        motion, before = self.form.mode.motion, f"{words}{self._blank}" * bool(words)
         columns = np.arange(self.columns)[chosen].tolist()
         decimals = np.array(self.form.decimals(self.program.units))[chosen].tolist()
         spelt, closing = self._addresses(columns)
         prefix, suffix = f"{motion.rapid}{self._blank}".encode(), closing + motion.rapid_end.encode()
         row = self._row_format(spelt, tuple(decimals))
         none = np.zeros(1, np.int64)
-        return row.rows(self._modulo_ticks(ticks)[chosen][None], [prefix], none, [suffix], none)[0].decode()
+        return before + row.rows(self._modulo_ticks(ticks)[chosen][None], [prefix], none, [suffix], none)[0].decode()
 
     @property
     def columns(self) -> int:
@@ -231,8 +214,7 @@ class BlockWriter:
     def end(self) -> list[str]:
         """Blocks that bring feed mode and plane back to where they were at the start."""
         words, blocks = self.statements.words, []
-        if self._share is not None:
-            self._share.end()
+        self._curves.finish()
         if self._mode != FeedMode.PER_MINUTE:
             blocks += [words.feed_mode[key] for key in (int(FeedMode.PER_MINUTE),) if key in words.feed_mode]
             self._take_mode(FeedMode.PER_MINUTE)
@@ -276,8 +258,6 @@ class BlockWriter:
     def text(self, run: Run, dwell: int = 0, words: str = "") -> bytes:
         """Text of a run that is not empty; `dwell` in milliseconds, `words` stand in its first block."""
         run = self._curves.prepare(run)
-        if self._share is not None:
-            self._share.take(run)
         prefix, prefix_id, extra = self._prefixes(run, words)
         left_out = self._left_out(run, prefix, prefix_id) if self._leaves_out else None
         suffix, suffix_id = self._suffixes(run, dwell)

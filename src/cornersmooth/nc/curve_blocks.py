@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from itertools import product
 from typing import Protocol
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.geometry.ragged import ranges
-from cornersmooth.model import Bools, Floats, Ints, Units
+from cornersmooth.model import Bools, Floats, Ints, Program, Units
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.run import Run
@@ -60,6 +60,9 @@ class Curves:
         """Ticks of the rows on curves in `format`."""
         return run.ticks[curved]
 
+    def finish(self) -> None:
+        """Take note that no more rows follow."""
+
 
 class KnotBlocks(Curves):
     """FANUC's G06.2: a knot before and a weight after every control point, the last four knots in blocks of their own.
@@ -95,18 +98,25 @@ class SplineBlocks(Curves):
 
     With the clamped knots u the block of control point j has PL = u[j+2] − u[j+1]: 0, 1/2, 1/2, 0 for five points.
     Curves that follow one another are one spline with triple knots between them, with the same intervals.
+
+    SINUMERIK wants six splines of every ten blocks (programming manual 12/2019): ten feed blocks from the beginning of
+    every spline on are counted; what comes after a rapid is no spline.
     """
 
-    def __init__(self, weight_decimals: int) -> None:
-        self._decimals = weight_decimals
+    def __init__(self, weight_decimals: int, line: Ints, findings: Findings) -> None:
+        self._decimals, self._line, self._findings = weight_decimals, line, findings
         self._open = False  # the last block was on a spline
+        self._flags, self._moves = np.zeros(0, np.bool_), np.zeros(0, np.int64)  # of blocks that are not counted yet
+        self._before = False  # whether the block before these is a spline
 
     def prepare(self, run: Run) -> Run:
         """Leave out the first control points; find the knot intervals of the others."""
         if run.spline is not None:
             run = replace(run, spline=_intervals(run.spline, run.curve))
         self._open &= bool((run.curve > 0).any())  # a run of lines alone gets no prefixes of ours
-        return some_rows(run, run.curve != 1)
+        run = some_rows(run, run.curve != 1)
+        self._take(run)
+        return run
 
     def add_prefixes(self, run: Run, table: list[bytes], chosen: Ints) -> int:
         """``BSPLINE`` where a spline begins."""
@@ -125,6 +135,38 @@ class SplineBlocks(Curves):
 
     def _number(self, value: float) -> str:
         return format_number(value, self._decimals, trim=True).rstrip(".")
+
+    def _take(self, run: Run) -> None:
+        """Count the blocks of a run, a block a row."""
+        edges = np.flatnonzero(np.diff(run.rapid.astype(np.int8))) + 1
+        for rows in np.split(np.arange(len(run)), edges):
+            if run.rapid[rows[0]]:
+                self.finish()
+            else:
+                self._flags = np.concatenate((self._flags, run.curve[rows] > 0))
+                self._moves = np.concatenate((self._moves, run.move[rows]))
+                self._count(len(self._flags) - _WINDOW)
+
+    def finish(self) -> None:
+        """Count what is left where no further feed block follows."""
+        self._count(len(self._flags) - 1)
+        self._before = False
+
+    def _count(self, last: int) -> None:
+        """Count the windows that begin up to a block, and forget these blocks."""
+        if last < 0:
+            return
+        flags = self._flags
+        starts = np.flatnonzero(flags & ~np.concatenate(([self._before], flags[:-1])))
+        starts = starts[starts <= last]
+        total = np.concatenate(([0], np.cumsum(flags)))
+        stop = np.minimum(starts + _WINDOW, len(flags))
+        few = starts[total[stop] - total[starts] < _LEAST]
+        if len(few):
+            text = "fewer than six of ten blocks are BSPLINE, which SINUMERIK wants; -f poly (vectors) has no such rule"
+            self._findings.add("CS325", "warning", int(self._line[self._moves[few[0]]]), text, len(few))
+        self._before = bool(flags[last])
+        self._flags, self._moves = flags[last + 1 :], self._moves[last + 1 :]
 
 
 def _intervals(spline: Floats, curve: NDArray[np.int8]) -> Floats:
@@ -310,61 +352,15 @@ def _splines(curve: NDArray[np.int8], spline: Floats, counts: Ints) -> Splines:
     return Splines(knots, counts - 2)
 
 
-def curves_for(form: Form, units: Units) -> Curves:
+def curves_for(form: Form, program: Program, findings: Findings) -> Curves:
     """Way to write curves of a form."""
-    decimals = form.table.digits.weight
+    decimals, units = form.table.digits.weight, program.units
     if form.curve == "g6.2":
         return KnotBlocks(decimals, b" " if form.mode.motion.spaces else b"")
     if form.curve == "bspline":
-        return SplineBlocks(decimals)
+        return SplineBlocks(decimals, program.line, findings)
     if form.curve == "poly":
         return PolyBlocks(form, units)
     if form.curve == "spl":
         return SplBlocks(form, units)
     return Curves()
-
-
-@dataclass
-class SplineShare:
-    """Counts spline blocks: SINUMERIK wants six of every ten (programming manual 12/2019).
-
-    Looks at ten feed blocks from the beginning of every spline on; what comes after a rapid is no spline.
-    """
-
-    line: Ints  #: (n,) lines of the CL file, for messages
-    findings: Findings
-    _flags: Bools = field(default_factory=lambda: np.zeros(0, np.bool_))
-    _moves: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
-    _before: bool = False  # whether the block before these is a spline
-
-    def take(self, run: Run) -> None:
-        """Count the blocks of a run, a block a row."""
-        edges = np.flatnonzero(np.diff(run.rapid.astype(np.int8))) + 1
-        for rows in np.split(np.arange(len(run)), edges):
-            if run.rapid[rows[0]]:
-                self.end()
-            else:
-                self._flags = np.concatenate((self._flags, run.curve[rows] > 0))
-                self._moves = np.concatenate((self._moves, run.move[rows]))
-                self._count(len(self._flags) - _WINDOW)
-
-    def end(self) -> None:
-        """Count what is left where no further feed block follows."""
-        self._count(len(self._flags) - 1)
-        self._before = False
-
-    def _count(self, last: int) -> None:
-        """Count the windows that begin up to a block, and forget these blocks."""
-        if last < 0:
-            return
-        flags = self._flags
-        starts = np.flatnonzero(flags & ~np.concatenate(([self._before], flags[:-1])))
-        starts = starts[starts <= last]
-        total = np.concatenate(([0], np.cumsum(flags)))
-        stop = np.minimum(starts + _WINDOW, len(flags))
-        few = starts[total[stop] - total[starts] < _LEAST]
-        if len(few):
-            text = "fewer than six of ten blocks are BSPLINE, which SINUMERIK wants; -f poly (vectors) has no such rule"
-            self.findings.add("CS325", "warning", int(self.line[self._moves[few[0]]]), text, len(few))
-        self._before = bool(flags[last])
-        self._flags, self._moves = flags[last + 1 :], self._moves[last + 1 :]

@@ -17,7 +17,7 @@ from cornersmooth.model import Bools, Floats, Ints, Move, Program, Statement
 from cornersmooth.nc.block_writer import BlockWriter
 from cornersmooth.nc.control import INVERSE_TIME
 from cornersmooth.nc.findings import Findings
-from cornersmooth.nc.first_block import UPRIGHT, FirstBlock
+from cornersmooth.nc.first_block import UPRIGHT, check_first_block
 from cornersmooth.nc.holes import HoleWriter
 from cornersmooth.nc.operation import Operation
 from cornersmooth.nc.planes import Planes
@@ -327,7 +327,7 @@ class MotionWriter:
         if not run.rapid.all():
             self.warnings.of_cut(int(run.move[np.argmin(run.rapid)]), turning=bool(operation.on["spindle"]))
         if writer.form.rotary:
-            self.warnings.of_turns(run, writer.form, writer.angles(run.ticks))
+            self.warnings.of_turns(run, writer.form, writer.angles)
         self.position = self.last = run.ticks[-1]
         self.last_writer, operation.halted = writer, False
         yield writer.text(run, dwell, operation.take_with_z())
@@ -336,17 +336,14 @@ class MotionWriter:
 
     def _turns(self, run: Run) -> list[tuple[int, bool]]:
         """Rows before which the tool goes up so that rotary axes turn there, and whether that is within a cut."""
-        cuts = np.zeros(0, np.int64) if run.left is None else np.flatnonzero(run.left)
-        return sorted([(row, False) for row in self._rewinds(run).tolist()] + [(row, True) for row in cuts.tolist()])
-
-    def _rewinds(self, run: Run) -> Ints:
-        """Rows before which the tool goes up, so that rotary axes turn back there."""
-        if not self.writer.form.rotary or not len(run) or not run.rapid.any():
-            return np.zeros(0, np.int64)
-        before = run.ticks[:1] if self.position is None else self.position[None]
-        angles = self.writer.angles(np.concatenate((before, run.ticks)))
-        lines = self.program.line[run.move]
-        return retracts_before(self.writer.form, angles, run.rapid, lines, self.findings, self.operation.can_rewind())
+        turns = [] if run.left is None else [(row, True) for row in np.flatnonzero(run.left).tolist()]
+        if self.writer.form.rotary and run.rapid.any():
+            before = run.ticks[:1] if self.position is None else self.position[None]
+            angles, lines = self.writer.angles(np.concatenate((before, run.ticks))), self.program.line[run.move]
+            possible = self.operation.can_rewind()
+            rows = retracts_before(self.writer.form, angles, run.rapid, lines, self.findings, possible)
+            turns += [(row, False) for row in rows.tolist()]
+        return sorted(turns)
 
     def _leave_cut(self, back: Run) -> Iterator[bytes]:
         """Leave a cut along the tool, and come back to the row where it goes on, with other rotary words, at feed."""
@@ -360,10 +357,13 @@ class MotionWriter:
 
     def _approaches(self, first: Ints, above: float) -> list[str]:
         """Blocks that bring the tool over its first position, and to where it comes down along its axis."""
-        if not (above and self.operation.can_rewind()):
-            return self.writer.approach(first)
-        start = self.writer.lifted(first, above)
-        return [*self.writer.approach(start), self.writer.rapid(start, self.operation.take_with_z())]
+        writer, down = self.writer, bool(above) and self.operation.can_rewind()
+        start = writer.lifted(first, above) if down else first
+        # a tilted tool under tool tip control, or in a tilted plane, goes there in one block (`first_block`), and so do
+        # words of a second point, which would turn the tool elsewhere without Z
+        at_once = writer.form.orientation == "point" or writer.tool_axis(start)[2] < UPRIGHT
+        over = [] if at_once else [writer.rapid(start, chosen=np.arange(len(start)) != 2)]
+        return [*over, writer.rapid(start, self.operation.take_with_z())] if down else over
 
     def _look_at_first(self, end: Ints, move: int) -> None:
         """Look at the block that leads a tilted tool to its first position from the height of the retract."""
@@ -374,8 +374,8 @@ class MotionWriter:
         angles = writer.angles(end[None])[0] if form.rotary else None
         if writer.plane is not None:
             angles = writer.plane.angles
-        block = FirstBlock(form, machine, writer.plane, writer.tip(end), axis, angles, int(self.program.line[move]))
-        block.check(self._nose(), self.findings, self.program.source.name)
+        where = self.program.source.name, int(self.program.line[move])
+        check_first_block(form, machine, writer.tip(end), axis, angles, self._nose(), where, self.findings)
 
     def _nose(self) -> Floats | None:
         """(2,) mm, where the retract has left X and Y of the spindle nose; None where that is not known."""

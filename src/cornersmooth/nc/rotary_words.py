@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cornersmooth.errors import InputError, SettingsError
+from cornersmooth.geometry.ragged import starts
 from cornersmooth.kinematics import Machine, solutions
 from cornersmooth.memory import return_free_memory
 from cornersmooth.model import Bools, Floats, Ints, Move, Program, SmoothProgram
@@ -19,7 +20,10 @@ from cornersmooth.nc.form import Form
 from cornersmooth.nc.rewinds import from_zero
 from cornersmooth.rotary import rapid_moves, rewound_angles, rotary_angles, still_poses
 from cornersmooth.rotary.axis_findings import reach_error
-from cornersmooth.smoothing.sampling import Rows
+from cornersmooth.smoothing.sampling import Rows, dense_rows
+
+#: what a curve may turn the axis, over ε at H: tip and axis point may be off to opposite sides
+_SWING = 2.0
 
 
 @dataclass(frozen=True)
@@ -131,3 +135,45 @@ def _note_rewinds(machine: Machine, angles: Floats, left: Bools, line: Ints, fin
         f"{turn[0, column]:.4g} deg above the retract: expect a mark on the part"
     )
     findings.add("CS376", "warning", int(line[rows[0]]), text, len(rows))
+
+
+def within_reach(smoothed: SmoothProgram, form: Form) -> SmoothProgram:
+    """Round runs at the limits of the rotary axes corner by corner, if the machine cannot follow their curves.
+
+    Where poses are at the limit of a rotary axis, the curve of a run may go beyond it within the tolerance. That of a
+    single corner does not: its axes are between those of the poses.
+    """
+    if smoothed.runs is None or form.machine is None or not form.rotary or form.rewind:
+        return smoothed
+    near = _near_limits(smoothed, form)
+    if not near.any():
+        return smoothed
+    try:
+        rotary_way(dense_rows(smoothed), smoothed, form, Findings())
+    except InputError:
+        from cornersmooth.smoothing.global_runs import corner_by_corner  # which takes long to load
+
+        return corner_by_corner(smoothed, near)
+    return smoothed
+
+
+def _near_limits(smoothed: SmoothProgram, form: Form) -> Bools:
+    """(r,) bool: runs with a pose so near to the limit of an axis that the curve may go beyond it.
+
+    All runs on a machine with one rotary axis, whose limits are those of the directions, too.
+    """
+    runs, machine, settings = smoothed.runs, form.machine, smoothed.settings
+    assert runs is not None
+    assert machine is not None
+    if len(machine.names) < 2:
+        return np.ones(len(runs), np.bool_)
+    found = solutions(machine, smoothed.program.axis[runs.pose])
+    swing = np.degrees(_SWING * settings.tolerance / settings.axis_scale)
+    room = np.full(found.angles.shape, swing)
+    with np.errstate(divide="ignore"):  # at the pole the first axis turns as far as it likes
+        room[..., 0] /= np.abs(np.sin(np.radians(np.minimum(found.pole_distance, 90.0))))[:, None]
+    near = np.zeros(len(runs.pose), np.bool_)
+    for k, limit in zip(*np.nonzero(np.isfinite(machine.limits)), strict=True):
+        off = found.angles[..., k] - machine.limits[k, limit]
+        near |= (np.abs(off - 360.0 * np.round(off / 360.0)) <= room[..., k]).any(axis=1)
+    return np.maximum.reduceat(near, starts(runs.count)[:-1])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -169,13 +170,13 @@ class MotionWarnings:
             text = "the spindle is not started before the first cut of a tool; put SPINDL before it"
             self._once("CS335", "warning", pose, text)
 
-    def of_turns(self, run: Run, form: Form, angles: Floats) -> None:
-        """Say that an endless axis gets words that some machines of the control refuse; `angles` are those of `run`."""
+    def of_turns(self, run: Run, form: Form, angles_of: Callable[[Ints], Floats]) -> None:
+        """Say that an endless axis gets words that some machines of the control refuse; angles are those of ticks."""
         if "CS346" in self._noted or form.mode.motion.endless_words or form.machine is None:
             return
         axes = form.machine.axes[: len(form.machine.names)]
         endless = np.array([axis.limits is None and not axis.modulo for axis in axes])
-        angles = angles[:, : len(axes)]
+        angles = angles_of(run.ticks)[:, : len(axes)]
         rows = np.flatnonzero(((angles[:, endless] < 0.0) | (angles[:, endless] >= 360.0)).any(axis=1))
         if len(rows):
             names = " and ".join(form.machine.names[axis] for axis in np.flatnonzero(endless).tolist())
