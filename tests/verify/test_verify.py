@@ -9,6 +9,7 @@ from itertools import product
 import numpy as np
 import pytest
 
+from cornersmooth.cl import read
 from cornersmooth.errors import SettingsError
 from cornersmooth.model import Arcs, Move, Program
 from cornersmooth.nc_reader import read_nc
@@ -269,3 +270,26 @@ def test_second_table_of_the_paper_is_measured_in_the_text(tolerance, tip, axis_
     # four printed decimals, and half a step of the written numbers
     assert found.pose_tip[1:3] == pytest.approx(tip, abs=1.2e-4)
     assert found.pose_axis_point[1:3] == pytest.approx(axis_point, abs=1.2e-4)
+
+
+@pytest.mark.parametrize(
+    ("asked", "block", "code"),
+    [
+        (True, "G3 X60. Y0. I-10. J0. F500.", ""),
+        (True, "G3 I-10. F500.", ""),
+        (True, "G1 X60. F500.", "CS521"),
+        (True, "", "CS535"),
+        (False, "G3 X60. Y0. I-10. J0. F500.", "CS536"),
+        (False, "G3 I-10. F500.", "CS536"),
+        (False, "G1 X60.3 F500.\nX60.", "CS536"),
+        (False, "G1 X60.005 F500.\nX60.", ""),  # within the tolerance
+        (False, "", ""),
+    ],
+)
+def test_motion_that_ends_where_it_begins_between_two_stops(asked: bool, block: str, code: str) -> None:
+    circle = "FEDRAT/500,MMPM\nCIRCLE/50,0,5,0,0,1,10\nGOTO/60,0,5\n" if asked else ""
+    cl = f"UNITS/MM\nLOADTL/1\nSPINDL/1000,RPM,CLW\nRAPID\nGOTO/60,0,5\n{circle}RAPID\nGOTO/60,0,50\nFINI\n"
+    head = "%\nO1\nG21 G90 G94 G17 G40 G49 G80\nG91 G28 Z0.\nG90\nT1 M6\nS1000 M3\nG54\nG43 H1\nG0 X60. Y0.\nG0 Z5.\n"
+    text = f"{head}{block}\nG0 Z50.\nM5\nG91 G28 Z0.\nG90\nG49\nM30\n%\n"
+    found = verify(read(cl.encode(), name="part.cls"), text.encode(), tolerance=0.01, words=False)
+    assert [problem.code for problem in found.problems][:1] == [code] * bool(code)

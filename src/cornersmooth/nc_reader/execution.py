@@ -72,6 +72,8 @@ def execute(table: Table, modal: Modal, problems: list[Problem]) -> tuple[Elemen
     placed = held.columns(table, _TIP, modal.tip, tip)
     straight = (code <= 1) | np.isnan(code)
     is_arc = np.zeros(len(table), np.bool_) if straight.all() else (code == 2) | (code == 3)
+    if is_arc.any():  # a full circle need not say where it ends
+        placed |= is_arc & ~np.isnan([table.column(letter) for letter in "IJKR"]).all(axis=0)
     letters = modal.rotary or (_POINT if points else _VECTOR)
     vector_length = modal.vector_length
     if modal.rotary or points:

@@ -65,16 +65,6 @@ class Around:
         return cls(FreeSpace(points, beside.T, radius, *bends), at, places, start)
 
     @property
-    def base(self) -> int:
-        """First vertex of the path."""
-        return int(self.places[0])
-
-    @property
-    def top(self) -> int:
-        """Last vertex of the path."""
-        return int(self.places[-1])
-
-    @property
     def row_reached(self) -> int:
         """The first row after the last of which something is reached; the last row if that is."""
         count = len(self.reached) - (not self.reached[-1])
@@ -117,7 +107,7 @@ class Around:
                 return None
             if row < self.at[at]:
                 continue
-            goes_on = last < at < end and self.base <= known[at] <= self.top
+            goes_on = last < at < end and self.places[0] <= known[at] <= self.places[-1]
             if goes_on and holds(here, self.inward(float(known[at])), final):
                 return float(known[at])
             at = min(at + 1, end)
@@ -125,7 +115,7 @@ class Around:
             return None
         if stop is None:
             return self.outward(lowest(self.reached[-1]))
-        return float(stop) if stop == self.top and holds(self.reached[-1], final + 1.0, final) else None
+        return float(stop) if stop == self.places[-1] and holds(self.reached[-1], final + 1.0, final) else None
 
     def farthest(self) -> float:
         """Last place that was reached."""

@@ -21,8 +21,9 @@ from cornersmooth.nc_reader.ahead import Ahead
 from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem
 from cornersmooth.statements.tool_changes import ToolChanges
 from cornersmooth.verify.chain import Sections
+from cornersmooth.verify.free_space import largest_square
 from cornersmooth.verify.match import Batch
-from cornersmooth.verify.motions import inner_points, written_motion
+from cornersmooth.verify.motions import Motion, inner_points, written_motion
 from cornersmooth.verify.nearest import COLUMNS, Metric
 from cornersmooth.verify.passage import Walk
 from cornersmooth.verify.stops import BEFORE, Part, Stops, out_of_hole
@@ -60,11 +61,9 @@ class Batches:
         # the stretch that has no end yet: where it begins, as a move and in the text, and on the CL path; and the last
         # move that it may have
         self._move, self._element, self._move_last = -1, 0, -1
-        self._start, self._fraction, self._share = 0, 0.0, 0.0
+        self._start, self._fraction = 0, 0.0
         self._continued = False
-        # whether a lack of motion between its stops has been said, and where the tool was at the end of it if not
-        self._told = False
-        self._origin: tuple[Floats, Floats] | None = None
+        self._told = False  # whether a lack of motion between its stops has been said
         self._pending: list[tuple[int, int, int, int, float]] = []
 
     def of(self, chunks: Iterable[Elements]) -> Iterator[Batch]:
@@ -118,11 +117,8 @@ class Batches:
             self.problems.append(Problem("CS532", line, int(nc.line[at]), text))
         if kind == Move.HOLE:  # out of it the way begins anywhere
             there = path.length_at(out_of_hole(task, nc, at, move)[0])
-        self._move, self._element, self._continued, self._told, self._origin = move, element, False, False, None
-        self._start, self._fraction, self._share = start, 0.0, 0.0
-        if there > begin:
-            self._start, self._fraction = path.place_at(there)
-            self._share = (there - begin) / float(path.length[last_vertex[move + 1]] - begin)
+        self._move, self._element, self._continued, self._told = move, element, False, False
+        self._start, self._fraction = path.place_at(there) if there > begin else (start, 0.0)
         before = last_vertex[max(move - (kind == Move.RAPID), 0)]
         self.stops.extend((element, there, float(path.length[before])))
 
@@ -132,7 +128,7 @@ class Batches:
             return
         theirs, ours = move_last > self._move, element_last > self._element
         if theirs != ours and not self._told:
-            self._lost(move_last, element_last, theirs=theirs)
+            self._stands(move_last, element_last, theirs=theirs)
         if not (theirs and ours):
             return
         stop = int(self.task.original.trail.last[move_last])
@@ -153,8 +149,6 @@ class Batches:
         # nothing of the CL path is left for what is held: it may only stay where it is
         yield from self._flush()
         yield from self._close(self._move, last)
-        nc, at = self._ahead.nc, self._element - self._ahead.base
-        self._origin = self._origin or (nc.tip[at].copy(), nc.second[at].copy())
         self._element, self._continued = last, True
 
     def _cut(self, element: int, stop: int) -> Iterator[Batch]:
@@ -180,7 +174,7 @@ class Batches:
         table["last"] -= begin
         elements = self._ahead.part(begin, last + 1)
         part = elements.part(lead, len(elements))
-        motion = written_motion(part, task.tolerance, task.axis_length, own_axis=task.own_axis)
+        motion = self._motion(part)
         ends = motion.last[table["first"] - lead], motion.last[table["last"] - lead]
         start = table["start"] + table["fraction"]
         sections = Sections(*ends, start, table["stop"].astype(np.float64), goes_on)
@@ -209,30 +203,30 @@ class Batches:
             words=elements_with_words(self._events, begin + lead, last),
         )
 
-    def _lost(self, move_last: int, element_last: int, *, theirs: bool) -> None:
-        """Say that only one of the two motions moves between two stops."""
-        task, nc, base = self.task, self._ahead.nc, self._ahead.base
-        original = task.original
-        program = original.program
+    def _stands(self, move_last: int, element_last: int, *, theirs: bool) -> None:
+        """Say if between two stops one motion leaves the place where the other stands: CS535, CS536."""
+        task, path, original = self.task, self.task.path, self.task.original
+        motion = self._motion(self._ahead.part(self._element, element_last + 1))
+        place = path.at(np.array([self._start + self._fraction]))
         if theirs:
-            poses = original.pose[self._move : move_last + 1]
-            tip, other, scale = program.tip[poses], program.axis[poses], task.axis_length
-            tip[0] += self._share * (tip[1] - tip[0])
-            other[0] += self._share * (other[1] - other[0])
-            text, code = "feed moves of the CL file are missing", "CS535"
+            stop = int(original.trail.last[move_last])
+            own, bend = np.concatenate((place, path.points[self._start + 1 : stop + 1])), path.bend[self._start : stop]
+            text, code, other = "feed moves of the CL file are missing", "CS535", motion.six[0]
         else:
-            part = slice(self._element - base, element_last + 1 - base)
-            tip, other = nc.tip[part], nc.second[part]
-            scale = task.axis_length if nc.second_is == "vector" else 1.0
-            text, code = "feed moves that the CL file does not have", "CS536"
-        from_tip, from_other = (tip[0], other[0]) if theirs or self._origin is None else self._origin
-        extent = np.abs(tip - from_tip).max() + scale * np.abs(other - from_other).max()
-        if extent > task.margin(nc):
+            own, bend = motion.six, motion.bend
+            text, code, other = "feed moves that the CL file does not have", "CS536", place[0]
+        off = np.sqrt(largest_square((own - other).T))
+        amount = float((np.maximum(off[1:], off[:-1]) + bend).max(initial=0.0))
+        if amount > task.tolerance + ARITHMETIC:
             self._told = True
+            nc, base = self._ahead.nc, self._ahead.base
             move = min(self._move + 1, len(original.pose) - 1)
             element = min(self._element + 1 - base, len(nc) - 1)
-            line = int(program.line[original.pose[move]])
-            self.problems.append(Problem(code, line, int(nc.line[element]), text, float(extent)))
+            line = int(original.program.line[original.pose[move]])
+            self.problems.append(Problem(code, line, int(nc.line[element]), text, amount))
+
+    def _motion(self, nc: Elements) -> Motion:
+        return written_motion(nc, self.task.tolerance, self.task.axis_length, own_axis=self.task.own_axis)
 
 
 def elements_with_words(events: Sequence[Event], first: int, last: int) -> Ints:

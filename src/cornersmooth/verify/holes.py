@@ -39,7 +39,7 @@ class HoleLines:
         return digit_errors(self.ahead.nc, own, self.tip[moves], self.axis[moves], self.axis_length)[0]
 
     def heights(self, moves: Ints, elements: Ints) -> Floats:
-        """(k,) mm above the poses of holes at the ends of elements; NaN beside the hole or with another axis."""
+        """(k,) mm above the poses of holes at the ends of straight elements; NaN beside a hole or with another axis."""
         nc, own, axis = self.ahead.nc, elements - self.ahead.base, self.axis[moves]
         away = nc.tip[own] - self.tip[moves]
         height = np.einsum("ij,ij->i", away, axis)
@@ -49,6 +49,7 @@ class HoleLines:
         lean = np.where(nc.tip_room[own] > 0.0, nc.second_room[own], 0.0)
         on = beside <= self.room + lean * np.abs(height)
         on &= turned * self.axis_length <= 2 * self.room + lean * self.axis_length
+        on &= (nc.kind[own] == Element.RAPID) | (nc.kind[own] == Element.LINE)
         return np.where(on, height, np.nan)
 
     def at(self, move: int, element: int) -> bool:

@@ -241,7 +241,7 @@ class Stops:
                 taken = True
                 yield one
             # of holes that may be left out the first that the element may belong to
-            if taken and here is not trace and not (here.inside and self._over(here.stop, element)):
+            if taken and here is not trace and here.inside and not self._over(here.stop, element):
                 return
             here = self._goes_on(here, element)
 

@@ -107,7 +107,8 @@ class WordPlaces:
         stop, there, begin = np.frombuffer(batches.stops).reshape(-1, 3).T.copy()
         # what is known best comes last
         self._ends = {element: at for element, (at, _) in found.words.items()}
-        self._ends |= _by_element(stop, there) | _by_element(hole, self._of_moves(move))
+        # an element that reaches several stops is at the first of them, and where the next begins at the last
+        self._ends |= _by_element(stop[::-1], there[::-1]) | _by_element(hole, self._of_moves(move))
         self._begins = _by_element(stop + 1, there) | _by_element(hole, self._of_moves(np.maximum(after - 1, 0)))
         self._begins |= _by_element(stop, begin) | {batches.elements: length}
         self._others = {element: others for element, (_, others) in found.words.items() if others}
