@@ -13,10 +13,10 @@ from cornersmooth.report.info import describe
 
 def run_info(given: Options) -> int:
     """Do the work of the command; return its exit code."""
-    from cornersmooth.cli.filter import describe_program
-
     data, name, is_program = given.read()
     if is_program:
+        from cornersmooth.cli.filter import describe_program
+
         told = describe_program(data, name)
         looks = f", looks like {told['looks_like']}" if told["looks_like"] else ""
         lines = [

@@ -39,8 +39,6 @@ LAWS = tuple(_TITLES)
 
 def run_time(given: Options) -> int:
     """Do the work of the command; return its exit code."""
-    from cornersmooth.cli.filter import time_of_program
-
     inputs = [given.source, given.text] if given.text else [given.source]
     check_inputs(*inputs)
     check_reports(given.reports, ".html", inputs, force=given.force)
@@ -50,6 +48,8 @@ def run_time(given: Options) -> int:
     if is_program:
         if given.csv or given.reports:
             raise click.UsageError("--csv and --report: of an NC program only the times are told")
+        from cornersmooth.cli.filter import time_of_program
+
         return time_of_program(data, name, given)
     control = given.load_control()
     if control.lines.planner:

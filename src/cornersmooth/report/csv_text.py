@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
-from cornersmooth.feedrate.timelaw import TimeLaw
 from cornersmooth.kinematics.machine import LINEAR
+
+if TYPE_CHECKING:  # the planner takes long to load
+    from cornersmooth.feedrate.timelaw import TimeLaw
 
 #: rows of text made at a time
 _BLOCK = 10_000
