@@ -18,7 +18,6 @@ from pathlib import Path
 import pytest
 
 from cornersmooth import Settings, __version__, choose_form, output
-from cornersmooth.cli.cluster import _proof_of_sharing, do
 from cornersmooth.cli.job import Job
 from cornersmooth.cli.options import Options
 from cornersmooth.nc import Frame
@@ -134,7 +133,7 @@ def test_a_scheduler_with_tls_takes_those_with_its_certificate(folder: Path, tmp
     with contextlib.ExitStack() as stack:
         with config.set(ours):
             security = distributed.Security()
-            here = {"n_workers": 1, "threads_per_worker": 1, "processes": False, "dashboard_address": None}
+            here = {"n_workers": 1, "threads_per_worker": 1, "processes": False, "dashboard_address": ":0"}
             cluster = stack.enter_context(distributed.LocalCluster(protocol="tls", security=security, **here))
         address = cluster.scheduler_address
         assert address.startswith("tls://")
@@ -159,7 +158,7 @@ def test_what_a_killed_run_has_left_goes_with_the_next(tmp_path: Path) -> None:
         (tmp_path / f".{host}.{process}-{end}").touch()
     target = str(tmp_path / "one.nc")
     job = Job("one.cls", target, (), "one", Options(directory="out"), Settings(), choose_form(), Frame())
-    with _proof_of_sharing([job]) as proof:
+    with pytest.importorskip("cornersmooth.cli.cluster")._proof_of_sharing([job]) as proof:
         assert Path(proof).exists()
         left = {path.name for path in tmp_path.iterdir()} - {Path(proof).name}
     assert left == {f".{name}.{os.getpid()}-{end}", f".cluster-elsewhere.{done.pid}-{end}"}
@@ -181,6 +180,7 @@ def test_what_cannot_work_is_refused(folder: Path, tmp_path: Path, words: tuple[
 
 def test_workers_that_do_not_fit_say_so(tmp_path: Path) -> None:
     job = Job("a.cls", "out/a.nc", (), "a", Options(directory="out"), Settings(), choose_form(), Frame())
+    do = pytest.importorskip("cornersmooth.cli.cluster", reason="distributed is not installed").do
     assert "does not see out" in do(job, "/", "out/none", __version__).message
     found = do(job, "/", "", "0.0")
     assert (found.status, found.message.startswith("a.cls: error: ")) == ("error", True)

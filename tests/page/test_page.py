@@ -295,7 +295,7 @@ def test_the_time_is_that_of_the_whole_program_or_none(tmp_path, monkeypatch):
     rows = "".join(f"GOTO/{x}.0,{x % 2}.0,0.0\n" for x in range(31))
     source.write_text(f"TOOL PATH/LONG,TOOL,T\nFEDRAT/MMPM,1500.0\n{rows}END-OF-PATH\n")
     verdicts = []
-    monkeypatch.setattr("cornersmooth.settings.TIMED_POSES", 30)
+    monkeypatch.setattr("cornersmooth.cli.job.TIMED_POSES", 30)
     for more in ((), ("--time",), ("-q",), ("--time", "--report", tmp_path / "long.html")):
         done = run("smooth", source, "-e", "0.02", "-o", nc, "--force", "--machine", "table-ac", *more)
         assert done.returncode == 0, done.stderr

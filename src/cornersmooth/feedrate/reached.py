@@ -15,8 +15,11 @@ from cornersmooth.model import Bools, Floats
 #: part of a limit from which it counts as reached
 _REACHED = 0.98
 
-#: times looked at, spread evenly over the motion, and at once
-_TIMES, _TOGETHER = 20_000, 65_536
+#: times looked at, spread evenly over the motion: for each element, at least and at most
+_EACH, _FEWEST, _MOST = 64, 2_000, 20_000
+
+#: times looked at together
+_TOGETHER = 65_536
 
 _ORDERS = ("speed", "acceleration", "jerk")
 
@@ -102,7 +105,7 @@ def limiting(law: TimeLaw) -> list[tuple[str, float]]:
     path = law.path
     if not len(path) or law.total <= 0.0:
         return []
-    times = np.linspace(0.0, law.total, _TIMES)
+    times = np.linspace(0.0, law.total, min(max(_EACH * len(path), _FEWEST), _MOST))
     states = law.at(times)
     way = law.kinematics(times)[0]
     element = np.clip(np.searchsorted(law.edge, way, side="right") - 1, 0, len(path) - 1)
