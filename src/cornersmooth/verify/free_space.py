@@ -92,13 +92,6 @@ class FreeSpace:
         bend = np.maximum(self.own_bend[np.clip(rows - 1, 0, last)], self.own_bend[np.clip(rows, 0, last)])
         return self.radius - bend[:, None] - self.path_bend[segments]
 
-    def is_free(self, row: int) -> bool:
-        """Whether anything of a row is free."""
-        part = slice(0, self.path.shape[1] - 1)
-        way, radius = np.diff(self.path, axis=1), self.row_radius(slice(row, row + 1), part)[0]
-        low, high = free_interval(self.own[:, row, None], self.path[:, part], way, radius)
-        return bool((low <= high).any())
-
     def along(self, row: int, place: float) -> Reached:
         """What is reached of a row from one place of it on, if it is free: that, and what is beyond without a break."""
         count = self.path.shape[1] - 1

@@ -213,11 +213,21 @@ class Walk:
                 continue
             reached = begin + around.row_reached
             row = max(reached, first)  # the chain has proved what is before that
-            proved = begin == known or not around.space.is_free(len(around.reached) - 1)
+            proved = begin == known or not self._is_near(reached, known, top)
             found = Break(row, around.farthest(), proved and row == reached)
             if proved or begin == 0:
                 break
         return found
+
+    def _is_near(self, row: int, known: int, top: int) -> bool:
+        """Whether a vertex may be near a place up to a vertex of the path, and not before that of an earlier one."""
+        if known < 0:
+            return True
+        bottom = min(int(self._place[known]), top - 1)
+        start = self.path.points[bottom:top].T
+        way = self.path.points[bottom + 1 : top + 1].T - start
+        low, high = free_interval(self._own[row][:, None], start, way, np.asarray(self.radius))
+        return bool((low <= high).any())
 
     def _within_reach(self, begin: int, until: int, stop: int) -> int:
         """Vertex of the path before which some rows end, if they run beside it."""
