@@ -72,7 +72,6 @@ def places(old: Reading, new: Reading) -> tuple[list[Place], list[Problem]]:
 
 
 def _line(new: Reading, at: int) -> int:
-    """Line that begins at a byte."""
     return int(np.searchsorted(new.start, at))
 
 
@@ -88,7 +87,6 @@ def _found(new: Reading, text: bytes, at: int, *, last: bool) -> int | None:
 
 
 def _first_other(old: Reading, new: Reading) -> Problem:
-    """Say which of the lines before all runs is another one."""
     for line in range(len(old.why)):
         if line >= len(new.why) or old.lines(line, line + 1) != new.lines(line, line + 1):
             return _changed(line, f"line {line + 1} of the old program, outside of runs, is another one")

@@ -124,7 +124,6 @@ def _start(job: Job, run: Run, form: Form, before: int | None) -> bytes:
 
 
 def _block(job: Job, run: Run, place: Floats, form: Form, *, rapid: bool) -> bytes:
-    """Block that goes to a place."""
     look, axes, spelling = form.mode.motion, run.state.axes, job.spelling
     vector = axes[3:] == ("I", "J", "K")
     other = place[3:] / np.linalg.norm(place[3:]) if vector else place[3:]

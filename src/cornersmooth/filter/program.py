@@ -181,7 +181,6 @@ def _own_form(form: Form) -> Form:
 
 
 def _spliced(old: Reading, texts: dict[int, bytes]) -> tuple[bytes, list[Place]]:
-    """Put blocks in the places of runs."""
     parts: list[bytes] = []
     where: list[Place] = []
     at, line = 0, 0

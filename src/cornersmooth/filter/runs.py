@@ -179,7 +179,6 @@ class ProgramReader:
         return found
 
     def _take_line(self, found: Reading, number: int, text: bytes, *, known: bool) -> None:
-        """Take a line that is no plain motion block."""
         if not known:  # who jumps here may come from anywhere
             found.state.lose_all()
         why = found.state.take(text, self.lexer)

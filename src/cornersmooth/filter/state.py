@@ -312,7 +312,6 @@ class State:
         return set() if does is Does.NOTHING else {does}
 
     def _take_block(self, text: str) -> None:
-        """Take a whole block of Klartext."""
         done = {Does.PLACE}
         if text.startswith("BEGIN PGM"):
             self.unit, self.absolute = 25.4 if text.endswith("INCH") else 1.0, True

@@ -142,7 +142,6 @@ class Posed:
 
 
 def _rotary(machine: Machine, angles: np.ndarray) -> str:
-    """Rotary words in alphabetical order."""
     named = sorted(zip(machine.names, angles.tolist(), strict=False))
     return _words([name for name, _ in named], np.array([angle for _, angle in named]))
 

@@ -64,7 +64,6 @@ def deviation_along(
 
 
 def _of_poses(match: Match) -> Distribution:
-    """Deviations at the original poses of one match."""
     reached = of_original(match)
     original = match.original
     pose = original.pose[original.trail.owner[reached.vertex]]
@@ -76,7 +75,6 @@ def _of_poses(match: Match) -> Distribution:
 
 
 def _of_elements(match: Match, offset: int, samples: int) -> Distribution:
-    """Deviations at written poses of one match."""
     last = match.motion.last
     start, end = last[:-1], last[1:]
     feeding = np.flatnonzero((match.section[start] == match.section[end]) & (match.section[end] >= 0))

@@ -76,5 +76,4 @@ def axis_step_findings(program: Program, settings: Settings) -> tuple[Finding, .
 
 
 def _feed_moves(program: Program) -> Bools:
-    """Poses that are reached in a cut: (n,) bool."""
     return (program.kind == Move.LINEAR) | (program.kind == Move.ARC)

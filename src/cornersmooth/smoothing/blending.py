@@ -144,7 +144,6 @@ def _deviation(rows: Vertices, limits: LineLimits, corners: _Corners, blend: Flo
 
 
 def _original(rows: Vertices, parameter: Floats) -> tuple[Floats, Floats]:
-    """Tip and axis point of the original motion at parameters."""
     s = rows.parameter
     row = np.clip(np.searchsorted(s, parameter) - 1, 0, len(s) - 2)
     step = s[row + 1] - s[row]

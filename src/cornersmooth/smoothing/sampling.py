@@ -159,7 +159,6 @@ def _batches(counts: Ints, poses: int, *, curves: bool) -> Iterator[_Batch]:
 
 
 def _fill_arcs(smoothed: SmoothProgram, batch: _Batch, counts: Ints) -> None:
-    """Points of the arcs in the batch with their axes."""
     pose = smoothed.program.arcs.pose
     inside = np.flatnonzero((pose >= batch.poses[0]) & (pose <= batch.poses[-1]))
     if not len(inside):
@@ -170,7 +169,6 @@ def _fill_arcs(smoothed: SmoothProgram, batch: _Batch, counts: Ints) -> None:
 
 
 def _fill_curves(smoothed: SmoothProgram, segments: Segments, batch: _Batch) -> None:
-    """Control points of the transitions of the batch."""
     corners, rows = smoothed.corners, batch.rows
     here = segments.row[batch.poses] >= 0
     pose, first = batch.poses[here], batch.last[here] - 5

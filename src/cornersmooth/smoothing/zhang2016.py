@@ -188,7 +188,6 @@ def _turn(leg_in: Floats, leg_out: Floats) -> tuple[tuple[Floats, Floats], Float
 
 
 def _left_sharp(corners: Corners, rows: Ints) -> Corners:
-    """Corners without the transitions of some rows."""
     k = len(corners)
     names = (item.name for item in fields(Corners) if "trim" in item.name or "error" in item.name)
     nothing: dict[str, Any] = dict.fromkeys(names, np.zeros(k))

@@ -8,12 +8,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cornersmooth.model import Bools, Ints
+
+if TYPE_CHECKING:
+    from cornersmooth.text.rows import RowFormat
 
 Bytes = NDArray[np.uint8]
 #: entries are unsigned integers of as many bytes as the group has characters
@@ -97,27 +100,25 @@ class Group:
 class Cell:
     """One number of a row: the column of its sign (None where it needs none), its groups from right to left."""
 
+    form: RowFormat
     sign: int | None
     whole: tuple[Group, ...]
     part: tuple[Group, ...]
-    plus: bool
-    trim: bool
-    leading_zero: bool
 
     def write(self, ticks: Ints, matrix: Bytes) -> None:
         """Write (r,) numbers into (r, width) rows."""
         if self.sign is not None:
-            other = ord("+") if self.plus else 0
+            other = ord("+") if self.form.plus else 0
             matrix[:, self.sign] = (ticks < 0).view(np.uint8) * np.uint8(ord("-") - other) + np.uint8(other)
         left = np.abs(ticks)
-        ended: Bools | bool = self.trim  # whether digits may be dropped: only zeros follow
+        ended: Bools | bool = self.form.trim  # whether digits may be dropped: only zeros follow
         for group in self.part:
             left, values = group.split(left)
             group.put(matrix, values, ended)
-            if self.trim:
+            if self.form.trim:
                 ended = (values == 0) & ended
         # a zero before the point stays where it is asked for, and where it is all there is
-        alone: Bools | bool = ended if self.part and not self.leading_zero else True
+        alone: Bools | bool = ended if self.part and not self.form.leading_zero else True
         for group in self.whole[:-1]:
             left, values = group.split(left)
             group.put(matrix, values, np.where(left > 0, 2, alone))
@@ -138,21 +139,11 @@ class Layout:
 
 
 @lru_cache(maxsize=256)
-def lay_out(
-    words: tuple[bytes, ...],
-    decimals: tuple[int, ...],
-    plus: bool,
-    trim: bool,
-    leading_zero: bool,
-    digits: tuple[int, ...],
-    negative: tuple[bool, ...],
-    head: int,
-    tail: int,
-) -> Layout:
+def lay_out(form: RowFormat, digits: tuple[int, ...], negative: tuple[bool, ...], head: int, tail: int) -> Layout:
     """Lay out rows: `head` columns, each word with a number, `tail` columns.
 
-    The first five are those of `RowFormat`. Every number has at most so many `digits` before the point, and a place for
-    its sign where some of its column are `negative`.
+    Every number has at most so many `digits` before the point, and a place for its sign where some of its column are
+    `negative`.
     """
     row = bytearray(head)
 
@@ -161,9 +152,9 @@ def lay_out(
         return len(row) - len(characters)
 
     cells, spans = [], []
-    for word, places, before_point, some_negative in zip(words, decimals, digits, negative, strict=True):
+    for word, places, before_point, some_negative in zip(form.words, form.decimals, digits, negative, strict=True):
         start = add(word)
-        sign = add(b"\0") if plus or some_negative else None
+        sign = add(b"\0") if form.plus or some_negative else None
         whole = [Group(add(bytes(n)), n, whole_table(n)) for n in _groups(before_point, leading=(1, 2, GROUP))]
         part: list[Group] = []
         for n in _groups(places, leading=(1, 2, 3, GROUP)):
@@ -171,9 +162,9 @@ def lay_out(
             if not part and not with_point:
                 add(b".")
             part.append(Group(add(bytes(n + with_point)), n, part_table(n, with_point)))
-        if not part and trim:
+        if not part and form.trim:
             add(b".")
-        cells.append(Cell(sign, tuple(whole[::-1]), tuple(part[::-1]), plus, trim, leading_zero))
+        cells.append(Cell(form, sign, tuple(whole[::-1]), tuple(part[::-1])))
         spans.append((start, len(row)))
     behind = add(bytes(tail))
     add(bytes(-len(row) % WORD if row else WORD))

@@ -134,17 +134,8 @@ class RowFormat:
         if lowest and not -TICK_LIMIT <= min(lowest) <= max(highest) <= TICK_LIMIT:
             raise OutputError("CS301", "a number is too large to be written", "please report this with the input file")
         largest = [max(-low, high) for low, high in zip(lowest, highest, strict=True)]
-        layout = lay_out(
-            self.words,
-            self.decimals,
-            self.plus,
-            self.trim,
-            self.leading_zero,
-            tuple(len(str(n // 10**places)) for n, places in zip(largest, self.decimals, strict=True)),
-            tuple(low < 0 for low in lowest),
-            head,
-            tail,
-        )
+        digits = tuple(len(str(n // 10**places)) for n, places in zip(largest, self.decimals, strict=True))
+        layout = lay_out(self, digits, tuple(low < 0 for low in lowest), head, tail)
         if len(layout.template) > WIDEST:
             raise ValueError(f"rows of {len(layout.template)} bytes are wider than {WIDEST}")
         return layout
