@@ -11,7 +11,7 @@ from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.feedrate import Limits, TimeLaw, direct, plan_text
 from cornersmooth.feedrate.written import written_motion
 from cornersmooth.kinematics import Machine, endless, with_dynamics
-from cornersmooth.model import Floats, Program
+from cornersmooth.model import Bools, Floats, Program
 from cornersmooth.nc_reader import NcProgram
 from cornersmooth.report.paths import OriginalPath, WrittenPath
 from cornersmooth.rotary import rapid_moves, rotary_angles
@@ -112,11 +112,6 @@ def clock(planned: Planned, name: str, ways: Floats) -> Floats:
     return law.times_at(np.interp(ways, way + 1e-9 * np.arange(len(way)), coordinate))
 
 
-def speeds_along(planned: Planned, name: str, steps: Floats) -> Floats:
-    """Lowest and highest speed, mm/min, between neighbouring places (k + 1,) on the original: (2 k,); NaN in rapids."""
-    return _ends(speeds_over(planned.laws[name], clock(planned, name, _looks(steps))))
-
-
 def speeds_over(law: TimeLaw, times: Floats) -> Floats:
     """Speed, mm/min, at times (k,) s; NaN in rapids and after the end."""
     at, speed = law.kinematics(times)[:2]
@@ -127,32 +122,25 @@ def speeds_over(law: TimeLaw, times: Floats) -> Floats:
     return np.where(times <= law.total, 60.0 * speed, np.nan)
 
 
-def loads_along(planned: Planned, name: str, steps: Floats) -> dict[str, Floats]:
-    """As `axis_loads`, lowest and highest between neighbouring places (k + 1,) on the original: (2 k,) each."""
-    loads = axis_loads(planned.laws[name], clock(planned, name, _looks(steps)))
-    return {axis: _ends(load) for axis, load in loads.items()}
-
-
-def axis_loads(law: TimeLaw, times: Floats) -> dict[str, Floats]:
-    """Speeds (k,) of a machine's axes in per cent of their limits; axes without one are left out."""
+def axis_loads(law: TimeLaw, times: Floats, feeding: Bools) -> dict[str, Floats]:
+    """Speeds (k,) of a machine's axes in per cent of their limits, NaN in rapids; axes without one are left out."""
     if law.machine_axes is None:
         return {}
     limit = law.machine_axes.limits[0]
     speed = np.abs(law.axes_at(times)[1]).T
-    feeding = np.isfinite(speeds_over(law, times))
     return {
         law.machine_axes.names[index]: np.where(feeding, 100.0 * speed[index] / limit[index], np.nan)
         for index in np.flatnonzero(np.isfinite(limit)).tolist()
     }
 
 
-def _looks(steps: Floats) -> Floats:
+def looks(steps: Floats) -> Floats:
     """Places where each step between (k + 1,) places is looked at: (`_LOOKS` k,)."""
     count = len(steps) - 1
     return np.interp(np.linspace(0.0, count, count * _LOOKS, endpoint=False), np.arange(count + 1), steps)
 
 
-def _ends(values: Floats) -> Floats:
+def ends_of_steps(values: Floats) -> Floats:
     """Lowest and highest value of each step in the order in which they come: (2 k,)."""
     looks = values.reshape(-1, _LOOKS)
     low, high = np.nan_to_num(looks, nan=np.inf), np.nan_to_num(looks, nan=-np.inf)

@@ -20,10 +20,10 @@ from cornersmooth.page.planned_speeds import (
     Planned,
     axis_loads,
     clock,
+    ends_of_steps,
     feed_seconds,
-    loads_along,
+    looks,
     plan_all,
-    speeds_along,
     speeds_over,
 )
 from cornersmooth.report.paths import OriginalPath, WrittenPath, original_path, written_path
@@ -284,9 +284,12 @@ def _add_charts(
         times = np.linspace(0.0, last, 2 * count, endpoint=False)
         along, loads = scale == "way", {}
         for name, law in planned.laws.items():
-            speed = speeds_along(planned, name, steps) if along else speeds_over(law, times)
+            seen = clock(planned, name, looks(steps)) if along else times
+            speed = speeds_over(law, seen)
+            own = axis_loads(law, seen, np.isfinite(speed))
+            if along:  # the lowest and the highest of each step
+                speed, own = ends_of_steps(speed), {axis: ends_of_steps(load) for axis, load in own.items()}
             pack.add(f"{scale}_speed_{name}", np.round(speed, 1), "f4")
-            own = loads_along(planned, name, steps) if along else axis_loads(law, times)
             loads[name] = {axis: np.round(load, 1) for axis, load in own.items()}
             for axis, load in loads[name].items():
                 pack.add(f"{scale}_{axis}_{name}", load, "f4")
