@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, fields
 from importlib import import_module
-from typing import Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,9 @@ from cornersmooth.methods import AUTO, DEFAULT_METHOD, METHODS
 from cornersmooth.model import Bools, Corners, FeedMode, Floats, Ints, Move, Program, SmoothProgram, Status
 from cornersmooth.settings import Settings
 from cornersmooth.vectors import norm
+
+if TYPE_CHECKING:
+    from cornersmooth.smoothing.segments import Segments
 
 #: called with what is done, and with what there is in all: corners, or poses of runs
 Progress = Callable[[int, int], None]
@@ -74,15 +77,6 @@ def divide(numerator: Floats | float, denominator: Floats) -> Floats:
     return np.divide(numerator, denominator, out=np.full_like(denominator, np.inf), where=denominator > 0.0)
 
 
-class Remainders(NamedTuple):
-    """What transitions leave of g segments."""
-
-    start: Ints  # poses at the ends of the segments, (g,)
-    end: Ints
-    tip: Floats  # fractions of the tip segment at which the remainder starts and ends, (g, 2)
-    axis: Floats  # the same of the axis-point segment
-
-
 @dataclass
 class Placed:
     """Transitions of g corners; the names are those of `Corners`."""
@@ -128,12 +122,10 @@ class Construction(ABC):
         """
 
     @abstractmethod
-    def divide(
-        self, program: Program, settings: Settings, remainders: Remainders, number: int
-    ) -> tuple[Floats, Floats]:
-        """Inner points of straight remainders that are written as `number` lines of equal change of axis.
+    def divide(self, smoothed: SmoothProgram, segments: Segments, pose: Ints, number: int) -> tuple[Floats, Floats]:
+        """Divide what transitions leave of the segments into poses (g,) into `number` lines of equal change of axis.
 
-        Where the tip is on its segment (g, number - 1), and unit axes (g, number - 1, 3).
+        Gives where the tip is on its segment (g, number - 1), and unit axes (g, number - 1, 3).
         """
 
     def axes(self, program: Program, corners: Corners, settings: Settings, rows: Ints, u: Floats) -> Floats | None:

@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cornersmooth.geometry import nurbs
-from cornersmooth.model import Floats, Ints, LimitedBy, Program, SmoothProgram, Status
+from cornersmooth.model import Floats, Ints, LimitedBy, SmoothProgram, Status
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.construction import (
     Construction,
     Legs,
     Placed,
-    Remainders,
     divide,
     half_cosine,
     refuse_turns,
 )
 from cornersmooth.vectors import dot, norm, square, unit
+
+if TYPE_CHECKING:
+    from cornersmooth.smoothing.segments import Segments
 
 #: parameters u at which the deviation at constant H is evaluated; it is largest near u = ½
 _PROBES = 0.5 * np.array([0.5, 0.7, 0.8, 0.87, 0.92, 0.96, 0.98, 1.0])
@@ -181,16 +184,14 @@ class Proportional(Construction):
             np.multiply(values[after] - here, trim_out, out=own[:, 2])
         return shares @ legs[0], shares @ legs[1]
 
-    def divide(
-        self, program: Program, settings: Settings, remainders: Remainders, number: int
-    ) -> tuple[Floats, Floats]:
+    def divide(self, smoothed: SmoothProgram, segments: Segments, pose: Ints, number: int) -> tuple[Floats, Floats]:
         """Equal angles of the ruled motion: tan φ is linear in the fraction, φ the angle from the middle."""
-        first = program.axis[remainders.start]
-        turn = program.axis[remainders.end] - first
+        axis = smoothed.program.axis
+        first = axis[segments.start[pose]]
+        turn = axis[pose] - first
         slope = np.tan(np.arcsin(np.minimum(norm(turn) / 2.0, 1.0)))[:, None]
-        ends = np.arctan((2.0 * remainders.tip - 1.0) * slope)
-        share = np.arange(1, number) / number
-        angle = ends[:, :1] + (ends[:, 1:] - ends[:, :1]) * share
+        low, high = (np.arctan((2.0 * end[pose, None] - 1.0) * slope) for end in (segments.entry, segments.exit))
+        angle = low + (high - low) * (np.arange(1, number) / number)
         fraction: Floats = (np.tan(angle) / slope + 1.0) / 2.0
         return fraction, unit(first[:, None] + fraction[..., None] * turn[:, None])
 

@@ -19,7 +19,7 @@ from cornersmooth.model import Bools, Floats, Ints, SmoothProgram
 from cornersmooth.slices import joined_rows
 from cornersmooth.smoothing.construction import construction_of
 from cornersmooth.smoothing.runs.rows import NO_ROWS, SectionRows, run_lines, section_rows, some_at_once
-from cornersmooth.smoothing.segments import Segments, lines_per_half, segments_of
+from cornersmooth.smoothing.segments import Segments, inner_points, lines_per_half, segments_of
 from cornersmooth.vectors import unit
 
 
@@ -206,7 +206,7 @@ def _fill_transitions(smoothed: SmoothProgram, segments: Segments, batch: _Batch
         batch.rows.tip[where], batch.rows.other[where] = points[:, 1:], unit(levers[:, 1:])
         assert batch.rows.place is not None
         batch.rows.place[where] = u
-        batch.rows.move[where[:, len(u) // 2 :]] = segments.following[poses[chosen]][:, None]
+        batch.rows.move[where[:, len(u) // 2 :]] = smoothed.corners.after[rows[chosen]][:, None]
         first = segments.has_line[poses[chosen]]
         at = where[first, 0] - 1
         batch.rows.tip[at], batch.rows.other[at] = points[first, 0], unit(levers[first, 0])
@@ -214,16 +214,10 @@ def _fill_transitions(smoothed: SmoothProgram, segments: Segments, batch: _Batch
 
 def _fill_divided(smoothed: SmoothProgram, segments: Segments, batch: _Batch) -> None:
     """Inner points of the straight remainders that are written as several lines."""
-    program, settings = smoothed.program, smoothed.settings
-    construction = construction_of(settings.method)
     lines = np.where(segments.has_line[batch.poses] & (batch.last > batch.first), segments.lines[batch.poses], 1)
     for number in np.unique(lines):
         if number < 2:
             continue
         pose, first = batch.poses[lines == number], batch.first[lines == number]
-        start = segments.start[pose]
-        fraction, axis = construction.divide(program, settings, segments.remainders(pose), int(number))
         rows = first[:, None] + np.arange(number - 1)
-        step = program.tip[pose] - program.tip[start]
-        batch.rows.tip[rows] = program.tip[start][:, None] + fraction[..., None] * step[:, None]
-        batch.rows.other[rows] = axis
+        batch.rows.tip[rows], batch.rows.other[rows] = inner_points(smoothed, segments, pose, int(number))

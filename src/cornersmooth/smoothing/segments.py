@@ -16,7 +16,7 @@ from cornersmooth.geometry import nurbs
 from cornersmooth.methods import METHODS
 from cornersmooth.model import Bools, Floats, Ints, Move, SmoothProgram, Status
 from cornersmooth.settings import FLIP_ANGLE, STANDING, Settings
-from cornersmooth.smoothing.construction import Remainders, legs_at
+from cornersmooth.smoothing.construction import construction_of, legs_at
 from cornersmooth.vectors import norm, square
 
 #: exponent of the graded nodes s = (j/n)^(2/3)
@@ -52,18 +52,12 @@ class Segments:
     row: Ints  # row of `Corners`, -1 where the pose is no smoothed corner
     skip: Bools  # contributes nothing: repeats another pose, or is stated only
     start: Ints  # pose the straight line into pose i starts from, -1 for none
-    following: Ints
     entry: Floats  # fraction of the incoming segment where the straight remainder starts
     exit: Floats  # and where it ends
     axis_entry: Floats
     axis_exit: Floats
     has_line: Bools  # the straight remainder has a length
     lines: Ints  # lines it is written in
-
-    def remainders(self, pose: Ints) -> Remainders:
-        """What transitions leave of the segments into some poses."""
-        ends = ((self.entry, self.exit), (self.axis_entry, self.axis_exit))
-        return Remainders(self.start[pose], pose, *(np.stack((a[pose], b[pose]), axis=1) for a, b in ends))
 
 
 def segments_of(smoothed: SmoothProgram, *, dense: bool) -> Segments:
@@ -83,8 +77,6 @@ def segments_of(smoothed: SmoothProgram, *, dense: bool) -> Segments:
     origin = np.arange(n) - 1  # of a pose behind repeated ones: the first of them
     origin[corners.pose[repeated] + 1] = corners.before[repeated]
     start[last] = origin[last]
-    following = np.full(n, -1, np.int64)
-    following[corners.pose] = corners.after
 
     linear = start >= 0
     known = np.maximum(start, 0)
@@ -93,7 +85,7 @@ def segments_of(smoothed: SmoothProgram, *, dense: bool) -> Segments:
     if corners.axis_trim_in is not corners.trim_in:
         axis_entry, axis_leave = _ends(n, corners.pose, corners.axis_trim_in, corners.axis_trim_out, linear, known)
     has_line, lines = np.ones(n, np.bool_), np.ones(n, np.int64)
-    segments = Segments(row, skip, start, following, entry, leave, axis_entry, axis_leave, has_line, lines)
+    segments = Segments(row, skip, start, entry, leave, axis_entry, axis_leave, has_line, lines)
     for begin in range(0, n, _BATCH):
         poses = begin + np.flatnonzero(linear[begin : begin + _BATCH] & ~skip[begin : begin + _BATCH])
         _measure_remainders(smoothed, segments, poses, dense=dense)
@@ -128,6 +120,13 @@ def _measure_remainders(smoothed: SmoothProgram, segments: Segments, poses: Ints
         # about a standing tip all ways of turning evenly are one motion: nothing says when the axis is where
         divided = ~joins & ((norm(step) > 0.0) | (settings.axis_step is not None))
         _divide(settings, segments, poses[divided], chord[divided])
+
+
+def inner_points(smoothed: SmoothProgram, segments: Segments, pose: Ints, number: int) -> tuple[Floats, Floats]:
+    """Tips and unit axes (g, number - 1, 3) inside straight remainders that are written as `number` lines."""
+    tip, start = smoothed.program.tip, segments.start[pose]
+    fraction, axis = construction_of(smoothed.settings.method).divide(smoothed, segments, pose, number)
+    return tip[start][:, None] + fraction[..., None] * (tip[pose] - tip[start])[:, None], axis
 
 
 def turn_limit(settings: Settings, half_turn: Floats, tolerance: float) -> Floats:

@@ -15,7 +15,7 @@ from cornersmooth.geometry import nurbs
 from cornersmooth.model import Bools, Floats, Ints, Program, SmoothProgram
 from cornersmooth.smoothing.construction import construction_of
 from cornersmooth.smoothing.sampling import nodes
-from cornersmooth.smoothing.segments import lines_of, segments_of
+from cornersmooth.smoothing.segments import inner_points, lines_of, segments_of
 from cornersmooth.vectors import dot, norm, square, unit
 
 #: parameters at which transitions are measured, u = ½ in the middle, parts in which what is left of segments is
@@ -49,15 +49,11 @@ def straying_remainders(smoothed: SmoothProgram) -> Ints:
 
     There tip and axis are out of step by what the two were cut unlike.
     """
-    program, segments = smoothed.program, segments_of(smoothed, dense=False)
+    segments = segments_of(smoothed, dense=False)
 
     def stray(pose: Ints) -> Bools:
-        start = segments.start[pose]
-        fraction, axis = construction_of(smoothed.settings.method).divide(
-            program, smoothed.settings, segments.remainders(pose), _PARTS
-        )
-        tip = program.tip[start][:, None] + fraction[..., None] * (program.tip[pose] - program.tip[start])[:, None]
-        return _off_the_motion(smoothed, np.stack((start, pose), axis=1), tip, axis)
+        ends = np.stack((segments.start[pose], pose), axis=1)
+        return _off_the_motion(smoothed, ends, *inner_points(smoothed, segments, pose, _PARTS))
 
     unlike = (segments.entry != segments.axis_entry) | (segments.exit != segments.axis_exit)
     pose = _those(np.flatnonzero(unlike & segments.has_line & (segments.start >= 0)), stray)

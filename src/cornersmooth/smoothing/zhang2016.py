@@ -16,12 +16,12 @@ from cornersmooth.smoothing.construction import (
     Legs,
     Placed,
     Progress,
-    Remainders,
     divide,
     half_cosine,
     refuse_turns,
     with_rows,
 )
+from cornersmooth.smoothing.segments import Segments
 from cornersmooth.smoothing.self_check import straying_remainders, straying_transitions
 from cornersmooth.smoothing.synchronise import REPORT_PARAMETERS, matching_parameters, synchronisation_report
 from cornersmooth.vectors import angle_between, dot, norm, unit
@@ -120,21 +120,20 @@ class Zhang2016(Construction):
         tops[:, -1] = axis_curve[:, -1]  # the straight motion behind starts from its own axis: equation (26)
         return points, tops - points
 
-    def divide(
-        self, program: Program, settings: Settings, remainders: Remainders, number: int
-    ) -> tuple[Floats, Floats]:
+    def divide(self, smoothed: SmoothProgram, segments: Segments, pose: Ints, number: int) -> tuple[Floats, Floats]:
         """Equal parts of the tip segment and of the great circle: equations (24) to (28)."""
-        height = settings.axis_length
-        start = program.axis[remainders.start]
-        step = program.tip[remainders.end] - program.tip[remainders.start]
-        axis_step = step + height * (program.axis[remainders.end] - start)
-        ends = [height * start + remainders.axis[:, [at]] * axis_step - remainders.tip[:, [at]] * step for at in (0, 1)]
+        tip, axes, start = smoothed.program.tip, smoothed.program.axis, segments.start[pose]
+        height, step = smoothed.settings.axis_length, tip[pose] - tip[start]
+        axis_step = step + height * (axes[pose] - axes[start])
+        low, high = segments.entry[pose, None], segments.exit[pose, None]
+        both = (low, segments.axis_entry[pose, None]), (high, segments.axis_exit[pose, None])
+        ends = [height * axes[start] + of_axis * axis_step - of_tip * step for of_tip, of_axis in both]
         share = np.arange(1, number) / number
-        fraction: Floats = remainders.tip[:, :1] + share * (remainders.tip[:, 1:] - remainders.tip[:, :1])
+        fraction: Floats = low + share * (high - low)
         axis = _great_circle(unit(ends[0]), unit(ends[1]), share)
         # the motion that all methods are measured against is ruled: where the two differ by more than a line may
         ruled = unit(ends[0][:, None] + share[:, None] * (ends[1] - ends[0])[:, None])
-        apart = height * norm(axis - ruled).max(axis=1) > settings.interpolation_tolerance
+        apart = height * norm(axis - ruled).max(axis=1) > smoothed.settings.interpolation_tolerance
         return fraction, np.where(apart[:, None, None], ruled, axis)
 
     def axes(self, program: Program, corners: Corners, settings: Settings, rows: Ints, u: Floats) -> Floats:
