@@ -224,19 +224,9 @@ def _keeps(rows: Vertices, limits: LineLimits, start: Ints, end: Ints) -> Bools:
 
 def _in_order(rows: Vertices, limits: LineLimits, start: Ints, end: Ints) -> Bools:
     """(q,) bool: whether the tool never goes back along the original, where axes that run evenly bend its way."""
-    assert rows.position is not None
-    assert limits.tip_of is not None
-    count = end - start + 1
-    line, place = spread(count)
+    line, place = spread(end - start + 1)
     row = place + start[line]
-    s, begin, finish = rows.parameter, start[line], end[line]
-    length = s[end] - s[start]
-    share = ((s[row] - s[begin]) / np.where(length > 0.0, length, 1.0)[line])[:, None]
-    words, position = (
-        values[begin] + share * (values[finish] - values[begin]) for values in (rows.words, rows.position)
-    )
-    tip = limits.tip_of(position, words)
-    way = np.diff(np.hstack((tip, tip + limits.axis_length * limits.axis_of(words))), axis=0)
+    way = np.diff(np.hstack(_on_lines(rows, limits, start, end, line, rows.parameter[row])), axis=0)
     original = np.diff(np.hstack((rows.original_tip[row], rows.original_axis_point[row])), axis=0)
     back = (line[1:] == line[:-1]) & ((way * original).sum(axis=1) < 0.0)
     return np.bincount(line[1:][back], minlength=len(start)) == 0
@@ -246,22 +236,27 @@ def _off(rows: Vertices, limits: LineLimits, start: Ints, end: Ints, count: Ints
     """(q,) largest share of the limits in use, at the `count` rows inside lines or halfway between rows."""
     line, place = spread(count)
     row = place + start[line] + (not halves)
-    s, low = rows.parameter, rows.parameter[start]
-    length = s[end] - low
 
     def at(values: Floats) -> Floats:
         return (values[row] + values[row + 1]) / 2.0 if halves else values[row]
 
-    share = ((at(s) - low[line]) / np.where(length > 0.0, length, 1.0)[line])[:, None]
-    begin, finish = start[line], end[line]
-    words = rows.words[begin] + share * (rows.words[finish] - rows.words[begin])
-    way = rows.tip if rows.position is None else rows.position
-    tip = way[begin] + share * (way[finish] - way[begin])
-    if limits.tip_of is not None:
-        tip = limits.tip_of(tip, words)
-    axis_point = tip + limits.axis_length * limits.axis_of(words)
+    tip, axis_point = _on_lines(rows, limits, start, end, line, at(rows.parameter))
     original_tip = at(rows.original_tip)
     lever = at(rows.original_axis_point) - original_tip
     lever *= (limits.axis_length / np.maximum(norm(lever), np.finfo(np.float64).tiny))[:, None]
     off = np.maximum(norm(tip - original_tip) / limits.tip, norm(axis_point - original_tip - lever) / limits.axis_point)
     return np.maximum.reduceat(off, starts(count)[:-1])
+
+
+def _on_lines(
+    rows: Vertices, limits: LineLimits, start: Ints, end: Ints, line: Ints, s: Floats
+) -> tuple[Floats, Floats]:
+    """Tips and axis points (m, 3) on some `line` (m,) of those from `start` to `end` (q,), at parameters s (m,)."""
+    begin, finish, low = start[line], end[line], rows.parameter[start]
+    length = rows.parameter[end] - low
+    share = ((s - low[line]) / np.where(length > 0.0, length, 1.0)[line])[:, None]
+    way = rows.tip if rows.position is None else rows.position
+    words, tip = (values[begin] + share * (values[finish] - values[begin]) for values in (rows.words, way))
+    if limits.tip_of is not None:
+        tip = limits.tip_of(tip, words)
+    return tip, tip + limits.axis_length * limits.axis_of(words)
