@@ -8,8 +8,8 @@ from functools import partial
 import numpy as np
 
 from cornersmooth.model import Floats
-from cornersmooth.verify.around import Inner
 from cornersmooth.verify.chain import Path, Sections
+from cornersmooth.verify.free_space import Inner
 from cornersmooth.verify.passage import Passage, Walk
 
 #: own vertices that are looked at together

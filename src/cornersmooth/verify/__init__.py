@@ -14,7 +14,7 @@ every moment the tips are within the tolerance and the axis points are within th
 what is decided     where
 =================== ===================================================================================================
 both as polylines   `cl_motion`, `motions`; how far they leave their chords, proved: `bending`
-run beside another  `passage`: by a `chain` of nearest places, where that fails exactly (`around`, `free_space`)
+run beside another  `passage`: by a `chain` of nearest places, where that fails exactly (`free_space`)
 stretch by stretch  `stops`: which elements reach them; `batches` cuts long stretches and decides; `match`: its places
 holes               `holes`; poses that are named by their digits: `motions`; tool changes: package `statements`
 what parts          `deviation`: the lines and the distances, which `distances` measures; poses that must be exact

@@ -21,10 +21,9 @@ from cornersmooth.nc_reader.ahead import Ahead
 from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem
 from cornersmooth.statements.tool_changes import ToolChanges
 from cornersmooth.verify.chain import Sections
-from cornersmooth.verify.free_space import largest_square
 from cornersmooth.verify.match import Batch
 from cornersmooth.verify.motions import Motion, inner_points, written_motion
-from cornersmooth.verify.nearest import COLUMNS, Metric
+from cornersmooth.verify.nearest import COLUMNS, Metric, largest_square
 from cornersmooth.verify.passage import Walk
 from cornersmooth.verify.stops import BEFORE, Part, Stops, out_of_hole
 from cornersmooth.verify.task import ARITHMETIC, Task
@@ -109,18 +108,17 @@ class Batches:
         task, nc, at = self.task, self._ahead.nc, element - self._ahead.base
         original, path, last_vertex = task.original, task.path, task.original.trail.last
         kind = int(original.program.kind[original.pose[move]])
-        start = int(last_vertex[move])
-        there = begin = float(path.length[start])
         if move == 0 and kind == Move.RAPID and nc.kind[at] != Element.RAPID:
             text = "the first rapid is written as a feed move"
             line = int(original.program.line[original.pose[move]])
             self.problems.append(Problem("CS532", line, int(nc.line[at]), text))
-        if kind == Move.HOLE:  # out of it the way begins anywhere
-            there = path.length_at(out_of_hole(task, nc, at, move)[0])
+        # out of a hole the way begins anywhere
+        place = out_of_hole(task, nc, at, move)[0] if kind == Move.HOLE else float(last_vertex[move])
         self._move, self._element, self._continued, self._told = move, element, False, False
-        self._start, self._fraction = path.place_at(there) if there > begin else (start, 0.0)
+        self._start = min(int(place), max(path.segments - 1, 0))
+        self._fraction = place - self._start
         before = last_vertex[max(move - (kind == Move.RAPID), 0)]
-        self.stops.extend((element, there, float(path.length[before])))
+        self.stops.extend((element, path.length_at(place), float(path.length[before])))
 
     def _close(self, move_last: int, element_last: int) -> Iterator[Batch]:
         """End the stretch."""

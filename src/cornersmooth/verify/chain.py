@@ -25,7 +25,7 @@ from functools import cached_property
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.verify.free_space import largest_square
+from cornersmooth.verify.nearest import largest_square
 
 #: rows that are looked for together: at least, at first, at most (speed only)
 _BLOCKS = 64, 512, 8192
@@ -74,21 +74,13 @@ class Path:
 
     def length_at(self, place: float) -> float:
         """Path length up to a place, mm."""
-        k = min(int(place), self.segments - 1)
-        return float(self.length[k] + (place - k) * (self.length[k + 1] - self.length[k]))
+        return float(self.lengths_at(np.array([place]))[0])
 
     def lengths_at(self, place: Floats) -> Floats:
         """(k,) path lengths up to places, mm."""
         k = np.minimum(place.astype(np.int64), self.segments - 1)
         start = self.length.take(k)
         return start + (place - k) * (self.length.take(k + 1) - start)
-
-    def place_at(self, length: float) -> tuple[int, float]:
-        """Return segment and fraction at a path length."""
-        last = max(len(self.length) - 2, 0)
-        segment = min(max(int(np.searchsorted(self.length, length, side="right")) - 1, 0), last)
-        start, end = self.length[segment : segment + 2]
-        return segment, float(np.clip((length - start) / (end - start), 0.0, 1.0)) if end > start else 0.0
 
     def way_apart(self, here: float, there: float) -> float:
         """How far the path goes away from one place on its way to another, mm; places are path lengths.
@@ -210,11 +202,11 @@ class Chain:
     far: Bools  #: (n,): whether it is not because vertices are farther apart: dividing the step proves nothing
 
 
-def points_at(path: Floats, place: Floats, first: int = 0) -> Floats:
-    """(3h, k) points of a polyline (m + 1, 3h) at places; rows before `first` are left out of it."""
-    k = np.minimum(place.astype(np.int64) - first, len(path) - 2)
+def points_at(path: Floats, place: Floats) -> Floats:
+    """(3h, k) points of a polyline (m + 1, 3h) at places."""
+    k = np.minimum(place.astype(np.int64), len(path) - 2)
     start: Floats = path.take(k, axis=0)
-    return np.ascontiguousarray((start + (place - first - k)[:, None] * (path.take(k + 1, axis=0) - start)).T)
+    return np.ascontiguousarray((start + (place - k)[:, None] * (path.take(k + 1, axis=0) - start)).T)
 
 
 def chain(own: Floats, bend: Floats, path: Path, radius: float, sections: Sections) -> Chain:

@@ -9,7 +9,7 @@ from cornersmooth.nc_reader.curves import CurveGroup, groups
 from cornersmooth.nc_reader.elements import Element, Elements
 from cornersmooth.verify.findings import Findings
 from cornersmooth.verify.match import Match
-from cornersmooth.verify.nearest import larger_square
+from cornersmooth.verify.nearest import largest_square
 
 
 def measure_continuity(match: Match, found: Findings) -> None:
@@ -23,7 +23,7 @@ def measure_continuity(match: Match, found: Findings) -> None:
     chosen = np.flatnonzero(np.append(lines[1:] != lines[:-1], True))
     ends = last[chosen]
     six = match.six[ends] if len(ends) < len(match.six) else match.six
-    square = larger_square(six[1:] - six[:-1])
+    square = largest_square((six[1:] - six[:-1]).T)
     square[(square == 0) | ~match.on[ends[1:]] | ~match.on[ends[:-1]]] = np.inf
     square[match.section[ends[1:]] != match.section[ends[:-1]]] = np.inf
     _note(match, found, "shortest", -np.sqrt(square), chosen[1:] + first)

@@ -16,7 +16,7 @@ from cornersmooth.verify.chain import points_at
 from cornersmooth.verify.findings import AXIS_OFF, Findings, Violation, Where
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.motions import digit_errors, inner_points
-from cornersmooth.verify.nearest import COLUMNS, Metric, larger_square, nearest_places, on_segments
+from cornersmooth.verify.nearest import COLUMNS, Metric, largest_square, nearest_places, on_segments
 from cornersmooth.verify.passage import AROUND, LONGER, MOST_BREAKS, Break
 from cornersmooth.verify.task import ARITHMETIC, Task
 
@@ -62,8 +62,9 @@ class Reached:
 def of_written(match: Match) -> Reached:
     """Every written vertex that has a place, against the polyline of the original there."""
     vertex = np.flatnonzero(match.on)
-    away = match.away if len(vertex) == len(match.away) else match.away[vertex]
-    return Reached(vertex, Gap.of(match.task, away), match.place[vertex], True)
+    place = match.place[vertex]
+    away = match.six[vertex] - points_at(match.path.points, place).T
+    return Reached(vertex, Gap.of(match.task, away), place, True)
 
 
 def of_original(match: Match) -> Reached:
@@ -73,7 +74,7 @@ def of_original(match: Match) -> Reached:
     point = match.path.points[vertex]
     place = nearest_places(point, match.six, row, 1, first[row], last[row] - 1)
     away = _written(match, place) - point
-    far = np.flatnonzero(larger_square(away) > match.tolerance**2)
+    far = np.flatnonzero(largest_square(away.T) > match.tolerance**2)
     if len(far):  # the sum of both squares is least there, but not the larger: the place that is proved
         place[far] = row[far] + share[far]
         away[far] = _written(match, place[far]) - point[far]

@@ -58,11 +58,11 @@ def _touched(match: Match, start: Ints, end: Ints) -> tuple[Ints, Ints]:
     """First and last original move that an element runs along."""
     length = match.path.length
     owner = match.original.trail.owner
-    segment, at = match.segment[start], match.fraction[start]
-    rest = (1 - at) * (length[segment + 1] - length[segment])
+    segment = match.segment[start]
+    rest = length[segment + 1] - match.path.lengths_at(match.place[start])
     segment = np.where((rest <= match.margin) & (segment < match.high[start]), segment + 1, segment)
-    last, at = match.segment[end], match.fraction[end]
-    gone = at * (length[last + 1] - length[last])
+    last = match.segment[end]
+    gone = match.path.lengths_at(match.place[end]) - length[last]
     last = np.where((gone <= match.margin) & (last > segment), last - 1, last)
     last = np.maximum(last, segment)
     return owner[segment + 1], owner[last + 1]

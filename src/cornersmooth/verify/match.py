@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.elements import Elements
-from cornersmooth.verify.chain import Path, passed, points_at
+from cornersmooth.verify.chain import Path, passed
 from cornersmooth.verify.cl_motion import Original
 from cornersmooth.verify.free_space import FreeSpace
 from cornersmooth.verify.motions import Motion
@@ -127,11 +127,6 @@ class Match(Batch):
         return np.minimum(np.nan_to_num(self.place).astype(np.int64), self.path.segments - 1)
 
     @cached_property
-    def fraction(self) -> Floats:
-        """(v,) on that segment."""
-        return np.nan_to_num(self.place) - self.segment
-
-    @cached_property
     def low(self) -> Ints:
         """(v,) first segment of the CL path in the stretch a vertex belongs to."""
         return self.stretches["start"][np.maximum(self.section, 0)].astype(np.int64)
@@ -140,16 +135,6 @@ class Match(Batch):
     def high(self) -> Ints:
         """(v,) last segment of the CL path in the stretch a vertex belongs to."""
         return self.stretches["stop"][np.maximum(self.section, 0)] - 1
-
-    @cached_property
-    def away(self) -> Floats:
-        """(v, 6) from its place to each vertex; zero where there is none."""
-        rows = np.flatnonzero(self.on)
-        if len(rows) == len(self.six):
-            return self.six - points_at(self.path.points, self.place).T
-        away = np.zeros(self.six.shape)
-        away[rows] = self.six[rows] - points_at(self.path.points, self.place[rows]).T
-        return away
 
     @cached_property
     def passing(self) -> tuple[Ints, Ints, Floats]:

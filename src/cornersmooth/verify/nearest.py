@@ -18,10 +18,10 @@ COLUMNS: Final[dict[Metric, slice]] = {"both": slice(0, 6), "tip": slice(0, 3), 
 _BLOCK: Final = 8192
 
 
-def larger_square(away: Floats) -> Floats:
-    """(k,) the larger of the squares of both halves, tip and axis point, of differences (k, 6)."""
-    tip, point = away[:, :3], away[:, 3:]
-    return np.maximum(np.einsum("ij,ij->i", tip, tip), np.einsum("ij,ij->i", point, point))
+def largest_square(away: Floats) -> Floats:
+    """Square (...) of the longest of the triples of vectors (3h, ...)."""
+    squares = [np.einsum("i...,i...->...", away[c : c + 3], away[c : c + 3]) for c in range(0, len(away), 3)]
+    return np.maximum(*squares) if len(squares) == 2 else np.asarray(squares[0])
 
 
 def nearest_places(

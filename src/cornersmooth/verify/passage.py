@@ -16,10 +16,10 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.model import Floats, Ints
-from cornersmooth.verify.around import Around, Inner
 from cornersmooth.verify.chain import Path, Sections, chain, points_at
 from cornersmooth.verify.cl_motion import UNBOUND
-from cornersmooth.verify.free_space import free_interval, largest_square, lowest
+from cornersmooth.verify.free_space import Around, Inner, free_interval, lowest
+from cornersmooth.verify.nearest import largest_square
 
 #: rows before one that is not proved from which on it is worked out exactly, one after the other; farther back nothing
 #: is looked at, and the answer is NOT VERIFIED
