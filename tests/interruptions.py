@@ -21,10 +21,10 @@ from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from oracle.command import forked
 from oracle.messages import one_line
 
 OLD = b"old program\n"
-COMMAND = [str(Path(sys.executable).parent / "cornersmooth"), "smooth"]
 #: seconds after which nothing may be left
 LEFT = 2.0
 #: SIGINT to the group, as a terminal sends it, or to the command alone; SIGTERM; SIGKILL of one of its processes
@@ -87,15 +87,16 @@ class Bench:
             out = folder / f"whole{batch:d}"
             out.mkdir()
             begin = time.monotonic()
-            subprocess.run(self.words(batch, out), check=True, capture_output=True)
+            with forked(*self.words(batch, out), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+                assert process.wait() == 0
             self.seconds[batch] = time.monotonic() - begin
             self.whole |= {path.name: path.read_bytes() for path in out.iterdir()}
 
     def words(self, batch: bool, out: Path) -> list[str]:
-        """Argument vector of a run."""
+        """What a run is started with."""
         if batch:
-            return [*COMMAND, *map(str, self.several), "-d", str(out), "-j", "2", "--force"]
-        return [*COMMAND, str(self.single), "-o", str(out / "single.nc"), "--force"]
+            return ["smooth", *map(str, self.several), "-d", str(out), "-j", "2", "--force"]
+        return ["smooth", str(self.single), "-o", str(out / "single.nc"), "--force"]
 
     def interrupt(self, one: Try) -> Found:
         """Run once, interrupt, and look."""
@@ -106,14 +107,14 @@ class Bench:
             names = [f"{path.stem}.nc" for path in self.several] if one.batch else ["single.nc"]
             for each in names if one.old else ():
                 (out / each).write_bytes(OLD)
-            process = subprocess.Popen(
-                self.words(one.batch, out),
+            process = forked(
+                *self.words(one.batch, out),
+                prepare=lambda: signal.signal(signal.SIGINT, [signal.SIG_DFL, signal.SIG_IGN][one.how == "nohup"]),
+                changes={"TMPDIR": str(scratch)},
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.PIPE,
-                env=os.environ | {"TMPDIR": str(scratch)},
                 start_new_session=True,
-                preexec_fn=lambda: signal.signal(signal.SIGINT, [signal.SIG_DFL, signal.SIG_IGN][one.how == "nohup"]),
             )
             time.sleep(one.moment * self.seconds[one.batch])
             _send(process, one.how)

@@ -16,7 +16,7 @@ import pytest
 
 from interruptions import FILES, Bench
 from oracle.chains import cl_text, random_chains
-from oracle.command import BAD_INPUT, BAD_OUTPUT, DONE, SMALL, USAGE, run, started
+from oracle.command import BAD_INPUT, BAD_OUTPUT, DONE, SMALL, USAGE, forked, run, started
 from oracle.messages import one_line
 from oracle.share import share
 
@@ -159,7 +159,7 @@ def test_a_batch_that_was_interrupted_goes_on_where_it_was(tmp_path: Path) -> No
     out = tmp_path / "out"
     words = [word for word in bench.words(True, out) if word != "--force"]
     for moment in share((0.5, 0.7), 2):
-        process = subprocess.Popen(words, stderr=subprocess.PIPE, start_new_session=True)
+        process = forked(*words, stderr=subprocess.PIPE, start_new_session=True)
         try:
             process.wait(moment * bench.seconds[True])
         except subprocess.TimeoutExpired:
@@ -167,7 +167,7 @@ def test_a_batch_that_was_interrupted_goes_on_where_it_was(tmp_path: Path) -> No
         _, said = process.communicate()
         # -15: before Python took over the signal, or after it gave it back
         assert process.returncode in (0, 143, -signal.SIGTERM), said.decode()
-    result = subprocess.run(words, capture_output=True, check=True)
+    result = run(*words)
     counts = result.stderr.decode().splitlines()[-1]
     assert counts.startswith(f"{FILES} files: ")
     assert files_in(out) == bench.whole

@@ -232,7 +232,7 @@ def test_path_before_holes_is_measured_as_it_is_read(monkeypatch):
     part = Ahead.part
     monkeypatch.setattr(Ahead, "part", lambda ahead, *rows: (held.append(len(ahead.nc)), part(ahead, *rows))[1])
     assert codes(program, text("G43.5 H1", *lines)) == []
-    assert max(held) < 200
+    assert max(held) < 100
     assert "CS562" in codes(program, text("G43.5 H1", *lines[:403], ("G1", 0, 0, -7), *lines[404:]))
 
 
@@ -249,7 +249,7 @@ def many_holes(count, dwell=()):
 
 
 def test_a_long_run_of_holes_is_measured_as_it_is_read(monkeypatch):
-    program, lines = many_holes(400)
+    program, lines = many_holes(200)
     monkeypatch.setattr(reader, "GIVEN_OUT", 4)
     monkeypatch.setattr(block_tables, "CHUNK", 60)
     monkeypatch.setattr(stops, "TOGETHER", 8)
@@ -257,9 +257,9 @@ def test_a_long_run_of_holes_is_measured_as_it_is_read(monkeypatch):
     part = Ahead.part
     monkeypatch.setattr(Ahead, "part", lambda ahead, *rows: (held.append(len(ahead.nc)), part(ahead, *rows))[1])
     assert codes(program, text(*lines)) == []
-    assert max(held) < 200
-    assert codes(program, text(*lines[:600], ("G1", lines[600][1], 0, -8.5), *lines[601:])) == ["CS562"]
-    assert codes(program, text(*lines[:602], *lines[605:])) == ["CS561"]
+    assert max(held) < 100
+    assert codes(program, text(*lines[:300], ("G1", lines[300][1], 0, -8.5), *lines[301:])) == ["CS562"]
+    assert codes(program, text(*lines[:302], *lines[305:])) == ["CS561"]
 
 
 def test_one_dwell_of_many_that_is_missing_is_one_finding(monkeypatch):
