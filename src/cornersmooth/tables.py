@@ -39,27 +39,12 @@ _MOST_REPEATS, _LONGEST_PATTERN = 4, 200
 _COUNTS = ("no", "one", "two", "three")
 
 
-class TableText(NamedTuple):
-    """Text of a table, the file for messages, and the name of what it describes where it has none itself."""
-
-    text: str
-    file: str
-    name: str
-
-
 class Bound(NamedTuple):
     """What a number must keep, as ``Annotated`` says it of a field; `hint` says what to give instead."""
 
     low: float = 0
     high: float = _MOST
     hint: str = ""
-
-
-class Parsed(NamedTuple):
-    """A table, and the name of the one that comes with the program and that it is like; empty for none."""
-
-    table: Table
-    like: str
 
 
 @dataclass(frozen=True)
@@ -97,11 +82,14 @@ class Shelf:
         called = {_plain(each): each for each in known} | {_plain(key): own for key, own in self.aliases().items()}
         return called.get(_plain(name), "")
 
-    def choose(self, name_or_path: str | Path) -> TableText:
-        """Table of that name, or in that file: a text that ends in ``.toml`` or holds a path separator."""
+    def choose(self, name_or_path: str | Path) -> tuple[str, str, str]:
+        """Text of a table, the file for messages, and the name of what it describes where it has none itself.
+
+        A text that ends in ``.toml`` or holds a path separator is a file; anything else is a name.
+        """
         given = str(name_or_path)
         if not is_file(name_or_path):
-            return TableText(self.built_in(given), f"{given}.toml", given)
+            return (self.built_in(given), f"{given}.toml", given)
         try:
             with Path(name_or_path).open(encoding="utf-8-sig") as file:  # some editors put a mark before it
                 text = file.read(_LARGEST + 1)
@@ -113,7 +101,7 @@ class Shelf:
             raise SettingsError(
                 self.unreadable, f"{self.kind} file is longer than a table", "check the name", file=given
             )
-        return TableText(text, given, Path(name_or_path).stem)
+        return (text, given, Path(name_or_path).stem)
 
     def built_in(self, name: str) -> str:
         """Text of a table that comes with the program (SettingsError, which names the closest name)."""
@@ -127,8 +115,8 @@ class Shelf:
             raise SettingsError(self.unknown, f"unknown {self.kind} {name!r}", hint)
         return (resources.files(self.package) / self.folder / f"{found}.toml").read_text(encoding="utf-8")
 
-    def parse(self, text: str | Table) -> Parsed:
-        """Table that a text holds, or one that was read already, on top of the one that it is like.
+    def parse(self, text: str | Table) -> tuple[Table, str]:
+        """Table of a text, or one that was read already, on top of the one that it is like; the name of that, or "".
 
         Raises SettingsError: the text is not TOML, has an unknown key, or is like a table that is not known.
         """
@@ -142,10 +130,10 @@ class Shelf:
         if not isinstance(like, str):
             raise self.wrong(f"like is {like!r}", f"name one of the built-in {self.kind}s")
         if not like:
-            return Parsed(table, "")
-        base = self.parse(self.built_in(like)).table
+            return (table, "")
+        base = self.parse(self.built_in(like))[0]
         base.pop("name", None)
-        return Parsed(_merged(base, table), self.find(like))
+        return (_merged(base, table), self.find(like))
 
     @contextmanager
     def in_file(self, file: str) -> Iterator[None]:

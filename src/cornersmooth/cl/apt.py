@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -29,7 +30,7 @@ from cornersmooth.cl.words import (
     near_motion_word,
 )
 from cornersmooth.errors import Finding
-from cornersmooth.model import MM_PER_UNIT, Arcs, Floats, Ints, Keep, Move, Program, Source, Units
+from cornersmooth.model import MM_PER_UNIT, Floats, Ints, Keep, Move, Program, Source, Units
 from cornersmooth.nc_reader.recognition import first_block
 from cornersmooth.provenance import HEAD
 
@@ -249,18 +250,16 @@ def _program(state: ReaderState, asked: Units | None) -> Program:
     axis, axis_findings = state.axes()
     kind = state.kinds()
     line = state.lines()
-    resolved = arc_geometry.resolve(state.arcs, tip, kind, state.file, state.arc_rule)
-    kind[resolved.lines] = Move.LINEAR
+    arcs, straight, kept, arc_findings = arc_geometry.resolve(state.arcs, tip, kind, state.file, state.arc_rule)
+    kind[straight] = Move.LINEAR
     keep = state.exact.spread(state.n).astype(np.uint8)
-    keep[resolved.kept] = Keep.CONTRADICTION
-    keep[resolved.kept - 1] = Keep.CONTRADICTION
-    turned = np.abs(axis[resolved.arcs.pose] - axis[resolved.arcs.pose - 1]).max(axis=1, initial=0) > AXIS_NOISE
-    along = [finding("CS147", int(line[resolved.arcs.pose[turned]][0]), int(turned.sum()))] if turned.any() else []
+    keep[kept] = keep[kept - 1] = Keep.CONTRADICTION
+    turned = np.abs(axis[arcs.pose] - axis[arcs.pose - 1]).max(axis=1, initial=0) > AXIS_NOISE
+    along = [finding("CS147", int(line[arcs.pose[turned]][0]), int(turned.sum()))] if turned.any() else []
     fed = _fed_from_elsewhere(tip, kind)
     jumps = [finding("CS185", int(line[fed[0]]), len(fed))] if len(fed) else []
     for index in state.unitless_feeds:
         state.feed.value[index] *= scale
-    arcs = Arcs(resolved.arcs.pose, resolved.arcs.centre * scale, resolved.arcs.normal, resolved.arcs.sweep)
     return Program(
         tip=tip * scale,
         axis=axis,
@@ -269,11 +268,11 @@ def _program(state: ReaderState, asked: Units | None) -> Program:
         line=line,
         feed_mode=state.feed_mode.spread(state.n).astype(np.uint8),
         keep=keep,
-        arcs=arcs,
+        arcs=replace(arcs, centre=arcs.centre * scale),
         statements=tuple(state.statements),
         units=units,
         source=Source(state.file, "apt", state.dialect.name),
-        findings=(*said, *state.findings.values(), *axis_findings, *resolved.findings, *along, *jumps),
+        findings=(*said, *state.findings.values(), *axis_findings, *arc_findings, *along, *jumps),
     )
 
 

@@ -121,26 +121,17 @@ def read_arc(record: Record, file: str, rule: ArcRule | None, decimals: int) -> 
     )
 
 
-@dataclass(frozen=True)
-class ResolvedArcs:
-    """Arcs with both ends, and what became of the rest."""
-
-    arcs: Arcs
-    lines: Ints  #: poses of arcs that are lines
-    kept: Ints  #: poses whose arcs contradict their neighbours
-    findings: tuple[Finding, ...]
-
-
 def resolve(
     table: Sequence[Arc], tip: Floats, kind: NDArray[np.uint8], file: str, rule: ArcRule | None
-) -> ResolvedArcs:
+) -> tuple[Arcs, Ints, Ints, list[Finding]]:
     """Find sweep and sense of all arcs from the poses around them; tips are as written, in the unit of the arcs.
 
+    Poses of arcs that are lines, and of those that contradict their neighbours, come with them, and findings.
     Raises InputError CS123 where an end is not on the circle, CS126 where a stated angle is not the arc's.
     """
     if not table:
         none = np.zeros(0, np.int64)
-        return ResolvedArcs(Arcs(), none, none, ())
+        return Arcs(), none, none, []
     pose = np.array([arc.pose for arc in table], np.int64)
     centre, normal, radius, resolution, full_turns, stated = (
         np.array([getattr(arc, name) for arc in table], np.float64)
@@ -205,7 +196,7 @@ def resolve(
         findings.append(finding("CS141", table[int(short.argmax())].line, int(short.sum())))
     good = ~short
     arcs = Arcs(pose[good], centre[good], normal[good], (turn + 2 * np.pi * full_turns)[good])
-    return ResolvedArcs(arcs, pose[short], pose[contrary], tuple(findings))
+    return arcs, pose[short], pose[contrary], findings
 
 
 def _as_stated(

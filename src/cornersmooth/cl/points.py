@@ -37,9 +37,7 @@ class _Rows:
 
     def take(self, group: tuple[int, ...]) -> Floats:
         """Columns of the table."""
-        first, last = group[0], group[-1]
-        in_order = group == tuple(range(first, last + 1))
-        return self.values[:, first : last + 1] if in_order else self.values[:, list(group)]
+        return self.values[:, list(group)]
 
     def at(self, wrong: Bools) -> int:
         """Line of the first row that is wrong."""
