@@ -77,16 +77,8 @@ class Result:
     ) -> dict[str, Any]:
         """Everything that the JSON report says; see `cornersmooth.report`.
 
-        Parameters
-        ----------
-        command : str
-            Command line that made it.
-        loosened : str
-            What settings made looser than the default.
-        saving : Saving, optional
-            Planned times.
-        limits : Machine, optional
-            Whose limits these keep, in place of those of the machine of the form.
+        `command` is the command line that made it, `loosened` what settings made looser than the default, `saving` the
+        planned times, `limits` the machine whose limits these keep, in place of that of the form.
         """
         form, own = self.form, len(self.smoothed.findings)
         return report(
