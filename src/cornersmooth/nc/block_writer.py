@@ -17,7 +17,7 @@ from cornersmooth.kinematics import machine_position, tool_axis
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program
 from cornersmooth.nc.circles import FIRST_PLANE, Circles
 from cornersmooth.nc.control import INVERSE_TIME
-from cornersmooth.nc.curve_blocks import Curves, RowWriter, bezier_points, curves_for
+from cornersmooth.nc.curve_blocks import Curves, SplFormat, bezier_points, curves_for
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.planes import Plane
@@ -115,10 +115,8 @@ class BlockWriter:
         if not unwind:
             endless = np.isinf(low)[order]
             zero[endless] = 360 * degree * np.round(ticks[3:][endless] / (360 * degree))
-        zero_block, start_block = (
-            self.rapid(words, chosen=slice(3, None)) for words in (np.append(np.zeros(3, np.int64), zero), ticks)
-        )
-        return {"rotary_zero": (zero_block,), "rotary_start": (start_block,)}
+        goals = {"rotary_zero": np.append(np.zeros(3, np.int64), zero), "rotary_start": ticks}
+        return {name: (self.rapid(goal, chosen=slice(3, None)),) for name, goal in goals.items()}
 
     def angles(self, ticks: Ints) -> Floats:
         """(r, 2) degrees of rows of ticks, in the order of the machine's axes."""
@@ -262,7 +260,7 @@ class BlockWriter:
         left_out = self._left_out(run, prefix, prefix_id) if self._leaves_out else None
         suffix, suffix_id = self._suffixes(run, dwell)
         self.blocks += len(run) + extra
-        apart: list[tuple[Bools, RowWriter, Ints]] = []  # rows with words of their own
+        apart: list[tuple[Bools, RowFormat | SplFormat, Ints]] = []  # rows with words of their own
         if run.arc is not None and (circular := run.arc >= 0).any():
             said = len(self._arc_format.decimals) - 1
             numbers = np.column_stack((run.ticks[circular, :said], self.circles.radius[run.arc[circular]]))
@@ -449,4 +447,4 @@ class BlockWriter:
             self._refuse(
                 int(moves[0]), "a feed move before any feed, which the control refuses", "give one with --feed"
             )
-        self.findings.add("CS311", "warning", int(self.program.line[moves[0]]), text, len(moves))
+        self.findings.add_each("CS311", "warning", self.program.line[moves], text)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,16 +25,6 @@ _DEGREE = 3
 _WINDOW, _LEAST = 10, 6
 
 
-class RowWriter(Protocol):
-    """What writes rows that have words of their own: `RowFormat`, or the like of it."""
-
-    def rows(
-        self, ticks: Ints, prefix: Sequence[bytes], prefix_id: Ints, suffix: Sequence[bytes], suffix_id: Ints
-    ) -> tuple[bytes, Ints]:
-        """Text, and where each row starts in it."""
-        ...
-
-
 class Curves:
     """How curves are written: here as what there are none of.
 
@@ -43,7 +32,7 @@ class Curves:
     `numbers`.
     """
 
-    format: RowWriter | None = None
+    format: RowFormat | SplFormat | None = None
 
     def prepare(self, run: Run) -> Run:
         """Return the run with only the rows that become blocks, and remember what follows."""
@@ -162,9 +151,8 @@ class SplineBlocks(Curves):
         total = np.concatenate(([0], np.cumsum(flags)))
         stop = np.minimum(starts + _WINDOW, len(flags))
         few = starts[total[stop] - total[starts] < _LEAST]
-        if len(few):
-            text = "fewer than six of ten blocks are BSPLINE, which SINUMERIK wants; -f poly (vectors) has no such rule"
-            self._findings.add("CS325", "warning", int(self._line[self._moves[few[0]]]), text, len(few))
+        text = "fewer than six of ten blocks are BSPLINE, which SINUMERIK wants; -f poly (vectors) has no such rule"
+        self._findings.add_each("CS325", "warning", self._line[self._moves[few]], text)
         self._before = bool(flags[last])
         self._flags, self._moves = flags[last + 1 :], self._moves[last + 1 :]
 
@@ -281,7 +269,7 @@ class SplBlocks(_Polynomials):
         super().__init__(form, units)
         letters = (*form.mode.motion.coordinates, *form.other_words)
         self._coefficient = form.table.digits.coefficient
-        self.format = _SplFormat(letters, self._line_decimals, self._coefficient)
+        self.format = SplFormat(letters, self._line_decimals, self._coefficient)
 
     def numbers(self, run: Run, curved: Bools) -> Ints:
         """End point, then K3, K2 and K1 of each axis."""
@@ -293,7 +281,7 @@ class SplBlocks(_Polynomials):
         return np.concatenate((to_ticks(end, self._line_decimals), to_ticks(factors, self._coefficient)), axis=1)
 
 
-class _SplFormat:
+class SplFormat:
     """Rows of SPL: coefficients of ten and more have an exponent, so rows are put together one by one."""
 
     def __init__(self, letters: Sequence[str], decimals: Sequence[int], coefficient: int) -> None:

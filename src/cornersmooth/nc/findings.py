@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 from cornersmooth.errors import Finding, Severity
+from cornersmooth.model import Ints
 
 
 @dataclass
@@ -19,6 +20,11 @@ class Findings:
         old = self._found.get((code, text))
         new = Finding(code, severity, line, text, count) if old is None else replace(old, count=old.count + count)
         self._found[code, text] = new
+
+    def add_each(self, code: str, severity: Severity, lines: Ints, text: str) -> None:
+        """Count what was noticed at each of some lines of the CL file, if any."""
+        if len(lines):
+            self.add(code, severity, int(lines[0]), text, len(lines))
 
     def add_all(self, others: Iterable[Finding]) -> None:
         """Count what was noticed elsewhere."""

@@ -54,21 +54,23 @@ class HoleWriter:
         """Holes of one cycle, of the control or as plain moves; those left out are only approached."""
         motion = self.motion
         cycle, program, poses = motion.statements.cycles.now, motion.program, rows.move
-        approach = self._approach[poses]
-        line = int(program.line[poses[0]])
+        heights = travel_height(program, poses, self._approach[poses])
+        lines, line = program.line[poses], int(program.line[poses[0]])
         kind = self._cycle_of_control(cycle, poses)
         if cycle is None or (cycle.tap and not kind):
             why = "its words are not understood" if cycle is None else self._why_no_tap(cycle, poses)
             motion.statements.cycles.leave_out(why, line, len(poses))
-            yield from self._over_holes(rows, travel_height(program, poses, approach))
+            yield from self._over_holes(rows, heights)
             return
+        travel = np.maximum(heights, max(cycle.retract, cycle.clearance or 0.0))
+        clearance = travel if cycle.clearance is None else np.full(len(poses), cycle.clearance)
         if kind:
-            yield from self._cycles(cycle, kind, poses, approach)
+            yield from self._cycles(cycle, kind, poses, travel, clearance)
             return
-        motion.findings.add("CS316", "note", line, "hole of a cycle written as plain moves", len(poses))
+        motion.findings.add_each("CS316", "note", lines, "hole of a cycle written as plain moves")
         before = -1 if motion.operation.comes_first else int(poses[0]) - 1
-        motion.warnings.of_holes(poses, before, *travel_of(cycle, program, poses, approach))
-        hole, tip, rapid, dwell = hole_moves(cycle, program, poses, approach)
+        motion.warnings.of_holes(poses, before, travel, clearance)
+        hole, tip, rapid, dwell = hole_moves(cycle, program, poses, travel, clearance)
         move = poses[hole]
         run = replace(Run.straight(program, motion.ticks_at(rows, tip, hole), move), rapid=rapid, dwell=dwell)
         if not np.isnan(cycle.feed):
@@ -95,17 +97,15 @@ class HoleWriter:
         """Whether the spindle turns as a thread needs it."""
         return bool(self.motion.statements.clockwise and self.motion.statements.speed and self.motion.operation.turning)
 
-    def _cycles(self, cycle: Cycle, kind: str, poses: Ints, approach: Ints) -> Iterator[bytes]:
+    def _cycles(self, cycle: Cycle, kind: str, poses: Ints, travel: Floats, clearance: Floats) -> Iterator[bytes]:
         """Holes as cycles of the control, each from the height at which the tool goes from hole to hole."""
         motion, program, writer = self.motion, self.motion.program, self.motion.writer
-        line = int(program.line[poses[0]])
-        motion.findings.add("CS347", "note", line, "hole written as a cycle of the control", len(poses))
+        motion.findings.add_each("CS347", "note", program.line[poses], "hole written as a cycle of the control")
         if kind == "tap":
             text = "a tap is left to the control's cycle: see that it turns the spindle with the feed"
-            motion.findings.add("CS348", "warning", line, text, len(poses))
+            motion.findings.add_each("CS348", "warning", program.line[poses], text)
         motion.warnings.of_cut(int(poses[0]), turning=motion.operation.turning)
         feeds, modes = hole_feeds(cycle, program, poses)
-        travel, clearance = travel_of(cycle, program, poses, approach)
         table = writer.form.table.cycles
         once = next(
             (k for k, block in enumerate(getattr(table, kind)) if "{x}" in block), 0
@@ -176,12 +176,13 @@ def approaches(program: Program) -> Ints:
     return np.maximum.accumulate(np.where(program.kind == Move.HOLE, -1, np.arange(len(program))))
 
 
-def hole_moves(cycle: Cycle, program: Program, poses: Ints, approach: Ints) -> tuple[Ints, Floats, Bools, Bools]:
+def hole_moves(
+    cycle: Cycle, program: Program, poses: Ints, travel: Floats, clearance: Floats
+) -> tuple[Ints, Floats, Bools, Bools]:
     """Plain moves for holes of one cycle, m of them: the hole of each, its end (m, 3) mm, rapids, dwells after it.
 
-    `approach` (h,) is what `approaches` says of the poses.
+    Heights (h,) above the holes, mm: at which the tool goes from hole to hole, and where feeding begins.
     """
-    travel, clearance = travel_of(cycle, program, poses, approach)
     heights, rapid, dwell = [travel, clearance], [True, True], [False, False]
 
     def go(height: Floats, *, fast: bool) -> None:
@@ -208,12 +209,6 @@ def hole_moves(cycle: Cycle, program: Program, poses: Ints, approach: Ints) -> t
     count = len(poses)
     hole = np.repeat(np.arange(count), len(rapid))
     return hole, tip.reshape(-1, 3), np.tile(rapid, count), np.tile(dwell, count)
-
-
-def travel_of(cycle: Cycle, program: Program, poses: Ints, approach: Ints) -> tuple[Floats, Floats]:
-    """(h,) mm each: heights above the holes at which the tool goes from hole to hole, and where feeding begins."""
-    travel = np.maximum(travel_height(program, poses, approach), max(cycle.retract, cycle.clearance or 0.0))
-    return travel, travel if cycle.clearance is None else np.full(len(poses), cycle.clearance)
 
 
 def travel_height(program: Program, poses: Ints, approach: Ints) -> Floats:

@@ -57,14 +57,12 @@ def retracts_before(form: Form, angles: Floats, rapid: Bools, line: Ints, findin
     """
     assert form.machine is not None
     rows = rows_that_swing(form.machine, angles, np.concatenate(([False], rapid))) - 1
-    if not len(rows):
-        return rows
     if not possible:
         text = "rotary axes swing the tilted tool in a rapid, and the control's table has no retract: keep clear there"
-        findings.add("CS340", "warning", int(line[rows[0]]), text, len(rows))
+        findings.add_each("CS340", "warning", line[rows], text)
         return rows[:0]
     text = "retract before a rapid in which rotary axes swing the tilted tool: they turn at its height"
-    findings.add("CS341", "note", int(line[rows[0]]), text, len(rows))
+    findings.add_each("CS341", "note", line[rows], text)
     return rows
 
 

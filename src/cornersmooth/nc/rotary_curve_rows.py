@@ -113,9 +113,8 @@ def rotary_curve_rows(smoothed: SmoothProgram, form: Form, findings: Findings) -
     for part, _ in pairwise(chain(_Work.of(smoothed, form, way).parts(), (None,))):
         assert part is not None
         part.way.angles[-1] = way.angles[part.end]
-        if len(part.lost):
-            text = "curve written in lines: on it the rotary axes would leave the tolerance or their limits"
-            findings.add("CS378", "note", int(program.line[part.lost.min()]), text, len(part.lost))
+        text = "curve written in lines: on it the rotary axes would leave the tolerance or their limits"
+        findings.add_each("CS378", "note", program.line[np.sort(part.lost)], text)
         if not curved and part.sections.good.any():
             text = f"{form.curve.upper()} with rotary axes under tool tip control is the machine builder's to allow"
             findings.add("CS370", "warning", 0, f"{text}; ask before running it")

@@ -86,14 +86,10 @@ def rotary_rows(
             line=line,
             file=program.source.name,
         )
-        if len(more.unsolved):
-            text = (
-                "the tool axis jumps further than rotary axes can follow within the tolerance; see what it does there"
-            )
-            findings.add("CS369", "warning", int(line[more.unsolved[0] + 1]), text, len(more.unsolved))
-        if len(more):
-            text = f"point inserted so that {' and '.join(machine.names)} keep the tool within the tolerance"
-            findings.add("CS367", "note", int(line[more.segment[0] + 1]), text, len(more))
+        text = "the tool axis jumps further than rotary axes can follow within the tolerance; see what it does there"
+        findings.add_each("CS369", "warning", line[more.unsolved + 1], text)
+        text = f"point inserted so that {' and '.join(machine.names)} keep the tool within the tolerance"
+        findings.add_each("CS367", "note", line[more.segment + 1], text)
         filled = fill(way.tip[here], way.axis[here], way.angles[here], more)
         start, at_pose = segments_of_rows(way.move, here.start, here.stop)
         held = left | np.append(left[1:], False)  # both rows of a place where a cut is left
@@ -173,11 +169,9 @@ def _timed(
                 findings.add("CS372", "note", 0, text, before - len(filled.pose))
             rate = _rates(filled, chunk, program, settings, form)
         assert rate is not None
-        beyond = np.flatnonzero(rate[own] > fastest)
-        if len(beyond):
-            line = int(program.line[chunk.move[filled.pose[own][beyond[0]]]])
-            text = f"block slowed down: it is shorter than F{fastest:.10g} of inverse time (G93) can say"
-            findings.add("CS371", "warning", line, text, len(beyond))
+        beyond = filled.pose[own][rate[own] > fastest]
+        text = f"block slowed down: it is shorter than F{fastest:.10g} of inverse time (G93) can say"
+        findings.add_each("CS371", "warning", program.line[chunk.move[beyond]], text)
         rate = np.minimum(rate, fastest)
     return filled, np.round(rate, INVERSE_TIME_DECIMALS)
 

@@ -134,7 +134,7 @@ def _note_rewinds(machine: Machine, angles: Floats, left: Bools, line: Ints, fin
         f"the cut is left along the tool and gone on with where {machine.names[column]} has turned by "
         f"{turn[0, column]:.4g} deg above the retract: expect a mark on the part"
     )
-    findings.add("CS376", "warning", int(line[rows[0]]), text, len(rows))
+    findings.add_each("CS376", "warning", line[rows], text)
 
 
 def within_reach(smoothed: SmoothProgram, form: Form) -> SmoothProgram:

@@ -55,38 +55,31 @@ def _arcs(circles: Circles, program: Program, findings: Findings) -> None:
         (circles.blocks > 0, "CS313", "arc written as circular blocks"),
         (circles.blocks == 0, "CS314", "arc written as lines"),
     ):
-        rows = np.flatnonzero(chosen)
-        if len(rows):
-            findings.add(code, "note", int(program.line[program.arcs.pose[rows[0]]]), text, len(rows))
+        findings.add_each(code, "note", program.line[program.arcs.pose[chosen]], text)
 
 
 def _flips(program: Program, findings: Findings) -> None:
     """Rapids whose axis turns by nearly half a turn; feed moves that do so are refused before."""
     poses, _ = axis_steps(program, rapid_moves(program.kind), FLIP_ANGLE)
-    if len(poses):
-        text = (
-            f"the tool axis turns by more than {FLIP_ANGLE:g} deg in a rapid, and which way a control turns is not "
-            "defined; keep clear of the part there, or insert a pose in between"
-        )
-        findings.add("CS326", "warning", int(program.line[poses[0]]), text, len(poses))
+    text = (
+        f"the tool axis turns by more than {FLIP_ANGLE:g} deg in a rapid, and which way a control turns is not "
+        "defined; keep clear of the part there, or insert a pose in between"
+    )
+    findings.add_each("CS326", "warning", program.line[poses], text)
 
 
 def _large_feeds(form: Form, program: Program, findings: Findings) -> None:
     """Feeds per minute beyond what the control takes."""
     largest = form.mode.motion.largest_feed
     cuts = ~rapid_moves(program.kind) & (program.feed_mode == FeedMode.PER_MINUTE)
-    rows = np.flatnonzero(cuts & (program.feed > largest))
-    if largest and len(rows):
-        text = f"feed beyond the F{largest:.10g} mm/min that the control takes; give a lower one"
-        findings.add("CS388", "warning", int(program.line[rows[0]]), text, len(rows))
+    text = f"feed beyond the F{largest:.10g} mm/min that the control takes; give a lower one"
+    findings.add_each("CS388", "warning", program.line[cuts & bool(largest) & (program.feed > largest)], text)
 
 
 def _feeds(program: Program, findings: Findings) -> None:
     cuts = ~rapid_moves(program.kind) & (program.feed_mode == FeedMode.PER_REVOLUTION)
-    rows = np.flatnonzero(cuts)
-    if len(rows):
-        text = "feed per revolution without tool tip control counts along the machine's axes; give feeds per minute"
-        findings.add("CS323", "warning", int(program.line[rows[0]]), text, len(rows))
+    text = "feed per revolution without tool tip control counts along the machine's axes; give feeds per minute"
+    findings.add_each("CS323", "warning", program.line[cuts], text)
 
 
 @dataclass
@@ -129,10 +122,9 @@ class MotionWarnings:
         turned = dot(axis, come) < _TURNED
         turned[0] &= before >= 0
         low = travel <= clearance
-        rows = np.flatnonzero(turned & (low | np.concatenate(([False], low[:-1]))))
-        if len(rows):
-            text = "the tool turns on its way to a hole to where feeding begins; see that it is free to, or give RTRCTO"
-            self.findings.add("CS384", "warning", int(self.program.line[poses[rows[0]]]), text, len(rows))
+        turned &= low | np.concatenate(([False], low[:-1]))
+        text = "the tool turns on its way to a hole to where feeding begins; see that it is free to, or give RTRCTO"
+        self.findings.add_each("CS384", "warning", self.program.line[poses[turned]], text)
 
     def of_tip_control(self, pose: int, form: Form) -> None:
         """Say that a tilted tool has left the rotary axes anywhere, and no words bring them back.
