@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from cornersmooth.errors import InputError
 from cornersmooth.kinematics import machine_position, tool_axis
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program
-from cornersmooth.nc.circles import FIRST_PLANE, Circles
+from cornersmooth.nc.circles import FIRST_PLANE, ArcBlocks, Circles
 from cornersmooth.nc.control import INVERSE_TIME
-from cornersmooth.nc.curve_blocks import Curves, SplFormat, bezier_points, curves_for
+from cornersmooth.nc.curve_blocks import Curves, bezier_points, curves_for
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.planes import Plane
@@ -48,7 +48,6 @@ class BlockWriter:
     _feed: int = -1  # ticks and feed mode of the last F, as one number
     _mode: int = FeedMode.PER_MINUTE
     _format: RowFormat = field(init=False)
-    _arc_format: RowFormat = field(init=False)
     _curves: Curves = field(init=False)
     _blank: str = field(init=False)
     _leaves_out: bool = field(init=False)
@@ -68,10 +67,10 @@ class BlockWriter:
         if self._leaves_out:  # what is left out takes the blank before it with it
             spaced = (self._blank.encode() + spaced[0], *spaced[1:])
         self._format = self._row_format(spaced, decimals)
-        radius = f"{self._blank}{motion.radius}".encode()
-        said = 2 if motion.arc_directions else 3
-        self._arc_format = self._row_format((*spaced[:said], radius), decimals[:said] + decimals[:1])
-        self._curves = curves_for(self.form, self.program, self.findings)
+        if self.form.curve:
+            self._curves = curves_for(self.form, self.program, self.findings)
+        else:
+            self._curves = ArcBlocks(self.circles, motion, self._format)
         self._blend_in_force = self._usual_blend
 
     def _addresses(self, columns: Sequence[int]) -> tuple[tuple[bytes, ...], bytes]:
@@ -260,39 +259,22 @@ class BlockWriter:
         left_out = self._left_out(run, prefix, prefix_id) if self._leaves_out else None
         suffix, suffix_id = self._suffixes(run, dwell)
         self.blocks += len(run) + extra
-        apart: list[tuple[Bools, RowFormat | SplFormat, Ints]] = []  # rows with words of their own
-        if run.arc is not None and (circular := run.arc >= 0).any():
-            said = len(self._arc_format.decimals) - 1
-            numbers = np.column_stack((run.ticks[circular, :said], self.circles.radius[run.arc[circular]]))
-            apart.append((circular, self._arc_format, numbers))
-            if directions := self.form.mode.motion.arc_directions:
-                turns = [f"{self._blank}{turn}".encode() for turn in directions]
-                suffix_id[circular] += len(suffix) * (1 + ~self.circles.clockwise[run.arc[circular]])
-                suffix += [turn + end for turn in turns for end in suffix]
-        if self._curves.format is not None and (curved := run.curve > 0).any():
-            apart.append((curved, self._curves.format, self._curves.numbers(run, curved)))
-        if not apart:
+        own = self._curves.rows(run)  # rows with words of their own, where these have such
+        if self._curves.format is None or not own.any():
             suffix = [self._closing + end for end in suffix]
             return self._format.rows(self._modulo_ticks(run.ticks), prefix, prefix_id, suffix, suffix_id, left_out)[0]
-        which = np.zeros(len(run), np.int64)
-        for number, (rows, _, _) in enumerate(apart, start=1):
-            which[rows] = number
-        plain = which == 0
+        plain, numbers = ~own, self._curves.numbers(run, own)
         out = None if left_out is None else left_out[plain]
         texts = [
             self._format.rows(run.ticks[plain], prefix, prefix_id[plain], suffix, suffix_id[plain], out),
-            *(
-                layout.rows(numbers, prefix, prefix_id[rows], suffix, suffix_id[rows])
-                for rows, layout, numbers in apart
-            ),
+            self._curves.format.rows(numbers, prefix, prefix_id[own], suffix, suffix_id[own]),
         ]
-        return interleave(which, texts)
+        return interleave(own.astype(np.int64), texts)
 
     def _prefixes(self, run: Run, words: str) -> tuple[list[bytes], Ints, int]:
         """Table of what stands before the numbers, an entry for each row, and the blocks hidden in the prefixes."""
         motion = self.form.mode.motion
-        starts = (motion.line, motion.rapid, motion.clockwise, motion.counterclockwise)
-        table = [f"{word}{self._blank}".encode() for word in starts]
+        table = [f"{word}{self._blank}".encode() for word in (motion.line, motion.rapid)]
         chosen = run.rapid.astype(np.int64)
         before: dict[int, bytes] = {}  # blocks before some rows
         feeding = np.flatnonzero(~run.rapid)
@@ -306,9 +288,7 @@ class BlockWriter:
             before[int(feeding[place])] = self._block(self.statements.words.feed_mode, self._mode)
         if run.arc is not None:
             rows = np.flatnonzero(run.arc >= 0)
-            arcs = run.arc[rows]
-            chosen[rows] = np.where(self.circles.clockwise[arcs], 2, 3)
-            planes = self.circles.plane[arcs]
+            planes = self.circles.plane[run.arc[rows]]
             for place in np.flatnonzero(np.diff(planes, prepend=self.statements.plane)).tolist():
                 block = self._block(self.statements.words.plane, int(planes[place]))
                 before[int(rows[place])] = before.get(int(rows[place]), b"") + block
@@ -317,7 +297,7 @@ class BlockWriter:
         if words:
             before[0] = before.get(0, b"") + f"{words}{self._blank}".encode()
         extra = sum(blocks.count(b"\n") for blocks in before.values())
-        if (run.curve > 0).any():
+        if self._curves.rows(run).any():
             extra += self._curves.add_prefixes(run, table, chosen)
         entries: dict[bytes, int] = {}
         for row, blocks in before.items():
@@ -417,7 +397,7 @@ class BlockWriter:
                 self._feed = int(keys[-1])
                 rows = given[changed]
                 on_curves = [(row, table[chosen[row]]) for row in rows[curved[rows]].tolist()]
-        if curved.any():
+        if self._curves.rows(run).any():
             self._curves.add_suffixes(run, table, chosen)
         # the line before a curve brings the feed; where it is nothing in the written digits the curve must
         for row, given_feed in on_curves:

@@ -26,13 +26,17 @@ _WINDOW, _LEAST = 10, 6
 
 
 class Curves:
-    """How curves are written: here as what there are none of.
+    """How curves, or arcs, are written.
 
     `format` is None where control points have the words of lines; else rows on curves have words of their own and
     `numbers`.
     """
 
     format: RowFormat | SplFormat | None = None
+
+    def rows(self, run: Run) -> Bools:
+        """(r,) rows on curves."""
+        return run.curve > 0
 
     def prepare(self, run: Run) -> Run:
         """Return the run with only the rows that become blocks, and remember what follows."""
@@ -349,6 +353,4 @@ def curves_for(form: Form, program: Program, findings: Findings) -> Curves:
         return SplineBlocks(decimals, program.line, findings)
     if form.curve == "poly":
         return PolyBlocks(form, units)
-    if form.curve == "spl":
-        return SplBlocks(form, units)
-    return Curves()
+    return SplBlocks(form, units)
