@@ -188,23 +188,13 @@ def turned_part(machine: Machine, angles: Floats) -> Floats:
 
 def _rotary_angles(machine: Machine, axis: Floats) -> Floats | None:
     """(2,) degrees within the limits that bring the tool to an axis: as preferred, else as little as possible."""
-    low, high = machine.limits.T
-    zero = np.zeros(2)
-    if (low <= zero).all() and (zero <= high).all() and norm(tool_axis(machine, zero[None]) - axis)[0] <= _SAME:
-        return zero
-    found = solutions(machine, axis[None])
-    if found.beyond[0] > 0.0:
-        return None
-    turns = np.array([[one, other] for one in (-360.0, 0.0, 360.0) for other in (-360.0, 0.0, 360.0)])
-    angles = (found.angles[0][:, None, :] + turns).reshape(-1, 2)
-    angles = angles[((angles >= low) & (angles <= high)).all(axis=1)]
-    if not len(angles):
-        return None
-    turned = np.abs(angles).sum(axis=1)
-    if machine.preferred is not None:
-        name, sign = machine.preferred
-        turned = turned + np.where(sign * angles[:, machine.names.index(name)] >= 0.0, 0.0, 1e6)
-    return angles[int(np.argmin(turned))]
+
+    def turned(angles: Floats) -> float:
+        name, sign = machine.preferred or (machine.names[0], 0)
+        return float(np.abs(angles).sum()) + 1e6 * (sign * angles[machine.names.index(name)] < 0.0)
+
+    found = [angles for angles in _angles(machine, axis) if norm(tool_axis(machine, angles[None]) - axis)[0] <= _SAME]
+    return min(found, key=turned, default=None)
 
 
 def check_travel_in_planes(planes: Planes, program: Program, form: Form, findings: Findings) -> None:
@@ -220,7 +210,7 @@ def check_travel_in_planes(planes: Planes, program: Program, form: Form, finding
         places = np.flatnonzero((planes.of == number) & (program.kind != Move.FROM))
         tip, poses = _on_the_way(program, places)
         fit, refused = [], None
-        for angles in _angles(machine, plane):
+        for angles in [plane.angles] if plane.angles is not None else _angles(machine, plane.frame[:, 2]):
             try:
                 travel.check(tip, np.tile(angles, (len(tip), 1)), poses)
                 fit.append(angles)
@@ -248,17 +238,14 @@ def _on_the_way(program: Program, poses: Ints) -> tuple[Floats, Ints]:
     return np.concatenate((program.tip[poses], between)), np.concatenate((poses, program.arcs.pose[arcs[rows]]))
 
 
-def _angles(machine: Machine, plane: Plane) -> list[Floats]:
-    """Angles, (2,) degrees each, of which the control may take any: within their limits."""
-    if plane.angles is not None:
-        return [plane.angles]
-    axis, zero = plane.frame[None, :, 2], np.zeros((1, 2))
+def _angles(machine: Machine, axis: Floats) -> list[Floats]:
+    """Angles, (2,) degrees each, of which a control may take any: those of both solutions, within the limits."""
     low, high = machine.limits.T
-    turns = 360.0 * np.array([0.0, -1.0, 1.0])[:, None]
-    if norm(tool_axis(machine, zero) - axis)[0] <= _SAME:  # any angle of the axis along the tool would do: it stays
-        return [zero[0]]
+    zero, turns = np.zeros(2), 360.0 * np.array([0.0, -1.0, 1.0])[:, None]
+    if norm(tool_axis(machine, zero[None]) - axis)[0] <= _SAME and (low <= zero).all() and (zero <= high).all():
+        return [zero]  # any angle of the axis along the tool would do: it stays
     found = []
-    for angles in solutions(machine, axis).angles[0]:
+    for angles in solutions(machine, axis[None]).angles[0]:
         within = (angles + turns >= low) & (angles + turns <= high)
         if within.any(axis=0).all():
             found.append(angles + turns[np.argmax(within, axis=0), 0])
