@@ -12,9 +12,11 @@ from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, get_args
 
+from cornersmooth.errors import SettingsError
 from cornersmooth.nc.control import STEPS, Blocks, Control, Digits, FormTable, Mode, Motion, Orientation, Words
-from cornersmooth.nc.trusted_words import trusted_words
-from cornersmooth.tables import Shelf, Table, filled, is_file
+from cornersmooth.nc_reader import CONTROLS
+from cornersmooth.nc_reader.word_list import WordRule, word_list
+from cornersmooth.tables import Shelf, Table, check_pattern, filled, is_file
 
 _FORM_KEYS = ("description", "curve", "upright", "plane", *get_args(Orientation))
 _MOTION_KEYS = tuple(item.name for item in fields(Motion))
@@ -46,6 +48,18 @@ _CYCLE_BRACES: Table = dict.fromkeys(
 ) | {"milliseconds": 1, "speed": ""}
 #: the same in blocks of extras
 _EXTRA_BRACES: Table = {"blend": "0.001", "turn": "0.01"}
+
+#: largest number of a machine function
+_LARGEST = 9999
+
+#: functions that mean the same on every machine (ISO 6983-1; M17 ends a subprogram)
+_FIXED = re.compile(r"M(\d|17|19|30)")
+
+#: functions that move the tool, change what coordinates mean, or jump to other blocks
+_MOVING = re.compile(r"M(9[6-9]|198|428|429|430)")
+
+#: path functions of Klartext
+_PATH_FUNCTIONS = re.compile(r"M(89|9\d|1[0-4]\d)")
 
 
 class _Controls(Shelf):
@@ -175,10 +189,35 @@ def _form(name: str, entry: Any, motion: Table) -> FormTable:
 
 
 def _trusted(given: Any, where: str, dialect: str) -> frozenset[str]:
-    try:
-        return trusted_words(_SHELF.texts(given, where), dialect)
-    except ValueError as error:
-        raise _SHELF.wrong(f"{where}: {error}", 'give machine functions, as in ["M208"]') from error
+    """All machine functions that some patterns hold which a shop's own table declares not to move the tool.
+
+    Refused are patterns of other words, of none, or of words that may move the tool or that the control knows.
+    """
+    found: set[str] = set()
+    rules = word_list(dialect).words if dialect in CONTROLS else ()
+
+    def rule_of(word: str) -> WordRule | None:
+        return next((rule for rule in rules if rule.pattern.fullmatch(word)), None)
+
+    def wrong(why: object) -> SettingsError:
+        return _SHELF.wrong(f"{where}: {why}", 'give machine functions, as in ["M208"]')
+
+    any_function = rule_of(f"M{_LARGEST}")
+    for pattern in _SHELF.texts(given, where):
+        try:
+            check_pattern(pattern)
+        except ValueError as error:
+            raise wrong(error) from error
+        own = {word for number in range(_LARGEST + 1) if re.fullmatch(pattern, word := f"M{number}")}
+        if not pattern.startswith("M") or not own:
+            raise wrong(f"{pattern!r} is no machine function: other words may move the tool")
+        for word in sorted(own, key=lambda word: int(word[1:])):
+            if _MOVING.fullmatch(word) or (dialect == "heidenhain" and _PATH_FUNCTIONS.fullmatch(word)):
+                raise wrong(f"{pattern!r} holds {word}, which may move the tool")
+            if _FIXED.fullmatch(word) or rule_of(word) is not any_function:
+                raise wrong(f"{pattern!r} holds {word}, which verification compares with the CL file")
+        found |= own
+    return frozenset(found)
 
 
 def _mode(entry: Any, where: str, motion: Table) -> Mode:

@@ -76,8 +76,7 @@ def choose_form(
     orientation, mode = _mode(table, chosen, machine, tcp)
     asked = tuple(_extra(table, name, extra) for extra in dict.fromkeys(extras))
     if machine is not None and machine.names:
-        _check_modulo(table, chosen, mode, machine)
-        _check_curves(table, chosen, machine)
+        _check_axes(table, chosen, mode, machine)
     plane = _plane(table, chosen, machine) if planes else None
     found = Form(table, name, chosen.curve, orientation, mode, machine, asked, chosen.upright, rewind, plane)
     _check_rewind(found)
@@ -108,30 +107,27 @@ def _without_rotary_axes(table: Control, form: FormTable) -> Mode:
     return mode
 
 
-def _check_curves(table: Control, form: FormTable, machine: Machine) -> None:
-    """Refuse curves in rotary words of a machine with one rotary axis."""
-    if not form.curve or len(machine.names) > 1:
-        return
-    what = f"{table.name} form {form.name} has no curves for a machine with one rotary axis"
-    raise SettingsError("CS215", what, _use_lines(table, "leave out --machine"))
-
-
 def _use_lines(table: Control, otherwise: str) -> str:
     """Hint at the first form of a control that has lines; at something else where it has none."""
     lines = next((name for name, other in table.forms.items() if not other.curve), "")
     return f"use -f {lines}" if lines else otherwise
 
 
-def _check_modulo(table: Control, form: FormTable, mode: Mode, machine: Machine) -> None:
-    """Refuse modulo axes that the control does not send the shorter way, or whose words a curve would have."""
-    if not machine.modulo:
-        return
-    axes, hint = " and ".join(machine.modulo), "leave out modulo in the machine file"
-    if form.curve:
-        text = f"{table.name} form {form.name} has curves of the words of {axes}, which a modulo axis cannot follow"
+def _check_axes(table: Control, form: FormTable, mode: Mode, machine: Machine) -> None:
+    """Refuse curves with one rotary axis or with modulo axes, and modulo axes that do not go the shorter way."""
+    here, axes, hint = (
+        f"{table.name} form {form.name}",
+        " and ".join(machine.modulo),
+        "leave out modulo in the machine file",
+    )
+    if axes and form.curve:
+        text = f"{here} has curves of the words of {axes}, which a modulo axis cannot follow"
         raise SettingsError("CS215", text, _use_lines(table, hint))
-    if not mode.motion.shortest:
+    if axes and not mode.motion.shortest:
         raise SettingsError("CS215", f"{table.name} has no words by which {axes} goes the shorter way", hint)
+    if form.curve and len(machine.names) < 2:
+        what = f"{here} has no curves for a machine with one rotary axis"
+        raise SettingsError("CS215", what, _use_lines(table, "leave out --machine"))
 
 
 def _check_rewind(form: Form) -> None:

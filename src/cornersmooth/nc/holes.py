@@ -48,7 +48,9 @@ class HoleWriter:
 
     @cached_property
     def _approach(self) -> Ints:
-        return approaches(self.motion.program)
+        """(n,) pose from which the run of holes is approached that each pose belongs to, -1 for none."""
+        kind = self.motion.program.kind
+        return np.maximum.accumulate(np.where(kind == Move.HOLE, -1, np.arange(len(kind))))
 
     def write(self, rows: Rows) -> Iterator[bytes]:
         """Holes of one cycle, of the control or as plain moves; those left out are only approached."""
@@ -56,9 +58,8 @@ class HoleWriter:
         cycle, program, poses = motion.statements.cycles.now, motion.program, rows.move
         heights = travel_height(program, poses, self._approach[poses])
         lines, line = program.line[poses], int(program.line[poses[0]])
-        kind = self._cycle_of_control(cycle, poses)
+        kind, why = self._cycle_of_control(cycle, poses)
         if cycle is None or (cycle.tap and not kind):
-            why = "its words are not understood" if cycle is None else self._why_no_tap(cycle, poses)
             motion.statements.cycles.leave_out(why, line, len(poses))
             yield from self._over_holes(rows, heights)
             return
@@ -77,25 +78,23 @@ class HoleWriter:
             run = replace(run, feed=np.full(len(move), cycle.feed), mode=np.full(len(move), int(cycle.feed_mode)))
         yield from motion.emit_above(motion.moving(run), cycle.dwell)
 
-    def _cycle_of_control(self, cycle: Cycle | None, poses: Ints) -> str:
-        """Cycle of the control that drills holes, as `kind_of` names it; empty for none."""
-        if cycle is None or not self.motion.takes_cycles or not (self.native or cycle.tap):
-            return ""
-        if cycle.tap and not self._can_thread():
-            return ""
-        return kind_of(cycle, self.motion.writer.form, self.motion.program, poses)
+    def _cycle_of_control(self, cycle: Cycle | None, poses: Ints) -> tuple[str, str]:
+        """Cycle of the control that drills holes, as `kind_of` names it; empty for none, and then why no tap can be.
 
-    def _why_no_tap(self, cycle: Cycle, poses: Ints) -> str:
-        """Why the control's cycle cannot do a tap, in words; plain moves cannot turn the spindle with the feed."""
-        if not kind_of(cycle, self.motion.writer.form, self.motion.program, poses):
-            return "a tap, and the control has no such cycle for it"
-        if not self._can_thread():
-            return "a tap takes a spindle that turns clockwise at a known speed"
-        return "a tap, and the tool does not stay along Z between its changes, or nothing says that the rotary axes do"
-
-    def _can_thread(self) -> bool:
-        """Whether the spindle turns as a thread needs it."""
-        return bool(self.motion.statements.clockwise and self.motion.statements.speed and self.motion.operation.turning)
+        Plain moves cannot turn the spindle with the feed.
+        """
+        motion = self.motion
+        if cycle is None:
+            return "", "its words are not understood"
+        kind = kind_of(cycle, motion.writer.form, motion.program, poses)
+        if not kind:
+            return "", "a tap, and the control has no such cycle for it"
+        if cycle.tap and not (motion.statements.clockwise and motion.statements.speed and motion.operation.turning):
+            return "", "a tap takes a spindle that turns clockwise at a known speed"
+        if not motion.takes_cycles:
+            where = "the tool does not stay along Z between its changes, or nothing says that the rotary axes do"
+            return "", f"a tap, and {where}"
+        return kind if self.native or cycle.tap else "", ""
 
     def _cycles(self, cycle: Cycle, kind: str, poses: Ints, travel: Floats, clearance: Floats) -> Iterator[bytes]:
         """Holes as cycles of the control, each from the height at which the tool goes from hole to hole."""
@@ -169,11 +168,6 @@ class HoleWriter:
             yield from motion.text(motion.statements.warning_comment(f"NOT DRILLED: HOLE AT {place}"))
             run = Run.straight(program, ticks[index : index + 1], poses[index : index + 1], rapid=True)
             yield from motion.emit_above(motion.moving(run))
-
-
-def approaches(program: Program) -> Ints:
-    """(n,) pose from which the run of holes is approached that each pose belongs to, -1 for none."""
-    return np.maximum.accumulate(np.where(program.kind == Move.HOLE, -1, np.arange(len(program))))
 
 
 def hole_moves(

@@ -48,7 +48,7 @@ def own_words(table: Control) -> tuple[str, ...]:
         return ()
     base = load_control(table.dialect)
     known = set(_blocks(base))
-    blocks = [block for block in _blocks(table) if block not in known and not _is_step(block)]
+    blocks = [block for block in _blocks(table) if block not in known and not re.fullmatch(r"\{\w+\}", block)]
     changed = {name for name in _KINDS if getattr(table.words, name) != getattr(base.words, name)}
     for _ in _KINDS:  # one field may say several kinds, and several fields one
         said = {kind for name in changed for kind in _KINDS[name]}
@@ -79,10 +79,6 @@ def _modes(table: Control, other: Control) -> list[Mode]:
 
 def _around(modes: list[Mode]) -> list[tuple[object, ...]]:
     return [(mode.off, mode.within_on, mode.within_off, mode.begin) for mode in modes]
-
-
-def _is_step(block: str) -> bool:
-    return re.fullmatch(r"\{\w+\}", block) is not None
 
 
 def _blocks(table: Control) -> Iterator[str]:

@@ -30,9 +30,7 @@ def add_warnings(form: Form, smoothed: SmoothProgram, circles: Circles, findings
     _arcs(circles, smoothed.program, findings)
     if not form.rotary:  # rotary words say which way to turn
         _flips(smoothed.program, findings)
-    _large_feeds(form, smoothed.program, findings)
-    if form.orientation == "machine":
-        _feeds(smoothed.program, findings)
+    _feeds(form, smoothed.program, findings)
     if "{kinematics_on}" in form.mode.within_on and form.machine is not None and form.machine.tip_control is None:
         text = (
             "the machine file names no blocks that switch tip control on and off: the kinematics must keep the tip "
@@ -68,18 +66,16 @@ def _flips(program: Program, findings: Findings) -> None:
     findings.add_each("CS326", "warning", program.line[poses], text)
 
 
-def _large_feeds(form: Form, program: Program, findings: Findings) -> None:
-    """Feeds per minute beyond what the control takes."""
-    largest = form.mode.motion.largest_feed
-    cuts = ~rapid_moves(program.kind) & (program.feed_mode == FeedMode.PER_MINUTE)
+def _feeds(form: Form, program: Program, findings: Findings) -> None:
+    """Feeds per minute beyond what the control takes, and feeds per revolution of axes of the machine."""
+    largest, cuts = form.mode.motion.largest_feed, ~rapid_moves(program.kind)
+    beyond = cuts & (program.feed_mode == FeedMode.PER_MINUTE) & (program.feed > (largest or np.inf))
     text = f"feed beyond the F{largest:.10g} mm/min that the control takes; give a lower one"
-    findings.add_each("CS388", "warning", program.line[cuts & bool(largest) & (program.feed > largest)], text)
-
-
-def _feeds(program: Program, findings: Findings) -> None:
-    cuts = ~rapid_moves(program.kind) & (program.feed_mode == FeedMode.PER_REVOLUTION)
-    text = "feed per revolution without tool tip control counts along the machine's axes; give feeds per minute"
-    findings.add_each("CS323", "warning", program.line[cuts], text)
+    findings.add_each("CS388", "warning", program.line[beyond], text)
+    if form.orientation == "machine":
+        turned = cuts & (program.feed_mode == FeedMode.PER_REVOLUTION)
+        text = "feed per revolution without tool tip control counts along the machine's axes; give feeds per minute"
+        findings.add_each("CS323", "warning", program.line[turned], text)
 
 
 @dataclass
