@@ -229,7 +229,7 @@ def test_a_linear_axis_alone() -> None:
     law = plan(smoothed, Limits(accel=1e5, jerk=1e7), machine=machine)
     assert law.total == pytest.approx(1.821586, rel=1e-3)
     slow_y = replace(machine, dynamics=(Dynamics("Y", 1.0, 1.0, 1.0),))
-    assert plan(smoothed, machine=slow_y).total == pytest.approx(plan(smoothed).total, rel=1e-3)
+    assert plan(smoothed, machine=slow_y).total == pytest.approx(plan(smoothed).total, rel=2e-3)  # cells
 
 
 def test_a_rapid_takes_the_time_of_its_turn() -> None:

@@ -1,11 +1,11 @@
 """The fastest profiles under the limits of quantities, and which of these are held where.
 
 Rows of the problem hold the limits of some quantities at the ends and the middle of each cell: those that come nearest
-to their limits there. All quantities are then measured, at the quarters of cells too; where a plan is beyond a limit,
-one more quantity is held, and limits of that cell are made stricter by as much (an exchange method for semi-infinite
-programmes: Hettich and Kortanek 1993). What is still beyond after the last round is slowed down run by run, so that
-every plan keeps every limit. The first profile is that of a problem of the way alone, under limits that let quantities
-all but keep theirs.
+to their limits there. All quantities are then measured, at the quarters of cells too. Where a plan is beyond a limit,
+one more quantity is held, limits of that cell are made stricter by as much, and the cells around it are planned again
+(an exchange method for semi-infinite programmes: Hettich and Kortanek 1993). What is still beyond after the last round
+is slowed down run by run, so that every plan keeps every limit. The first profile is that of a problem of the way
+alone, under limits that let quantities all but keep theirs.
 """
 
 from __future__ import annotations
@@ -17,10 +17,11 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from cornersmooth.feedrate.grid import Grid
+from cornersmooth.feedrate.interior_point import WARM
 from cornersmooth.feedrate.intervals import Intervals
 from cornersmooth.feedrate.speed_problem import PLACES, Batch, around, problem_of
-from cornersmooth.feedrate.windows import solve_runs
-from cornersmooth.model import Floats
+from cornersmooth.feedrate.windows import braking_distance, solve_runs
+from cornersmooth.model import Floats, Ints
 
 #: quantities that are held in the first round, and cells around that count when they are chosen
 _HELD, _NEAR = 2, 5
@@ -32,10 +33,8 @@ _USED = 0.998
 _EASE, _ROUGH = 0.5, 0.05
 #: Newton steps of one round: most take 15 to 30; where terms are huge and cancel, hundreds gain next to nothing
 _STEPS = 40
-#: how much slower than the plan before the next one begins, so that it keeps its limits with room to spare
-_SLOWER = 0.97
-#: times that a profile is slowed down until it can be begun with
-_MOST_TRIES = 200
+#: cells on either side of one that is planned again at least
+_BESIDE = 8
 
 
 def fastest(grid: Grid, limits: Intervals, progress: Callable[[int, int], None] | None) -> tuple[Batch, Floats]:
@@ -45,11 +44,13 @@ def fastest(grid: Grid, limits: Intervals, progress: Callable[[int, int], None] 
     grid = _from_rest(grid, derivatives, bounds)
     if not limits.aligned:
         batch = problem_of(grid, derivatives, bounds)
-        return batch, solve_runs(batch, grid, progress)
+        c = batch.start()
+        solve_runs(batch, grid, c, progress)
+        return batch, _within(c, batch.use(c), grid)
     batch = problem_of(_eased(grid, derivatives, bounds), derivatives[:, :0], bounds[:, :0])
-    c = solve_runs(batch, grid, gap=_ROUGH, most=_STEPS)
-    going, run = np.ones(len(grid.first), np.bool_), grid.run
-    most, stricter = _used(batch, c, grid, derivatives, bounds), np.ones(len(c))
+    c = batch.start()
+    solve_runs(batch, grid, c, gap=_ROUGH, most=_STEPS)
+    most, stricter, first, last = _used(batch, c, grid, derivatives, bounds), np.ones(len(c)), grid.first, grid.last
     for number in range(_ROUNDS):
         held = np.argsort(-maximum_filter1d(most, _NEAR, axis=1), axis=0)[: _HELD + number]
         own = (
@@ -57,17 +58,38 @@ def fastest(grid: Grid, limits: Intervals, progress: Callable[[int, int], None] 
             for part, index in ((derivatives, np.s_[None, ..., None]), (bounds, np.s_[None]))
         )
         batch = problem_of(grid, next(own), _USED * next(own)).tightened(stricter)
-        cells, part = going[run], batch.cells(going[run], going)
-        c[cells] = solve_runs(part, grid.of(going), progress, start=_within(part, c[cells]), most=_STEPS)
+        cells, part = batch.stretches(first, last)
+        of_cells = c[cells]
+        solve_runs(part, grid.of(cells), of_cells, progress, most=_STEPS, begin_with=WARM)
+        c[cells] = of_cells
         used = _used(batch, c, grid, derivatives, bounds)
-        of_run = np.maximum.reduceat(used.max(axis=0), grid.first)
-        going = of_run > 1.0
-        if not going.any():
+        share = np.maximum(used.max(axis=0), batch.use(c))
+        beyond = np.flatnonzero(share > 1.0)
+        if not len(beyond):
             break
         most = np.maximum(most, used)
         of_held = np.take_along_axis(used, held, axis=0).max(axis=0) / _USED
         stricter = stricter * np.where(of_held > 1.0, _STRICTER * of_held, 1.0)
-    return batch, c / np.maximum(of_run, 1.0)[run]
+        first, last = _around(beyond, batch, grid)
+    return batch, _within(c, share, grid)
+
+
+def _within(c: Floats, share: Floats, grid: Grid) -> Floats:
+    """Coefficients of runs slower by as much as their cells use more than they may, (n,)."""
+    return c / np.maximum(np.maximum.reduceat(share, grid.first), 1.0)[grid.run]
+
+
+def _around(beyond: Ints, batch: Batch, grid: Grid) -> tuple[Ints, Ints]:
+    """First and last cells of stretches around some cells, long enough to brake before them and to speed up after."""
+    run = grid.run[beyond]
+    first, last = grid.first[run], grid.last[run]
+    of_run = {i: braking_distance(batch, grid, *ends) for i, *ends in set(zip(run, first, last, strict=True))}
+    reach = np.array([of_run[i] for i in run])
+    low = np.searchsorted(grid.start, grid.start[beyond] - reach) - _BESIDE
+    high = np.searchsorted(grid.start, grid.start[beyond] + reach) + _BESIDE
+    low, high = np.maximum(low, first), np.minimum(high, last)
+    apart = np.flatnonzero(low[1:] > high[:-1])
+    return low[np.append(0, apart + 1)], high[np.append(apart, len(high) - 1)]
 
 
 def _from_rest(grid: Grid, derivatives: Floats, bounds: Floats) -> Grid:
@@ -122,14 +144,3 @@ def _used(batch: Batch, c: Floats, grid: Grid, derivatives: Floats, bounds: Floa
         np.maximum(most, (np.abs(values).max(axis=-1) + between) / bound, out=most)
     most[:, np.concatenate((grid.first, grid.last))] = 0.0  # see `_from_rest`
     return most
-
-
-def _within(batch: Batch, c: Floats) -> Floats:
-    """Profiles that are slower than the given ones and keep all limits with room to spare."""
-    slower = c * _SLOWER
-    for _ in range(_MOST_TRIES):
-        beyond = np.logical_or.reduceat((batch.slacks(slower)[0] <= 0.0).any(axis=(0, 1)), batch.first)
-        if not beyond.any():
-            break
-        slower = np.where(np.repeat(beyond, batch.last - batch.first + 1), _SLOWER * slower, slower)
-    return slower

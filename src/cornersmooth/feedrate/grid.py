@@ -30,7 +30,7 @@ class Resolution:
 
 
 #: where more is limited than the way itself
-FINER = Resolution(part=0.05, growth=0.06)
+FINER = Resolution(part=0.06, growth=0.1)
 
 
 @dataclass(frozen=True)
@@ -55,15 +55,9 @@ class Grid:
         """(n,) number of the run that each cell belongs to."""
         return np.repeat(np.arange(len(self.first)), self.last - self.first + 1)
 
-    def of(self, runs: Bools) -> Grid:
-        """Cells of some runs, (r,) bool."""
-        size = self.last - self.first + 1
-        cells = np.repeat(runs, size)
-        first = np.cumsum(size[runs]) - size[runs]
-        start, width, cap, accel, jerk = (
-            part[cells] for part in (self.start, self.width, self.cap, self.accel, self.jerk)
-        )
-        return Grid(start, width, cap, accel, jerk, first)
+    def of(self, cells: Ints) -> Grid:
+        """Some cells; which of them are the first of runs is not known."""
+        return replace(self, start=self.start[cells], width=self.width[cells], cap=self.cap[cells])
 
 
 def make_grid(limits: Intervals, runs: Ints, resolution: Resolution | None = None) -> Grid:

@@ -17,13 +17,14 @@ At a standstill z ~ s^(4/3) has no such spline. There the first (last) cell of a
 constant jerk from (to) rest: v = 3e/t and a = 6e/t² at its end give z′ = (4/3)·z/e and a jerk of (2/9)·z^(3/2)/e²,
 again linear bounds.
 
-The time Σ w/√c is convex. Primal-dual Newton steps follow the central path; in the normal equations the jerk limit
-enters with its tangent at the current profile, which keeps the system positive definite, while the step length is taken
-on the limit itself, so every profile on the way is feasible and the last one is used as it stands. The normal matrix
-has five diagonals: one step costs a fixed time per cell. Each is solved twice (Mehrotra): where a step without barrier
-would lead says how far the barrier may fall, and what the products of changes would add. Linear limits in z: Verscheure
-et al. 2009; tangent of the jerk limit: Erkorkmaz et al. 2017; primal-dual steps and Mehrotra's: Nocedal and Wright,
-Numerical Optimization, ch. 19 and 14.
+The time Σ w/√c is convex. Primal-dual Newton steps follow the central path, for the logarithms of c: there the time
+has a third of its curvature by c, and grows to what the limits allow in a third of the steps. In the normal equations
+the jerk limit enters with its tangent at the current profile, which keeps the system positive definite, while the step
+length is taken on the limit itself. So a profile that keeps a limit keeps it at every step; what begins beyond a limit
+comes nearer to it with every step. The normal matrix has five diagonals: one step costs a fixed time per cell. Each is
+solved twice (Mehrotra): where a step without barrier would lead says how far the barrier may fall, and what the
+products of changes would add. Linear limits in z: Verscheure et al. 2009; tangent of the jerk limit: Erkorkmaz et al.
+2017; primal-dual steps from beyond limits, and Mehrotra's: Nocedal and Wright, Numerical Optimization, ch. 19 and 14.
 """
 
 from __future__ import annotations
@@ -39,13 +40,15 @@ GAP = 2e-4
 #: change of the time in one step, over what may remain, below which the dual variables are taken to have arrived too
 SETTLED = 5.0
 #: duality gap over the time that multipliers begin with, and where a plan that keeps most of the limits is known
-COLD, WARM = 5.0, 0.3
+COLD, WARM = 5.0, 0.1
 #: steps that together have to bring more than that
 PATIENCE = 10
 #: least part of the gap that a step aims at
 LEAST_FALL = 1e-3
-#: Newton steps after which the profile is taken as it is; it is feasible at every step
+#: Newton steps after which the profile is taken as it is
 MAX_STEPS = 500
+#: room to a limit that the iteration begins with at least, over the width of what both sides leave
+_ROOM = 0.01
 #: part of the way to the nearest limit that a step may take
 TO_LIMIT = 0.95
 #: part of a step below which the next one goes back to the middle, and by what the barrier rises there
@@ -63,7 +66,7 @@ def solve(batch: Batch, c: Floats, gap: float = GAP, most: int = MAX_STEPS, begi
     Parameters
     ----------
     c : (n,) float64
-        Strictly feasible coefficients to start from.
+        Coefficients to start from; they may be beyond limits.
     gap : float
         Remaining duality gap over the time at which a profile is taken.
     most : int
@@ -74,36 +77,43 @@ def solve(batch: Batch, c: Floats, gap: float = GAP, most: int = MAX_STEPS, begi
     Returns
     -------
     (n,) float64
-        Strictly feasible coefficients; the time is within about `gap` of the smallest on this grid.
+        Coefficients whose time is within about `gap` of the smallest on this grid. Where the start keeps all limits
+        with room to spare, they keep them too.
     """
-    slack, z = batch.slacks(c)
+    room, z = batch.slacks(c)
+    slack = np.maximum(room, _ROOM * (room[0] + room[1]))
     time = float((batch.weight / np.sqrt(c)).sum())
     dual = begin * time / slack.size / slack
     worst, fall, times = 1.0, time, [np.inf]
     for _ in range(most):
         bites = [0.5 * values**-1.5 for values in z]  # −d(z^(−1/2))/dz
         inverse, product = 1.0 / slack, dual * slack
-        mean = float(product.sum()) / slack.size
+        beyond = 1.0 - room * inverse
+        lifted = dual * beyond
         factors = _factors(_normal_matrix(batch, c, dual * inverse, bites))
-        step = _step(batch, c, factors, None, bites)
-        used = _change(batch, step, bites) * inverse  # part of the way to each limit
+        used = _used(batch, _step(batch, c, factors, lifted, bites), inverse, beyond, bites)
         length, dual_length = (_length(float(most_used)) for most_used in (used.max(), 1.0 - used.min()))
-        left = float((product * (1.0 + dual_length * (used - 1.0)) * (1.0 - length * used)).sum()) / slack.size
+        first_order = product * used
+        forces = first_order * used
+        whole, first, second = (float(part.sum()) for part in (product, first_order, forces))
+        left = (1.0 - dual_length) * whole + (dual_length - length * (1.0 - dual_length)) * first
+        left = (left - length * dual_length * second) / whole
+        mean = whole / slack.size
         # while the time falls the forces are not in balance, and limits that are too near hold it up
-        aim = max(mean * max((left / mean) ** 3, LEAST_FALL), min(fall / slack.size, mean))
-        forces = np.full_like(slack, mean * RAISED) if worst < SHORT else aim + product * used * (used - 1.0)
-        step = _step(batch, c, factors, forces * inverse, bites)
-        used = _change(batch, step, bites) * inverse
-        toward = forces + product * (used - 1.0)
-        dual_length = _length(float((-toward / product).max()))
+        forces -= first_order
+        forces += mean * max(left**2, LEAST_FALL, min(fall / whole, 1.0))
+        if worst < SHORT:
+            forces[:] = mean * RAISED
+        step = _step(batch, c, factors, forces * inverse + lifted, bites)
+        used = _used(batch, step, inverse, beyond, bites)
+        toward = product * used
+        toward += forces
+        toward -= product
+        dual_length = _length(-float((toward / product).min()))
         length = _length(max(float(used.max()), float((-step / c).max())))
-        while True:
-            new_c = c + length * step
-            new_slack, new_z = batch.slacks(new_c)
-            if (new_slack > (1.0 - TO_LIMIT) * 0.5 * slack).all():
-                break
-            length *= 0.7
-        c, slack, z = new_c, new_slack, new_z
+        c = c + length * step
+        room, z = batch.slacks(c)
+        slack = np.maximum(room, slack * (1.0 - length * used))
         dual = (product + dual_length * toward) * inverse
         remaining = float((dual * slack).sum())
         before, time = time, float((batch.weight / np.sqrt(c)).sum())
@@ -124,22 +134,24 @@ def _length(most_used: float) -> float:
     return min(1.0, TO_LIMIT / max(most_used, TO_LIMIT))
 
 
-def _change(batch: Batch, step: Floats, bites: list[Floats]) -> Floats:
-    """(2, R, n) linear change of the limits' left minus right sides with a step of the coefficients."""
-    near, change = around(step), batch.of_limits()
-    for rows, into, bite in zip(batch.rows, batch.by_rows(change), bites, strict=True):
+def _used(batch: Batch, step: Floats, inverse: Floats, beyond: Floats, bites: list[Floats]) -> Floats:
+    """(2, R, n) parts of the way to each limit that a step of the coefficients takes, by tangents of the limits."""
+    near, used = around(step), batch.of_limits()
+    for rows, into, bite in zip(batch.rows, batch.by_rows(used), bites, strict=True):
         left, z = rows.values(near)
-        into[0] = left
-        np.negative(left, out=into[1])
-        into += bite * z
-    return change
+        z *= bite
+        np.add(z, left, out=into[0])
+        np.subtract(z, left, out=into[1])
+    used *= inverse
+    used += beyond
+    return used
 
 
 def _normal_matrix(batch: Batch, c: Floats, stiffness: Floats, bites: list[Floats]) -> Floats:
     """(3, n) diagonals of the normal equations, from the stiffness (2, R, n) of all limits."""
     pairs = [(i, j) for i in range(3) for j in range(i, 3)]
     found = {pair: np.zeros(len(c)) for pair in pairs}
-    found[1, 1] += 0.75 * batch.weight * c**-2.5
+    found[1, 1] += 0.25 * batch.weight * c**-2.5  # by the logarithm of c; 0.75 by c
     for rows, both, bite in zip(batch.rows, batch.by_rows(stiffness), bites, strict=True):
         whole = both[0] + both[1]
         weighted = whole * rows.left

@@ -29,14 +29,12 @@ class Rows(NamedTuple):
     right: Floats  #: (3, n): zero where `one` is 1, so that the limit is |left·c| ≤ 1
     one: float
 
-    def of(self, cells: slice | Bools) -> Rows:
-        """A copy for some cells."""
-        return Rows(self.left[..., cells].copy(), self.right[:, cells].copy(), self.one)
-
-    def free(self, cells: Bools) -> None:
-        """Take the limits away from some cells."""
-        self.left[..., cells] = 0.0
-        self.right[:, cells] = (1.0 - self.one) * _OWN
+    def of(self, cells: Ints, free: Bools) -> Rows:
+        """Those of some cells, some of them free of limits."""
+        left, right = (np.take(part, cells, axis=-1) for part in (self.left, self.right))  # contiguous along cells
+        left[..., free] = 0.0
+        right[:, free] = (1.0 - self.one) * _OWN
+        return Rows(left, right, self.one)
 
     def values(self, around: Floats) -> tuple[Floats, Floats]:
         """Left sides (R, n), and right·c (n,), for coefficients (3, n) before, of and after each cell."""
@@ -73,42 +71,32 @@ class Batch:
     def __len__(self) -> int:
         return len(self.weight)
 
-    def cells(self, chosen: slice | Bools, runs: Bools | Ints) -> Batch:
-        """Some cells on their own; `runs` (r,) are those that lie in them."""
-        size = (self.last - self.first + 1)[runs]
-        last = np.cumsum(size) - 1
-        return Batch(
-            forms=self.forms[..., chosen],
-            weight=self.weight[chosen],
-            steepest=self.steepest[:, chosen],
-            first=last + 1 - size,
-            last=last,
-            first_ratio=self.first_ratio[runs],
-            last_ratio=self.last_ratio[runs],
-            frozen=self.frozen[chosen].copy(),
-            rows=tuple(rows.of(chosen) for rows in self.rows),
-        )
+    def stretches(self, first: Ints, last: Ints) -> tuple[Ints, Batch]:
+        """Cells of some stretches of runs, (s,) first and last of each, and the batch of these alone.
 
-    def window(self, begin: int, end: int) -> Batch:
-        """Cells `begin` to `end`; where a run is cut its coefficients are frozen at the cut."""
-        whole = (self.first >= begin) & (self.last < end)
-        if whole.any():
-            return self.cells(slice(begin, end), whole)
-        run = np.searchsorted(self.first, [begin], side="right") - 1
-        cut_front, cut_back = begin > self.first[run], end <= self.last[run]
-        part = replace(
-            self.cells(slice(begin, end), run),
-            first=np.array([0]),
-            last=np.array([end - begin - 1]),
-            first_ratio=np.where(cut_front, np.nan, self.first_ratio[run]),
-            last_ratio=np.where(cut_back, np.nan, self.last_ratio[run]),
+        Where a stretch cuts a run its coefficients are frozen at the cut.
+        """
+        size = last - first + 1
+        after = np.cumsum(size)
+        begin, end = after - size, after - 1
+        cells = np.repeat(first - begin, size) + np.arange(after[-1])
+        own = np.searchsorted(self.first, first, side="right") - 1
+        front, back = first > self.first[own], last < self.last[own]
+        cut, frozen = np.zeros(len(cells), np.bool_), self.frozen[cells]
+        cut[begin[front]] = cut[end[back]] = True
+        frozen[begin[front, None] + np.arange(2)] = frozen[end[back, None] - np.arange(CRAWLING)] = True
+        part = Batch(
+            forms=np.take(self.forms, cells, axis=-1),
+            weight=self.weight[cells],
+            steepest=np.take(self.steepest, cells, axis=-1),
+            first=begin,
+            last=end,
+            first_ratio=np.where(front, np.nan, self.first_ratio[own]),
+            last_ratio=np.where(back, np.nan, self.last_ratio[own]),
+            frozen=frozen,
+            rows=tuple(rows.of(cells, cut) for rows in self.rows),
         )
-        cut = np.concatenate((cut_front, np.zeros(end - begin - 2, np.bool_), cut_back))
-        for rows in part.rows:
-            rows.free(cut)
-        part.frozen[:2] = cut_front
-        part.frozen[-CRAWLING:] = cut_back
-        return part
+        return cells, part
 
     @cached_property
     def ends(self) -> list[int]:
@@ -141,15 +129,20 @@ class Batch:
 
     def start(self) -> Floats:
         """Coefficients of profiles that keep every limit with room to spare: constant but for the ends of runs."""
-        c, use = np.ones(len(self)), np.full(len(self), 1e-300)
+        c = np.ones(len(self))
         self.follow(c)
+        slowest = START / np.maximum.reduceat(self.use(c), self.first)
+        return c * np.repeat(slowest, self.last - self.first + 1)
+
+    def use(self, c: Floats) -> Floats:
+        """(n,) how many times too large coefficients are for the limits of each cell."""
+        use = np.full(len(self), 1e-300)
         for rows in self.rows:
             left, z = rows.values(around(c))
             # left sides grow with z, the right side of jerk limits falls with its root
             power = 1.0 if rows.one else 2.0 / 3.0
             np.maximum(use, (np.abs(left).max(axis=0) * np.sqrt(z + rows.one)) ** power, out=use)
-        slowest = START / np.maximum.reduceat(use, self.first)
-        return c * np.repeat(slowest, self.last - self.first + 1)
+        return use
 
     def follow(self, c: Floats) -> None:
         """Set the end coefficients of the runs from their neighbours."""
