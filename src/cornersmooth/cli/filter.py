@@ -25,10 +25,9 @@ from cornersmooth.cli.shop import command_line, loosened
 from cornersmooth.cli.show import (
     INDENT,
     more,
-    print_heading,
     print_line,
     print_message,
-    program_text,
+    print_verdict,
     say,
     say_json,
     say_line,
@@ -231,12 +230,8 @@ def _measured(found: Checked, tolerance: float) -> str:
 
 def _show(name: str, contents: Mapping[str, Any], found: Filtered, given: Options) -> None:
     """Print the verdict, what was measured, and what was left as it is."""
-    verdict, _, what = contents["verdict_text"].partition(": ")
-    print_heading(
-        f"{verdict}  {program_text(contents['program'])}, {found.new_lines:,} lines from {found.lines:,} lines"
-    )
-    for part in (*what.split("; "), "all outside of runs is the same byte for byte"):
-        print_line(INDENT + part)
+    counts = f"{found.new_lines:,} lines from {found.lines:,} lines"
+    print_verdict(contents, counts, ["all outside of runs is the same byte for byte"])
     if found.checked is not None:
         show_wrong(name, found.checked.wrong)
     if found.seconds is not None:

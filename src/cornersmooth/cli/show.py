@@ -97,35 +97,41 @@ def told_finding(source: str, finding: Mapping[str, Any]) -> str:
     return message(finding["severity"], finding["text"], code=finding["code"], place=place, count=finding["count"])
 
 
+def print_verdict(contents: Mapping[str, Any], counts: str, lines: Iterable[str]) -> None:
+    """Print the verdict and the program, in bold on a terminal, then what the verdict says and other lines."""
+    verdict, _, what = contents["verdict_text"].partition(": ")
+    program = contents["program"]
+    machine = f", {program['machine']}" if program["machine"] else ""
+    name = f"{program['name'] or 'standard output'}  {program['control']} {program['form']}{machine}"
+    head = f"{verdict}  {name}, {counts}"
+    if sys.stderr is not None and sys.stderr.isatty():
+        console().print(printable(head), style="bold", soft_wrap=False)
+    else:
+        print_line(head)
+    for line in (*what.split("; "), *lines):
+        print_line(INDENT + line)
+
+
 def show_verdict(contents: Mapping[str, Any], saving: Saving | None = None) -> None:
-    """Print what became of a program, and what is to be checked."""
-    head, *lines = verdict_block(contents, saving)
-    print_heading(head)
-    for line in lines:
-        print_line(line)
-    show_checks(contents["findings"])
-
-
-def verdict_block(contents: Mapping[str, Any], saving: Saving | None = None) -> Iterator[str]:
-    """Say what became of a program that was smoothed: the verdict and the program, the error, the corners, the time."""
+    """Print what became of a program that was smoothed, and what somebody has to look at before it runs."""
     from cornersmooth.report.verdict import method_text, sharp_line, time_text
 
-    summary, program = contents["summary"], contents["program"]
-    verdict, _, what = contents["verdict_text"].partition(": ")
-    blocks = f"{summary['blocks_out']:,} blocks from {contents['input']['poses']:,} poses"
-    yield f"{verdict}  {program_text(program)}, {blocks}"
-    yield from (INDENT + part for part in what.split("; "))
-    yield INDENT + _error_text(contents)
-    yield f"{INDENT}{summary['smoothed']:,} of {summary['corners']:,} corners rounded, {sharp_line(contents)}"
-    if saving is not None:
-        yield from (INDENT + part for part in time_text(saving, contents["times"]["limits"]).split("; "))
-    yield f"{INDENT}method {method_text(summary)}"
-
-
-def program_text(program: Mapping[str, Any]) -> str:
-    """Say which program it is: its name, its control, its form, its machine."""
-    machine = f", {program['machine']}" if program["machine"] else ""
-    return f"{program['name'] or 'standard output'}  {program['control']} {program['form']}{machine}"
+    summary = contents["summary"]
+    lines = [
+        _error_text(contents),
+        f"{summary['smoothed']:,} of {summary['corners']:,} corners rounded, {sharp_line(contents)}",
+        *(time_text(saving, contents["times"]["limits"]).split("; ") if saving is not None else ()),
+        f"method {method_text(summary)}",
+    ]
+    print_verdict(contents, f"{summary['blocks_out']:,} blocks from {contents['input']['poses']:,} poses", lines)
+    for finding in contents["findings"]:
+        if finding["to_check"]:
+            what, _, hint = finding["text"].partition("; ")
+            line = f"line {finding['line']}: " if finding["line"] else ""
+            times = f" ({finding['count']:,} times)" if finding["count"] > 1 else ""
+            print_line(f"{'CHECK':<{len(INDENT)}}{line}{what}{times} [{finding['code']}]")
+            if hint:
+                print_line(f"{INDENT}hint: {hint}")
 
 
 def _error_text(contents: Mapping[str, Any]) -> str:
@@ -141,18 +147,6 @@ def _error_text(contents: Mapping[str, Any]) -> str:
         name = "max_axis_point_deviation_mm" if found else "max_axis_error_mm"
         second = f"axis point {known[name] or 0.0:.4f} mm (H {settings['axis_length_mm']:g} mm)"
     return f"{label}: tip {known[f'max_tip_{kind}_mm'] or 0.0:.4f} mm, {second} {where}"
-
-
-def show_checks(findings: Sequence[Mapping[str, Any]]) -> None:
-    """Print what somebody has to look at before the program runs."""
-    for finding in findings:
-        if finding["to_check"]:
-            what, _, hint = finding["text"].partition("; ")
-            line = f"line {finding['line']}: " if finding["line"] else ""
-            times = f" ({finding['count']:,} times)" if finding["count"] > 1 else ""
-            print_line(f"{'CHECK':<{len(INDENT)}}{line}{what}{times} [{finding['code']}]")
-            if hint:
-                print_line(f"{INDENT}hint: {hint}")
 
 
 def show_summary(contents: Mapping[str, Any], seconds: Mapping[str, float], verbose: int) -> None:
@@ -208,14 +202,6 @@ def say_json(contents: Mapping[str, Any]) -> None:
 
     text = report_json(contents)
     print(text.encode("utf-8", "backslashreplace").decode(), end="")  # names need not be UTF-8  # noqa: T201
-
-
-def print_heading(text: str) -> None:
-    """Print the first line of a result to standard error, in bold on a terminal."""
-    if sys.stderr is not None and sys.stderr.isatty():
-        console().print(printable(text), style="bold", soft_wrap=False)
-    else:
-        print_line(text)
 
 
 def say_line(text: str, indent: int = 2) -> None:
