@@ -59,7 +59,6 @@ def run_compare(given: Options) -> int:
 
 
 def _lines(table: Table, commands: list[str], verbose: bool) -> Iterator[str]:
-
     if table.share < 1.0:
         yield f"from {100.0 * table.share:.2g} % of the poses: whole runs from the middle of the part"
     if verbose:

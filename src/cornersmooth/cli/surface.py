@@ -70,7 +70,6 @@ def _tool(program: Program, asked: Tool | None) -> Tool:
 def _report(
     form: str, program: Program, source: bytes, written: bytes | str, nc: Any, found: SurfaceMap, given: Options
 ) -> Iterator[str | bytes]:
-
     if form == ".json":
         yield report_json(found.as_dict())
     elif form == ".csv":

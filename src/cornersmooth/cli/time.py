@@ -74,7 +74,6 @@ def run_time(given: Options) -> int:
 
 
 def _compare(data: bytes, name: str, given: Options) -> Comparison:
-
     machine, axes = given.load_machine(), given.load_limits()
     axes = machine if axes is None else axes
     limits, settings = given.path_limits(), given.settings()
