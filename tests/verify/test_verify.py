@@ -293,3 +293,13 @@ def test_motion_that_ends_where_it_begins_between_two_stops(asked: bool, block: 
     text = f"{head}{block}\nG0 Z50.\nM5\nG91 G28 Z0.\nG90\nG49\nM30\n%\n"
     found = verify(read(cl.encode(), name="part.cls"), text.encode(), tolerance=0.01, words=False)
     assert [problem.code for problem in found.problems][:1] == [code] * bool(code)
+
+
+@pytest.mark.parametrize("block", ["", "G1 Z-8.", "G2 I5.", "G2 X0. Y0. I5.", "G3 X0. Y0. Z-8. I5."])
+def test_a_circle_in_a_hole(block: str) -> None:
+    drill = "CYCLE/DRILL,FEDTO,8,MMPM,100,RAPTO,3,RTRCTO,25\nGOTO/0,0,0\nCYCLE/OFF\n"
+    cl = f"UNITS/MM\nLOADTL/1\nSPINDL/1000,RPM,CLW\nRAPID\nGOTO/0,0,25\n{drill}RAPID\nGOTO/80,0,50\nFINI\n"
+    head = "%\nO1\nG21 G90 G94 G17 G40 G49 G80\nG91 G28 Z0.\nG90\nT1 M6\nS1000 M3\nG54\nG43 H1\nG0 X0. Y0.\nG0 Z25.\n"
+    text = f"{head}G0 Z3.\nG1 Z-8. F100.\n{block}\nG0 Z25.\nG0 X80. Z50.\nM5\nG91 G28 Z0.\nG90\nG49\nM30\n%\n"
+    found = verify(read(cl.encode(), name="part.cls"), text.encode(), tolerance=0.01, words=False)
+    assert [problem.code for problem in found.problems] == ["CS536"] * ("I5" in block)

@@ -32,6 +32,7 @@ def check_feeds(match: Match, found: Findings) -> None:
 
     # a planned feed of what does not move the tool, as a table that turns about it, tells nothing but a time
     still = nc.least_feed[element] & (np.linalg.norm(match.six[end] - match.six[start], axis=1) <= ARITHMETIC)
+    still &= end == start + 1  # a full circle has more vertices
     good = _fits(match, element, low) | rapid | still
     other = np.flatnonzero(~good)
     if len(other):

@@ -49,8 +49,7 @@ class HoleLines:
         lean = np.where(nc.tip_room[own] > 0.0, nc.second_room[own], 0.0)
         on = beside <= self.room + lean * np.abs(height)
         on &= turned * self.axis_length <= 2 * self.room + lean * self.axis_length
-        on &= (nc.kind[own] == Element.RAPID) | (nc.kind[own] == Element.LINE)
-        return np.where(on, height, np.nan)
+        return np.where(on & self._straight(own), height, np.nan)
 
     def at(self, move: int, element: int) -> bool:
         """Whether an element ends exactly at the pose of a move, or stands after one that does."""
@@ -86,10 +85,16 @@ class HoleLines:
         return bool(self._of("standing", -1, element))
 
     def standing(self, _: Ints, elements: Ints) -> Bools:
-        """(k,) whether elements lead nowhere."""
+        """(k,) whether elements lead nowhere: a full circle ends where it begins, and does."""
         nc, own = self.ahead.nc, elements - self.ahead.base
         ways = (values[own] - values[np.maximum(own - 1, 0)] for values in (nc.tip, nc.second))
-        return (own > 0) & ~leads_somewhere(nc, *ways)
+        return (own > 0) & self._straight(own) & ~leads_somewhere(nc, *ways)
+
+    def _straight(self, own: Ints) -> Bools:
+        """(k,) whether elements at hand are no arcs and no curves."""
+        kind = self.ahead.nc.kind[own]
+        straight: Bools = (kind == Element.RAPID) | (kind == Element.LINE)
+        return straight
 
     def in_line(self, move: int, other: int) -> bool:
         """Whether the pose of another move is in the line of a hole, as far as the digits show."""

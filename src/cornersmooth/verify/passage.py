@@ -18,7 +18,7 @@ import numpy as np
 from cornersmooth.model import Floats, Ints
 from cornersmooth.verify.chain import Path, Sections, chain, points_at
 from cornersmooth.verify.cl_motion import UNBOUND
-from cornersmooth.verify.free_space import Around, Inner, free_interval, lowest
+from cornersmooth.verify.free_space import FINE, Around, Inner, free_interval, lowest
 from cornersmooth.verify.nearest import largest_square
 
 #: rows before one that is not proved from which on it is worked out exactly, one after the other; farther back nothing
@@ -31,9 +31,8 @@ _SOON: Final = 64
 #: radii of path length around a break where it is looked for what is off, and where to go on (which faults are named)
 AROUND: Final = 200.0
 
-#: parts that a bent step is divided into where it is not proved, as often as its bend is not tiny, in radii
+#: parts that a bent step is divided into where it is not proved, as often as its bend is not fine
 PARTS: Final = 8
-_TINY: Final = 1e-4
 
 #: how many times longer than some rows the path beside them may be; where it is longer, the answer may be NOT VERIFIED
 LONGER: Final = 4.0
@@ -169,7 +168,7 @@ class Walk:
         """Put points into bent steps, from a row on, to some vertices and beside them; say whether there were any."""
         steps = np.unique(np.concatenate((bad - 2, bad - 1, bad)))
         steps = steps[(steps >= row) & (steps < len(self._own) - 1)]
-        steps = steps[(self._bend[steps] > _TINY * self.radius) & (self._bend[steps] < UNBOUND)]
+        steps = steps[(self._bend[steps] > FINE * self.radius) & (self._bend[steps] < UNBOUND)]
         if not len(steps):
             return False
         share = np.arange(1, PARTS) / PARTS

@@ -21,7 +21,7 @@ import numpy as np
 
 from cornersmooth.model import Ints, Move
 from cornersmooth.nc_reader.ahead import Ahead
-from cornersmooth.nc_reader.elements import Elements, Problem
+from cornersmooth.nc_reader.elements import Element, Elements, Problem
 from cornersmooth.nc_reader.tool import beyond_digits, directions, moving_rapids
 from cornersmooth.statements.cycles import Drilling, drillings
 from cornersmooth.statements.tool_changes import ToolChanges
@@ -470,10 +470,11 @@ class Stops:
 
 
 def out_of_hole(task: Task, nc: Elements, element: int, move: int) -> tuple[float, bool]:
-    """Place on the move after a hole that is nearest to the end of an element, and whether that is within ε."""
+    """Place on the move after a hole nearest to the end of an element, and whether that leads there straight, to ε."""
     tip, last = nc.tip[element : element + 1], task.original.trail.last
     six = task.six(tip, directions(nc, tip, nc.second[element : element + 1]))
     segment = np.arange(int(last[move]), int(last[move + 1]))
     share, square = on_segments(six[None], task.path.points, segment[None], COLUMNS["both"])
     nearest = int(np.argmin(square))
-    return float(segment[nearest] + share[0, nearest]), bool(square[0, nearest] <= task.radius**2)
+    straight = nc.kind[element] == Element.LINE
+    return float(segment[nearest] + share[0, nearest]), bool(straight and square[0, nearest] <= task.radius**2)
