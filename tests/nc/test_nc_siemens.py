@@ -17,9 +17,8 @@ from cornersmooth.cl import read
 from cornersmooth.geometry import nurbs
 from cornersmooth.model import SmoothProgram
 from cornersmooth.nc import choose_form, fit_settings, write
-from cornersmooth.nc.curve_blocks import SplineBlocks, _intervals
+from cornersmooth.nc.curve_blocks import Run, SplineBlocks, _intervals
 from cornersmooth.nc.findings import Findings
-from cornersmooth.nc.run import Run
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from nc.grammars import reader

@@ -17,12 +17,11 @@ from cornersmooth.kinematics import machine_position, tool_axis
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program
 from cornersmooth.nc.circles import FIRST_PLANE, ArcBlocks, Circles
 from cornersmooth.nc.control import INVERSE_TIME
-from cornersmooth.nc.curve_blocks import Curves, bezier_points, curves_for
+from cornersmooth.nc.curve_blocks import Curves, Run, bezier_points, curves_for
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.planes import Plane
 from cornersmooth.nc.program_frame import BLEND_STEP, blend_word
-from cornersmooth.nc.run import Run
 from cornersmooth.nc.statement_writer import StatementWriter
 from cornersmooth.text import RowFormat, format_number, interleave, to_ticks
 from cornersmooth.vectors import unit

@@ -16,10 +16,9 @@ import numpy as np
 from cornersmooth.geometry.arcs import arc_points, arc_radii, divided
 from cornersmooth.model import Bools, Floats, Ints, Keep, Program
 from cornersmooth.nc.control import Motion
-from cornersmooth.nc.curve_blocks import Curves
+from cornersmooth.nc.curve_blocks import Curves, Run
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.planes import Planes
-from cornersmooth.nc.run import Run
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.sampling import Rows
 from cornersmooth.text import RowFormat, to_ticks

@@ -1,9 +1,9 @@
-"""How curves are written: rows of control points become the blocks of each control, splines or polynomials."""
+"""How rows become blocks: what each block says, and how curves are written, as splines or polynomials."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.geometry.ragged import ranges
 from cornersmooth.model import Bools, Floats, Ints, Program, Units
+from cornersmooth.nc.control import INVERSE_TIME
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
-from cornersmooth.nc.run import Run
 from cornersmooth.slices import some_rows
 from cornersmooth.text import RowFormat, format_number, to_ticks
 
@@ -23,6 +23,42 @@ _DEGREE = 3
 
 #: blocks that are counted together, and how many of them must be splines
 _WINDOW, _LEAST = 10, 6
+
+
+@dataclass(frozen=True)
+class Run:
+    """Rows that nothing interrupts, r of them: what each block says."""
+
+    ticks: Ints  #: (r, c) numbers in steps of their last digit
+    move: Ints  #: (r,) pose, for messages
+    rapid: Bools  #: (r,)
+    feed: Floats  #: (r,) mm/min, mm/rev or 1/min, NaN where there is none
+    mode: Ints  #: (r,) `FeedMode` or `INVERSE_TIME`
+    curve: NDArray[np.int8]  #: (r,) as in `Rows`
+    arc: Ints | None = None  #: (r,)
+    dwell: Bools | None = None  #: (r,) where the tool waits after the block
+    #: (r, 4, c) Bézier points of the knot intervals of curves, in units of the text, for polynomials
+    bezier: Floats | None = None
+    spline: Floats | None = None  #: (r, 3)
+    blend: Floats | None = None  #: (r,), mm; as in `Rows`
+    left: Bools | None = None  #: (r,) as in `Rows`
+
+    @classmethod
+    def straight(cls, program: Program, ticks: Ints, move: Ints, *, rapid: bool = False) -> Run:
+        """Straight moves in rapid, or at the feeds of moves of the program."""
+        count, mode = len(ticks), program.feed_mode[move].astype(np.int64)
+        return cls(ticks, move, np.full(count, rapid), program.feed[move], mode, np.zeros(count, np.int8))
+
+    def __len__(self) -> int:
+        return len(self.ticks)
+
+    def with_programmed_feed(self, program: Program) -> Run:
+        """Give the first move the program's feed where it has a time, which counts the way from the pose before."""
+        if self.mode[0] != INVERSE_TIME:
+            return self
+        feed, mode = self.feed.copy(), self.mode.copy()
+        feed[0], mode[0] = program.feed[self.move[0]], program.feed_mode[self.move[0]]
+        return replace(self, feed=feed, mode=mode)
 
 
 class Curves:

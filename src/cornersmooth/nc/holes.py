@@ -19,9 +19,9 @@ import numpy as np
 
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program
 from cornersmooth.nc.control import Blocks
+from cornersmooth.nc.curve_blocks import Run
 from cornersmooth.nc.cycle_blocks import hole_feeds, kind_of
 from cornersmooth.nc.hole_cycles import Cycle
-from cornersmooth.nc.run import Run
 from cornersmooth.smoothing.sampling import Rows
 from cornersmooth.text import format_number
 from cornersmooth.vectors import dot

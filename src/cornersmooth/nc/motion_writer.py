@@ -16,13 +16,13 @@ from cornersmooth.kinematics.position import nose_position
 from cornersmooth.model import Bools, Floats, Ints, Move, Program, Statement
 from cornersmooth.nc.block_writer import BlockWriter
 from cornersmooth.nc.control import INVERSE_TIME
+from cornersmooth.nc.curve_blocks import Run
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.first_block import UPRIGHT, check_first_block
 from cornersmooth.nc.holes import HoleWriter
 from cornersmooth.nc.operation import Operation
 from cornersmooth.nc.planes import Planes
 from cornersmooth.nc.rewinds import refuse_compensated, retracts_before
-from cornersmooth.nc.run import Run
 from cornersmooth.nc.statement_args import with_starts
 from cornersmooth.nc.statement_writer import StatementWriter
 from cornersmooth.nc.warnings import MotionWarnings

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -12,7 +13,6 @@ import numpy as np
 
 from cornersmooth.errors import OutputError, SettingsError
 from cornersmooth.model import Move, Program
-from cornersmooth.nc.comments import comment_lines
 from cornersmooth.nc.control import LINE_ENDS, Blocks, Control, ProgramTable, TextStyle
 from cornersmooth.nc.control_tables import control_names, load_control
 from cornersmooth.nc.form import Form
@@ -38,6 +38,14 @@ _HIGHEST_NUMBER = 7999
 #: a word that loads a tool, and what of a line is a comment
 _TOOL_WORD = re.compile(r"(?<![A-Z])T[ ]?[\d#\[]", re.IGNORECASE)
 _COMMENT = re.compile(r"\([^)]*\)|;.*")
+
+#: characters of a comment's text in one block; controls truncate or refuse long ones
+_LONGEST = 120
+
+#: brackets end a comment, ``%`` a file, ``;`` a block on some controls; ``~`` lets a block go on in the next line
+_REPLACED = str.maketrans("()%;~", "[]/,-")
+
+_SPELLED = {"ß": "ss", "Ø": "O", "ø": "o", "Æ": "AE", "æ": "ae", "Œ": "OE", "œ": "oe", "đ": "d", "Đ": "D", "ł": "l"}
 
 
 class Stream(Protocol):
@@ -247,3 +255,27 @@ def _filled(lines: Sequence[str], values: dict[str, str]) -> list[str]:
             raise SettingsError("CS216", f"{line!r} has characters that an NC program cannot hold", "use ASCII")
         filled.append(text)
     return filled
+
+
+def plain_text(text: str) -> str:
+    """Return the text in the characters that controls accept in a comment; what has no such form becomes ``?``."""
+    text = "".join(_SPELLED.get(letter, letter) for letter in text)
+    decomposed = unicodedata.normalize("NFKD", text)
+    kept = "".join(letter for letter in decomposed if not unicodedata.combining(letter))
+    ascii_text = kept.encode("ascii", "replace").decode("ascii")
+    printable = "".join(letter if letter.isprintable() else " " for letter in ascii_text)
+    return " ".join(printable.translate(_REPLACED).split())
+
+
+def comment_lines(text: str, marks: tuple[str, str] = ("(", ")"), orders: tuple[str, ...] = ()) -> list[str]:
+    """Text as one or more comments between marks; none for an empty text. `orders` are words that would be obeyed."""
+    plain, at = plain_text(text), 0
+    lines = []
+    while at < len(plain):
+        part = plain[at : at + _LONGEST]
+        at += _LONGEST
+        at += plain[at : at + 1] == " "  # there are no two blanks side by side
+        if part.upper().startswith(orders):
+            part = f"- {part}"
+        lines.append(f"{marks[0]}{part}{marks[1]}".rstrip())
+    return lines

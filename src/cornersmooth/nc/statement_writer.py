@@ -13,13 +13,13 @@ from dataclasses import dataclass, field
 
 from cornersmooth.errors import InputError
 from cornersmooth.model import Move, Program, Statement
-from cornersmooth.nc.comments import comment_lines
 from cornersmooth.nc.compensation import begin_compensation
 from cornersmooth.nc.control import Blocks, Words
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.hole_cycles import HoleCycles
 from cornersmooth.nc.operation import Operation
+from cornersmooth.nc.program_frame import comment_lines
 from cornersmooth.nc.statement_args import (
     milliseconds,
     number_after,

@@ -12,10 +12,10 @@ from cornersmooth.errors import Severity
 from cornersmooth.methods import CURVES_METHOD, DEFAULT_METHOD
 from cornersmooth.model import FeedMode, Floats, Ints, Move, Program, SmoothProgram
 from cornersmooth.nc.circles import Circles
+from cornersmooth.nc.curve_blocks import Run
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.first_block import UPRIGHT
 from cornersmooth.nc.form import Form
-from cornersmooth.nc.run import Run
 from cornersmooth.rotary import rapid_moves
 from cornersmooth.settings import FLIP_ANGLE
 from cornersmooth.smoothing import axis_steps
