@@ -128,34 +128,24 @@ def parse_control(text: str | Table, *, file: str = "<control>", name: str = "co
     """
     with _SHELF.in_file(file):
         table, like = _SHELF.parse(text)
-        digits = _SHELF.table(table.get("digits", {}), "digits")
+        digits = dict(_SHELF.table(table.get("digits", {}), "digits"))
+        _SHELF.check_keys(digits, (*(item.name for item in fields(Digits)), "systems"), "digits.")
+        systems = {}
+        for system, entry in _SHELF.table(digits.pop("systems", {}), "digits.systems").items():
+            where = f"digits.systems.{system}"  # with those of the table where it says nothing
+            systems[system] = _SHELF.record(Digits, digits | _SHELF.table(entry, where), where)
         motion = table.get("motion", {})
         _SHELF.record(Motion, motion, "motion")
         rest = {key: value for key, value in table.items() if key != "motion"}
         return _SHELF.record(
             Control,
-            {"name": name, "forms": {}, "digits": {}} | rest,
+            {"name": name, "forms": {}} | rest | {"digits": digits},
             "",
-            given={"like": like, "systems": _systems(digits), "own": True},
-            digits=lambda _, where: _digits({key: value for key, value in digits.items() if key != "systems"}, where),
+            given={"like": like, "systems": systems, "own": True},
             words=_words,
             forms=lambda forms, where: _forms(forms, where, motion),
             trusted=partial(_trusted, dialect=like),
         )
-
-
-def _digits(table: Any, where: str) -> Digits:
-    if isinstance(table, dict):
-        _SHELF.check_keys(table, (*(item.name for item in fields(Digits)), "systems"), f"{where}.")
-    return _SHELF.record(Digits, table, where)
-
-
-def _systems(digits: Table) -> dict[str, Digits]:
-    """Digits to choose from, each with those of the table where it says nothing."""
-    systems = _SHELF.table(digits.get("systems", {}), "digits.systems")
-    plain = {key: value for key, value in digits.items() if key != "systems"}
-    where = {name: f"digits.systems.{name}" for name in systems}
-    return {name: _digits(plain | _SHELF.table(entry, where[name]), where[name]) for name, entry in systems.items()}
 
 
 def _words(table: Any, where: str) -> Words:
