@@ -112,10 +112,7 @@ class Operation:
     def go_home(self, *, along: bool = True) -> list[str]:
         """Blocks that bring the tool to the height of the retract with spindle and coolant on.
 
-        Parameters
-        ----------
-        along : bool
-            Whether it may have to go back along its axis first.
+        `along`: it may have to go back along its axis first.
         """
         self._moved = self.begun = False
         return [

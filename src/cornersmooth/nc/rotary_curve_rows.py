@@ -39,8 +39,8 @@ from cornersmooth.vectors import norm, unit
 #: the first rotary axis may turn fast where the pole is nearer than so many times the axis step, and so many degrees
 _NEAR_POLE, _NEAR_POLE_DEGREES = 5.0, 1.0
 
-#: poses of curves that are worked on at a time
-_TOGETHER = 1 << 13
+#: control points of a corner, and those that are worked on at a time
+_CONTROLS, _TOGETHER = 5, 40_960
 
 
 @dataclass(frozen=True)
@@ -182,9 +182,9 @@ class _Work:
 
     def parts(self) -> Iterator[_Part]:
         """All rows, from that which the part before ends with, and sections of some curves."""
-        size, runs, begin = np.ones(len(self.pose), np.int64), self.smoothed.runs, 0
+        size, runs, begin = np.full(len(self.pose), _CONTROLS), self.smoothed.runs, 0
         if runs is not None:
-            size[len(self.corner) :] = runs.count
+            size[len(self.corner) :] = runs.knot_count + 2
         for one, other in pairwise(batches(size[self.order], _TOGETHER).tolist()):
             whole = other == len(self.order)
             end = len(self.way.move) - 1 if whole else int(self.row[self.first[other] - 1])
