@@ -10,6 +10,7 @@ from cornersmooth.kinematics import load_machine
 from cornersmooth.nc_reader import block_tables, read_nc
 from cornersmooth.nc_reader.elements import Element
 from cornersmooth.nc_reader.rotary import MOST_LINES
+from cornersmooth.nc_reader.tool import written_at
 from oracle.messages import one_line
 from verify.writing import simple_text, wavy
 
@@ -247,3 +248,24 @@ def test_an_angle_that_lost_its_point_is_found_and_has_few_lines(c):
     assert nc.tip[own[-1], 0] == pytest.approx(2.0, abs=1e-12)
     assert np.degrees(np.arccos(nc.second[own[-1], 2])) == pytest.approx(30, abs=1e-9)
     assert ("CS526", 7) in [(problem.code, problem.nc_line) for problem in nc.problems]
+
+
+@pytest.mark.parametrize("tcp", [True, False])
+def test_an_arc_is_turned_with_the_table_that_carries_it(tcp: bool) -> None:
+    head = (
+        f"%\nO1\nG21 G90 G94 G17 G40 G49 G80\nG54\nG0 A20. C10.\n{'G43.4' if tcp else 'G43'} H1\nG0 X50. Y0.\nG0 Z5.\n"
+    )
+    arc, lines = (
+        read_nc(f"{head}{block}\nM30\n%\n".encode(), machine=load_machine("table-ac"), tcp=tcp)
+        for block in ("G2 X60. Y0. I5. J0. F500.", "G1 X55. Y5. F500.\nX60. Y0.")
+    )
+    element = np.array([int(np.argmax(arc.kind == Element.ARC))])
+    tip, _ = written_at(arc, element, np.array([0.5]))
+    np.testing.assert_allclose(tip[0], lines.tip[-2], atol=1e-9)
+    assert arc.unlooked == ()
+
+
+def test_an_arc_on_which_an_axis_turns_is_not_looked_at() -> None:
+    head = "%\nO1\nG21 G90 G94 G17 G40 G49 G80\nG54\nG0 A20. C10.\nG43.4 H1\nG0 X50. Y0.\nG0 Z5.\n"
+    text = f"{head}G2 X60. Y0. I5. J0. A0. F500.\nM30\n%\n"
+    assert read_nc(text.encode(), machine=load_machine("table-ac")).unlooked == ((9, "an arc on which an axis turns"),)

@@ -180,6 +180,10 @@ class Reader:
                 self._check_turned(run)
                 if self.dialect.retracts:
                     self._check_swings(rotary.swung(run, start), run)
+                words = np.nan_to_num(np.vstack((before.second, run.second)))
+                at = run.arcs.element
+                on_arc = at[(words[at + 1] != words[at]).any(axis=1)]
+                self.unlooked += [(line, "an arc on which an axis turns") for line in run.line[on_arc].tolist()]
                 run = rotary.resolve(run, start, inverse_time=before.inverse_time)
                 lines, count = np.unique(run.line, return_counts=True)
                 turned = "the way of a block that turns very far"

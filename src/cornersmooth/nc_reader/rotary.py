@@ -173,7 +173,12 @@ class Rotary:
         position = np.vstack((before.tip, run.tip))
         angles = np.nan_to_num(np.vstack((before.second, run.second))[:, :2])
         tip, vector = self.tips(position, angles), self.directions(angles)
-        curves = self._curves(run.curves)
+        curves, arcs = self._curves(run.curves), run.arcs
+        if len(arcs):  # axes that carry the part turn its circles, too
+            there = angles[arcs.element + 1]
+            centre = self.tips(arcs.centre, there)
+            normal = self.tips(arcs.centre + arcs.normal, there) - centre
+            run = replace(run, arcs=replace(arcs, centre=centre, normal=normal))
         if inverse_time:
             run = self._timed(run, position, tip, vector, angles)
         count = self._counts(run, position, angles)
