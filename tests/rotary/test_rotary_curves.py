@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import sys
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
 from pathlib import Path
@@ -12,6 +13,7 @@ import pytest
 from scipy.interpolate import BSpline
 from scipy.spatial import cKDTree
 
+import cornersmooth
 from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.geometry import nurbs
 from cornersmooth.kinematics import Machine, load_machine, machine_names, tool_axis
@@ -20,6 +22,7 @@ from cornersmooth.nc import Form, choose_form, fit_settings, write
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.rotary_curve_rows import rotary_curve_rows
 from cornersmooth.settings import Settings
+from cornersmooth.slices import joined_rows
 from cornersmooth.smoothing import smooth
 from cornersmooth.smoothing.construction import construction_of
 from cornersmooth.smoothing.segments import segments_of
@@ -27,6 +30,7 @@ from oracle.loops import bytecodes
 from oracle.share import covering_share
 
 TOLERANCE = 0.01  # mm
+SAMPLES = Path(__file__).parents[2] / "samples"
 KNOTS5 = np.array([0, 0, 0, 0, 0.5, 1, 1, 1, 1])
 U = np.linspace(0, 1, 129)
 
@@ -376,3 +380,30 @@ def test_long_paths_are_made_without_a_loop_over_corners():
     counts = [len(piece.weights) for piece in pieces_of(smoothed, machine).curves.values()]
     assert len(counts) == n - 2
     assert (np.array(counts) == 5).mean() > 0.9
+
+
+@pytest.mark.parametrize(("method", "tolerance"), [("proportional", 0.01), ("proportional", 0.002), ("global", 0.01)])
+def test_curves_in_small_parts_are_those_in_one(method: str, tolerance: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    form = choose_form("siemens", "bspline", machine=load_machine("xyzac-trt"))
+    program = cornersmooth.read(SAMPLES / "impeller.cls")
+    smoothed = smooth(program, fit_settings(Settings(tolerance=tolerance, method=method), form, program.units))
+    found = []
+    for together in (60, 1_000_000):
+        monkeypatch.setattr(sys.modules["cornersmooth.nc.rotary_curve_rows"], "_TOGETHER", together)
+        findings = Findings()
+        rows = joined_rows(
+            [
+                replace(part, spline=np.zeros((len(part.move), 3)) if part.spline is None else part.spline)
+                for part in rotary_curve_rows(smoothed, form, findings)
+                if len(part.move)
+            ]
+        )
+        found.append((rows, {finding.code: finding for finding in findings.all()}))
+    (rows, others), (whole, noted) = found
+    assert (whole.curve > 0).any()
+    assert others == noted
+    for name in ("move", "curve", "joined"):
+        np.testing.assert_array_equal(getattr(rows, name), getattr(whole, name), name)
+    np.testing.assert_allclose(rows.tip, whole.tip, atol=1e-9)
+    # of a line between two parts one joint is not known yet: the curve before may end a little slower or faster
+    np.testing.assert_allclose(rows.other, whole.other, atol=1e-4)
