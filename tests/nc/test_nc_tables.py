@@ -56,7 +56,7 @@ def test_wrong_values_are_refused_by_file_and_key(control: str) -> None:
     table = tomllib.loads(control_table(control))
     refused = tried = 0
     for number, place in enumerate(places(table)):
-        for value in share(WRONG, 3, number):
+        for value in share(WRONG, 5, number):
             tried += 1
             try:
                 parse_control(put(table, place, value), file="own.toml")

@@ -281,7 +281,7 @@ def _moved(line, by):
 def test_rapids_that_miss_their_poses_one_after_another_are_those_of_their_poses(used, monkeypatch):
     """What is at hand of the text may be fewer rapids than are looked for: the rest of them is still to come."""
     monkeypatch.setattr(block_tables, "CHUNK", 4000)
-    program = part(count=1000, every=8)
+    program = part(count=600, every=5)
     lines = text_of(program).decode().splitlines()
     rapids = [k for k, line in enumerate(lines) if re.match(r"(G0 |)X.*I", line) and "G0" in line][30:70]
     for k in rapids:
