@@ -1,4 +1,4 @@
-"""Fast path equals careful path: lines read by their digit patterns, and the same lines read carefully."""
+"""Lines read by their digit patterns say what each says alone."""
 
 from __future__ import annotations
 
@@ -9,17 +9,16 @@ from itertools import product
 import numpy as np
 import pytest
 
+from cornersmooth.errors import InputError
 from cornersmooth.nc_reader import block_tables
 from cornersmooth.nc_reader.dialects import dialect_of
-from cornersmooth.nc_reader.line_patterns import LinePatterns, lines_of
+from cornersmooth.nc_reader.line_patterns import LinePatterns, Lines
 from cornersmooth.nc_reader.words import Table
 from oracle.share import covering_share, how_many
 
 NUMBERS = ["0.", "-0.", "5.", ".5", "-.25", "12.3456", "-123.4567", "0.3956870", "-1.0000000", "1234.5678", "7", "-42"]
 NUMBERS += ["123.456789", "-1234.567891", "-9876543.2104567", "99.99999999", "-0.10000001"]
 ODD = ["+1.5", "0.123456789", "1234567890.123456", "1-2", "", " 3.", "1..2", "1.5+1.5", "--1.5", "1.5E3"]
-#: numbers with a sign are of the kind that is read by patterns
-READABLE = [None, "+1.5"]
 
 ISO = ["X# Y# Z#", "X#Y#Z#I#J#K#", "G1 X# Y# Z# F#", "G0 X# Z#", "K# X# Y# Z# U# V# W# R#", "K#", "G6.2 P4 K# X#"]
 ISO += ["", "(A 1.5 B)", "T1 M6", "S12000 M3", "G4 X1.5", "N10 G1 X#", "G1 X# (A)", "/ X#"]
@@ -73,33 +72,38 @@ def read(call):
 @pytest.mark.parametrize(
     ("control", "seed", "odd"), covering_share(product(SHAPES, range(how_many(1, 3)), [None, *ODD]), 3)
 )
-def test_fast_path_is_the_careful_path(control, seed, odd):
-    data, lexer = text(control, seed, odd), dialect_of(control).lexer
-    patterns = LinePatterns(lexer)
-    lines = lines_of(data, patterns)
-    assert lines is not None or odd not in READABLE
-    fast = read(block_tables.read_lines(data, None, lexer))
-    careful = read(block_tables._in_order(block_tables.LetteredLines(data, lexer), data, 1, lexer, None))
-    assert fast == careful
-    assert any(isinstance(item, dict) for _, item in fast[0])
-
-
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("control", SHAPES)
-def test_every_line_alone_says_the_same(control, seed):
-    data, dialect = text(control, seed, None), dialect_of(control)
-    together = dict(lines_apart(block_tables.read_lines(data, None, dialect.lexer)))
-    for number, line in enumerate(data.split(b"\n")[:-1], 1):
+def test_lines_in_runs_say_what_each_says_alone(control, seed, odd):
+    data, dialect = text(control, seed, odd), dialect_of(control)
+    together, wrong = read(block_tables.read_lines(data, None, dialect.lexer))
+    for (number, said), line in zip(together, data.split(b"\n"), strict=False):
         alone = dialect.lexer.line(line, number, None)
-        if isinstance(together[number], dict):
-            assert dialect.row(alone) == together[number]
-        else:
-            assert together[number] == alone
+        assert said == (alone if not isinstance(said, dict) else dialect.row(alone))
+    assert any(isinstance(said, dict) for _, said in together)
+    if len(together) < len(data.split(b"\n")) - 1:
+        assert odd is not None
+        with pytest.raises(InputError) as error:
+            dialect.lexer.line(data.split(b"\n")[200], 201, None)
+        assert str(error.value) == wrong
+
+
+def test_digits_that_stand_for_themselves_make_another_pattern():
+    data = b"G1 X1.5\nG4 X2.5\nG0 X3.5\nG1 X4.5\n"
+    lines = Lines.of(data, LinePatterns(dialect_of("fanuc").lexer))
+    assert lines.bulk().tolist() == [True, False, True, True]
+    columns = lines.columns(np.array([0, 2, 3]))
+    assert columns["G"].tolist() == [1.0, 0.0, 1.0]
+    assert columns["X"].tolist() == [1.5, 3.5, 4.5]
+
+
+def test_numbers_of_any_length_are_those_of_python():
+    numbers = [b"0.1234567890123", b"-123456789012.123456", b"-0.000000001", b"99999999.99999999", b"5", b"-.5", b"3."]
+    data = b"".join(b"X%s Y1.0\n" % number for number in numbers)
+    lines = Lines.of(data, LinePatterns(dialect_of("linuxcnc").lexer))
+    assert lines.columns(np.arange(len(numbers)))["X"].tolist() == [float(number) for number in numbers]
 
 
 def test_fast_path_is_taken():
-    lines = lines_of(b"X1.5 Y-2.25\nX-1.5 Y2.25 Z12345.678\n(A)\n", LinePatterns(dialect_of("fanuc").lexer))
-    assert lines is not None
+    lines = Lines.of(b"X1.5 Y-2.25\nX-1.5 Y2.25 Z12345.678\n(A)\n", LinePatterns(dialect_of("fanuc").lexer))
     assert lines.bulk().tolist() == [True, True, False]
     columns = lines.columns(np.arange(2))
     assert columns["X"].tolist() == [1.5, -1.5]

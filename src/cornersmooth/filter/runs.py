@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from cornersmooth.filter.state import ANGLES, ANY, INVERSE_TIME, NONE, VECTOR, VOCABULARIES, State
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.nc_reader.block_tables import CHUNK, LetteredLines
+from cornersmooth.nc_reader.block_tables import CHUNK
 from cornersmooth.nc_reader.dialects import dialect_of
-from cornersmooth.nc_reader.line_patterns import LinePatterns, lines_of
+from cornersmooth.nc_reader.line_patterns import LinePatterns, Lines
 
 #: degrees that a rotary word may change by in a cut: from half a turn on controls do not agree on the way
 _HALF_TURN: Final = 180.0
@@ -155,16 +155,16 @@ class ProgramReader:
             chunk = found.lines(first, stop).removeprefix(_MARK if first == 0 else b"")
             chunk = chunk if chunk.endswith(b"\n") else chunk + b"\n"
             text = self.lexer.unfolded(chunk)
-            lines = lines_of(text, patterns) or LetteredLines(text, self.lexer)
+            lines = Lines.of(text, patterns)
             bulk = lines.bulk().copy()
             bulk[[number - first for number in targets if first <= number < stop]] = False
             if b"~" in chunk:
                 bulk[[k for k in range(stop - first) if b"~" in found.lines(first + k, first + k + 1)]] = False
             ends = np.concatenate(([0], np.flatnonzero(np.frombuffer(text, np.uint8) == ord("\n")) + 1)).tolist()
-            columns = lines.columns(np.flatnonzero(bulk)) if bulk.any() else None
+            columns = lines.columns(np.flatnonzero(bulk)) if bulk.any() else {}
             before = np.concatenate(([0], np.cumsum(bulk)))
             for a, b in pairwise(np.flatnonzero(np.diff(bulk, prepend=~bulk[0], append=~bulk[-1])).tolist()):
-                if bulk[a] and columns is not None:
+                if bulk[a]:
                     started, own = True, slice(before[a], before[b])
                     self._take_rows(found, first + a, {key: one[own] for key, one in columns.items()}, corners, asked)
                     continue

@@ -34,8 +34,6 @@ class Lexer:
     comment: re.Pattern[str]
     #: the number of a block, before its words
     block_number = re.compile(r"N[ \t]*(\d+)[ \t]*")
-    #: numbers that differ from block to block: those with a point
-    measure = re.compile(rb"(?<![G.\d])[-+]?(?:\d+\.\d*|\.\d+)")
     #: what a line begins with that can begin a curve, behind a line end
     begins: re.Pattern[bytes]
     #: lines between motion blocks that say nothing of the motion; None for a control without such

@@ -218,7 +218,6 @@ class _KlartextLexer(Lexer):
     )
     comment = re.compile(r";(.*)$")
     block_number = re.compile(r"(\d+)(?:[ \t]+|$)")
-    measure = re.compile(rb"(?<=K\d[A-Z])[-+]?(?:\d+\.\d*|\.\d+)E[-+]?\d+|(?<![.\d])[-+]?(?:\d+\.\d*|\.\d+)(?![.\dE])")
 
     def __init__(self, rotary: str) -> None:
         axes = "XYZ" + rotary
