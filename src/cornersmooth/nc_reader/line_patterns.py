@@ -22,15 +22,15 @@ from cornersmooth.nc_reader.lexer import Lexer
 from cornersmooth.nc_reader.words import Word
 from cornersmooth.text.eight_digits import DIGITS, LAST_DIGITS, join_digits, words_of
 
-#: line ends that must stand before and after a chunk, so that words beyond its ends can be fetched
+#: line ends that must stand before a chunk, so that words beyond its begin can be fetched
 MARGIN: Final = 24
 
-_DIGITS: Final = b"0123456789"
-_TO_ZERO: Final = bytes(ord("0") if code in _DIGITS else code for code in range(256))
 #: digits of a number that is read here: integers of so many are exact in float64
 _MOST_DIGITS: Final = 15
 #: digits of a line that stand for themselves, at most: so many fit an integer
 _MOST_PLACES: Final = 18
+#: bytes by which lines are compared with the ones before
+_WIDEST: Final = 160
 _NUMBER: Final = re.compile(rb"(?P<sign>[-+]?)(?P<whole>\d*)(?P<point>\.?)(?P<part>\d*)(?P<power>E[-+]?\d+)?")
 
 #: the bytes after the point, for so many decimals; all where there is no point
@@ -73,16 +73,16 @@ class LinePatterns:
         #: a line of each pattern that is new
         self.fresh: list[bytes] = []
 
-    def label(self, text: bytes, start: Ints) -> Ints:
-        """(l,) rows of `known`: the pattern of each line of a text; `start` is the first byte of each."""
-        lines = text.translate(_TO_ZERO).split(b"\n")[:-1]
-        shape = np.fromiter(map(self._shapes.__getitem__, lines), np.int64, len(lines))
+    def label(self, text: bytes, start: Ints, size: Ints) -> Ints:
+        """(l,) rows of `known`: the pattern of each line of a text; its first byte, and its size with its end."""
+        raw = np.frombuffer(text, np.uint8)
+        shape = self._shape(raw, start, size)
         new = np.flatnonzero(shape >= len(self._places))
         new = new[np.unique(shape[new], return_index=True)[1]]
         added = [self._add(_line(text, start[row])) for row in new.tolist()]
         if added:
             self._places = np.concatenate((self._places, [places for places, _ in added]))
-        raw, digits = np.frombuffer(text, np.uint8), np.zeros(len(shape), np.int64)
+        digits = np.zeros(len(shape), np.int64)
         rows: Any = slice(None)
         for column in self._places.T:
             at = column[shape[rows]]
@@ -93,8 +93,8 @@ class LinePatterns:
         if added:
             own = np.stack((digits[new], [number for _, number in added]), axis=1)
             self._usual = np.concatenate((self._usual, own))
-        usual, label = self._usual[shape].T.copy()
-        others = np.flatnonzero(usual != digits)
+        label = self._usual[:, 1][shape]
+        others = np.flatnonzero(self._usual[:, 0][shape] != digits)
         for row, key in zip(
             others.tolist(), zip(shape[others].tolist(), digits[others].tolist(), strict=True), strict=True
         ):
@@ -102,6 +102,21 @@ class LinePatterns:
                 self._others[key] = self._add(_line(text, start[row]))[1]
             label[row] = self._others[key]
         return label
+
+    def _shape(self, raw: NDArray[np.uint8], start: Ints, size: Ints) -> Ints:
+        """(l,) shape of each line; most have the same as the one before, and are compared with it as words."""
+        digits = raw - np.uint8(ord("0"))
+        zeroed = (raw - digits * (digits <= 9)).tobytes()
+        wide = min(int(size.max()), _WIDEST) // DIGITS + 1
+        windows = np.ndarray((len(raw) - _WIDEST - DIGITS + 1,), f"V{DIGITS * wide}", buffer=zeroed, strides=(1,))
+        lines = windows[start].view(np.uint64).reshape(-1, wide)
+        other = size[1:] > _WIDEST
+        for column in lines.T:
+            other |= column[1:] != column[:-1]
+        head = np.flatnonzero(np.append(True, other))
+        spans = zip(start[head].tolist(), (start + size)[head].tolist(), strict=True)
+        found = np.array([self._shapes[zeroed[begin:end]] for begin, end in spans])
+        return np.repeat(found, np.diff(head, append=len(size)))
 
     def _add(self, line: bytes) -> tuple[list[int], int]:
         """Take a line of a new pattern apart; return places of digits that stand for themselves, and its number."""
@@ -152,7 +167,7 @@ def _line(text: bytes, start: int) -> bytes:
 class Lines:
     """Lines of a chunk, each with its pattern."""
 
-    text: bytes  #: with `MARGIN` before it
+    text: bytes  #: between line ends, so that words beyond its own can be fetched
     words: NDArray[np.void]  #: what stands from every place of it on
     start: Ints  #: (l,): first byte of every line
     label: Ints  #: (l,): row of `patterns`
@@ -161,11 +176,11 @@ class Lines:
     @classmethod
     def of(cls, text: bytes, patterns: LinePatterns) -> Lines:
         """Lines of a chunk, which ends with a line end."""
-        ends = np.flatnonzero(np.frombuffer(text, np.uint8) == ord("\n"))
-        start = np.append(0, ends[:-1] + 1)
-        label = patterns.label(text, start)
-        text = b"".join((b"\n" * MARGIN, text))
-        return cls(text, words_of(np.frombuffer(text, np.uint8)), start + MARGIN, label, patterns.known)
+        text = b"".join((b"\n" * MARGIN, text, b"\n" * (_WIDEST + 8)))
+        raw = np.frombuffer(text, np.uint8)
+        ends = np.flatnonzero(raw == ord("\n"))[MARGIN - 1 : -_WIDEST - 8]
+        start, size = ends[:-1] + 1, np.diff(ends)
+        return cls(text, words_of(raw), start, patterns.label(text, start, size), patterns.known)
 
     def line(self, row: int) -> bytes:
         """One of them, without its end."""
