@@ -106,7 +106,9 @@ class LinePatterns:
     def _shape(self, raw: NDArray[np.uint8], start: Ints, size: Ints) -> Ints:
         """(l,) shape of each line; most have the same as the one before, and are compared with it as words."""
         digits = raw - np.uint8(ord("0"))
-        zeroed = (raw - digits * (digits <= 9)).tobytes()
+        digits *= digits <= 9
+        zeroed = np.subtract(raw, digits, out=digits).tobytes()
+        del digits
         wide = min(int(size.max()), _WIDEST) // DIGITS + 1
         windows = np.ndarray((len(raw) - _WIDEST - DIGITS + 1,), f"V{DIGITS * wide}", buffer=zeroed, strides=(1,))
         lines = windows[start].view(np.uint64).reshape(-1, wide)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, NoReturn
 import numpy as np
 
 from cornersmooth.errors import InputError
-from cornersmooth.model import MM_PER_UNIT, Floats, Ints, Units
+from cornersmooth.model import MM_PER_UNIT, Floats, Units
 from cornersmooth.nc_reader.block_tables import Readable, read_lines
 from cornersmooth.nc_reader.dialects.base import Memory
 from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem, Second, settle
@@ -105,7 +105,9 @@ class Reader:
             else:
                 self.line(item)
             waiting = self.elements - self.given_out
-            if self.placed and waiting >= GIVEN_OUT and not (self.retracts.cut_is_left or self._may_go_up(waiting)):
+            # the last element may be a way up to a retract, which is then changed
+            goes_up = waiting < 2 * GIVEN_OUT and bool(self.ready) and self.ready[-1].kind[-1] == Element.RAPID
+            if self.placed and waiting >= GIVEN_OUT and not (self.retracts.cut_is_left or goes_up):
                 yield self._collected()
         self.flush()
         if self.rotary is not None:
@@ -179,7 +181,9 @@ class Reader:
                 self.problems += turn_problems(run, before.second, machine)
                 self._check_turned(run)
                 if self.dialect.retracts:
-                    self._check_swings(rotary.swung(run, start), run)
+                    text = "rotary axes swing the tilted tool in a rapid that is not above a retract"
+                    lines = run.line[rotary.swung(run, start)]
+                    self.problems += [Problem("CS537", 0, line, text) for line in lines.tolist()]
                 words = np.nan_to_num(np.vstack((before.second, run.second)))
                 at = run.arcs.element
                 on_arc = at[(words[at + 1] != words[at]).any(axis=1)]
@@ -288,12 +292,6 @@ class Reader:
         if last and machine.tool_length != before.tool_length:
             self._left_at = last[0].tip[-1]
 
-    def _arrive_again(self, run: Elements, step: float) -> None:
-        """Put another tool to where the one before has left, if no more than printed digits are between."""
-        left_at, self._left_at = self._left_at, None
-        if left_at is not None and np.linalg.norm(run.tip[0] - left_at) <= step:
-            run.tip[0] = left_at
-
     def _know_points(self, run: Elements) -> None:
         """From here on U V W are a point on the axis: what was said before of the axis is no such point."""
         if self.placed:
@@ -316,7 +314,9 @@ class Reader:
         self.coarse = (self.coarse or int(run.line[0])) if steps[0] > widest[0] else 0
         steps = min(steps[0], widest[0]), min(steps[1], widest[1])
         if self.rotary is not None:
-            self._arrive_again(run, steps[0])
+            left_at, self._left_at = self._left_at, None
+            if left_at is not None and np.linalg.norm(run.tip[0] - left_at) <= steps[0]:
+                run.tip[0] = left_at  # another tool is put to where the one before has left
         rotary = self.rotary is not None
         elements = replace(run, second_is=second_is, tip_step=steps[0], second_step=steps[1], rotary=rotary)
         if plane is not None:
@@ -333,10 +333,6 @@ class Reader:
         """Largest steps of the last printed digits, of tip and second triple, that are accounted for."""
         tip, turn = self.options.widest
         return tip, tip if second_is == "point" else turn
-
-    def _may_go_up(self, waiting: int) -> bool:
-        """Whether the last element may be a way up to a retract, which is then changed."""
-        return waiting < 2 * GIVEN_OUT and bool(self.ready) and self.ready[-1].kind[-1] == Element.RAPID
 
     def _settle(self) -> None:
         """Where words of the position come late, put the tool where they send it first."""
@@ -426,11 +422,6 @@ class Reader:
         gone = "XYZ" if self.plane is not None else axes
         tip = tuple(math.nan if axis in gone else at for axis, at in zip("XYZ", self.modal.tip, strict=True))
         self.modal = self.modal.but(tip=tip)
-
-    def _check_swings(self, elements: Ints, run: Elements) -> None:
-        """Complain of rapids in which rotary axes lead the tool far round."""
-        text = "rotary axes swing the tilted tool in a rapid that is not above a retract"
-        self.problems += [Problem("CS537", 0, int(run.line[element]), text) for element in elements.tolist()]
 
     def wrong(self, code: str, line: Line, text: str) -> None:
         """Note what breaks the rules of the control."""
