@@ -10,8 +10,7 @@ import numpy as np
 from cornersmooth import nc, smoothing
 from cornersmooth.errors import CornersmoothError
 from cornersmooth.feedrate import BlockLimits, Limits, direct, limiting, plan_text
-from cornersmooth.feedrate.linuxcnc import line_times
-from cornersmooth.feedrate.linuxcnc_program import axis_limits, program_lines
+from cornersmooth.feedrate.linuxcnc import axis_limits, line_times, program_lines
 from cornersmooth.kinematics import Machine, endless, tool_axis, with_dynamics
 from cornersmooth.model import Floats, Ints, Move, Program
 from cornersmooth.nc import Form

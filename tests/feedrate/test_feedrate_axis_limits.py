@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cornersmooth.feedrate import Limits, plan, rational_curves, taylor
-from cornersmooth.feedrate.motion import known_by_way, poses, taylor_along
+from cornersmooth.feedrate.motion import poses, taylor_along
 from cornersmooth.feedrate.path import Path, build_path
 from cornersmooth.feedrate.timelaw import TimeLaw
 from cornersmooth.model import Arcs, Floats, Ints, Move, Program
@@ -22,7 +22,7 @@ STEP = 2e-4  # s
 def derivatives(path: Path, element: Ints, share: Floats) -> list[tuple[Floats, Floats]]:
     """First three derivatives of tip and tool axis by the path coordinate."""
     tip, axis, speed = taylor_along(path, element, share)
-    return list(zip(known_by_way(tip, speed), known_by_way(axis, speed), strict=True))
+    return list(zip(taylor.by_way(tip, speed), taylor.by_way(axis, speed), strict=True))
 
 
 def sampled(law: TimeLaw) -> tuple[Floats, Floats]:

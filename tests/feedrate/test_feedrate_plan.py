@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cornersmooth.errors import SettingsError
-from cornersmooth.feedrate import Limits, TimeLaw, direct, plan, planner, windows
+from cornersmooth.feedrate import Limits, TimeLaw, between, direct, plan, planner
 from cornersmooth.feedrate.grid import Resolution, make_grid
 from cornersmooth.model import Arcs, Move, Program, Statement
 from cornersmooth.settings import Settings
@@ -123,7 +123,7 @@ def test_windows_agree_with_the_whole(chain: Callable[[int], Program], monkeypat
     program = Program.from_poses(np.cumsum(step, axis=0), np.tile([0.0, 0.0, 1.0], (300, 1)), feed=3000.0)
     smoothed, limits = smooth(program, Settings(tolerance=0.02)), Limits()
     whole = plan(smoothed, limits)
-    monkeypatch.setattr(windows, "WINDOW", 2400)
+    monkeypatch.setattr(between, "WINDOW", 2400)
     calls = []
     windowed = plan(smoothed, limits, progress=lambda done, total: calls.append((done, total)))
     assert len(calls) > 3

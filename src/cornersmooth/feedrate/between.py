@@ -6,6 +6,10 @@ one more quantity is held, limits of that cell are made stricter by as much, and
 (an exchange method for semi-infinite programmes: Hettich and Kortanek 1993). What is still beyond after the last round
 is slowed down run by run, so that every plan keeps every limit. The first profile is that of a problem of the way
 alone, under limits that let quantities all but keep theirs.
+
+Long runs are solved window by window, so that the time is linear in the length of the program and the working memory is
+bounded. A window ends with a crawl that can be kept up over all that follows, so there always is a way on; of its
+profile that part is planned again that lies nearer to its end than the distance needed to brake, at most an eighth.
 """
 
 from __future__ import annotations
@@ -17,12 +21,14 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from cornersmooth.feedrate.grid import Grid
-from cornersmooth.feedrate.interior_point import WARM
+from cornersmooth.feedrate.interior_point import COLD, GAP, MAX_STEPS, WARM, solve
 from cornersmooth.feedrate.intervals import Intervals
-from cornersmooth.feedrate.speed_problem import PLACES, Batch, around, problem_of
-from cornersmooth.feedrate.windows import braking_distance, solve_runs
+from cornersmooth.feedrate.scurve import stopping_distance
+from cornersmooth.feedrate.speed_problem import CRAWLING, PLACES, Batch, around, problem_of
 from cornersmooth.model import Floats, Ints
 
+#: limits solved together, cells times rows: the arrays of one window stay in the processor's cache
+WINDOW = 50_000
 #: quantities that are held in the first round, and cells around that count when they are chosen
 _HELD, _NEAR = 2, 5
 #: most rounds, and how much stricter than seen limits are made
@@ -83,7 +89,7 @@ def _around(beyond: Ints, batch: Batch, grid: Grid) -> tuple[Ints, Ints]:
     """First and last cells of stretches around some cells, long enough to brake before them and to speed up after."""
     run = grid.run[beyond]
     first, last = grid.first[run], grid.last[run]
-    of_run = {i: braking_distance(batch, grid, *ends) for i, *ends in set(zip(run, first, last, strict=True))}
+    of_run = {i: _braking_distance(batch, grid, *ends) for i, *ends in set(zip(run, first, last, strict=True))}
     reach = np.array([of_run[i] for i in run])
     low = np.searchsorted(grid.start, grid.start[beyond] - reach) - _BESIDE
     high = np.searchsorted(grid.start, grid.start[beyond] + reach) + _BESIDE
@@ -144,3 +150,61 @@ def _used(batch: Batch, c: Floats, grid: Grid, derivatives: Floats, bounds: Floa
         np.maximum(most, (np.abs(values).max(axis=-1) + between) / bound, out=most)
     most[:, np.concatenate((grid.first, grid.last))] = 0.0  # see `_from_rest`
     return most
+
+
+def solve_runs(
+    batch: Batch,
+    grid: Grid,
+    c: Floats,
+    progress: Callable[[int, int], None] | None = None,
+    *,
+    gap: float = GAP,
+    most: int = MAX_STEPS,
+    begin_with: float = COLD,
+) -> None:
+    """Set coefficients (n,) to those of the fastest profiles; short runs together, long ones window by window.
+
+    Parameters
+    ----------
+    c : (n,) float64
+        Coefficients to begin with.
+    progress : callable, optional
+        Called with (cells done, cells in all).
+    gap : float
+        Remaining duality gap over the time at which a profile is taken.
+    most : int
+        Newton steps after which it is taken in any case.
+    begin_with : float
+        Duality gap over the time to begin with.
+    """
+
+    def solve_window(first: Ints, last: Ints) -> None:
+        cells, part = batch.stretches(first, last)
+        c[cells] = solve(part, c[cells], gap, most, begin_with)
+        if progress is not None:
+            progress(int(last[-1]) + 1, len(c))
+
+    size, run = WINDOW // batch.ends[-1], 0
+    while run < len(batch.first):
+        at = batch.first[run : run + 1]
+        following = max(int(np.searchsorted(batch.last, at[0] + size)), run + 1)
+        end = batch.last[following - 1 : following]
+        if end[0] - at[0] < size:
+            solve_window(batch.first[run:following], batch.last[run:following])
+        else:
+            brake = _braking_distance(batch, grid, int(at[0]), int(end[0]))
+            while True:
+                stop = np.minimum(at + size - 1, end)
+                solve_window(at, stop)
+                if stop == end:
+                    break
+                keep = np.searchsorted(grid.start, grid.start[stop + 1 - CRAWLING] - brake)
+                at = np.minimum(np.maximum(keep, at + size * 7 // 8), stop - CRAWLING - 1)
+        run = following
+
+
+def _braking_distance(batch: Batch, grid: Grid, begin: int, end: int) -> float:
+    """Distance in which the fastest motion in some cells can stop under the strictest limits there."""
+    speed = np.sqrt(grid.cap[begin + 1 : end].max())
+    slope, bend = batch.steepest[:, begin : end + 1].max(axis=1)
+    return 1.1 * float(stopping_distance(speed, 0.5 / slope, 1.0 / bend))

@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cornersmooth.feedrate import arcs, rational_curves
+from cornersmooth.feedrate import rational_curves, taylor
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.machine_axes import MachineAxes
-from cornersmooth.feedrate.motion import curvature, known_by_way, taylor_along
-from cornersmooth.feedrate.path import Kind, Path
+from cornersmooth.feedrate.motion import curvature, taylor_along
+from cornersmooth.feedrate.path import Kind, Path, arc_series
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.vectors import norm
 
@@ -87,10 +87,10 @@ class Quantities:
         parts = [np.zeros((3, 0, len(which)))]
         for series, limited in zip((tip, axis), self.vectors, strict=True):
             if limited:
-                parts.append(norm(np.stack(known_by_way(series, speed)))[:, None] * _SIGNS[..., None])
+                parts.append(norm(np.stack(taylor.by_way(series, speed)))[:, None] * _SIGNS[..., None])
         if self.machine_axes is not None:
             positions = self.machine_axes.positions(which, where, tip, axis)
-            parts.append(np.stack(known_by_way(positions, speed)).transpose(0, 2, 1))
+            parts.append(np.stack(taylor.by_way(positions, speed)).transpose(0, 2, 1))
         found = np.concatenate(parts, axis=1)
         found = np.where(self.counts[:, which] & np.isfinite(found), found, 0.0)
         return found.reshape(3, len(self), *element.shape), tip.reshape(4, *element.shape, 3)
@@ -150,7 +150,7 @@ def path_limits(path: Path, limits: Limits, machine_axes: MachineAxes | None = N
     whole = np.flatnonzero(~asked)
     fastest = path.speed**2
     arc = np.flatnonzero((path.kind == Kind.ARC) & ~path.turning)
-    kappa = curvature(arcs.series(path.program, path.move[arc], 0.0))
+    kappa = curvature(arc_series(path.program, path.move[arc], 0.0))
     fastest[arc] = np.minimum(fastest[arc], limits.centripetal_accel / kappa)
     parts = _divided(quantities, asked, fastest, limits.centripetal_accel)
     for element, high, width, cap in (

@@ -18,7 +18,7 @@ import numpy as np
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate import taylor
-from cornersmooth.feedrate.motion import known_by_way, taylor_along
+from cornersmooth.feedrate.motion import taylor_along
 from cornersmooth.feedrate.path import Path
 from cornersmooth.feedrate.rational_curves import WHOLE
 from cornersmooth.kinematics import Machine
@@ -63,7 +63,7 @@ class MachineAxes:
         """
         tip, axis, speed = taylor_along(self.path, element, share)
         position = self.positions(element, share, tip, axis)
-        return position[0], *known_by_way(position, speed)
+        return position[0], *taylor.by_way(position, speed)
 
     def positions(self, element: Ints, share: Floats, tip: Floats, axis: Floats) -> Floats:
         """Taylor series (4, m, 5) of the axes from those of tip and tool axis, (4, m, 3) each."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from cornersmooth.feedrate import arcs, taylor
-from cornersmooth.feedrate.path import Kind, Path
+from cornersmooth.feedrate import taylor
+from cornersmooth.feedrate.path import Kind, Path, arc_series
 from cornersmooth.feedrate.rational_curves import parameters_at, taylor_series
 from cornersmooth.model import Floats, Ints
 from cornersmooth.smoothing.construction import construction_of
@@ -15,17 +15,6 @@ _NO_SPEED = np.finfo(np.float64).tiny
 
 #: turn over a way in which a curve is straight up to rounding, over that way
 _STRAIGHT = 1e-12
-
-
-def known_by_way(series: Floats, speed: Floats) -> tuple[Floats, Floats, Floats]:
-    """First three derivatives by the path coordinate, infinite where the tip comes to a stand (see `taylor.by_way`).
-
-    Per mm, mm², mm³; per rad where the tip stands still.
-    """
-    with np.errstate(over="ignore", invalid="ignore"):
-        one, two, three = taylor.by_way(series, speed)
-    one, two, three = (np.where(np.isfinite(order), order, np.inf) for order in (one, two, three))
-    return one, two, three
 
 
 def taylor_along(
@@ -88,7 +77,7 @@ def _lines(path: Path, element: Ints, share: Floats, orders: int) -> tuple[Float
     lever[1] = axis_part * turn + (axis_part - part) * step
     bow = np.flatnonzero(path.kind[element] == Kind.ARC)
     if len(bow):
-        tip[:, bow] = arcs.series(program, end[bow], share[bow])[:orders]
+        tip[:, bow] = arc_series(program, end[bow], share[bow])[:orders]
     return tip, lever
 
 

@@ -15,14 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cornersmooth.errors import SettingsError
-from cornersmooth.feedrate import arcs
 from cornersmooth.feedrate.curves import Curves
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.rational_curves import STANDSTILL, WHOLE, end_tangents
 from cornersmooth.model import Bools, Corners, FeedMode, Floats, Ints, Move, Program, Runs, Status
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.construction import find_neighbours
-from cornersmooth.vectors import angle_between, norm, unit
+from cornersmooth.vectors import angle_between, dot, norm, unit
 
 #: angles below this are no motion of the axis, rad
 NO_TURN = 1e-9
@@ -180,6 +179,21 @@ def build_path(
     )
 
 
+def arc_series(program: Program, moves: Ints, fraction: Floats | float) -> Floats:
+    """Taylor coefficients (4, k, 3) of the tip by the fraction of the way along the arcs into these poses, mm."""
+    rows = np.searchsorted(program.arcs.pose, moves)
+    start = program.tip[moves - 1]
+    sweep, normal = program.arcs.sweep[rows][:, None], program.arcs.normal[rows]
+    radius = start - program.arcs.centre[rows]
+    radius -= dot(radius, normal)[:, None] * normal
+    rise = dot(program.tip[moves] - start, normal)[:, None] * normal
+    angle = sweep * np.reshape(fraction, (-1, 1))
+    arm = np.cos(angle) * radius + np.sin(angle) * np.cross(normal, radius)  # Rodrigues
+    across = np.cross(normal, arm)
+    tip = start - radius + arm + rise * np.reshape(fraction, (-1, 1))
+    return np.stack((tip, sweep * across + rise, -(sweep**2) * arm / 2.0, -(sweep**3) * across / 6.0))
+
+
 def _moves(program: Program, settings: Settings) -> tuple[Ints, Ints]:
     """Poses that are moved to, in order, and the poses they are reached from; repeated poses are one."""
     n = len(program)
@@ -225,7 +239,7 @@ def _rests(
     tangents = np.tile(step / np.maximum(chord, STANDSTILL)[:, None], (2, 1, 1))
     arc = np.flatnonzero(program.kind[moves] == Move.ARC)
     for side in range(2):
-        along = arcs.series(program, moves[arc], float(side))[1]
+        along = arc_series(program, moves[arc], float(side))[1]
         length[arc], tangents[side, arc] = norm(along), unit(along)
     angle = np.zeros(len(moves))
     still = np.flatnonzero((length <= STANDSTILL) & (trims[2] + trims[3] < 1.0))

@@ -60,7 +60,7 @@ def normalised(a: Floats) -> Floats:
 
 
 def by_way(a: Floats, speed: Floats) -> tuple[Floats, Floats, Floats]:
-    """First three derivatives by the way s of a series in u.
+    """First three derivatives by the way s of a series in u; infinite where ds/du is zero.
 
     Parameters
     ----------
@@ -68,7 +68,9 @@ def by_way(a: Floats, speed: Floats) -> tuple[Floats, Floats, Floats]:
     speed : (3, m) float64
         Series of ds/du.
     """
-    first = divide(derivative(a), speed[..., None])
-    second = divide(derivative(first), speed[:, :, None])
-    third = divide(derivative(second), speed[:, :, None])
-    return first[0], second[0], third[0]
+    found, series = [], a
+    with np.errstate(over="ignore", invalid="ignore"):
+        for _ in range(3):
+            series = divide(derivative(series), speed[: len(series) - 1, :, None])
+            found.append(np.where(np.isfinite(series[0]), series[0], np.inf))
+    return found[0], found[1], found[2]

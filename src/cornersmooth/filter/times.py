@@ -8,8 +8,7 @@ import numpy as np
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate import plan_text
-from cornersmooth.feedrate.linuxcnc import line_times
-from cornersmooth.feedrate.linuxcnc_program import axis_limits, program_lines
+from cornersmooth.feedrate.linuxcnc import axis_limits, line_times, program_lines
 from cornersmooth.filter.checking import Place, pair, shared
 from cornersmooth.filter.motion import Job, motion_of_runs
 from cornersmooth.filter.runs import Reading
