@@ -80,12 +80,12 @@ OWN = ["nx_blade.cls", "nx_pocket.cls", "creo_plate.ncl", "solidworks_bracket.ap
     [*((name, part) for part, name in enumerate(OWN)), *of_corpus((name, part) for part, name in enumerate(FILES))],
 )
 def test_files_keep_the_tolerance(name: str, part: int) -> None:
-    """Each file in a twelfth of the controls and forms: `nc.sweep` does all."""
+    """Each file in a tenth of the controls and forms: `nc.sweep` does all."""
     path = cl_file(name)
     # without tool tip control every line becomes many: `nc.sweep` tries those
     small = path.stat().st_size < 12_000 and name not in OWN
     cases = [case for case in CHOSEN if case.tcp or small]
-    cases = share(cases, 12, part)
+    cases = share(cases, 10, part)
     assert 2 * sum(keeps_the_tolerance(name, path.read_bytes(), case) for case in cases) > len(cases)
 
 
