@@ -1,4 +1,4 @@
-"""Work grows no faster than the input: bytecodes of reading, writing and verifying at n and at 4 n."""
+"""Work grows no faster than the input: lines of Python of reading, writing and verifying at n and at 4 n."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from cornersmooth.nc import Frame, choose_form, fit_settings, write
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from cornersmooth.verify import verify
-from oracle.loops import bytecodes
+from oracle.loops import lines
 
 HEAD = "UNITS/MM\nLOADTL/1\nSPINDL/5000,RPM,CLW\nRAPID\nGOTO/0,0,50,0,0,1\nFEDRAT/500,MMPM\nGOTO/0,0,0,0,0,1\n"
 
@@ -68,5 +68,5 @@ def whole(text: str) -> None:
 def test_four_times_the_input_is_four_times_the_work(what: str) -> None:
     count, make = INPUTS[what]
     whole(make(count))  # what is made once
-    nothing, once, four = (bytecodes(lambda n=n: whole(make(n))) for n in (1, count, 4 * count))
+    nothing, once, four = (lines(lambda n=n: whole(make(n))) for n in (1, count, 4 * count))
     assert four - nothing <= MOST * (once - nothing), (nothing, once, four)
