@@ -12,7 +12,7 @@ import cornersmooth as cs
 from cornersmooth.filter import Filtered, filter_program, verify_programs
 from cornersmooth.filter.state import VOCABULARIES
 from cornersmooth.verdict import Verdict
-from filter.programs import ISO, PROGRAMS, WORDS, N, X, Y, Z, cuts
+from filter.programs import ISO, PROGRAMS, WORDS, X, Y, Z, cuts
 from oracle.command import BAD_INPUT, DONE, run
 
 EPS = 0.02
@@ -318,17 +318,17 @@ def test_verify_finds_what_is_wrong_with_a_program_of_anybody() -> None:
 
 
 def test_says_the_time_of_what_has_changed(tmp_path: Path) -> None:
-    control, machine, text = PROGRAMS["fanuc words"]
+    control, machine, count = "fanuc", "table-ac", 8
+    text = ISO.format(on="G43.4 H1", start="A20. C30.", cuts=cuts(WORDS, feed="F1000.", last=count))
     form, settings, axes = form_of(control, machine), cs.Settings(tolerance=EPS), cs.load_machine(machine)
-    # so slow that no axis has to brake: the length over the feed, of all but the first cut, to which it is a rapid
-    length = np.linalg.norm(np.diff(np.column_stack((X, Y, Z)), axis=0), axis=1).sum()
+    # so slow that no axis has to brake: the length over the feed, and 19 mm down to the first place
+    length = np.linalg.norm(np.diff(np.column_stack((X, Y, Z))[:count], axis=0), axis=1).sum()
     slow = filter_program(text.replace("F1000.", "F6.").encode(), form, settings, axes=axes)
     assert slow.seconds is not None
-    first = 19.0 if "Z20." in text else 0.0  # from Z20 down to the first place
     # plans are at most 0.3 % slower than the fastest where the tool stops at every corner
-    assert slow.seconds[0] == pytest.approx((length + first) / 0.1, rel=3e-3)
+    assert slow.seconds[0] == pytest.approx((length + 19.0) / 0.1, rel=3e-3)
     # each corner is cut by less than ε
-    assert slow.seconds[0] - 2 * N * EPS / 0.1 < slow.seconds[1] < slow.seconds[0]
+    assert slow.seconds[0] - 2 * count * EPS / 0.1 < slow.seconds[1] < slow.seconds[0]
     (tmp_path / "part.nc").write_text(text)
     on = ("--control", control, "--machine", machine, "--limits", machine, "-e", EPS)
     told = run("filter", "part.nc", *on, "-o", "new.nc", cwd=tmp_path).stderr.decode()
