@@ -93,7 +93,7 @@ def test_setups_beyond_the_travel_are_left_out() -> None:
 
 def test_command_saves_a_tenth_and_says_what_is_the_users(tmp_path: Path) -> None:
     source = tmp_path / "impeller.cls"
-    source.write_bytes(beginning(IMPELLER, 205))
+    source.write_bytes(beginning(IMPELLER, 105))
     told = run("setup", source, "--limits", "table-ac", "--plans", "1", "--tilt", "30", "--json", cwd=tmp_path)
     assert told.returncode == DONE
     found = json.loads(told.stdout)
