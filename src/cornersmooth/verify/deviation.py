@@ -189,7 +189,7 @@ class _Around:
         last = min(max(resumed - 1, row), end, row + _MOST_ROWS)
         here, stop = path.length_at(one.place), float(match.high[row] + 1)
         vertices = np.arange(int(one.place) + 1, int(stop) + 1)
-        if len(again):
+        if last == resumed - 1 and len(again):
             stop = float(match.place[resumed])
             vertices = vertices[: int(np.ceil(stop)) - int(one.place) - 1]
         elif last < end or match.goes_on:  # no farther than the rows that are looked at
