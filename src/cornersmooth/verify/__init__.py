@@ -17,10 +17,10 @@ both as polylines   `cl_motion`, `motions`; how far they leave their chords, pro
 run beside another  `passage`: by a `chain` of nearest places, where that fails exactly (`free_space`)
 stretch by stretch  `stops`: which elements reach them; `batches` cuts long stretches and decides; `match`: its places
 holes               `holes`; poses that are named by their digits: `motions`; tool changes: package `statements`
-what parts          `deviation`: the lines and the distances, which `distances` measures; poses that must be exact
-feeds               `feeds`; where a vertex may be besides its place: `reachable`
+what parts          `deviation`: the lines and the distances; poses that must be exact
+feeds               `feeds`; where a vertex may also be: `match`
 words               `word_check`, `word_states` by `nc_reader.word_list`; `word_places`: where, for `statements`
-what is said        `findings`, `result`; all of it: `verifier`
+findings            `findings`, `result`; the driver: `verifier`
 =================== ===================================================================================================
 
 A *place* is a segment of the CL path and a fraction of it. A *stop* is the end of a rapid, or the first pose.
