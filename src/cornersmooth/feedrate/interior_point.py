@@ -122,6 +122,9 @@ def solve(batch: Batch, c: Floats, gap: float = GAP, most: int = MAX_STEPS, begi
         worst = min(length, dual_length)
         if worst > 0.5 and remaining < gap * time and fall < SETTLED * gap * time:
             break
+        # limits that cannot all be kept: the duals grow without end, and the profile stays
+        if remaining * gap > time:
+            break
         # tangents of jerk limits may turn from step to step without end
         times.append(time)
         if times[-PATIENCE:][0] - time < SETTLED * gap * time and remaining < PATIENCE * SETTLED * gap * time:
