@@ -114,3 +114,11 @@ def test_the_number_of_one_control_is_another_word_on_the_next(control: str) -> 
 def test_what_a_control_has_no_word_for_is_not_missing() -> None:
     lines, _ = _lines("heidenhain", CL.format("COOLNT/XAIR", "COOLNT/XAIR"))
     assert any("COOLNT/XAIR" in line for line in lines)
+
+
+def test_a_coolant_that_is_asked_for_by_its_number_is_switched_off_at_the_end() -> None:
+    lines, _ = _lines("haas", CL.format("AUXFUN/88", "COOLNT/ON"))
+    words = ("M88", "M89", "M8", "M9")
+    assert [line for line in lines if line in words] == ["M88", "M89", "M8", "M8", "M9"]
+    lines, _ = _lines("haas", CL.format("COOLNT/OFF", "AUXFUN/88").replace("COOLNT/OFF\nGOTO/20", "AUXFUN/9\nGOTO/20"))
+    assert [line for line in lines if line in words] == ["M9", "M8", "M9", "M88", "M89", "M9"]

@@ -374,9 +374,14 @@ class StatementWriter:
             text = f"AUXFUN/{number} clamps a rotary axis or lets it turn: left out, the machine's file says where"
             self.findings.add("CS359", "warning", statement.line, text)
             return self.comment(statement.text)
-        if number in (3, 4, 5, 7, 8, 9):
-            self.operation.switch("spindle" if number <= 5 else "coolant", () if number in (5, 9) else blocks)
-        return list(blocks)
+        if number in (3, 4, 5):
+            self.operation.switch("spindle", () if number == 5 else blocks)
+        off = {self.words.coolant.get("OFF"), *self.words.coolant_off.values()}
+        if blocks not in off | set(self.words.coolant.values()):
+            return list(blocks)
+        before = self.operation.coolant_before(blocks)
+        self.operation.switch("coolant", () if blocks in off else blocks)
+        return [*(block for block in before if block not in blocks), *blocks]
 
     def paint(self, statement: Statement) -> list[str]:
         """PAINT: colours and speeds of the CAM system's screen."""
