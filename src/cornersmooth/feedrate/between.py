@@ -164,18 +164,7 @@ def solve_runs(
 ) -> None:
     """Set coefficients (n,) to those of the fastest profiles; short runs together, long ones window by window.
 
-    Parameters
-    ----------
-    c : (n,) float64
-        Coefficients to begin with.
-    progress : callable, optional
-        Called with (cells done, cells in all).
-    gap : float
-        Remaining duality gap over the time at which a profile is taken.
-    most : int
-        Newton steps after which it is taken in any case.
-    begin_with : float
-        Duality gap over the time to begin with.
+    `progress` is called with (cells done, cells in all); the rest is that of `solve`, where `begin_with` is `begin`.
     """
 
     def solve_window(first: Ints, last: Ints) -> None:

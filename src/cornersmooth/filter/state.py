@@ -79,10 +79,15 @@ _WORKED_OUT: Final = re.compile(
 _SPELT: Final = re.compile(r"RAPID|LN|side|turn|circle|centre( .*)?|DC .*")
 
 
+#: what words mean beside the motion that move nothing
+_QUIET: Final = ("spindle", "coolant", "stop")
+
+
 @dataclass(frozen=True)
 class Vocabulary:
     """What a control's words do; its fields are explained in ``words.toml``."""
 
+    control: str
     patterns: Mapping[Does, str]
     tip: Mapping[str, str]
     ends: Mapping[str, str]
@@ -91,6 +96,8 @@ class Vocabulary:
 
     def does(self, word: str) -> Does:
         """Say what a word such as ``G43.4`` does; words of group 01, of units, distances and feeds are not here."""
+        if word_list(self.control).means.get(word, ("",))[0] in _QUIET:
+            return Does.NOTHING
         found = (does for does, pattern in self.patterns.items() if re.fullmatch(pattern, word))
         return next(found, Does.PLACE if word.startswith("M") else Does.ALL)
 
@@ -103,11 +110,8 @@ def _vocabularies() -> dict[str, Vocabulary]:
         if "tip" in table:
             patterns = {does: table[does] for does in Does if does in table}
             patterns = {does: one if isinstance(one, str) else "|".join(one) for does, one in patterns.items()}
-            means = word_list(name).means.items()
-            quiet = (re.escape(word) for word, (kind, _) in means if kind in ("spindle", "coolant", "stop"))
-            patterns[Does.NOTHING] = "|".join((patterns[Does.NOTHING], *quiet))
             rest = table.get("ends", {}), table["offsets"], table.get("change_keeps_tip", False)
-            found[name] = Vocabulary(patterns, table["tip"], *rest)
+            found[name] = Vocabulary(name, patterns, table["tip"], *rest)
     return found
 
 
