@@ -10,12 +10,14 @@ import pytest
 
 #: the name `cornersmooth.verify` is the function
 FOLDERS = [
-    Path(str(import_module(f"cornersmooth.{name}").__file__)).parent for name in ("verify", "statements", "nc_reader")
+    Path(str(import_module(f"cornersmooth.{name}").__file__)).parent
+    for name in ("verify", "statements", "nc_words", "nc_reader")
 ]
 MODULES = [path for folder in FOLDERS for path in sorted(folder.rglob("*.py"))]
 ALLOWED = (
     "cornersmooth.verify",
     "cornersmooth.statements",
+    "cornersmooth.nc_words",
     "cornersmooth.nc_reader",
     "cornersmooth.model",
     "cornersmooth.errors",

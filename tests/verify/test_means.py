@@ -10,7 +10,8 @@ import pytest
 from cornersmooth.cl import read
 from cornersmooth.kinematics import load_machine
 from cornersmooth.nc import choose_form, control_tables
-from cornersmooth.nc_reader import word_list
+from cornersmooth.nc_reader import word_tables
+from cornersmooth.nc_words import rules
 from cornersmooth.pipeline import postprocess
 from cornersmooth.settings import Settings
 from cornersmooth.tables import Shelf
@@ -49,7 +50,8 @@ AIR = {
 @pytest.fixture
 def _with_air(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Tables of both sides with one entry more; HEIDENHAIN has none."""
-    written, listed = Shelf.built_in, word_list._table
+    written, listed = Shelf.built_in, word_tables._table
+    caches = (control_tables._built_in, word_tables.word_table, word_tables.means_of, rules.word_list)
 
     def table(self: Shelf, name: str) -> str:
         text = written(self, name)
@@ -62,12 +64,12 @@ def _with_air(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         return {**found, "means": found["means"] | (AIR[control][1] if control in AIR else {})}
 
     monkeypatch.setattr(Shelf, "built_in", table)
-    monkeypatch.setattr(word_list, "_table", means)
-    for cached in (control_tables._built_in, word_list.word_list):
+    monkeypatch.setattr(word_tables, "_table", means)
+    for cached in caches:
         cached.cache_clear()
     yield
     monkeypatch.undo()
-    for cached in (control_tables._built_in, word_list.word_list):
+    for cached in caches:
         cached.cache_clear()
 
 

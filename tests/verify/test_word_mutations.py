@@ -14,12 +14,12 @@ from cornersmooth.cl import read
 from cornersmooth.nc import Frame, fit_settings, write
 from cornersmooth.nc_reader.block_tables import read_lines
 from cornersmooth.nc_reader.elements import Problem
-from cornersmooth.nc_reader.word_list import word_list
+from cornersmooth.nc_words.check import WordCheck
+from cornersmooth.nc_words.rules import word_list
+from cornersmooth.nc_words.states import GONE_ON
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from cornersmooth.verify import verify
-from cornersmooth.verify.word_check import WordCheck
-from cornersmooth.verify.word_states import GONE_ON
 from nc.cases import CHOSEN, Case
 from oracle.share import how_many
 

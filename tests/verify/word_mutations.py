@@ -21,10 +21,10 @@ from cornersmooth.nc import fit_settings, write
 from cornersmooth.nc_reader.block_tables import read_lines
 from cornersmooth.nc_reader.reader import Reader
 from cornersmooth.nc_reader.reading import ReadingOptions
+from cornersmooth.nc_words.check import WordCheck
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from cornersmooth.verify import verify
-from cornersmooth.verify.word_check import WordCheck
 from nc.cases import RUNNABLE, Case
 
 from .form_mutations import EPS, PLACE, H, program_of

@@ -17,7 +17,7 @@ from typing import Any, Final
 
 from cornersmooth.errors import InputError
 from cornersmooth.nc_reader.lexer import Lexer
-from cornersmooth.nc_reader.word_list import word_list
+from cornersmooth.nc_reader.word_tables import means_of
 from cornersmooth.nc_reader.words import Line, Word
 
 
@@ -96,7 +96,7 @@ class Vocabulary:
 
     def does(self, word: str) -> Does:
         """Say what a word such as ``G43.4`` does; words of group 01, of units, distances and feeds are not here."""
-        if word_list(self.control).means.get(word, ("",))[0] in _QUIET:
+        if means_of(self.control).get(word, ("",))[0] in _QUIET:
             return Does.NOTHING
         found = (does for does, pattern in self.patterns.items() if re.fullmatch(pattern, word))
         return next(found, Does.PLACE if word.startswith("M") else Does.ALL)

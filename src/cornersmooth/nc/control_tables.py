@@ -15,7 +15,7 @@ from typing import Any, get_args
 from cornersmooth.errors import SettingsError
 from cornersmooth.nc.control import STEPS, Blocks, Control, Digits, FormTable, Mode, Motion, Orientation, Words
 from cornersmooth.nc_reader import CONTROLS
-from cornersmooth.nc_reader.word_list import WordRule, word_list
+from cornersmooth.nc_words.rules import WordRule, word_list
 from cornersmooth.tables import Shelf, Table, check_pattern, filled, is_file
 
 _FORM_KEYS = ("description", "curve", "upright", "plane", *get_args(Orientation))

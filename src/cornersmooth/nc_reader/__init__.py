@@ -16,8 +16,7 @@ event             a word that stands beside the motion
 
 Where is what:
 
-- what a text is: `source` (bytes), `dialects` (grammar), `word_list`,
-  `word_rules` (what may stand together in a block)
+- what a text is: `source` (bytes), `dialects` (grammar), `word_tables` (words and what they mean)
 - bytes to tables: `lexer`, `words`, `block_tables`, `line_patterns`
 - tables to elements: `reader` holds the modal state, `execution` executes: `arcs`, `splines`, `rotary`;
   `needed_states` says which words want another state; `retracts` leads back from retracts, and back into cuts

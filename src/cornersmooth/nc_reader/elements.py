@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from cornersmooth.errors import message
 from cornersmooth.model import MM_PER_UNIT, Bools, Floats, Ints, Units
-from cornersmooth.nc_reader.word_list import Means
+from cornersmooth.nc_reader.word_tables import Means
 
 #: what the second triple of a motion block is: the tool vector, or a point on the tool axis
 Second = Literal["vector", "point"]

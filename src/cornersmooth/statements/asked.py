@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from cornersmooth.model import Move, Program, Statement
-from cornersmooth.nc_reader.word_list import Means
+from cornersmooth.nc_reader.word_tables import Means
 from cornersmooth.statements.tokens import PAUSES, SPEED_DECIMALS, Token, of_m
 
 #: cutting speeds in mm per minute
@@ -25,7 +25,7 @@ _ALIKE = {"ON": "FLOOD", "NOMORE": "OFF"}
 class Asking:
     """Goes through the CL statements and notes what they ask for. What it cannot interpret asks for nothing.
 
-    What words of the control say (`WordList.means`) is for AUXFUN.
+    What words of the control say (`means_of`) is for AUXFUN.
     """
 
     def __init__(self, program: Program, means: Means | None = None) -> None:
@@ -193,7 +193,7 @@ def asked(
     places : sequence of float, mm
         Of the statements, along the path, whose length is `end`.
     means : mapping
-        What words of the control say, as of `WordList`.
+        What words of the control say, as of `means_of`.
     dwells : sequence of Token
         What the cycles of holes ask for, in order.
     """

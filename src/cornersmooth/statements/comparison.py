@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Set
 from itertools import pairwise, takewhile, zip_longest
 
 from cornersmooth.nc_reader.elements import Problem
-from cornersmooth.nc_reader.word_list import Means
+from cornersmooth.nc_reader.word_tables import Means
 from cornersmooth.statements.tokens import Token
 
 #: codes and names of kinds
@@ -83,7 +83,7 @@ def compare(
     room : float, mm
         How far apart along the path the places of the same token may be.
     means : mapping
-        What words of the control say, as of `WordList`: for what none says nothing is missing.
+        What words of the control say, as of `means_of`: for what none says nothing is missing.
     apart : callable
         How far, in mm, two places along the path are apart that differ by more than the room.
     own : set of str

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from cornersmooth.nc_reader.elements import Event
-from cornersmooth.nc_reader.word_list import Means
+from cornersmooth.nc_reader.word_tables import Means
 
 #: decimals of a spindle speed that count: FANUC's S takes whole numbers only
 SPEED_DECIMALS = 0
@@ -63,12 +63,12 @@ _CHANGE = ("M", 6.0)
 
 
 def of_m(value: float, means: Means) -> tuple[str, float | str]:
-    """Kind and value of what an M word other than M6 does on a control; `means` as of `WordList`."""
+    """Kind and value of what an M word other than M6 does on a control; `means` as of `means_of`."""
     return means.get(f"M{value:g}", ("auxiliary", value))
 
 
 def said(events: Sequence[Event], places: Sequence[Place], means: Means) -> list[Token]:
-    """What the words of the NC program do, each at its place; `means` as of `WordList`."""
+    """What the words of the NC program do, each at its place; `means` as of `means_of`."""
     tokens: list[Token] = []
     chosen: float | None = None
     moment = element = 0

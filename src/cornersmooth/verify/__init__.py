@@ -19,7 +19,7 @@ stretch by stretch  `stops`: which elements reach them; `batches` cuts long stre
 holes               `holes`; poses that are named by their digits: `motions`; tool changes: package `statements`
 what parts          `deviation`: the lines and the distances; poses that must be exact
 feeds               `feeds`; where a vertex may also be: `match`
-words               `word_check`, `word_states` by `nc_reader.word_list`; `word_places`: where, for `statements`
+words               package `nc_words`; what the CL file asks for: `statements`, and where: `word_places`
 findings            `findings`, `result`; the driver: `verifier`
 =================== ===================================================================================================
 

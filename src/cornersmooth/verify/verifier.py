@@ -15,13 +15,14 @@ from cornersmooth.copied_signature import taking_what
 from cornersmooth.errors import SettingsError
 from cornersmooth.model import Program
 from cornersmooth.nc_reader.elements import Elements, Event, NcProgram, Problem
-from cornersmooth.nc_reader.machine_positions import MachinePositions
 from cornersmooth.nc_reader.needed_states import CONTROL_WORDS
 from cornersmooth.nc_reader.reader import Reader
 from cornersmooth.nc_reader.reading import DIGITS_SAMPLE, ReadingOptions, program_of
 from cornersmooth.nc_reader.rotary import sagitta
 from cornersmooth.nc_reader.source import Source, readable_twice
-from cornersmooth.nc_reader.word_list import word_list
+from cornersmooth.nc_words.check import WordCheck
+from cornersmooth.nc_words.machine_positions import MachinePositions
+from cornersmooth.nc_words.states import GONE_ON
 from cornersmooth.processes import Helper, can_fork, map_in_processes
 from cornersmooth.settings import BOUNDS
 from cornersmooth.statements.comparison import KINDS
@@ -35,9 +36,7 @@ from cornersmooth.verify.match import Batch, Match
 from cornersmooth.verify.own_rapids import OwnRapids
 from cornersmooth.verify.result import Verification
 from cornersmooth.verify.task import Task, length_of
-from cornersmooth.verify.word_check import WordCheck
 from cornersmooth.verify.word_places import WordPlaces, place_words
-from cornersmooth.verify.word_states import GONE_ON
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine
@@ -194,7 +193,7 @@ class Verifier:
         lever = None if rotary is None else float(rotary.levers(task.original.trail.tip).max(initial=0.0))
         reader = Reader(self._name, options, steps, lever)
         machine = self._machine if options.dialect.retracts else None
-        switches, scale = word_list(options.control).switches, self._program.mm_per_unit
+        scale, switches = self._program.mm_per_unit, options.dialect.switches
         positions = MachinePositions(machine, scale, switches=switches, tcp=options.tcp)
         check = WordCheck(options.control, options.dialect.lexer, options.tolerance / scale, *self._own, positions)
         own_rapids = OwnRapids(task.original)

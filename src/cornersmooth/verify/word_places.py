@@ -16,7 +16,7 @@ import numpy as np
 from cornersmooth.model import Floats, Ints
 from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem
 from cornersmooth.nc_reader.tool import leads_somewhere
-from cornersmooth.nc_reader.word_list import Means
+from cornersmooth.nc_reader.word_tables import Means
 from cornersmooth.statements.asked import asked
 from cornersmooth.statements.comparison import compare
 from cornersmooth.statements.tokens import TAP, Place, Token, said

@@ -9,7 +9,7 @@ from cornersmooth.nc_reader.dialects.base import Dialect
 from cornersmooth.nc_reader.dialects.heidenhain import Heidenhain
 from cornersmooth.nc_reader.dialects.iso import Iso
 from cornersmooth.nc_reader.dialects.siemens import Siemens
-from cornersmooth.nc_reader.word_list import CONTROLS, word_list
+from cornersmooth.nc_reader.word_tables import CONTROLS, word_table
 
 __all__ = ["CONTROLS", "Dialect", "dialect_of"]
 
@@ -31,4 +31,4 @@ def dialect_of(control: str, rotary: str = "") -> Dialect:
     """
     if control not in CONTROLS:
         raise SettingsError("CS204", f"unknown control {control!r}", f"use one of {', '.join(CONTROLS)}")
-    return _SPELLINGS[word_list(control).spelling](control, rotary)
+    return _SPELLINGS[word_table(control).get("spelling", "iso")](control, rotary)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from cornersmooth.nc_reader.lexer import Lexer
-from cornersmooth.nc_reader.word_list import word_list
+from cornersmooth.nc_reader.word_tables import means_of, word_table
 from cornersmooth.nc_reader.words import Columns, Line
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ class Memory:
     orientation: str = ""  #: how the tool axis is interpolated
 
 
-#: how the values of a table `WordList.grammar` are read, where not as they are
+#: how the values of a table `[grammar]` are read, where not as they are
 _READ: Mapping[str, Callable[[Any], Any]] = {
     "tip_control": lambda table: {float(code): name for code, name in table.items()},
     "controls": lambda table: {kind: tuple(names) for kind, names in table.items()},
@@ -84,10 +84,10 @@ class Dialect:
     digits: re.Pattern[bytes] = re.compile(rb"(?:([XYZ])|([IJUVW]))[-+]?\d*\.(\d*)")
 
     def __init__(self, control: str, rotary: str = "") -> None:
-        listed = word_list(control)
-        for key, value in listed.grammar.items():
+        table = word_table(control)
+        for key, value in table["grammar"].items():
             setattr(self, key, _READ[key](value) if key in _READ else value)
-        self.switches, self.means, self.rotary = listed.switches, listed.means, rotary
+        self.switches, self.means, self.rotary = table.get("switches", False), means_of(control), rotary
         if rotary:
             self.digits = re.compile(
                 rb"(?<!K\d)(?:([XYZ])|(?<![A-Z0-9])([%b])(?:=DC\()?)[-+]?\d*\.(\d*)" % rotary.encode()

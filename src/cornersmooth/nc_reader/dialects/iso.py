@@ -12,7 +12,7 @@ from cornersmooth.nc_reader.dialects.base import Dialect
 from cornersmooth.nc_reader.hole_cycles import HoleCycle, drill
 from cornersmooth.nc_reader.lexer import NUMBER, Lexer, fixed, number_of
 from cornersmooth.nc_reader.planes import TiltedPlane, room_of, rotated_frame, turned_frame
-from cornersmooth.nc_reader.word_list import word_list
+from cornersmooth.nc_reader.word_tables import word_table
 from cornersmooth.nc_reader.words import MOTION_CODES, NURBS, Columns, Line, Word
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ _NO_CYCLE = 80.0
 
 
 class Iso(Dialect):
-    """Words of one letter and a number; what differs between these controls is in `WordList.grammar`.
+    """Words of one letter and a number; what differs between these controls is in `[grammar]` of their tables.
 
     Parameters are those of `Dialect`.
     """
@@ -65,7 +65,7 @@ class Iso(Dialect):
 
     def __init__(self, control: str, rotary: str = "") -> None:
         super().__init__(control, rotary)
-        self.lexer = (_LinuxLexer if self.semicolon else _IsoLexer)(rotary, word_list(control).points)
+        self.lexer = (_LinuxLexer if self.semicolon else _IsoLexer)(rotary, frozenset(word_table(control)["points"]))
 
     def decimals(self, text: bytes) -> tuple[int, int | None]:
         """As `Dialect.decimals`: the angles of a tilted plane are no vectors, nor are the centres of arcs."""

@@ -1,24 +1,16 @@
 """The closed list of words of each control: what they are, what must hold before the tool moves, where they may stand.
 
-The lists are data, one TOML file for each control in `word_lists`, with the manual that they are from. Keys:
+They are data (`nc_reader.word_tables`), with the manual that they are from. Keys:
 
 ``begin``, ``end``
     Blocks, as regular expressions, that a program begins and ends with.
 ``header``
     What may stand before that: a mark of the transfer.
-``points``
-    Addresses whose numbers need their decimal point.
-``switches``
-    Whether tip control is switched by blocks that the machine's file names.
 ``orders``
     What a comment begins with that the control would obey.
-``spelling``
-    How the words are spelt: a class of `dialects`; ``"iso"`` unless it says otherwise.
-``[grammar]``
-    How the words are read: attributes of the control's class in `dialects`.
 ``[means]``
-    What words say beside the motion, as `statements` has it: the kind, then the word of the CL file. Words of spindle
-    and coolant need no ``[[word]]``: their rules follow. What is no value here the control has no word for. A third
+    Words of spindle and coolant need no ``[[word]]``: their rules follow.
+``[[word]]``: their rules follow. What is no value here the control has no word for. A third
     part says of what kind alone a word is the end (``M89 = "coolant OFF THRU"``). ``""``: not the word of a control
     that this one is like.
 ``[[word]]``
@@ -57,25 +49,16 @@ The lists are data, one TOML file for each control in `word_lists`, with the man
 from __future__ import annotations
 
 import re
-import tomllib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
-from importlib.resources import files
 from typing import Any, Final
 
+from cornersmooth.nc_reader.word_tables import word_table
 from cornersmooth.nc_reader.words import Word
-
-#: words, and kind and value of what each says beside the motion
-Means = Mapping[str, tuple[str, str]]
 
 #: values that end a state, or do not begin one
 _ENDS: Final = frozenset(("OFF", "ORIENT"))
-
-_LISTS: Final = files(__package__).joinpath("word_lists")
-
-#: controls whose texts are read
-CONTROLS: Final = tuple(sorted(item.name.removesuffix(".toml") for item in _LISTS.iterdir()))
 
 #: keys of a word that are regular expressions
 _PATTERNS: Final = frozenset(("is", "needs", "must", "after", "then", "behind", "down", "bars"))
@@ -131,12 +114,7 @@ class WordList:
     begin: tuple[re.Pattern[str], ...] = ()
     end: tuple[re.Pattern[str], ...] = ()
     header: re.Pattern[str] | None = None
-    points: frozenset[str] = frozenset()
-    switches: bool = False
-    spelling: str = "iso"
     orders: re.Pattern[str] | None = None
-    grammar: Mapping[str, Any] = field(default_factory=dict)
-    means: Means = field(default_factory=dict)
     #: what is the control's own comes first
     words: tuple[WordRule, ...] = ()
     blocks: tuple[WordRule, ...] = field(default=())
@@ -162,29 +140,17 @@ class WordList:
 @cache
 def word_list(control: str) -> WordList:
     """Words of a control."""
-    table = _table(control)
-    means = {word: text.split() for word, text in table.pop("means").items() if text}
-    words, blocks = (tuple(map(_rule, table.pop(key))) for key in ("word", "block"))
+    table = word_table(control)
+    words, blocks = (tuple(map(_rule, table[key])) for key in ("word", "block"))
+    means = {word: text.split() for word, text in table["means"].items() if text}
     return WordList(
-        **{key: _READ[key](value) for key, value in table.items()},
-        means={word: (parts[0], "".join(parts[1:2])) for word, parts in means.items()},
+        begin=tuple(map(re.compile, table["begin"])),
+        end=tuple(map(re.compile, table["end"])),
+        header=re.compile(table["header"]) if "header" in table else None,
+        orders=re.compile(table["orders"], re.IGNORECASE) if "orders" in table else None,
         words=(*_functions(means), *words),
         blocks=blocks,
     )
-
-
-def _table(control: str) -> dict[str, Any]:
-    """Table of a control, with what it takes over of the control that it is like."""
-    table = tomllib.loads(_LISTS.joinpath(f"{control}.toml").read_text(encoding="utf-8"))
-    if "like" in table:
-        base = _table(table.pop("like"))
-        table = {
-            **base,
-            **table,
-            "means": base["means"] | table.get("means", {}),
-            **{key: [*table.get(key, ()), *base[key]] for key in ("word", "block")},
-        }
-    return table
 
 
 def _functions(means: Mapping[str, Sequence[str]]) -> Iterator[WordRule]:
@@ -205,23 +171,6 @@ def _functions(means: Mapping[str, Sequence[str]]) -> Iterator[WordRule]:
                 tidy=parts[1] not in _ENDS,
                 bars=re.compile("|".join(others)) if others else None,
             )
-
-
-def _patterns(texts: list[str]) -> tuple[re.Pattern[str], ...]:
-    return tuple(map(re.compile, texts))
-
-
-#: how the values of the other keys are read
-_READ: Final[dict[str, Callable[[Any], Any]]] = {
-    "begin": _patterns,
-    "end": _patterns,
-    "header": re.compile,
-    "points": frozenset,
-    "switches": bool,
-    "spelling": str,
-    "orders": lambda text: re.compile(text, re.IGNORECASE),
-    "grammar": dict,
-}
 
 
 def _rule(entry: dict[str, Any]) -> WordRule:

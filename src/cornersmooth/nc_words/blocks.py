@@ -8,8 +8,8 @@ from typing import Final
 
 from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.nc_reader.lexer import Lexer
-from cornersmooth.nc_reader.word_list import WordList, WordRule, any_of, shown
 from cornersmooth.nc_reader.words import Line
+from cornersmooth.nc_words.rules import WordList, WordRule, any_of, shown
 
 #: words of a block, or the block as a whole, with their rules; None for what is not on the list, or not beside these
 Ruled = list[tuple[str, WordRule | None]]

@@ -11,11 +11,11 @@ import numpy as np
 
 from cornersmooth.errors import InputError
 from cornersmooth.nc_reader.lexer import Lexer
-from cornersmooth.nc_reader.machine_positions import MachinePositions
-from cornersmooth.nc_reader.word_list import WordList, WordRule, shown, word_list, word_text
-from cornersmooth.nc_reader.word_rules import NOT_LISTED, WordRules
 from cornersmooth.nc_reader.words import Line, Table
-from cornersmooth.verify.word_states import LINEAR, ROTARY, WordStates
+from cornersmooth.nc_words.blocks import NOT_LISTED, WordRules
+from cornersmooth.nc_words.machine_positions import MachinePositions
+from cornersmooth.nc_words.rules import WordList, WordRule, shown, word_list, word_text
+from cornersmooth.nc_words.states import LINEAR, ROTARY, WordStates
 
 #: words that bear on no motion: tool, spindle, stops, coolant (ISO 6983-1, M0 to M9 and M19)
 _BESIDE_MOTION: Final = re.compile(r"T\d+|S\d+(\.\d*)?|M(\d|19)|TOOL CALL \d+( Z)?( S\d+)?")

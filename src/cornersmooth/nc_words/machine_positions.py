@@ -8,8 +8,8 @@ from collections.abc import Iterator, Mapping, Sequence, Set
 from typing import TYPE_CHECKING, Final
 
 from cornersmooth.nc_reader.elements import Problem
-from cornersmooth.nc_reader.word_list import WordRule
 from cornersmooth.nc_reader.words import Line
+from cornersmooth.nc_words.rules import WordRule
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine
@@ -42,7 +42,7 @@ class MachinePositions:
     mm_per_unit : float
         Of the text.
     switches : bool
-        `WordList.switches`.
+        `Dialect.switches`.
     tcp : bool
         Whether words are those of the tip.
     """

@@ -1,6 +1,6 @@
 """States of the control as the words of a program set them, and what must hold where the tool moves, changes or stops.
 
-A word sets a state to a value; its rule (`nc_reader.word_list`) says when it must have been said, until when it may
+A word sets a state to a value; its rule (`rules`) says when it must have been said, until when it may
 hold, and at which places of the program it may be: after a retract, on the way down, under tool tip control.
 
 Posts have many ways to begin, to change tools and to end, and most of them are right. A program whose head says how it
@@ -18,10 +18,10 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.nc_reader.elements import Problem
-from cornersmooth.nc_reader.machine_positions import SAME, MachinePositions
 from cornersmooth.nc_reader.rotary import tool_vectors
-from cornersmooth.nc_reader.word_list import WordList, WordRule, any_of, shown
-from cornersmooth.nc_reader.word_rules import NOT_LISTED, Ruled
+from cornersmooth.nc_words.blocks import NOT_LISTED, Ruled
+from cornersmooth.nc_words.machine_positions import SAME, MachinePositions
+from cornersmooth.nc_words.rules import WordList, WordRule, any_of, shown
 
 #: a retract with the same tool, which only GOHOME of the CL file asks for
 GONE_ON: Final = "a retract that another motion of the same tool follows"
