@@ -7,12 +7,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numpy as np
 import pytest
 
 from cornersmooth.cl import read
 from cornersmooth.model import Program
-from cornersmooth.nc_reader import read_nc
 from cornersmooth.settings import Settings
 from cornersmooth.verify import Verification, verify
 from nc.cases import Case
@@ -629,17 +627,6 @@ def test_what_is_written_passes(name: str) -> None:
 @pytest.mark.parametrize("name", ["creeping", "axis alone"])
 def test_blocks_as_fast_as_f_can_say_are_right_in_a_plan_too(name: str) -> None:
     assert ALARMS[name].verified(ALARMS[name].text, slower=True).problems == ()
-
-
-def test_a_plan_may_let_the_tip_creep_within_its_digits() -> None:
-    """Its least feed is the lower one of both that the block may have been timed by, less their room."""
-    text = read_nc(CREEPING.text.encode(), control="fanuc", machine=CREEPING.case.choose().machine, tcp=False)
-    others = np.array([np.nan, 0.5, 40.0])
-    part = replace(text.part(0, 3), feed=np.full(3, 100.0), other_feed=others, feed_room=np.array([1.0, 1.0, 0.0]))
-    known = part.at_most()
-    assert known.least_feed.all()
-    np.testing.assert_allclose(known.feed, [99.0, 0.0, 40.0], atol=1e-300)
-    assert (known.feed > 0.0).all()
 
 
 def test_tip_that_turns_round_before_the_axis_point_is_not_going_back() -> None:

@@ -28,9 +28,6 @@ _MOVES = {Element.RAPID: Move.RAPID, Element.LINE: Move.LINEAR, Element.ARC: Mov
 #: parts of blocks add up to whole ones but for this
 _PART_OF_A_BLOCK = 1e-6
 
-#: mm/min: a feed below it of a block with the largest F of inverse time says only that the block is not at rest
-_SAYS_NOTHING = 1.0
-
 #: minutes: no block takes less
 _SHORTEST = 1e-9
 
@@ -156,7 +153,7 @@ def _said(nc: NcProgram) -> Floats:
 
     What is read for them is only a feed that they are not below.
     """
-    unsaid = nc.least_feed & (nc.feed < _SAYS_NOTHING)
+    unsaid = nc.least_feed & (nc.feed <= nc.feed_room)
     known = np.flatnonzero(~unsaid & (nc.feed > 0.0))
     if not unsaid.any() or not len(known):
         return nc.feed

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cornersmooth.kinematics import Machine, inverse_time, machine_position
+from cornersmooth.kinematics import Machine, inverse_time, machine_position, tool_axis
 from cornersmooth.methods import METHODS
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program, SmoothProgram
 from cornersmooth.nc.findings import Findings
@@ -252,7 +252,8 @@ def _rates(path: FilledPath, chunk: _Chunk, program: Program, settings: Settings
         return None
     own = chunk.move[path.pose]
     step = np.diff(path.tip, axis=0, prepend=path.tip[:1])
-    swing = step + settings.axis_scale * np.diff(path.axis, axis=0, prepend=path.axis[:1])
+    axis = tool_axis(machine_of(form), path.angles)  # near the pole not that of the row
+    swing = step + settings.axis_scale * np.diff(axis, axis=0, prepend=axis[:1])
     length = norm(step)
     digits = form.rounding(program.units)
     still = (length < digits) | ((length < settings.tolerance) & (norm(swing) > settings.tolerance))

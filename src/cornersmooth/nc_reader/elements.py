@@ -16,6 +16,9 @@ from cornersmooth.errors import message
 from cornersmooth.model import MM_PER_UNIT, Bools, Floats, Ints, Units
 from cornersmooth.nc_reader.word_tables import Means
 
+#: relative slack of arithmetic on feeds
+_ARITHMETIC: Final = 1e-9
+
 #: what the second triple of a motion block is: the tool vector, or a point on the tool axis
 Second = Literal["vector", "point"]
 
@@ -198,15 +201,17 @@ class Elements:
         return replace(self, **own, curves=curves, arcs=replace(self.arcs, element=last[self.arcs.element]))
 
     def at_most(self) -> Self:
-        """Return the same elements with feeds that those of the moves are not below.
+        """Return the same elements with feeds that a plan may have lowered: none per revolution, which cuts threads."""
+        return replace(self, least_feed=~self.per_revolution)
 
-        No plan lowers a feed per revolution: threads.
-        """
-        least = np.maximum(np.fmin(self.feed, self.other_feed) - self.feed_room, np.finfo(np.float64).tiny)
-        feed = np.where((self.feed > 0.0) & ~self.per_revolution, least, self.feed)
-        room = np.where(self.per_revolution, self.feed_room, 0.0)
-        other = np.where(self.per_revolution, self.other_feed, np.nan)
-        return replace(self, feed=feed, other_feed=other, feed_room=room, least_feed=~self.per_revolution)
+    def carry(self, element: Ints | int, feed: Floats | float, per_revolution: Bools | bool) -> Bools:
+        """Whether elements carry feeds in that unit, as far as the digits show."""
+        own, other = self.feed[element], self.other_feed[element]
+        room = self.feed_room[element] + _ARITHMETIC * np.maximum(np.abs(feed), 1.0)
+        near = (np.abs(own - feed) <= room) | (np.abs(other - feed) <= room)
+        near |= self.least_feed[element] & (own > 0.0) & (np.fmin(own, other) <= feed + room)
+        found: Bools = near & (self.per_revolution[element] == per_revolution)
+        return found
 
     @classmethod
     def joined(cls, parts: Sequence[Elements]) -> Elements:

@@ -34,14 +34,8 @@ _ORDER, _HALVINGS = 8, 6
 #: last digit of F where it is moves per minute
 _F_STEP = 1e-3
 
-#: a feed that is lower than any, mm/min, and yet is one
-_LEAST_FEED = 1e-9
-
 #: largest F of G93 on controls: a block with it may be slower than it should be
 _FASTEST = (9999.999, 999_999.999)
-
-#: ways of the tip shorter than so many steps of what is printed say little
-_SHORT_STEPS = 3.0
 
 #: an axis that turns faster (deg/min) may make a block slower than its feed where the text times it (G93)
 FAST_TURN = 30_000.0
@@ -263,30 +257,25 @@ class Rotary:
     def _timed(self, run: Elements, position: Floats, tip: Floats, vector: Floats, angles: Floats) -> Elements:
         """Blocks whose F is moves per minute, with their feeds (mm/min), and how far these are uncertain.
 
-        Where the tip stands still the axis point runs with the feed. Where the tip stays within ε either may: who wrote
-        the program may have had any tolerance up to ε, and at that the tip stood still or not.
+        In the time of a block the tip runs its way with the feed. Where the tip may have stayed within ε the axis point
+        may run its own way so: at some tolerance up to ε the tip stood still. Each number is off by half a digit.
         """
-        rate, levers = run.feed, self.levers(position)
-        step, turn_step = self.steps(float(levers.max(initial=0.0, where=~np.isnan(levers))))
+        rate, levers, turn_step = run.feed, self.levers(position), np.radians(self.angle_step)
         length = np.linalg.norm(np.diff(tip, axis=0), axis=1)
         swing = np.linalg.norm(np.diff(tip + self.axis_length * vector, axis=0), axis=1)
         turn = np.abs(np.diff(angles, axis=0)).max(axis=1)
-        short = length < _SHORT_STEPS * step
-        still = length < 0.5 * self.tip_step if self.tip_control else short
-        printed = 2 * step + self.axis_length * turn_step  # who timed the block knew its length before it was rounded
-        either = (length < self.tolerance + printed) & (swing > length) & ~(still & self.tip_control)
-        swings = still | ((length < self.tolerance) & (swing > self.tolerance))
+        off = np.sqrt(3) * self.tip_step + np.maximum(levers[1:], levers[:-1]) * turn_step
+        either = (length - off < self.tolerance) & (swing > length)
+        swings = either & ((length < off) | (swing > self.tolerance))
         way, other = np.where(swings, (swing, length), (length, swing))
-        pole = self.pole_room(vector)
-        off = np.where(still | either, printed, 2 * step)
-        off += np.where(still, self.axis_length * (pole[1:] + pole[:-1]), 0.0)
-        room = np.maximum(rate * off, _F_STEP * np.where(either, np.maximum(way, other), way))
-        room[(rate * turn > FAST_TURN) | (~still & short)] = np.inf
-        feed, other_feed = rate * way, np.where(either, rate * other, np.nan)
-        slowed = np.isin(rate, _FASTEST) & np.isfinite(room)
-        feed[slowed] = np.maximum(np.fmin(feed, other_feed) - room, _LEAST_FEED)[slowed]
-        room[slowed], other_feed[slowed] = 0.0, np.nan
-        return replace(run, feed=feed, other_feed=other_feed, feed_room=room, least_feed=slowed)
+        off += np.where(either, 2 * self.axis_length * turn_step, 0.0)  # both axes turn the axis point
+        return replace(
+            run,
+            feed=rate * way,
+            other_feed=np.where(either, rate * other, np.nan),
+            feed_room=rate * off + _F_STEP * np.where(either, swing, length),
+            least_feed=np.isin(rate, _FASTEST) | (rate * turn > FAST_TURN),
+        )
 
     def _curves(self, curves: Curves) -> Curves:
         """Curves in tip and tool vector."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from cornersmooth.model import Bools, FeedMode, Ints, Program
-from cornersmooth.nc_reader.elements import Element, Elements, Problem
+from cornersmooth.model import Bools, FeedMode, Ints
+from cornersmooth.nc_reader.elements import Element, Problem
 from cornersmooth.verify.findings import Findings, Runs
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.nearest import COLUMNS, on_segments
@@ -14,44 +14,37 @@ from cornersmooth.verify.task import ARITHMETIC
 #: segments on either side of a vertex that are looked at first (speed only)
 _FEW = 64
 
-#: elements that are looked at one by one in a run of wrong ones; none of those behind them is better
+#: wrong elements in a row that are looked at one by one; the rest of them goes with these
 _MOST_SINGLE = 50
 
 
 def check_feeds(match: Match, found: Findings) -> None:
     """Every element must carry the feed of its move: CS541 a wrong feed, CS542 none, CS543 the wrong feed mode."""
-    nc, original = match.nc, match.original
-    program, last = original.program, match.motion.last
-    start, end, feeding = last[:-1], last[1:], match.feeding
+    nc, feeding = match.nc, match.feeding
     element = np.flatnonzero(feeding) + match.first + 1
     if not len(element):
         return
-    start, end = start[feeding], end[feeding]
+    start, end = match.motion.last[:-1][feeding], match.motion.last[1:][feeding]
     low, high = _touched(match, start, end)
-    rapid = nc.kind[element] == Element.RAPID
-
     # a planned feed of what does not move the tool, as a table that turns about it, tells nothing but a time
     still = nc.least_feed[element] & (np.linalg.norm(match.six[end] - match.six[start], axis=1) <= ARITHMETIC)
     still &= end == start + 1  # a full circle has more vertices
-    good = _fits(match, element, low) | rapid | still
-    other = np.flatnonzero(~good)
-    if len(other):
-        good[other] = _fits(match, element[other], high[other])
-        several = np.flatnonzero(~good & (high > low + 1))
-        for k in several.tolist():
-            good[k] = _fits(match, int(element[k]), np.arange(low[k], high[k] + 1)).any()
-    wrong = np.flatnonzero(~good)
-    follows = np.diff(wrong, prepend=-2) == 1
+    good = still | (nc.kind[element] == Element.RAPID)
+    for move in (low, high):
+        rows = np.flatnonzero(~good)
+        good[rows] = _fits(match, element[rows], move[rows])
     in_a_row = 0
-    for k, joined in zip(wrong.tolist(), follows.tolist(), strict=True):
-        in_a_row = in_a_row + 1 if joined and not good[k - 1] else 0
-        if in_a_row >= _MOST_SINGLE:
-            continue
-        good[k] = _joined(match, int(element[k]), _beside(match, int(start[k])), _beside(match, int(end[k])))
+    for k in np.flatnonzero(~good).tolist():
+        in_a_row = in_a_row + 1 if k and not good[k - 1] else 0
+        if in_a_row < _MOST_SINGLE:
+            own = int(element[k])
+            good[k] = _fits(match, own, np.arange(low[k], high[k] + 1)).any() or _joined(
+                match, own, _beside(match, int(start[k])), _beside(match, int(end[k]))
+            )
     wrong = np.flatnonzero(~good)
     if len(wrong):
-        runs = np.split(wrong, np.flatnonzero(np.diff(wrong) > 1) + 1)
-        problems = [_problem(program, nc, original.pose, element, low, int(run[0])) for run in runs]
+        first = wrong[np.diff(wrong, prepend=-2) > 1]
+        problems = [_problem(match, int(element[k]), int(low[k])) for k in first.tolist()]
         found.feeds = Runs(problems, begins=not good[0], ends=not good[-1])
 
 
@@ -73,11 +66,7 @@ def _fits(match: Match, element: Ints | int, move: Ints) -> Bools:
     """Whether elements carry the feeds of moves, in their unit."""
     nc, program, pose = match.nc, match.original.program, match.original.pose[move]
     asked, mode = program.feed[pose], program.feed_mode[pose] == FeedMode.PER_REVOLUTION
-    feed, slack = nc.feed[element], ARITHMETIC * np.maximum(np.abs(asked), 1.0)
-    room = nc.feed_room[element] + slack
-    near = (np.abs(feed - asked) <= room) | (np.abs(nc.other_feed[element] - asked) <= room)
-    near |= nc.least_feed[element] & (feed > 0.0) & (feed <= asked + slack)
-    return np.isnan(asked) | (near & (nc.per_revolution[element] == mode))
+    return np.isnan(asked) | nc.carry(element, asked, mode)
 
 
 def _beside(match: Match, vertex: int) -> Ints:
@@ -85,12 +74,11 @@ def _beside(match: Match, vertex: int) -> Ints:
     low, here, high = int(match.low[vertex]), int(match.segment[vertex]), int(match.high[vertex])
     size = _FEW
     while True:
-        first, stop = max(here - size, low), min(here + size, high) + 1
-        segments = np.arange(first, stop)
+        segments = np.arange(max(here - size, low), min(here + size, high) + 1)
         _, square = on_segments(match.six[vertex, None, None, :3], match.path.points, segments[None], COLUMNS["tip"])
-        off = np.flatnonzero(square[0] > match.task.radius**2) + first
-        begin, end = off[off < here].max(initial=first - 1) + 1, off[off > here].min(initial=stop)
-        if (begin > first or first == low) and (end < stop or stop == high + 1):
+        off = segments[square[0] > match.task.radius**2]
+        begin, end = off[off < here].max(initial=low - 1) + 1, off[off > here].min(initial=high + 1)
+        if segments[0] <= max(begin - 1, low) and min(end, high) <= segments[-1]:
             owner: Ints = match.original.trail.owner[begin + 1 : end + 1]
             return owner
         size *= 4
@@ -105,19 +93,15 @@ def _joined(match: Match, element: int, first: Ints, last: Ints) -> bool:
     return not one.isdisjoint(other)
 
 
-def _problem(program: Program, nc: Elements, pose: Ints, element: Ints, low: Ints, k: int) -> Problem:
-    own, move = int(element[k]), int(pose[low[k]])
-    cl_line, nc_line = int(program.line[move]), int(nc.line[own])
-    unit = "rev" if program.feed_mode[move] == FeedMode.PER_REVOLUTION else "min"
-    said = "rev" if nc.per_revolution[own] else "min"
-    if np.isnan(nc.feed[own]):
-        return Problem(
-            "CS542",
-            cl_line,
-            nc_line,
-            "a feed move before any F, or at inverse time (G93) from a place that is not known",
-        )
-    if unit != said:
-        return Problem("CS543", cl_line, nc_line, f"the feed is per {said}, the CL file says per {unit}")
-    text = f"the feed is {nc.feed[own]:g} mm/{said}, the CL file says {program.feed[move]:g}"
-    return Problem("CS541", cl_line, nc_line, text)
+def _problem(match: Match, element: int, move: int) -> Problem:
+    nc, program, pose = match.nc, match.original.program, int(match.original.pose[move])
+    unit = "rev" if program.feed_mode[pose] == FeedMode.PER_REVOLUTION else "min"
+    said = "rev" if nc.per_revolution[element] else "min"
+    if np.isnan(nc.feed[element]):
+        what = "CS542", "a feed move before any F, or at inverse time (G93) from a place that is not known"
+    elif unit != said:
+        what = "CS543", f"the feed is per {said}, the CL file says per {unit}"
+    else:
+        what = "CS541", f"the feed is {nc.feed[element]:g} mm/{said}, the CL file says {program.feed[pose]:g}"
+    code, text = what
+    return Problem(code, int(program.line[pose]), int(nc.line[element]), text)

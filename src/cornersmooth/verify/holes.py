@@ -111,17 +111,12 @@ class HoleLines:
         if not feeds:
             return False
         nc, own = self.ahead.nc, feeds[0] - self.ahead.base
-        return bool(nc.per_revolution[own] and abs(nc.feed[own] - cycle.feed) <= 2 * nc.feed_room[own])
+        return bool(nc.per_revolution[own] and nc.carry(own, cycle.feed, True))
 
     def wrong_feed(self, element: int, cycle: Drilling) -> bool:
         """Whether the feed of an element is not that of a cycle."""
-        nc, own = self.ahead.nc, element - self.ahead.base
-        if math.isnan(cycle.feed):
-            return False
-        off = nc.feed[own] - cycle.feed
-        least = nc.least_feed[own]  # of a plan, which may lower it
-        fits = off <= ARITHMETIC if least else abs(off) <= 2 * nc.feed_room[own]
-        return bool(not fits or nc.per_revolution[own] != cycle.per_revolution)
+        own = element - self.ahead.base
+        return not (math.isnan(cycle.feed) or self.ahead.nc.carry(own, cycle.feed, cycle.per_revolution))
 
     def fed_above(self, move: int, element: int, cycle: Drilling) -> bool:
         """Whether a feed move ends above a hole, where no cycle feeds."""
