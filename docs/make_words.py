@@ -44,7 +44,7 @@ def roles(entry: dict[str, Any], kind: str) -> str:
             said.append(text.format(shown(entry[key])))
     if "share" in entry:
         said.append(f"at most {entry['share']:g} ε")
-    if entry.get("varies"):
+    if entry.get("needs") and entry.get("follows"):
         said.append("may change from line to line")
     if entry.get("before"):
         said.append("before an arc")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Set
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import replace
 from typing import Final
 
@@ -12,7 +12,7 @@ import numpy as np
 from cornersmooth.errors import InputError
 from cornersmooth.nc_reader.lexer import Lexer
 from cornersmooth.nc_reader.words import Line, Table
-from cornersmooth.nc_words.blocks import NOT_LISTED, WordRules
+from cornersmooth.nc_words.blocks import Ruled, WordRules
 from cornersmooth.nc_words.machine_positions import MachinePositions
 from cornersmooth.nc_words.rules import WordList, WordRule, shown, word_list, word_text
 from cornersmooth.nc_words.states import LINEAR, ROTARY, WordStates
@@ -59,14 +59,14 @@ class WordCheck:
         self._own = [pattern for block in trusted if (pattern := self._pattern(block)) is not None]
         self._states = WordStates(self.list, self._positions, trusted | {self._text(block) for block in trusted})
         self._left, self._accepted = trusted, accepted
-        self.problems = self._states.problems
+        self.problems, self._wrong = self._states.problems, self._states.wrong
         #: blocks taken on trust, line and text, and those of them that may bear on the motion
         self.trusted, self.unsure = self._states.trusted, self._states.unsure
-        self._blocks = self._begun = self._line = 0
+        self._line = 0  # of the last block
+        self._wanted = self.list.begin  # blocks of the begin that are still to come
         self._opening = ""
         self._tail: list[tuple[int, str]] = []
-        self._before = ""  # the block before, and what it wants next, with its line
-        self._then: tuple[WordRule, int] | None = None
+        self._before: tuple[int, str, Ruled] = 0, "", []
         self._code = -1.0
         self._weights = None if weights is None else tuple(weights)
 
@@ -101,24 +101,21 @@ class WordCheck:
 
     def _table(self, table: Table) -> None:
         """Look at a run of motion blocks: its words are those of motion, and no others."""
-        states, number = self._states, int(table.line[0])
-        self._starts(number, "")
-        self._blocks += len(table)
+        self._frames(int(table.line[0]), "")
         self._line = int(table.line[-1])
-        self._next_block("")
+        self._follow(self._line, "", [])
         self._check_weights(table)
-        states.turn(number, table.row(0).keys())
         self._positions.leave(table.columns.keys())
-        linear = ~np.all([np.isnan(table.column(name)) for name in sorted(LINEAR)], axis=0)
-        if states.attentive and linear.any():
-            row, down = int(np.argmax(linear)), ~np.isnan(table.column("Z"))
-            rows = [row, row + int(np.argmax(down[row:]))] if states.above and down[row:].any() else [row]
-            for row in dict.fromkeys(rows):
-                states.angles |= table.last_before(row, ROTARY)
-                code = table.last_before(row + 1, "G").get("G", self._code)
-                states.motion(int(table.line[row]), table.row(row), code)
-        self._code = table.last_before(len(table), "G").get("G", self._code)
-        states.angles |= table.last_before(len(table), ROTARY)
+        rows = [len(table)]
+        if self._states.attentive:
+            linear = ~np.all([np.isnan(table.column(name)) for name in sorted(LINEAR)], axis=0)
+            first, down = int(np.argmax(linear)), ~np.isnan(table.column("Z"))
+            rows = sorted({0, first, first + int(np.argmax(down[first:])), len(table)})
+        for row in rows:
+            self._states.angles |= table.last_before(row, ROTARY)
+            self._code = table.last_before(row + 1, "G").get("G", self._code)
+            if row < len(table):
+                self._move(int(table.line[row]), table.row(row))
 
     def _check_weights(self, table: Table) -> None:
         """Complain of weights that no curve of the program has; R of an arc is its radius."""
@@ -129,43 +126,41 @@ class WordCheck:
             for weight in weights or ():
                 off &= np.abs(column - weight) > _WEIGHT_ROOM
             for row in np.flatnonzero(off)[:_MOST_WEIGHTS].tolist():
-                text = f"a weight of {column[row]:g}, which no curve of this program has"
-                self._states.wrong(NOT_LISTED, int(table.line[row]), text)
+                self._wrong(int(table.line[row]), f"a weight of {column[row]:g}, which no curve of this program has")
 
     def _block(self, line: Line) -> Line:
         """Look at a line on its own; of one that is taken on trust only what is understood goes on to the reader."""
+        number = line.number
         for comment in line.comments:
             self._states.comment(comment)
             if self.list.orders is not None and self.list.orders.match(comment):
-                self._states.wrong(NOT_LISTED, line.number, f"a comment that the control obeys: {comment[:40]}")
+                self._wrong(number, f"a comment that the control obeys: {comment[:40]}")
             if _CONTROL_CHARACTERS.search(comment):
-                self._states.wrong(NOT_LISTED, line.number, "a comment with a character that ends a block or is none")
+                self._wrong(number, "a comment with a character that ends a block or is none")
         words = [word_text(word) for word in line.words] or ["%"] * line.tape
         text = " ".join(words)
         own = bool(words) and any(pattern.fullmatch(text) for pattern in self._own)
         if line.skipped and not own:
-            self._states.wrong(NOT_LISTED, line.number, "block skip: what the control does depends on a switch")
+            self._wrong(number, "block skip: what the control does depends on a switch")
         if not words:
             return line
-        self._line = line.number
-        before = len(self.problems)
-        ruled = self._rules.of(words)
-        if not self._starts(line.number, text):
-            follows = self._next_block(text)
+        before, ruled = len(self.problems), self._rules.of(words)
+        if not self._frames(number, text):
+            self._follow(number, text, ruled)
             self.problems += self._rules.problems(line, words, ruled)
-            for word, rule in ruled:
-                if rule is not None and rule.behind is not None and not rule.behind.fullmatch(follows):
-                    self._states.wrong(NOT_LISTED, line.number, f"{word} does not follow what it belongs to")
-                if rule is not None and rule.then is not None:
-                    self._then = rule, line.number
-            self._states.take(line.number, words, ruled)
+            self._states.take(number, words, ruled)
+        self._line = number
         if own:
             line = self._on_trust(line, text, before)
+            ruled = self._rules.of([word_text(word) for word in line.words])
         elif self._positions.rules:
-            retract = any(rule.retract and rule.pattern.fullmatch(text) for rule in self.list.blocks)
+            retract = any(rule is not None and rule.retract and rule in self.list.blocks for _, rule in ruled)
             self.problems += self._positions.take(line, text, retract=retract)
-        self._blocks += 1
-        self._move(line)
+        rules = [rule for _, rule in ruled if rule is not None]
+        codes = [word.value for word in line.words if word.name == "G" and word.value in (0.0, 1.0, 2.0, 3.0)]
+        self._code = codes[-1] if codes else self._code
+        apart = any(rule.alone for rule in rules) or (len(ruled) == 1 and len(line.words) > 1)
+        self._move(number, {word.name: word.value for word in line.words}, rules, apart=apart)
         return line
 
     def _on_trust(self, line: Line, text: str, before: int) -> Line:
@@ -193,52 +188,45 @@ class WordCheck:
         ]
         return replace(line, words=tuple(kept))
 
-    def _move(self, line: Line) -> None:
-        """Look at the motion of a block on its own."""
-        given = {word.name: word.value for word in line.words}
-        self._states.turn(line.number, given.keys())
-        self._states.angles |= {name: given[name] for name in ROTARY & given.keys()}
-        codes = [word.value for word in line.words if word.name == "G" and word.value in (0.0, 1.0, 2.0, 3.0)]
-        self._code = codes[-1] if codes else self._code
-        ruled = self._rules.of([word_text(word) for word in line.words])
-        rules = [rule for _, rule in ruled if rule is not None]
+    def _move(
+        self, line: int, given: Mapping[str, float], rules: Sequence[WordRule] = (), *, apart: bool = False
+    ) -> None:
+        """Look at where the words of a block send the axes; `apart`: they are not those of a motion of the tool."""
+        self._states.turn(line, given)
         moves, drills = any(rule.moves for rule in rules), any(rule.cycle for rule in rules)
-        apart = any(rule.alone for rule in rules) or (len(ruled) == 1 and len(line.words) > 1)
         if moves or (not apart and LINEAR & given.keys()):
-            self._states.motion(line.number, given, 1.0 if moves else self._code, moves=moves, drills=drills)
+            self._states.motion(line, given, 1.0 if moves else self._code, moves=moves, drills=drills)
 
-    def _next_block(self, text: str) -> str:
-        """Look at whether the block before wanted this one; return it."""
-        if self._then is not None:
-            rule, line = self._then
-            if rule.then is not None and not rule.then.fullmatch(text):
-                self._states.wrong(NOT_LISTED, line, f"{shown(rule.pattern)} without {shown(rule.then)} after it")
-            self._then = None
-        before, self._before = self._before, text
-        return before
+    def _follow(self, line: int, text: str, ruled: Ruled) -> None:
+        """Look at what a block and that before want of each other."""
+        number, before, theirs = self._before
+        for _, rule in theirs:
+            if rule is not None and rule.then is not None and not rule.then.fullmatch(text):
+                self._wrong(number, f"{shown(rule.pattern)} without {shown(rule.then)} after it")
+        for word, rule in ruled:
+            if rule is not None and rule.behind is not None and not rule.behind.fullmatch(before):
+                self._wrong(line, f"{word} does not follow what it belongs to")
+        self._before = line, text, ruled
 
     # how the program begins and ends
 
-    def _starts(self, number: int, text: str) -> bool:
+    def _frames(self, number: int, text: str) -> bool:
         """Whether a block is one that begins or ends the program, where it belongs."""
-        if self._blocks == 0 and self.list.header is not None and self.list.header.fullmatch(text):
+        if not self._line and self.list.header is not None and self.list.header.fullmatch(text):
             return True
-        if self._begun < len(self.list.begin):
-            wanted = self.list.begin[self._begun :]
+        if wanted := self._wanted:
             place = next((k for k, pattern in enumerate(wanted) if pattern.fullmatch(text)), None)
             if place != 0:
-                self._states.unframed(NOT_LISTED, number, f"the program must begin with {shown(wanted[0])}")
-            if place is None:
-                self._begun = len(self.list.begin)
-            else:
+                self._states.unframed(number, f"the program must begin with {shown(wanted[0])}")
+            self._wanted = () if place is None else wanted[place + 1 :]
+            if place is not None:
                 self._opening = self._opening or text
-                self._begun += place + 1
                 return True
         if any(pattern.fullmatch(text) for pattern in self.list.end):
             self._tail.append((number, text))
             return True
         for line, ending in self._tail:
-            self._states.unframed(NOT_LISTED, line, f"{ending} ends the program, and more follows")
+            self._states.unframed(line, f"{ending} ends the program, and more follows")
         self._tail = []
         return False
 
@@ -247,7 +235,7 @@ class WordCheck:
         first = self._tail[0][0] if self._tail else self._line
         ends, texts = self.list.end, [text for _, text in self._tail]
         if len(texts) != len(ends) or not all(map(re.Pattern.fullmatch, ends, texts)):
-            self._states.unframed(NOT_LISTED, first, f"the program must end with {', '.join(map(shown, ends))}, once")
+            self._states.unframed(first, f"the program must end with {', '.join(map(shown, ends))}, once")
         elif self._opening.partition(" ")[2] != texts[-1].partition(" ")[2]:
-            self._states.unframed(NOT_LISTED, self._tail[-1][0], f"{texts[-1]} ends what {self._opening} began")
+            self._states.unframed(self._tail[-1][0], f"{texts[-1]} ends what {self._opening} began")
         self._states.end(first)

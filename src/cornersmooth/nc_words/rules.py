@@ -82,7 +82,6 @@ class WordRule:
     then: re.Pattern[str] | None = None
     behind: re.Pattern[str] | None = None
     share: float | None = None
-    varies: bool = False
     never: bool = False
     high: bool = False
     retract: bool = False
@@ -120,18 +119,10 @@ class WordList:
     blocks: tuple[WordRule, ...] = field(default=())
 
     @cached_property
-    def effective(self) -> tuple[WordRule, ...]:
-        """Words without those that another rule before them is for, too."""
-        chosen: dict[tuple[str, re.Pattern[str] | None], WordRule] = {}
-        for rule in self.words:
-            chosen.setdefault((rule.pattern.pattern, rule.needs), rule)
-        return tuple(chosen.values())
-
-    @cached_property
     def heads(self) -> dict[str, list[WordRule]]:
         """Words of which one must come before the first motion, by state."""
         found: dict[str, list[WordRule]] = {}
-        for rule in self.effective:
+        for rule in self.words:
             if rule.first == "motion":
                 found.setdefault(rule.state, []).append(rule)
         return found
@@ -141,15 +132,17 @@ class WordList:
 def word_list(control: str) -> WordList:
     """Words of a control."""
     table = word_table(control)
-    words, blocks = (tuple(map(_rule, table[key])) for key in ("word", "block"))
     means = {word: text.split() for word, text in table["means"].items() if text}
+    words: dict[tuple[str, re.Pattern[str] | None], WordRule] = {}
+    for rule in (*_functions(means), *map(_rule, table["word"])):
+        words.setdefault((rule.pattern.pattern, rule.needs), rule)
     return WordList(
         begin=tuple(map(re.compile, table["begin"])),
         end=tuple(map(re.compile, table["end"])),
         header=re.compile(table["header"]) if "header" in table else None,
         orders=re.compile(table["orders"], re.IGNORECASE) if "orders" in table else None,
-        words=(*_functions(means), *words),
-        blocks=blocks,
+        words=tuple(words.values()),
+        blocks=tuple(map(_rule, table["block"])),
     )
 
 

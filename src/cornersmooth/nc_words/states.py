@@ -1,7 +1,7 @@
 """States of the control as the words of a program set them, and what must hold where the tool moves, changes or stops.
 
-A word sets a state to a value; its rule (`rules`) says when it must have been said, until when it may
-hold, and at which places of the program it may be: after a retract, on the way down, under tool tip control.
+A word sets a state to a value; its rule (`rules`) says when it must have been said, until when it may hold, and at
+which places of the program it may be: after a retract, on the way down, under tool tip control.
 
 Posts have many ways to begin, to change tools and to end, and most of them are right. A program whose head says how it
 was made goes the way of the control's table: what is missing there has been lost since (`WordStates._lost_since`).
@@ -35,26 +35,20 @@ FRAME: Final = "program frame"
 #: states that are spoken of by name; planes are those to which the control turns the rotary axes
 _OFFSET: Final = "work offset"
 _LENGTH: Final = "tool length"
-_PLANES: Final = ("tilted plane", "swivelled plane")
+_PLANES: Final = frozenset(("tilted plane", "swivelled plane"))
 _DYNAMIC: Final = "dynamic work offset"
 
-#: blocks that stop the program
+#: blocks that stop the program, and words of the spindle
 _STOPS: Final = ("M0", "M1", "STOP")
-
 _SPINDLE: Final = re.compile(r"M[345]")
 
-#: comments that say how a program was made, and the work offset and the machine in them
+#: comments that say how a program was made, and the words in them
 _MADE: Final = re.compile(r"CORNERSMOOTH \S+: \w+=", re.IGNORECASE)
-_MADE_FOR: Final = re.compile(r"\bOFFSET=([\w.]+)", re.IGNORECASE)
-_MACHINE: Final = re.compile(r"\bMACHINE=", re.IGNORECASE)
+_MADE_WORDS: Final = re.compile(r"\b(\w+)=([\w.]*)")
 
-#: words of axes: linear ones; those of a place; rotary ones; those beside which Z may not come down from a retract
+#: words of axes: linear and rotary ones; a tool vector; a second point on the axis, which tells nothing high up
 LINEAR: Final = frozenset("XYZ")
-_PLACE: Final = frozenset("XY")
 ROTARY: Final = frozenset("ABC")
-_ASIDE: Final = _PLACE | ROTARY
-
-#: words of a tool vector, and of a second point on the axis, with which nothing can be said of a place high up
 _VECTOR: Final = frozenset("IJK")
 _POINT: Final = frozenset(("U", "V", "W", "XH", "YH", "ZH"))
 
@@ -89,17 +83,16 @@ class WordStates:
         #: what is taken on trust, line and text, and what of it may bear on the motion
         self.trusted: list[tuple[int, str]] = []
         self.unsure: list[tuple[int, str]] = []
-        self._retracts = any(rule.high for rule in listed.effective)
+        self._retracts = any(rule.high for rule in listed.words)
         self._late = {rule.state for rule in listed.words if rule.late}
         self._approach = {rule.state for rule in listed.words if rule.off} | {_OFFSET, "cutting edge"}
+        self._made: dict[str, str] = {}  # what the head of a program of our own says
         self._said: set[str] = set()  # words so far; those that must come again before each of their kind, since then
         self._held: dict[str, _Held] = {}
-        self._first: dict[str, str] | None = None  # states at the first motion
-        self._deferred: set[str] = set()  # of them those that are said later
+        self._first: dict[str, str] | None = None  # states at the first motion; "" for those that may come later
         self._forgotten: dict[str, str] = {}  # states that a word has made the control forget, and that word
-        self._halted: dict[str, str] = {}  # states that a stop has ended, and the stop
         self._complained: set[tuple[str, int]] = set()
-        self._changed = True
+        self._by_tool: list[Problem] | None = []  # what is wrong unless the program has cycles; None where it has
         #: where the rotary axes have been sent, as far as that is said, and whether the control has turned them since
         self.angles: dict[str, float] = {}
         self._swivelled = False
@@ -108,71 +101,64 @@ class WordStates:
         self._high = False  # the tool has not moved since a retract
         self.above = False  # Z has not
         self._over = False  # the tool has been sent over its place since, without tip control
+        self._unsaid_at_retract: list[str] | None = None  # what was missing before the first retract
+        # since the last motion:
+        self._changed = True  # words have been said
         self._arc: tuple[str, int] | None = None  # a word that is for an arc, and its line
-        self._started = False  # the spindle has been started since the tool last moved
-        self._stopped: tuple[str, int] | None = None  # the tool change that has stopped it since, and its line
-        self._by_tool: list[Problem] | None = []  # what is wrong unless the program has cycles; None where it has
-        # of a program of our own: whether it is one, what its head names, what was missing before the first retract
-        self._ours, self._machine, self._made_for = False, False, ""
-        self._unsaid_at_retract: list[str] | None = None
+        self._started = False  # the spindle has been started
+        self._stopped: tuple[str, int] | None = None  # the tool change that has stopped it, and its line
+        self._halted: dict[str, str] = {}  # states that a stop has ended, and the stop
 
     # complaints
 
-    def wrong(self, code: str, line: int, text: str) -> None:
+    def wrong(self, line: int, text: str, code: str = NOT_LISTED) -> None:
         """Complain of a word or a state."""
         self.problems.append(Problem(code, 0, line, text))
 
-    def unframed(self, code: str, line: int, text: str) -> None:
+    def unframed(self, line: int, text: str, code: str = NOT_LISTED) -> None:
         """Complain of the blocks around the motion; where they are the user's own, they are taken on trust."""
         if FRAME in self._left:
             self.trusted.append((line, text))
             self.unsure.append((line, text))
         else:
-            self.wrong(code, line, text)
+            self.wrong(line, text, code)
 
-    def _lost_since(self, line: int, texts: Iterable[str], *, retracts: bool = True) -> None:
-        """Complain of what a program of our own has; `retracts`: where the control retracts the tool."""
-        if self._ours and (self._retracts or not retracts):
-            for text in texts:
-                self.unframed(NOT_LISTED, line, text)
+    def _lost_since(self, line: int, texts: Iterable[str]) -> None:
+        """Complain of what a program of our own has."""
+        for text in texts if self._made else ():
+            self.unframed(line, text)
 
     # what holds
 
-    def _in_force(self, state: str) -> _Held | None:
-        return None if state in self._forgotten else self._held.get(state)
-
     @property
-    def _all_in_force(self) -> list[_Held]:
+    def _in_force(self) -> list[_Held]:
         return [held for state, held in self._held.items() if state not in self._forgotten]
 
     @property
     def _tip_control(self) -> str:
         """Word of tool tip control that holds, if any."""
-        return next((held.text for held in self._all_in_force if held.rule.ends), "")
+        return next((held.text for held in self._in_force if held.rule.ends), "")
 
     def _running(self) -> list[str]:
         """Words that are switched off after the last motion of a tool."""
-        return [
-            held.text for held in self._all_in_force if held.rule.tidy and not {held.rule.state, held.text} & self._left
-        ]
+        on = [held for held in self._in_force if held.rule.tidy]
+        return [held.text for held in on if not {held.rule.state, held.text} & self._left]
 
     @property
     def attentive(self) -> bool:
         """Whether the next motion must be looked at."""
-        return bool(self._changed or self._high or self._retract or self._arc or self.above)
+        return self._changed or self.above
 
     # words
 
     def comment(self, text: str) -> None:
         """Take note of how the program was made, if a comment says so."""
         if self._first is None and _MADE.match(text):
-            self._ours = True
-            self._machine |= _MACHINE.search(text) is not None
-            offset = _MADE_FOR.search(text)
-            self._made_for = self._made_for or (offset[1] if offset else "")
+            self._made = dict(_MADE_WORDS.findall(text.upper())) | self._made
 
     def take(self, line: int, words: Sequence[str], ruled: Ruled) -> None:
         """Take over what a block says, and complain of what is not in its place."""
+        self._changed = True
         self._said |= set(words)
         known = [(word, rule) for word, rule in ruled if rule is not None]
         for word, rule in known:
@@ -180,22 +166,21 @@ class WordStates:
         for word, rule in known:
             self._set(line, word, rule, known)
         if any(rule.changes_tool for _, rule in known):
-            block = " ".join(words)
-            self._lost_since(line, [f"{block} under {word}" for word in self._running()], retracts=False)
+            self._lost_since(line, [f"{' '.join(words)} under {word}" for word in self._running()])
 
     def _place(self, line: int, word: str, rule: WordRule) -> None:
         """Complain of a word that is not in its place, as things are before its block."""
         if rule.after is not None:
             before = {said for said in self._said if rule.after.fullmatch(said)}
             if not before:
-                self.wrong(NOT_LISTED, line, f"{word} without {shown(rule.after)} before it")
+                self.wrong(line, f"{word} without {shown(rule.after)} before it")
             self._said -= before
         if rule.cycle:
             self._by_tool = None
         if rule.rotary == "zero" and (not self.angles or self._positions.away(self.angles)):
-            self.unframed(NOT_LISTED, line, f"{word} without the rotary axes at zero before it")
+            self.unframed(line, f"{word} without the rotary axes at zero before it")
         if rule.high and not self._high:
-            self.unframed(NOT_LISTED, line, f"{word} without a retract before it")
+            self.unframed(line, f"{word} without a retract before it")
         if rule.turns:
             self.angles, self._swivelled = {}, True
         if rule.retract:
@@ -204,31 +189,27 @@ class WordStates:
             self._retract, self._high, self.above, self._over = line, True, True, False
         if rule.changes_tool or word.startswith("TOOL CALL "):
             self._retract = 0
-        if rule.changes_tool:
-            if self._tip_control:
-                self.unframed(NOT_LISTED, line, f"{word} under {self._tip_control}")
-            if self._started:
-                self._started, self._stopped = False, (word, line)
+        if tip := self._tip_control:
+            if rule.changes_tool:
+                self.unframed(line, f"{word} under {tip}")
+            elif rule.outside:
+                self.wrong(line, f"{word} under {tip}")
+        if rule.changes_tool and self._started:
+            self._started, self._stopped = False, (word, line)
         if _SPINDLE.fullmatch(word):
             self._started, self._stopped = word != "M5", None
-        if rule.outside and self._tip_control:
-            self.wrong(NOT_LISTED, line, f"{word} under {self._tip_control}")
 
     def _set(self, line: int, word: str, rule: WordRule, known: Sequence[tuple[str, WordRule]]) -> None:
         """Take over the state that a word sets, and complain of what a program of our own says around it."""
         if rule.drops in self._held:
             self._forgotten[rule.drops] = word
         if word in _STOPS:  # ends spindle and coolant on most machines
-            rules = [(state, held.rule) for state, held in self._held.items()]
-            self._halted = {state: word for state, rule in rules if rule.tidy and rule.compared}
+            ended = [state for state, held in self._held.items() if held.rule.tidy and held.rule.compared]
+            self._halted = dict.fromkeys(ended, word)
         if rule.state:
-            beside = [
-                other
-                for other, theirs in known
-                if theirs.needs and theirs.needs.fullmatch(word) and not (theirs.compared or theirs.varies)
-            ]
-            self._held[rule.state] = _Held(" ".join([word, *beside]), rule, line)
-            self._changed = True
+            beside = [(other, its) for other, its in known if its.needs and its.needs.fullmatch(word)]
+            more = [other for other, its in beside if not (its.compared or its.follows)]
+            self._held[rule.state] = _Held(" ".join([word, *more]), rule, line)
             self._forgotten.pop(rule.state, None)
             self._halted.pop(rule.state, None)
             if not rule.off:
@@ -238,29 +219,29 @@ class WordStates:
             if rule.before and self._first is not None and word != self._first.get(rule.state):
                 self._arc = word, line
         if rule.bars is not None:
-            on = [held for held in self._all_in_force if rule.bars.fullmatch(held.rule.state)]
-            texts = [f"{word} under {held.text}" for held in on if held.rule.tidy or held.rule.ends]
-            self._lost_since(line, texts, retracts=False)
+            on = [held for held in self._in_force if rule.bars.fullmatch(held.rule.state)]
+            self._lost_since(line, [f"{word} under {held.text}" for held in on if held.rule.tidy or held.rule.ends])
         if rule.rotary == "zero" or (rule.rotary and self._high):  # elsewhere they are where the last motion left them
             self._tip_on = rule, dict(self.angles)
-        if rule.off and rule.state == _LENGTH and self._first is not None and not self.above:
+        if rule.off and rule.state == _LENGTH and self._first is not None and self._retracts and not self.above:
             self._lost_since(line, [f"{word} before the retract: it may move the tool by its length"])
         if rule.ends and self._over:
             self._lost_since(line, [f"{word} after the motion to where the tool comes down"])
 
     def _unsaid(self, when: str, word: str, state: str = "") -> Iterator[str]:
         """Words that must have come before others of a state, or before the first retract."""
-        for rule in self._list.effective:
+        for rule in self._list.words:
             if rule.first == when and state in ("", rule.state) and not any_of(rule.pattern, self._said):
                 yield f"{shown(rule.pattern)} must come before {word}"
 
-    def turn(self, line: int, words: Set[str]) -> None:
-        """Look at the words of a block that may turn the rotary axes alone, where a retract has left the tool."""
-        if self.above and ROTARY & words and not LINEAR & words:
-            ends = [held.text for held in self._all_in_force if held.rule.ends]
-            self._lost_since(line, [f"the rotary axes turn under {word}" for word in ends])
+    # where axes turn, and where the tool moves
 
-    # where the tool moves
+    def turn(self, line: int, words: Mapping[str, float]) -> None:
+        """Take over rotary words; they may not turn the axes alone where a retract has left the tool."""
+        self.angles |= {name: words[name] for name in ROTARY & words.keys()}
+        if self.above and ROTARY & words.keys() and not LINEAR & words.keys():
+            ends = [held.text for held in self._in_force if held.rule.ends]
+            self._lost_since(line, [f"the rotary axes turn under {word}" for word in ends])
 
     def motion(
         self, line: int, words: Mapping[str, float], code: float, *, moves: bool = False, drills: bool = False
@@ -269,61 +250,52 @@ class WordStates:
 
         `moves`: along Z, whatever the words are; `drills`: in a cycle of the control, so it does not go there at once.
         """
-        down, first = moves or "Z" in words, self._first is None
         if self._stopped is not None:
             word, number = self._stopped
-            self.wrong(NOT_LISTED, number, f"{word} stops the spindle that was started before it")
+            self.wrong(number, f"{word} stops the spindle that was started before it")
         ended = [(stop, self._held[state].text) for state, stop in self._halted.items() if state not in self._left]
-        texts = [f"{stop} ends {word}, and the tool moves on without it" for stop, word in ended]
-        self._lost_since(line, texts, retracts=False)
-        self._started, self._stopped, self._halted = False, None, {}
+        self._lost_since(line, [f"{stop} ends {word}, and the tool moves on without it" for stop, word in ended])
         if not drills:
             self._lost_since(line, list(self._approached(words)))
-        if first:
-            self._lost_since(line, [*(self._unsaid_at_retract or ()), *self._wrong_offset()])
         late = set()
-        if self.above and code == 0.0 and not down:
+        if self.above and code == 0.0 and not (moves or "Z" in words):
             late = {state for state in self._late & self._held.keys() if self._held[state].off}
-        self._changed, self._high = bool(late), False
         for state, word in self._forgotten.items():
             if state not in self._left:
-                self.unframed(NOT_ESTABLISHED, line, f"{state}: it must come after {word}, which deselects it")
-        self._forgotten = {}
+                self.unframed(line, f"{state}: it must come after {word}, which deselects it", NOT_ESTABLISHED)
         if self._first is None:
-            self._begin(line)
-            self._deferred = late
-            return
-        self._first |= {state: self._held[state].text for state in self._deferred - late}
-        self._deferred &= late
-        if self._retract and not late:
-            self.wrong(NOT_LISTED, self._retract, GONE_ON)
-            self._retract = 0
-        if self._arc is not None and code not in (2.0, 3.0):
-            self.wrong(NOT_LISTED, self._arc[1], f"{self._arc[0]} where no arc follows")
-        self._arc = None
-        self._compare(late, self._first)
+            self._begin(line, late)
+        else:
+            if self._retract and not late:
+                self.wrong(self._retract, GONE_ON)
+                self._retract = 0
+            if self._arc is not None and code not in (2.0, 3.0):
+                self.wrong(self._arc[1], f"{self._arc[0]} where no arc follows")
+            self._compare(late, self._first)
+        self._changed = self._high = self._started = False
+        self._arc, self._stopped, self._halted, self._forgotten = None, None, {}, {}
 
-    def _begin(self, line: int) -> None:
+    def _begin(self, line: int, late: Set[str]) -> None:
         """Look at what holds at the first motion."""
-        self._first = {state: held.text for state, held in self._held.items()}
-        self._retract, self._arc = 0, None
+        self._retract = 0
+        self._lost_since(line, [*(self._unsaid_at_retract or ()), *self._wrong_offset()])
+        self._first = {state: "" if state in late else held.text for state, held in self._held.items()}
         for state, rules in self._list.heads.items():
-            if state not in self._left and not any(
-                rule.pattern.fullmatch(word) for rule in rules for word in self._said
-            ):
+            if state not in self._left and not any(any_of(rule.pattern, self._said) for rule in rules):
                 wanted = " or ".join(shown(rule.pattern) for rule in rules)
-                self.unframed(NOT_ESTABLISHED, line, f"{state}: {wanted} must come before the first motion")
+                self.unframed(line, f"{state}: {wanted} must come before the first motion", NOT_ESTABLISHED)
 
-    def _compare(self, late: Set[str], first: Mapping[str, str]) -> None:
+    def _compare(self, late: Set[str], first: dict[str, str]) -> None:
         """Complain of states that are not what they were at the first motion, where nobody else compares them."""
         for state, held in self._held.items():
-            if held.rule.follows or state in late or held.text == first.get(state):
-                continue
-            if (state, held.line) not in self._complained:
+            if state not in late and first.get(state) == "":
+                first[state] = held.text
+            known = held.rule.follows or state in late or held.text == first.get(state)
+            if not known and (state, held.line) not in self._complained:
                 self._complained.add((state, held.line))
                 text = f"{state}: {held.text} where {first.get(state, 'nothing')} holds for the whole program"
                 if not held.rule.tool:
-                    self.wrong(NOT_LISTED, held.line, text)
+                    self.wrong(held.line, text)
                 elif self._by_tool is not None:
                     self._by_tool.append(Problem(NOT_LISTED, 0, held.line, text))
 
@@ -332,16 +304,16 @@ class WordStates:
         comes_down = self.above and "Z" in words
         self.above &= not comes_down
         tip_control = self._positions.keeps_tip or bool(self._tip_control)
-        self._over = self.above and (self._over or (bool(words.keys() & _PLACE) and not tip_control))
-        tip_on, self._tip_on = self._tip_on, None
+        aside = bool(words.keys() & set("XY"))
+        self._over = self.above and (self._over or (aside and not tip_control))
         if self._high and not words.keys() & _POINT:
             tilted = self._tilted(words)
             if tilted and not words.keys() >= LINEAR:
                 yield "a tilted tool does not come from a retract in one block of X Y Z"
-            if tilted is False and "Z" in words and words.keys() & _ASIDE:
+            if tilted is False and "Z" in words and (aside or words.keys() & ROTARY):
                 yield "the tool comes down from a retract before it is over its place"
-        if tip_on is not None:
-            rule, angles = tip_on
+        if self._tip_on is not None:
+            (rule, angles), self._tip_on = self._tip_on, None
             rotary = sorted(ROTARY & words.keys())
             off = [name for name in rotary if not abs(angles.get(name, math.nan) - words[name]) <= SAME]
             unknown = [name for name in rotary if name not in angles]
@@ -350,18 +322,17 @@ class WordStates:
             if unknown and rule.rotary == "zero":
                 yield f"tool tip control comes on before {' and '.join(unknown)} stands at zero"
         if comes_down:
-            in_force = [held for held in self._all_in_force if not held.rule.off]
-            on = {held.rule.state for held in in_force}
-            for rule in self._list.effective:
-                if rule.down and rule.state not in on and any(rule.down.fullmatch(held.text) for held in in_force):
+            on = {held.rule.state: held.text for held in self._in_force if not held.rule.off}
+            for rule in self._list.words:
+                if rule.down and rule.state not in on and any_of(rule.down, on.values()):
                     yield f"the tool comes down from a retract without {shown(rule.pattern)}"
-            unknown = sorted(self._positions.rotary - self.angles.keys() - words.keys()) if self._machine else []
-            if unknown and not (self._swivelled and not self.angles and on & {*_PLANES}):
+            unknown = sorted(self._positions.rotary - self.angles.keys()) if "MACHINE" in self._made else []
+            if unknown and not (self._swivelled and not self.angles and on.keys() & _PLANES):
                 yield f"the tool comes down from a retract before {' and '.join(unknown)} is sent to where it belongs"
 
     def _tilted(self, words: Mapping[str, float]) -> bool | None:
         """Whether X and Y lie in another plane in the part than on the machine; None where that is not known."""
-        on = {held.rule.state: held.text for held in self._all_in_force if not held.rule.off}
+        on = {held.rule.state: held.text for held in self._in_force if not held.rule.off}
         plane = [text for state, text in on.items() if state in _PLANES]
         if plane:
             return any(map(float, _DECIMAL.findall(plane[0])))
@@ -370,20 +341,21 @@ class WordStates:
         if words.keys() >= _VECTOR:
             axis = np.array([words[name] for name in "IJK"])
             return bool(axis[2] < _UPRIGHT * np.linalg.norm(axis))
-        machine, angles = self._positions.machine, {**self.angles, **words}
-        if machine is None or not set(machine.names) <= angles.keys():
+        machine = self._positions.machine
+        if machine is None or not set(machine.names) <= self.angles.keys():
             return None
-        given = [angles.get(axis.name, 0.0) for axis in machine.axes]
+        given = [self.angles.get(axis.name, 0.0) for axis in machine.axes]
         return bool(tool_vectors(machine, np.array([given]))[0, 2] < _UPRIGHT)
 
     def _wrong_offset(self) -> Iterator[str]:
         """What is wrong with the work offset, one for the whole program."""
-        held = self._in_force(_OFFSET)
-        if held is None or _OFFSET in self._left or self._made_for == "none":
+        held = next((held for held in self._in_force if held.rule.state == _OFFSET), None)
+        made_for = self._made.get("OFFSET", "")
+        if held is None or _OFFSET in self._left or made_for == "NONE":
             return
         match = held.rule.pattern.fullmatch(held.text)
         said = match[1] if match and match.re.groups else held.text
-        wanted = self._made_for or held.rule.preset
+        wanted = made_for or held.rule.preset
         if wanted and said.replace(" ", "_") != wanted:
             yield f"{held.text}, where the program was made for {wanted.replace('_', ' ')}"
 
@@ -395,12 +367,13 @@ class WordStates:
             held = self._held[state]
             if not held.off:
                 text = f"{state}: {held.text} of line {held.line} still holds at the end"
-                self.unframed(NOT_ESTABLISHED, line, text)
+                self.unframed(line, text, NOT_ESTABLISHED)
         if not self._high and self._retracts:
-            self.unframed(NOT_ESTABLISHED, line, "the tool is not retracted at the end")
+            self.unframed(line, "the tool is not retracted at the end", NOT_ESTABLISHED)
         if self._first is None:
             return
-        self._lost_since(line, [f"{word} still holds at the end" for word in self._running()], retracts=False)
+        self._lost_since(line, [f"{word} still holds at the end" for word in self._running()])
         away = self._positions.away(self.angles)
-        if (away or (self._swivelled and not self.angles and self._machine)) and not self._positions.rules:
+        turned = bool(away) or (self._swivelled and not self.angles and "MACHINE" in self._made)
+        if turned and self._retracts and not self._positions.rules:
             self._lost_since(line, [f"{' and '.join(away) or 'the rotary axes'} not at zero at the end"])
