@@ -1,30 +1,29 @@
-"""The written motion in batches, each with its stretches and the place of every vertex on the CL path.
+"""The written motion in batches, each with the stretches of the CL path that it is run beside.
 
 A *stretch* is the run of feed moves between two stops (see `stops`). Many short stretches make a batch; a long one is
-cut anywhere, as the decision (`passage`) goes on from where the motion has been reached.
-
-Tips and axis points are run together. Where the task says `apart`, each is run on its own as well: then together they
-have more room.
+cut anywhere. Where the place of a cut on the CL path is only guessed, each batch can be decided by itself: if the
+motions can be run beside each other through all guessed places, they can be. If not, they may be nevertheless.
 """
 
 from __future__ import annotations
 
 from array import array
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
-from cornersmooth.model import Floats, Ints, Move
+from cornersmooth.model import Ints, Move
 from cornersmooth.nc_reader.ahead import Ahead
 from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem
+from cornersmooth.nc_reader.tool import directions
 from cornersmooth.statements.tool_changes import ToolChanges
-from cornersmooth.verify.chain import Sections
-from cornersmooth.verify.match import Batch
-from cornersmooth.verify.motions import Motion, inner_points, written_motion
-from cornersmooth.verify.nearest import COLUMNS, Metric, largest_square
-from cornersmooth.verify.passage import Walk
+from cornersmooth.verify.decision import Batch, Decision
+from cornersmooth.verify.motions import written_motion
+from cornersmooth.verify.nearest import largest_square, nearest_places
+from cornersmooth.verify.passage import AROUND, LONGER
 from cornersmooth.verify.stops import BEFORE, Part, Stops, out_of_hole
 from cornersmooth.verify.task import ARITHMETIC, Task
 
@@ -33,15 +32,22 @@ BATCH: Final = 1 << 14
 
 #: a stretch, see `Batch.stretches`
 _STRETCH: Final = np.dtype(
-    [("first", np.int64), ("last", np.int64), ("start", np.int64), ("stop", np.int64), ("fraction", np.float64)]
+    [("first", np.int64), ("last", np.int64), ("start", np.float64), ("end", np.float64), ("stop", np.int64)]
 )
+
+#: share of the way, on either side, within which a place is guessed at first (speed only)
+_NEAR: Final = 0.05
 
 
 class Batches:
-    """Makes batches of the elements of a text, as they come, counted in the whole text; its `events` grow along."""
+    """Makes batches of the elements of a text, as they come, counted in the whole text; its `events` grow along.
 
-    def __init__(self, task: Task, events: Sequence[Event]) -> None:
-        self.task, self._events = task, events
+    Each is given out decided by `decide`; without that the places on the CL path where long stretches are cut are
+    guessed.
+    """
+
+    def __init__(self, task: Task, events: Sequence[Event], decide: Callable[[Batch], Decision] | None = None) -> None:
+        self.task, self._events, self._decide = task, events, decide
         self.problems: list[Problem] = []
         #: stops that are reached, three numbers for each: the element, and the CL path lengths where it is and where it
         #: begins
@@ -52,18 +58,14 @@ class Batches:
         self.taps: list[int] = []
         self.left_out: list[Problem] = []
         self.elements = 0
-        self._walks: list[tuple[Metric, Walk]] = [("both", Walk(task.path, task.radius))]
-        if task.apart:
-            alone: tuple[Metric, ...] = ("tip", "axis_point")
-            self._walks += [(one, Walk(task.path.only(COLUMNS[one]), task.tolerance + ARITHMETIC)) for one in alone]
-        self._reached = 0.0  # place on the CL path of the last vertex that is decided
         # the stretch that has no end yet: where it begins, as a move and in the text, and on the CL path; and the last
         # move that it may have
-        self._move, self._element, self._move_last = -1, 0, -1
-        self._start, self._fraction = 0, 0.0
+        self._move, self._element, self._move_last, self._place = -1, 0, -1, 0.0
         self._continued = False
         self._told = False  # whether a lack of motion between its stops has been said
-        self._pending: list[tuple[int, int, int, int, float]] = []
+        self.guessed = False  #: whether any place was
+        self._ratio = 1.0  # how long the CL path is beside the written one, of the last batch that was cut
+        self._pending: list[tuple[int, int, float, float, int]] = []
 
     def of(self, chunks: Iterable[Elements]) -> Iterator[Batch]:
         """Give out all batches of a text."""
@@ -115,8 +117,7 @@ class Batches:
         # out of a hole the way begins anywhere
         place = out_of_hole(task, nc, at, move)[0] if kind == Move.HOLE else float(last_vertex[move])
         self._move, self._element, self._continued, self._told = move, element, False, False
-        self._start = min(int(place), max(path.segments - 1, 0))
-        self._fraction = place - self._start
+        self._place = place
         before = last_vertex[max(move - (kind == Move.RAPID), 0)]
         self.stops.extend((element, path.length_at(place), float(path.length[before])))
 
@@ -132,11 +133,10 @@ class Batches:
         stop = int(self.task.original.trail.last[move_last])
         while element_last - self._element > BATCH + BATCH // 2:
             yield from self._cut(self._element + BATCH, stop)
-        start, fraction = (self._start, self._fraction) if self._start < stop else (stop - 1, 1.0)
         waiting = self._pending
         if waiting and (element_last - waiting[0][0] > BATCH or stop - waiting[0][2] > 2 * BATCH):
             yield from self._flush()
-        self._pending.append((self._element, element_last, start, stop, fraction))
+        self._pending.append((self._element, element_last, min(self._place, stop), stop, stop))
 
     def _cut_open(self, last: int) -> Iterator[Batch]:
         """Give out what is held of a stretch whose end is not known yet, but its last element."""
@@ -152,10 +152,35 @@ class Batches:
     def _cut(self, element: int, stop: int) -> Iterator[Batch]:
         """Give out a long stretch up to an element."""
         yield from self._flush()
-        start, fraction = (self._start, self._fraction) if self._start < stop else (stop - 1, 1.0)
-        yield self._batch([(self._element, element, start, stop, fraction)], goes_on=True)
-        self._start = min(int(self._reached), stop - 1)
-        self._element, self._fraction, self._continued = element, self._reached - self._start, True
+        place = min(self._place, stop)
+        end = self._guess(element, place, stop) if self._decide is None else np.nan
+        batch = self._batch([(self._element, element, place, end, stop)], goes_on=True)
+        yield batch
+        self._place = end if batch.decided is None else batch.decided.reached
+        self._element, self._continued = element, True
+
+    def _guess(self, element: int, start: float, stop: int) -> float:
+        """Place near the end of an element on a stretch that has run from a place on: the nearest where it should be.
+
+        If nothing is near there it is looked for on all of the path that may have been passed.
+        """
+        path, nc, self.guessed = self.task.path, self._ahead.part(self._element, element + 1), True
+        six = self.task.six(nc.tip, directions(nc, nc.tip, nc.second))
+        gone, begin = float(np.linalg.norm(np.diff(six, axis=0), axis=1).sum()), path.length_at(start)
+        around, place = AROUND * self.task.radius, start
+        for low, high in ((1.0 - _NEAR, 1.0 + _NEAR), (0.0, LONGER)):
+            low, high = (begin + share * self._ratio * gone + side for share, side in ((low, -around), (high, around)))
+            first, last = np.searchsorted(path.length, (low, high)).tolist()
+            first = min(max(first - 1, int(start)), stop - 1)
+            last = max(min(last, stop - 1), first)
+            middle, ends = np.array([(first + last) // 2]), (np.array([first]), np.array([last]))
+            reach = (last - first) // 2 + 1
+            place = max(float(nearest_places(six[-1:], path.points, middle, reach, *ends)[0]), start)
+            if largest_square(six[-1] - path.at(np.array([place]))[0]) <= self.task.radius**2:
+                break
+        if gone > around:
+            self._ratio = (path.length_at(place) - begin) / gone
+        return min(place, float(stop))
 
     def _flush(self) -> Iterator[Batch]:
         """Give out what waits."""
@@ -163,52 +188,31 @@ class Batches:
             yield self._batch(self._pending)
             self._pending = []
 
-    def _batch(self, rows: list[tuple[int, int, int, int, float]], *, goes_on: bool = False) -> Batch:
-        """Decide some stretches."""
-        task, lead = self.task, int(self._continued and rows[0][0] == self._element)
+    def _batch(self, rows: list[tuple[int, int, float, float, int]], *, goes_on: bool = False) -> Batch:
+        """Put some stretches into a batch."""
+        lead = int(self._continued and rows[0][0] == self._element)
         begin, last = rows[0][0] - lead, rows[-1][1]
         table = np.array(rows, _STRETCH)
         table["first"] -= begin
         table["last"] -= begin
-        elements = self._ahead.part(begin, last + 1)
-        part = elements.part(lead, len(elements))
-        motion = self._motion(part)
-        ends = motion.last[table["first"] - lead], motion.last[table["last"] - lead]
-        start = table["start"] + table["fraction"]
-        sections = Sections(*ends, start, table["stop"].astype(np.float64), goes_on)
-        place, breaks, whole = np.zeros(0), [], True
-        for metric, walk in self._walks:
-            columns = COLUMNS[metric]
-
-            def inner(number: Floats, columns: slice = columns) -> Floats:
-                return inner_points(part, motion, task, number)[:, columns]
-
-            found = walk.take(motion.six[:, columns], motion.bend, sections, inner)
-            place = found.place if metric == "both" else place
-            breaks += [(metric, one) for one in found.breaks]
-            whole &= found.whole
-        self._reached = float(np.nanmax(place, initial=start[-1]))
-        return Batch(
-            nc=elements,
+        batch = Batch(
+            nc=self._ahead.part(begin, last + 1),
             offset=begin,
             stretches=table,
-            motion=motion,
-            place=place,
-            breaks=tuple(breaks),
-            whole=whole,
             continued=bool(lead),
             goes_on=goes_on,
             words=elements_with_words(self._events, begin + lead, last),
         )
+        return batch if self._decide is None else replace(batch, decided=self._decide(batch))
 
     def _stands(self, move_last: int, element_last: int, *, theirs: bool) -> None:
         """Say if between two stops one motion leaves the place where the other stands: CS535, CS536."""
         task, path, original = self.task, self.task.path, self.task.original
-        motion = self._motion(self._ahead.part(self._element, element_last + 1))
-        place = path.at(np.array([self._start + self._fraction]))
+        motion = written_motion(self._ahead.part(self._element, element_last + 1), task)
+        place = path.at(np.array([self._place]))
         if theirs:
-            stop = int(original.trail.last[move_last])
-            own, bend = np.concatenate((place, path.points[self._start + 1 : stop + 1])), path.bend[self._start : stop]
+            start, stop = int(self._place), int(original.trail.last[move_last])
+            own, bend = np.concatenate((place, path.points[start + 1 : stop + 1])), path.bend[start:stop]
             text, code, other = "feed moves of the CL file are missing", "CS535", motion.six[0]
         else:
             own, bend = motion.six, motion.bend
@@ -222,9 +226,6 @@ class Batches:
             element = min(self._element + 1 - base, len(nc) - 1)
             line = int(original.program.line[original.pose[move]])
             self.problems.append(Problem(code, line, int(nc.line[element]), text, amount))
-
-    def _motion(self, nc: Elements) -> Motion:
-        return written_motion(nc, self.task.tolerance, self.task.axis_length, own_axis=self.task.own_axis)
 
 
 def elements_with_words(events: Sequence[Event], first: int, last: int) -> Ints:

@@ -176,7 +176,7 @@ class Sections:
     #: (s,): own vertices
     first: Ints
     last: Ints
-    #: (s,): places on the path beside them; the latter are vertices
+    #: (s,): places on the path beside them
     start: Floats
     stop: Floats
     open: bool = False  #: whether the last section goes on behind its last vertex: that may be anywhere before `stop`

@@ -125,6 +125,7 @@ def _written(match: Match, place: Floats) -> Floats:
 
 def check_breaks(match: Match, found: Findings) -> None:
     """Both motions must be run beside each other within the tolerance: CS521, CS522, CS523, CS525, CS527."""
+    found.parted = bool(match.breaks)
     for metric, one in match.breaks:
         _say(match, found, metric, one)
     if not match.whole and match.breaks:

@@ -5,19 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.nc_reader.elements import Elements
 from cornersmooth.verify.chain import Path, passed
 from cornersmooth.verify.cl_motion import Original
+from cornersmooth.verify.decision import Batch, Decider, Decision
 from cornersmooth.verify.free_space import FreeSpace
-from cornersmooth.verify.motions import Motion
-from cornersmooth.verify.nearest import Metric
-from cornersmooth.verify.passage import Break
 from cornersmooth.verify.task import Task
 
 #: vertices on either side of one from whose places it is worked out where it may be: more places could only be found
@@ -26,35 +22,16 @@ _AROUND: Final = 64
 
 
 @dataclass(frozen=True, kw_only=True)
-class Batch:
-    """Elements that are decided at once, and then measured."""
-
-    nc: Elements
-    offset: int  #: number of the first of them in the whole text
-    #: `first` and `last`: each stretch begins at the end of one element and ends with another, counted in this batch;
-    #: `start`, `fraction` and `stop`: where it begins on the CL path, and its last segment plus one
-    stretches: NDArray[Any]
-    motion: Motion  #: the polyline of the elements from the end of the first stretch's `first` on, v vertices
-    #: (v,): segment plus fraction of the CL path, ascending; NaN where a vertex is none of a stretch, or not reached
-    place: Floats
-    breaks: tuple[tuple[Metric, Break], ...]  #: where the motions part, and what does
-    whole: bool  #: whether all was decided
-    #: whether the first stretch begins in the batch before: one more element stands in front of it
-    continued: bool
-    goes_on: bool  #: whether the last stretch goes on in the next batch
-    words: Ints  #: elements of the whole text with words behind them, ascending
-
-    @property
-    def first(self) -> int:
-        """Element at the end of which it begins."""
-        return int(self.stretches["first"][0])
-
-
-@dataclass(frozen=True, kw_only=True)
-class Match(Batch):
+class Match(Batch, Decision):
     """A batch beside the CL motion, v vertices."""
 
     task: Task
+
+    @classmethod
+    def of(cls, task: Task, batch: Batch) -> Match:
+        """Decide a batch, unless it is decided."""
+        decided = Decider(task).decide(batch) if batch.decided is None else batch.decided
+        return cls(task=task, **vars(batch), **vars(decided))
 
     @property
     def six(self) -> Floats:
@@ -129,7 +106,7 @@ class Match(Batch):
     @cached_property
     def low(self) -> Ints:
         """(v,) first segment of the CL path in the stretch a vertex belongs to."""
-        return self.stretches["start"][np.maximum(self.section, 0)].astype(np.int64)
+        return np.minimum(self.stretches["start"][np.maximum(self.section, 0)].astype(np.int64), self.high)
 
     @cached_property
     def high(self) -> Ints:

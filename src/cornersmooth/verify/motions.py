@@ -17,10 +17,10 @@ from cornersmooth.nc_reader.elements import Element, Elements
 from cornersmooth.nc_reader.tool import directions, written_at
 from cornersmooth.verify.bending import arc_bend, curve_bend, turn_bend, wound_bend
 from cornersmooth.verify.cl_motion import UNBOUND, divided, parts_of
-from cornersmooth.verify.task import ARITHMETIC, Task, side_by_side
+from cornersmooth.verify.task import ARITHMETIC, Task
 
 #: bend of a step of the written motion, in tolerances (speed only: steps that are not proved are divided)
-WRITTEN_SHARE: Final = 1.0 / 32.0
+WRITTEN_SHARE: Final = 1.0 / 8.0
 
 #: parts of an element, or of a curve between its knots, at first (speed only: as above)
 _MOST_PARTS: Final = 64
@@ -37,8 +37,9 @@ class Motion:
     bend: Floats  #: (v - 1,) mm: of the step to the next vertex
 
 
-def written_motion(nc: Elements, tolerance: float, axis_length: float, *, own_axis: bool) -> Motion:
-    """Make the polyline of elements; the first of them only says where the motion begins. Lengths in mm; see `Task`."""
+def written_motion(nc: Elements, task: Task) -> Motion:
+    """Make the polyline of elements; the first of them only says where the motion begins."""
+    axis_length = task.axis_length
     second = nc.second - nc.tip if nc.second_is == "point" else nc.second
     bend = np.zeros(len(nc))
     bend[1:] = axis_length * turn_bend(second[:-1], second[1:])
@@ -53,7 +54,7 @@ def written_motion(nc: Elements, tolerance: float, axis_length: float, *, own_ax
             bend[at] = arc + axis_length * wound_bend(second[at - 1], slope, arc)
     bend[:1] = 0.0
     bend = np.minimum(bend, UNBOUND)
-    share = WRITTEN_SHARE * tolerance
+    share = WRITTEN_SHARE * task.tolerance
     parts = parts_of(bend, share, _MOST_PARTS)
     step_bend = bend / parts**2
     curved = []
@@ -65,7 +66,7 @@ def written_motion(nc: Elements, tolerance: float, axis_length: float, *, own_ax
         curved.append((group, at, inner, spans))
     if not len(nc) or parts.max() == 1:
         index = np.arange(len(nc))
-        six = side_by_side(nc.tip, directions(nc, nc.tip, nc.second), axis_length, own_axis)
+        six = task.six(nc.tip, directions(nc, nc.tip, nc.second))
         bends = step_bend[1:].copy()
         for _, at, _, spans in curved:
             bends[at - 1] = spans.max(axis=1, initial=0.0)
@@ -91,7 +92,7 @@ def written_motion(nc: Elements, tolerance: float, axis_length: float, *, own_ax
     axis = directions(nc, tip, other)
     if len(within):
         tip[within], axis[within] = written_at(nc, owner[within], fraction[within])
-    return Motion(side_by_side(tip, axis, axis_length, own_axis), owner, fraction, last, bends[1:])
+    return Motion(task.six(tip, axis), owner, fraction, last, bends[1:])
 
 
 def inner_points(nc: Elements, motion: Motion, task: Task, number: Floats, first: int = 0) -> Floats:

@@ -10,6 +10,7 @@ proved*.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -152,22 +153,54 @@ class Walk:
 
         Bent steps are divided as long as they are what is in the way.
         """
-        while True:
-            sections = Sections(self._first, self._last, self._begin, self._stop, self._open)
-            columns = np.ascontiguousarray(self._own[row:].T)
-            rest = sections.behind(section, row, begin)
-            found = chain(columns, self._bend[row:], self.path, self.radius, rest)
-            bent = np.flatnonzero(found.bad & ~found.far) + row
-            if not len(bent) or inner is None or not self._divide(row, bent, inner):
-                break
-        _, inside = rest.of(np.arange(len(found.place)))
+        sections = self._sections().behind(section, row, begin)
+        found = chain(np.ascontiguousarray(self._own[row:].T), self._bend[row:], self.path, self.radius, sections)
+        _, inside = sections.of(np.arange(len(found.place)))
         self._place[row:] = np.where(found.bad | ~inside, np.nan, found.place)
-        return np.flatnonzero(found.bad) + row
+        bent = np.flatnonzero(found.bad & ~found.far) + row
+        while len(bent) and inner is not None and self._divide(bent, inner):
+            bent = self._prove_again(row)
+        return self._missing(row)[0]
 
-    def _divide(self, row: int, bad: Ints, inner: Inner) -> bool:
-        """Put points into bent steps, from a row on, to some vertices and beside them; say whether there were any."""
-        steps = np.unique(np.concatenate((bad - 2, bad - 1, bad)))
-        steps = steps[(steps >= row) & (steps < len(self._own) - 1)]
+    def _sections(self) -> Sections:
+        return Sections(self._first, self._last, self._begin, self._stop, self._open)
+
+    def _missing(self, row: int) -> tuple[Ints, Ints]:
+        """Vertices from one on that have no place, and their sections."""
+        rows = row + np.flatnonzero(np.isnan(self._place[row:]))
+        number, inside = self._sections().of(rows)
+        return rows[inside], number[inside]
+
+    def _prove_again(self, row: int) -> Ints:
+        """Find places by the chain for vertices that have none, from one on; return those where bends are in the way.
+
+        Each run of them is a section, between the two vertices around it.
+        """
+        rows, number = self._missing(row)
+        new = np.append(True, (np.diff(rows) > 1) | (np.diff(number) > 0))
+        first, number = rows[new] - 1, number[new]
+        last = np.minimum(rows[np.append(new[1:], True)] + 1, self._last[number])
+        known = (first >= self._first[number]) & ~np.isnan(self._place[np.maximum(first, 0)])
+        first, last, number = first[known], last[known], number[known]
+        if not len(first):
+            return first
+        stop = np.where(np.isnan(self._place[last]), self._stop[number], self._place[last])
+        unknown = self._open and bool(last[-1] == self._last[-1] and np.isnan(self._place[last[-1]]))
+        size = last - first + 1
+        ends = np.cumsum(size)
+        at = np.repeat(first - ends + size, size) + np.arange(ends[-1])
+        sections = Sections(ends - size, ends - 1, self._place[first], stop, unknown)
+        bend = self._bend[np.minimum(at[:-1], len(self._bend) - 1)]
+        found = chain(np.ascontiguousarray(self._own[at].T), bend, self.path, self.radius, sections)
+        inner = np.ones(len(at), np.bool_)
+        inner[ends - size] = False
+        self._place[at[inner]] = np.where(found.bad, np.nan, found.place)[inner]
+        return at[found.bad & ~found.far & inner]
+
+    def _divide(self, bad: Ints, inner: Inner) -> bool:
+        """Put points into the bent steps to some vertices and from them; say whether there were any."""
+        steps = np.unique(np.concatenate((bad - 1, bad)))
+        steps = steps[steps < len(self._own) - 1]
         steps = steps[(self._bend[steps] > FINE * self.radius) & (self._bend[steps] < UNBOUND)]
         if not len(steps):
             return False
@@ -186,7 +219,7 @@ class Walk:
 
     def _repair(self, section: int, first: int, last: int, inner: Inner | None) -> int | Break:
         """Work out exactly how to come past some vertices; return one after them that has a place."""
-        known, end, stop = int(self._known[section]), int(self._last[section]), int(self._stop[section])
+        known, end, stop = int(self._known[section]), int(self._last[section]), float(self._stop[section])
         unfinished = self._open and section == len(self._first) - 1
         if first == known:
             return Break(first, float(self._begin[section]), True)
@@ -198,7 +231,7 @@ class Walk:
             rows, steps = slice(begin, until + 1), slice(begin, until)
             own = self._own[rows], self._bend[steps], self._number[rows]
             top = self._within_reach(begin, until, stop)
-            ends = -1 if until < end else None if unfinished else stop
+            ends = math.nan if until < end else None if unfinished else stop
             for fine in (False, True):
                 around = Around.of(own, self.path, self.radius, float(self._place[begin]), top, inner, fine=fine)
                 goal = around.goal(self._place[rows], last - begin, ends)
@@ -228,13 +261,13 @@ class Walk:
         low, high = free_interval(self._own[row][:, None], start, way, np.asarray(self.radius))
         return bool((low <= high).any())
 
-    def _within_reach(self, begin: int, until: int, stop: int) -> int:
+    def _within_reach(self, begin: int, until: int, stop: float) -> int:
         """Vertex of the path before which some rows end, if they run beside it."""
         path = self.path
         step = np.diff(self._own[begin : until + 1], axis=0)
         gone = float(np.sqrt(np.einsum("ij,ij->i", step, step)).sum())
         length = path.length_at(float(self._place[begin])) + LONGER * gone + AROUND * self.radius
-        return min(int(np.searchsorted(path.length, length)) + 1, stop)
+        return min(int(np.searchsorted(path.length, length)) + 1, math.ceil(stop))
 
     def _settle(self, begin: int, around: Around, goal: float) -> int:
         """Give vertices the first places from which another place, of the last row reached, can be reached."""
@@ -258,7 +291,7 @@ class Walk:
         It gets a place: the nearest to where the path was left.
         """
         path, end, left = self.path, int(self._last[section]), self.path.length_at(self._left)
-        bottom, top = int(np.nan_to_num(self._begin[section])), int(self._stop[section])
+        bottom, top = int(np.nan_to_num(self._begin[section])), math.ceil(self._stop[section])
         tried = row + np.unique(np.geomspace(1, max(end - row, 1), _TRIED).astype(np.int64)) - 1
         for width, rows in ((AROUND, tried), (AROUND * AROUND, tried[::6])):
             low, high = np.searchsorted(path.length, (left - width * self.radius, left + width * self.radius)).tolist()

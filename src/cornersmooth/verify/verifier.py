@@ -29,10 +29,11 @@ from cornersmooth.statements.comparison import KINDS
 from cornersmooth.verify.batches import Batches
 from cornersmooth.verify.cl_motion import half_turns
 from cornersmooth.verify.continuity import measure_continuity
+from cornersmooth.verify.decision import Batch, Decider
 from cornersmooth.verify.deviation import check_breaks, measure_original, measure_written
 from cornersmooth.verify.feeds import check_feeds
 from cornersmooth.verify.findings import Findings, Where, problems_of
-from cornersmooth.verify.match import Batch, Match
+from cornersmooth.verify.match import Match
 from cornersmooth.verify.own_rapids import OwnRapids
 from cornersmooth.verify.result import Verification
 from cornersmooth.verify.task import Task, length_of
@@ -179,14 +180,29 @@ class Verifier:
         return replace(found, apart=True) if self._apart else together
 
     def _work(self) -> Verification:
-        """Read and measure the text as far as it goes."""
+        """Read and measure the text as far as it goes.
+
+        First with guesses of where long stretches are cut, which can only prove that nothing is wrong.
+        """
+        found = None if self._apart else self._pass(guess=True)
+        if found is None:
+            if isinstance(self._text, Source):
+                self._text.begin_again()
+            found = self._pass(guess=False)
+        assert found is not None
+        return found
+
+    def _pass(self, *, guess: bool) -> Verification | None:
+        """Read and measure the text; None where the motions seem to part, and a guess may be why."""
         options, text = self._options, self._text
         if isinstance(text, NcProgram):
             task = self._task(rotary=text.rotary)
             elements = Elements(**{column.name: getattr(text, column.name) for column in fields(Elements)})
-            found = self._found(task, iter([elements]), list(text.events), lambda: (text, len(text.curves)))
+            found = self._found(
+                task, iter([elements]), list(text.events), lambda: (text, len(text.curves)), guess=guess
+            )
             words = "the words of the text: they are looked at where it is read, not afterwards"
-            return found.not_verified(words) if self._words else found
+            return found.not_verified(words) if found and self._words else found
         steps = options.steps(text.head(DIGITS_SAMPLE))
         rotary = options.rotary(steps)
         task = self._task(rotary=rotary is not None)  # takes memory, which who writes may need before there is text
@@ -205,7 +221,10 @@ class Verifier:
             nc = program_of(reader, [])
             return replace(nc, problems=(*nc.problems, *check.problems)), reader.curves
 
-        found = self._found(task, chunks, reader.events, said).not_verified(self._unverified(check))
+        found = self._found(task, chunks, reader.events, said, guess=guess)
+        if found is None:
+            return None
+        found = found.not_verified(self._unverified(check))
         beside = self._own_kinds - _OF_MOTION
         return replace(found, trusted=(*([(0, _own_table(beside))] if beside else []), *check.trusted))
 
@@ -221,9 +240,15 @@ class Verifier:
         chunks: Iterator[Elements],
         events: list[Event],
         said: Callable[[], tuple[NcProgram, int]],
-    ) -> Verification:
-        """Measure all that is read, and put everything together; `said`: of the text and its curves, then."""
-        program, batches, findings = self._program, Batches(task, events), Findings()
+        *,
+        guess: bool,
+    ) -> Verification | None:
+        """Measure all that is read, and put everything together; `said`: of the text and its curves, then.
+
+        With a `guess` None where the motions part, unless there is one batch, of which nothing was guessed.
+        """
+        program, batches = self._program, Batches(task, events, None if guess else Decider(task).decide)
+        findings = Findings()
         places = WordPlaces(batches, events)
         poses = np.concatenate((np.full((3, len(program)), np.nan), np.zeros((1, len(program)))))
         if self._slower:
@@ -234,12 +259,15 @@ class Verifier:
                 yield batch, findings.worst.copy()
 
         def work(item: tuple[Batch, dict[str, Where]]) -> Findings:
-            match, found = Match(task=task, **vars(item[0])), Findings(item[1])
+            match, found = Match.of(task, item[0]), Findings(item[1])
             for check in CHECKS:
                 check(match, found)
             return found
 
-        for found in map_in_processes(work, items(), self._processes, busy=True):
+        for number, found in enumerate(map_in_processes(work, items(), self._processes, busy=True)):
+            findings.parted |= found.parted
+            if guess and findings.parted and (number or batches.guessed):
+                return None
             for some in found.poses:
                 poses[:, some[0].astype(np.int64)] = some[1:]
             found.poses = []
