@@ -267,7 +267,7 @@ class Walk:
         step = np.diff(self._own[begin : until + 1], axis=0)
         gone = float(np.sqrt(np.einsum("ij,ij->i", step, step)).sum())
         length = path.length_at(float(self._place[begin])) + LONGER * gone + AROUND * self.radius
-        return min(int(np.searchsorted(path.length, length)) + 1, math.ceil(stop))
+        return min(int(np.searchsorted(path.length, length)) + 1, max(math.ceil(stop), 1))
 
     def _settle(self, begin: int, around: Around, goal: float) -> int:
         """Give vertices the first places from which another place, of the last row reached, can be reached."""
