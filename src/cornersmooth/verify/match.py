@@ -14,11 +14,11 @@ from cornersmooth.verify.chain import Path, passed
 from cornersmooth.verify.cl_motion import Original
 from cornersmooth.verify.decision import Batch, Decider, Decision
 from cornersmooth.verify.free_space import FreeSpace
+from cornersmooth.verify.passage import AROUND
 from cornersmooth.verify.task import Task
 
-#: vertices on either side of one from whose places it is worked out where it may be: more places could only be found
-#: with more
-_AROUND: Final = 64
+#: vertices on either side of one from whose places it is worked out first where it may be (speed only)
+_FEW: Final = 64
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,10 +143,19 @@ class Match(Batch, Decision):
         poses ask for it: what holds at one of these places holds.
         """
         there = np.zeros(len(pose), np.bool_)
-        if not self.on[vertex]:
-            return there
-        first = max(int(self.runs[0][vertex]), vertex - _AROUND)
-        last = min(int(self.runs[1][vertex]), vertex + _AROUND)
+        ends, around, far = [int(run[vertex]) for run in self.runs], _FEW, AROUND * self.tolerance
+        while self.on[vertex]:
+            first, last = max(ends[0], vertex - around), min(ends[1], vertex + around)
+            there |= self._reached(vertex, first, last, pose)
+            before, here, after = self.path.lengths_at(self.place[[first, vertex, last]]).tolist()
+            if there.all() or ((first == ends[0] or here - before > far) and (last == ends[1] or after - here > far)):
+                break
+            around *= 4
+        return there
+
+    def _reached(self, vertex: int, first: int, last: int, pose: Ints) -> Bools:
+        """(k,) the same, from the places of the first and the last of some written vertices."""
+        there = np.zeros(len(pose), np.bool_)
         start, end = self.place[[first, last]].tolist()
         bottom = int(start)
         top = min(max(math.ceil(end), bottom + 1), self.path.segments)
