@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cornersmooth.errors import InputError
-from cornersmooth.nc_reader import block_tables
+from cornersmooth.nc_reader import block_tables, line_patterns
 from cornersmooth.nc_reader.dialects import dialect_of
 from cornersmooth.nc_reader.line_patterns import LinePatterns, Lines
 from cornersmooth.nc_reader.words import Table
@@ -110,3 +110,27 @@ def test_fast_path_is_taken():
     assert columns["Y"].tolist() == [-2.25, 2.25]
     assert np.isnan(columns["Z"][0])
     assert columns["Z"][1] == 12345.678
+
+
+def same_alone(data, dialect):
+    """How many lines are read in runs; each says what it says alone."""
+    together = list(lines_apart(block_tables.read_lines(data, None, dialect.lexer)))
+    for (number, said), line in zip(together, data.split(b"\n")[:-1], strict=True):
+        alone = dialect.lexer.line(line, number, None)
+        assert said == (alone if not isinstance(said, dict) else dialect.row(alone))
+    return sum(isinstance(said, dict) for _, said in together)
+
+
+def test_shapes_with_one_key_or_with_keys_that_begin_alike_are_told_apart(monkeypatch):
+    data, dialect, factors = text("fanuc", 1, None), dialect_of("fanuc"), line_patterns._FACTORS
+    in_runs = same_alone(data, dialect)
+    monkeypatch.setattr(line_patterns, "_FACTORS", factors >> np.uint64(20))
+    assert same_alone(data, dialect) == in_runs > 100
+    monkeypatch.setattr(line_patterns, "_FACTORS", factors << np.uint64(62))
+    assert same_alone(data, dialect) < in_runs
+
+
+def test_long_lines_are_read_as_they_are():
+    blanks = (0, *range(116, 123), *range(500, 507), 600)
+    data = b"\n".join(b"X1.5 Y2.5" + b" " * k for k in blanks) + b"\n(" + b"A" * 300 + b")\nX3.5 Y1.5\n"
+    assert same_alone(data, dialect_of("fanuc")) == sum(k + 10 <= line_patterns._LONGEST for k in blanks) + 1

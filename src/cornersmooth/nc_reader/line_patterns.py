@@ -20,7 +20,7 @@ from cornersmooth.errors import InputError
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.lexer import Lexer
 from cornersmooth.nc_reader.words import Word
-from cornersmooth.text.eight_digits import DIGITS, LAST_DIGITS, join_digits, words_of
+from cornersmooth.text.eight_digits import DIGITS, LAST_DIGITS, Bytes, Words, join_digits, words_of
 
 #: line ends that must stand before a chunk, so that words beyond its begin can be fetched
 MARGIN: Final = 24
@@ -29,14 +29,22 @@ MARGIN: Final = 24
 _MOST_DIGITS: Final = 15
 #: digits of a line that stand for themselves, at most: so many fit an integer
 _MOST_PLACES: Final = 18
-#: bytes by which lines are compared with the ones before
-_WIDEST: Final = 160
+#: bytes of a line, its end included, that is read in runs; bytes that are compared at a time
+_LONGEST: Final = 512
+_PART: Final = 128
+#: bits of a key that lead to a shape
+_KEY_BITS: Final = 16
 _NUMBER: Final = re.compile(rb"(?P<sign>[-+]?)(?P<whole>\d*)(?P<point>\.?)(?P<part>\d*)(?P<power>E[-+]?\d+)?")
 
 #: the bytes after the point, for so many decimals; all where there is no point
 _BEHIND = np.array([((1 << (8 * k)) - 1) << (64 - 8 * k) for k in range(9)] + [(1 << 64) - 1], np.uint64)
 _TENS = np.array([float(f"1e{k}") for k in range(DIGITS + 1)])
-_EIGHT, _REST = np.uint64(8), np.uint64(56)
+_EIGHT, _HALF, _REST = np.uint64(8), np.uint64(32), np.uint64(56)
+
+#: keeps the first bytes of a part of a line, for every number of them
+_FIRST = (255 * np.tri(_PART + 1, _PART, -1, np.uint8)).view(np.uint64)
+#: of the words of a line in its key: odd, with bits at random
+_FACTORS = np.multiply.accumulate(np.full(_LONGEST // DIGITS, 0x9E3779B97F4A7C15, np.uint64))
 
 
 @dataclass(frozen=True)
@@ -51,37 +59,35 @@ class LinePattern:
     fields: bytes
 
 
-class _Numbering(dict[bytes, int]):
-    """Numbers what it meets."""
-
-    def __missing__(self, key: bytes) -> int:
-        self[key] = number = len(self)
-        return number
+#: stands for lines that are read on their own
+_ALONE: Final = LinePattern(None, b"", b"")
 
 
 class LinePatterns:
-    """The patterns of a text met so far."""
+    """The patterns of a text met so far.
+
+    The shape of a line is the line without its digits. A key, made of all its bytes, says which shape it may be, and
+    then their bytes are compared.
+    """
 
     def __init__(self, lexer: Lexer) -> None:
         self._lexer = lexer
-        self._shapes = _Numbering()  # lines with zeros for their digits
+        #: of each shape its key and its bytes; the first is that of lines that are too long
+        self._keys, self._bytes = np.zeros(1, np.uint64), np.zeros((1, _LONGEST // DIGITS), np.uint64)
+        #: shapes by their keys, and the one met last of those whose keys begin alike
+        self._rows, self._guess = {0: 0}, np.zeros(1 << _KEY_BITS, np.int64)
         #: of each shape: where digits stand for themselves, -1 behind those; the digits met first, and their pattern
-        self._places = np.zeros((0, _MOST_PLACES), np.int64)
-        self._usual = np.zeros((0, 2), np.int64)
+        self._places, self._usual = np.full((1, _MOST_PLACES), -1), np.zeros((1, 2), np.int64)
         self._others: dict[tuple[int, int], int] = {}  # patterns of a shape with other digits
-        self.known: list[LinePattern] = []
+        self.known = [_ALONE]
         #: a line of each pattern that is new
         self.fresh: list[bytes] = []
 
     def label(self, text: bytes, start: Ints, size: Ints) -> Ints:
         """(l,) rows of `known`: the pattern of each line of a text; its first byte, and its size with its end."""
         raw = np.frombuffer(text, np.uint8)
-        shape = self._shape(raw, start, size)
-        new = np.flatnonzero(shape >= len(self._places))
-        new = new[np.unique(shape[new], return_index=True)[1]]
-        added = [self._add(_line(text, start[row])) for row in new.tolist()]
-        if added:
-            self._places = np.concatenate((self._places, [places for places, _ in added]))
+        shape = self._shape(text, raw, start, size)
+        self.fresh += [_line(text, start[row]) for row in np.flatnonzero(shape == 0).tolist()]
         digits = np.zeros(len(shape), np.int64)
         rows: Any = slice(None)
         for column in self._places.T:
@@ -90,50 +96,65 @@ class LinePatterns:
             if not len(rows):
                 break
             digits[rows] = 10 * digits[rows] + (raw[start[rows] + at] & 15)
-        if added:
-            own = np.stack((digits[new], [number for _, number in added]), axis=1)
-            self._usual = np.concatenate((self._usual, own))
         label = self._usual[:, 1][shape]
         others = np.flatnonzero(self._usual[:, 0][shape] != digits)
         for row, key in zip(
             others.tolist(), zip(shape[others].tolist(), digits[others].tolist(), strict=True), strict=True
         ):
             if key not in self._others:
-                self._others[key] = self._add(_line(text, start[row]))[1]
+                self._others[key] = self._add(_line(text, start[row]))[-1]
             label[row] = self._others[key]
         return label
 
-    def _shape(self, raw: NDArray[np.uint8], start: Ints, size: Ints) -> Ints:
-        """(l,) shape of each line; most have the same as the one before, and are compared with it as words."""
-        digits = raw - np.uint8(ord("0"))
-        digits *= digits <= 9
-        zeroed = np.subtract(raw, digits, out=digits).tobytes()
-        del digits
-        wide = min(int(size.max()), _WIDEST) // DIGITS + 1
-        windows = np.ndarray((len(raw) - _WIDEST - DIGITS + 1,), f"V{DIGITS * wide}", buffer=zeroed, strides=(1,))
-        lines = windows[start].view(np.uint64).reshape(-1, wide)
-        other = size[1:] > _WIDEST
-        for column in lines.T:
-            other |= column[1:] != column[:-1]
-        head = np.flatnonzero(np.append(True, other))
-        spans = zip(start[head].tolist(), (start + size)[head].tolist(), strict=True)
-        found = np.array([self._shapes[zeroed[begin:end]] for begin, end in spans])
-        return np.repeat(found, np.diff(head, append=len(size)))
+    def _shape(self, text: bytes, raw: Bytes, start: Ints, size: Ints) -> Ints:
+        """(l,) shape of each line."""
+        marks = raw - np.uint8(ord("0"))
+        marks *= marks > 9  # zero for digits
+        key, parts = np.zeros(len(start), np.uint64), list(_parts(marks, start, size))
+        for rows, columns, words in parts:
+            key[rows] += (words ^ (words >> _HALF)) @ _FACTORS[columns]
+        key[size > _LONGEST] = 0
+        shape = self._guess[key >> np.uint64(64 - _KEY_BITS)]
+        unknown = np.flatnonzero(self._keys[shape] != key)
+        if len(unknown):
+            found, first, inverse = np.unique(key[unknown], return_index=True, return_inverse=True)
+            new = np.sort(unknown[first[[one not in self._rows for one in found.tolist()]]])
+            if len(new):
+                self._learn(key[new], marks, start[new], size[new], [_line(text, begin) for begin in start[new]])
+            shape[unknown] = np.array([self._rows[one] for one in found.tolist()])[inverse]
+        for rows, columns, words in parts:
+            other = words != self._bytes[:, columns].take(shape[rows], axis=0)
+            if other.any():  # too long, or two shapes have one key
+                shape[np.arange(len(shape))[rows][other.any(axis=1)]] = 0
+        return shape
 
-    def _add(self, line: bytes) -> tuple[list[int], int]:
-        """Take a line of a new pattern apart; return places of digits that stand for themselves, and its number."""
+    def _learn(self, key: Words, marks: Bytes, start: Ints, size: Ints, lines: list[bytes]) -> None:
+        """Take down new shapes, from a line of each."""
+        number = len(self._rows) + np.arange(len(key))
+        self._rows.update(zip(key.tolist(), number.tolist(), strict=True))
+        self._guess[key >> np.uint64(64 - _KEY_BITS)] = number
+        own = np.zeros((len(key), self._bytes.shape[1]), np.uint64)
+        for rows, columns, words in _parts(marks, start, size):
+            own[rows, columns] = words
+        self._keys, self._bytes = np.append(self._keys, key), np.concatenate((self._bytes, own))
+        added = np.array([self._add(line) for line in lines])
+        self._places = np.concatenate((self._places, added[:, :-2]))
+        self._usual = np.concatenate((self._usual, added[:, -2:]))
+
+    def _add(self, line: bytes) -> list[int]:
+        """Take a line of a new pattern apart: places of digits that stand for themselves, these, and its number."""
         places, pattern = self._take(line)
         self.known.append(pattern)
         self.fresh.append(line)
-        return places + [-1] * (_MOST_PLACES - len(places)), len(self.known) - 1
+        digits = int(bytes(line[place] for place in places) or b"0")
+        return [*places, *[-1] * (_MOST_PLACES - len(places)), digits, len(self.known) - 1]
 
     def _take(self, line: bytes) -> tuple[list[int], LinePattern]:
         """Places of the digits of a line that stand for themselves, and its pattern."""
-        alone = LinePattern(None, b"", b"")
         try:
             found = self._lexer.line(line, 0, None)
         except InputError:
-            return [], alone
+            return [], _ALONE
         spans = [(word.start, word.stop) for word in (*found.words, found.block_number) if word is not None]
         spans += [match.span() for match in self._lexer.comment.finditer(line.decode("latin-1"))]
         fixed = bytearray(line)
@@ -142,7 +163,7 @@ class LinePatterns:
         places = [match.start() for match in re.finditer(rb"\d", fixed)]
         columns = None if found.comments or found.skipped else self._lexer.motion(found)
         if columns is None or len(places) > _MOST_PLACES:
-            return places if len(places) <= _MOST_PLACES else [], alone
+            return places if len(places) <= _MOST_PLACES else [], _ALONE
         own = {name: word for name, word in columns.items() if isinstance(word, Word) and not word.fixed}
         constants = {
             name: word.value if isinstance(word, Word) else word for name, word in columns.items() if name not in own
@@ -151,7 +172,7 @@ class LinePatterns:
         for word in own.values():
             match = _NUMBER.fullmatch(line, word.start, word.stop)
             if match is None:
-                return places, alone
+                return places, _ALONE
             decimals = len(match["part"]) if match["point"] else -1
             digits = len(match["whole"]) + len(match["part"])
             left = match["power"] is not None or digits > _MOST_DIGITS or decimals > DIGITS
@@ -159,6 +180,18 @@ class LinePatterns:
             fields.append((*match.span(), *number, match["sign"] == b"-", left))
         values = np.array([*constants.values()]).tobytes(), np.array(fields, np.int64).tobytes()
         return places, LinePattern((*own, *constants), *values)
+
+
+def _parts(marks: Bytes, start: Ints, size: Ints) -> Iterator[tuple[Any, slice, Words]]:
+    """Bytes of lines, some at a time: rows that have so many, columns of all words of a line, and the words."""
+    longest = int(size.max())
+    wide = -(-min(longest, _PART) // DIGITS)
+    windows = np.ndarray((len(marks) - _PART,), f"V{DIGITS * wide}", buffer=marks.data, strides=(1,))
+    for first in range(0, min(longest, _LONGEST), _PART):
+        rows = np.flatnonzero(size > first) if first else slice(None)
+        words = windows[start[rows] + first].view(np.uint64).reshape(-1, wide)
+        words &= _FIRST[:, :wide].take(np.minimum(size[rows] - first, _PART), axis=0)
+        yield rows, slice(first // DIGITS, first // DIGITS + wide), words
 
 
 def _line(text: bytes, start: int) -> bytes:
@@ -178,9 +211,9 @@ class Lines:
     @classmethod
     def of(cls, text: bytes, patterns: LinePatterns) -> Lines:
         """Lines of a chunk, which ends with a line end."""
-        text = b"".join((b"\n" * MARGIN, text, b"\n" * (_WIDEST + 8)))
+        text = b"".join((b"\n" * MARGIN, text, b"\n" * (_PART)))
         raw = np.frombuffer(text, np.uint8)
-        ends = np.flatnonzero(raw == ord("\n"))[MARGIN - 1 : -_WIDEST - 8]
+        ends = np.flatnonzero(raw == ord("\n"))[MARGIN - 1 : -_PART]
         start, size = ends[:-1] + 1, np.diff(ends)
         return cls(text, words_of(raw), start, patterns.label(text, start, size), patterns.known)
 
@@ -234,7 +267,9 @@ class Lines:
 
         found: list[Floats] = []
         at = np.empty(len(start), np.int64)
-        for first, end, begin, behind, keep, divisor, lead_begin, lead_keep, point, long, lead, left in _columns(table):
+        for first, end, begin, keep, keep_before, divisor, lead_begin, lead_keep, point, long, lead, left in _columns(
+            table
+        ):
             if left:
                 spans = zip((start + each(first)).tolist(), (start + each(end)).tolist(), strict=True)
                 found.append(np.array([float(self.text[one:other]) for one, other in spans]))
@@ -248,10 +283,11 @@ class Lines:
                     before = self.words[at].view(np.uint64)
                     before >>= _REST
                     closed |= before
-                word ^= closed
-                word &= each(behind)
-                word ^= closed
-            word &= each(keep)
+                closed &= each(keep_before)
+                word &= each(keep)
+                word |= closed
+            else:
+                word &= each(keep)
             value = join_digits(word).view(np.int64)
             if lead:  # digits before those eight
                 np.add(start, each(lead_begin), out=at)
@@ -266,17 +302,17 @@ def _columns(table: Ints) -> Iterator[tuple[Any, ...]]:
     """How to read the numbers of lines with the same letters, of which `table` is as in `LinePattern.fields`.
 
     Of each number, one value for every pattern or the one of all: where it begins and ends; eight bytes before its end;
-    the bytes after the point; its last eight digits; what to divide by; the same of the digits before those eight. Then
-    of any pattern: whether there is a point, more bytes than a word has, digits before the last eight, or one is left
-    to `float`.
+    those of its last eight digits that are after the point, and before it; what to divide by; where digits before those
+    eight are, and which. Then of any pattern: whether there is a point, more bytes than a word has, digits before the
+    last eight, or one is left to `float`.
     """
     first, end, digits, decimals, minus, left = np.ascontiguousarray(table.transpose(2, 0, 1))
     size = digits + (decimals >= 0)
     divisor = np.where(minus > 0, -1.0, 1.0) * _TENS[np.maximum(decimals, 0)]
     lead = np.maximum(digits - DIGITS, 0)
     lead_begin = end - 2 * DIGITS - (decimals >= 0)
-    last = LAST_DIGITS[digits - lead]
-    values = (first, end, end - DIGITS, _BEHIND[decimals], last, divisor, lead_begin, LAST_DIGITS[lead])
+    last, behind = LAST_DIGITS[digits - lead], _BEHIND[decimals]
+    values = (first, end, end - DIGITS, last & behind, last & ~behind, divisor, lead_begin, LAST_DIGITS[lead])
     flags = (decimals >= 0, size > DIGITS, lead > 0, left > 0)
     return zip(*map(_alike, values), *(flag.any(axis=0).tolist() for flag in flags), strict=True)
 

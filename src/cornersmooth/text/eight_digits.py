@@ -22,15 +22,8 @@ _NIBBLES: Final = 0x0F0F0F0F0F0F0F0F
 #: keeps the values of the last k digits of a word, k from 0 to 8
 LAST_DIGITS: Final = np.array([(((1 << (8 * k)) - 1) << (64 - 8 * k)) & _NIBBLES for k in range(9)], np.uint64)
 
-#: join neighbours: ten to the digits of each half, the bits between them, what to keep
-_JOINS: Final = tuple(
-    (np.uint64((10**digits << shift) + 1), np.uint64(shift), np.uint64(mask))
-    for digits, shift, mask in (
-        (1, 8, 0x00FF00FF00FF00FF),
-        (2, 16, 0x0000FFFF0000FFFF),
-        (4, 32, 0x00000000FFFFFFFF),
-    )
-)
+#: what to keep of pairs and of fours
+_PAIRS, _FOURS = np.uint64(0x00FF00FF00FF00FF), np.uint64(0x0000FFFF0000FFFF)
 
 
 def words_of(text: Bytes) -> NDArray[np.void]:
@@ -40,8 +33,12 @@ def words_of(text: Bytes) -> NDArray[np.void]:
 
 def join_digits(words: Words) -> Words:
     """Turn words of eight digit values, masked by `LAST_DIGITS`, into integers, in place."""
-    for factor, shift, mask in _JOINS:
-        words *= factor
-        words >>= shift
-        words &= mask
+    words *= np.uint64((10 << 8) + 1)
+    words >>= np.uint64(8)
+    words &= _PAIRS
+    words *= np.uint64((10**2 << 16) + 1)
+    words >>= np.uint64(16)
+    words &= _FOURS
+    words *= np.uint64((10**4 << 32) + 1)
+    words >>= np.uint64(32)
     return words
