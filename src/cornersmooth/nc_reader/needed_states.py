@@ -13,7 +13,7 @@ from cornersmooth.nc_reader.elements import Element, Elements, Problem
 from cornersmooth.nc_reader.words import BSPLINE, NURBS, Table
 
 if TYPE_CHECKING:
-    from cornersmooth.kinematics.machine import Machine, RotaryAxis
+    from cornersmooth.kinematics.machine import Machine
     from cornersmooth.nc_reader.reader import Reader
 
 #: code of words that want another state of the control
@@ -48,21 +48,21 @@ def control_problems(table: Table, state: Reader, code: float, approach: Set[int
         kind, letters = ("angles" if state.rotary.tip_control else "machine"), set(state.rotary.names)
     else:
         kind, letters = ("point", set("UVW")) if state.modal.points else ("vector", set("IJ"))
-    motion = table.column("G")
-    if state.dialect.curves_need and not state.memory.high_speed:
-        text = f"a curve where {state.dialect.curves_need} must be in force"
+    dialect, motion = state.dialect, table.column("G")
+    if dialect.curves_need and not state.memory.high_speed:
+        text = f"a curve where {dialect.curves_need} must be in force"
         yield from first_wrong(CONTROL_WORDS, motion == NURBS, table.line, text)
     unnamed = letters - state.memory.spline_axes
-    if state.dialect.names_spline_axes and kind == "angles" and unnamed:
+    if dialect.names_spline_axes and kind == "angles" and unnamed:
         text = f"a spline of {' and '.join(sorted(unnamed))}, which no SPLINEPATH(1,X,Y,Z,...) names"
         yield from first_wrong(CONTROL_WORDS, motion == BSPLINE, table.line, text)
-    wanted, used = state.dialect.controls.get(kind), table.columns.keys() & letters
-    if wanted is not None and used and state.tip_control not in wanted:
-        rows = np.zeros(len(table), np.bool_)
-        rows[table.rows_with(used, code)] = True
+    wanted = dialect.controls.get(kind)
+    if wanted is not None and state.tip_control not in wanted:
+        rows = table.rows_with(letters, code)
+        line = table.line[rows]
         need = " or ".join(word or "no tool tip control" for word in wanted)
         text = f"{_KINDS[kind]} under {state.tip_control or 'no tool tip control'}, where {need} must be in force"
-        yield from first_wrong(CONTROL_WORDS, rows & ~np.isin(table.line, list(approach)), table.line, text)
+        yield from first_wrong(CONTROL_WORDS, ~np.isin(line, list(approach)), line, text)
 
 
 def axis_problems(
@@ -76,19 +76,17 @@ def axis_problems(
     for column, axis in enumerate(machine.axes):
         name, values = axis.name, table.column(axis.name)
         given, told = ~np.isnan(values), ~np.isnan(table.column(f"{BY_WORD} {axis.name}"))
+        wrong: dict[str, Bools] = {}
         if axis.modulo:
-            text = f"a word of {name} that is not from 0 to 360 degrees"
-            yield from first_wrong(CONTROL_WORDS, (values < 0.0) | (values >= 360.0), table.line, text)
+            wrong[f"a word of {name} that is not from 0 to 360 degrees"] = (values < 0.0) | (values >= 360.0)
         if way == BY_WORD and axis.modulo:
-            text = f"{name} without {BY_WORD}(), which sends it the shorter way"
-            yield from first_wrong(CONTROL_WORDS, given & ~told, table.line, text)
+            wrong[f"{name} without {BY_WORD}(), which sends it the shorter way"] = given & ~told
         elif way == BY_WORD:
-            yield from first_wrong(
-                CONTROL_WORDS, told, table.line, f"{name} with {BY_WORD}(), which is for modulo axes"
-            )
+            wrong[f"{name} with {BY_WORD}(), which is for modulo axes"] = told
         elif way and axis.modulo and not memory.shorter_way:
-            text = f"{name} without {way} in force, which sends it the shorter way"
-            yield from first_wrong(CONTROL_WORDS, given, table.line, text)
+            wrong[f"{name} without {way} in force, which sends it the shorter way"] = given
+        for text, rows in wrong.items():
+            yield from first_wrong(CONTROL_WORDS, rows, table.line, text)
         if axis.limits is not None:
             angles, line = (run.second[:, column], run.line) if len(run.curves) else (values, table.line)
             beyond = (angles < axis.low - step / 2) | (angles > axis.high + step / 2)
@@ -123,25 +121,13 @@ def take_clamp(word: float, machine: Machine, memory: Memory) -> bool:
     return False
 
 
-def is_clamped(axis: RotaryAxis, memory: Memory) -> bool:
-    """Whether an axis is held, or may be, as no word has said that it is not."""
-    return axis.clamp is not None and memory.clamped.get(axis.name, True)
-
-
 def clamp_problems(run: Elements, before: Sequence[float], machine: Machine, memory: Memory) -> Iterator[Problem]:
     """Which rotary axes turn in a run although they are clamped, or nobody has said that they are not."""
     for column, axis in enumerate(machine.axes):
-        if axis.clamp is not None and is_clamped(axis, memory):
+        if axis.clamp is not None and memory.clamped[axis.name]:
             angles = np.append(before[column], run.second[:, column])
             turned = (angles[1:] != angles[:-1]) & ~np.isnan(angles[1:])
             yield from first_wrong("CS538", turned, run.line, f"{axis.name} turns without {axis.clamp[1]} before it")
-
-
-def unclamped_problems(machine: Machine, memory: Memory) -> Iterator[Problem]:
-    """Which rotary axes are not clamped at the end of a program."""
-    for axis in machine.axes:
-        if axis.clamp is not None and not is_clamped(axis, memory):
-            yield Problem("CS538", 0, 0, f"{axis.name} is not clamped at the end")
 
 
 def kinematics_problems(run: Elements, machine: Machine, memory: Memory, *, tip_control: bool) -> Iterator[Problem]:

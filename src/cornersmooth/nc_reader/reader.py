@@ -21,11 +21,9 @@ from cornersmooth.nc_reader.needed_states import (
     clamp_problems,
     control_problems,
     first_wrong,
-    is_clamped,
     kinematics_problems,
     take_clamp,
     turn_problems,
-    unclamped_problems,
 )
 from cornersmooth.nc_reader.planes import ASIDE, NOT_ABOVE, TiltedPlane
 from cornersmooth.nc_reader.retracts import Retracts
@@ -59,7 +57,8 @@ class Reader:
         self.rotary = options.rotary(steps)
         self.modal = Modal(rotary=self.rotary.names if self.rotary is not None else "")
         self.tip_control = ""
-        self.memory = Memory()
+        clamps = self.rotary.machine.axes if self.rotary is not None else ()
+        self.memory = Memory(clamped={axis.name: True for axis in clamps if axis.clamp is not None})
         self._tool = -1.0  # that has been chosen
         self._left_at: Floats | None = None  # where a tool of another length has left
         self.waiting: list[Table | tuple[int, dict[str, float]]] = []
@@ -110,8 +109,8 @@ class Reader:
             if self.placed and waiting >= GIVEN_OUT and not (self.retracts.cut_is_left or goes_up):
                 yield self._collected()
         self.flush()
-        if self.rotary is not None:
-            self.problems += unclamped_problems(self.rotary.machine, self.memory)
+        free = [name for name, clamped in self.memory.clamped.items() if not clamped]
+        self.problems += [Problem("CS538", 0, 0, f"{name} is not clamped at the end") for name in free]
         self._settle()
         if self.ready:
             yield self._collected()
@@ -268,10 +267,9 @@ class Reader:
 
     def _turn(self, line: Line) -> None:
         """Complain of rotary axes that are held where a plane turns them."""
-        if self.rotary is not None:
-            for axis in self.rotary.machine.axes:
-                if is_clamped(axis, self.memory):
-                    self.wrong("CS538", line, f"{axis.name} turns to a tilted plane while it is clamped")
+        for name, clamped in self.memory.clamped.items():
+            if clamped:
+                self.wrong("CS538", line, f"{name} turns to a tilted plane while it is clamped")
 
     @property
     def _code(self) -> float:

@@ -14,7 +14,7 @@ from cornersmooth.nc_reader.lexer import Lexer
 from cornersmooth.nc_reader.words import Line, Table
 from cornersmooth.nc_words.blocks import Ruled, WordRules
 from cornersmooth.nc_words.machine_positions import MachinePositions
-from cornersmooth.nc_words.rules import WordList, WordRule, shown, word_list, word_text
+from cornersmooth.nc_words.rules import UNLISTED, WordList, WordRule, shown, word_list, word_text
 from cornersmooth.nc_words.states import LINEAR, ROTARY, WordStates
 
 #: words that bear on no motion: tool, spindle, stops, coolant (ISO 6983-1, M0 to M9 and M19)
@@ -147,45 +147,40 @@ class WordCheck:
         before, ruled = len(self.problems), self._rules.of(words)
         if not self._frames(number, text):
             self._follow(number, text, ruled)
-            self.problems += self._rules.problems(line, words, ruled)
+            self._wrong(number, *self._rules.problems(line, words, ruled))
             self._states.take(number, words, ruled)
         self._line = number
         if own:
-            line = self._on_trust(line, text, before)
+            line = self._on_trust(line, words, ruled, before)
             ruled = self._rules.of([word_text(word) for word in line.words])
         elif self._positions.rules:
-            retract = any(rule is not None and rule.retract and rule in self.list.blocks for _, rule in ruled)
+            retract = any(rule.retract and rule in self.list.blocks for _, rule in ruled)
             self.problems += self._positions.take(line, text, retract=retract)
-        rules = [rule for _, rule in ruled if rule is not None]
+        rules = [rule for _, rule in ruled]
         codes = [word.value for word in line.words if word.name == "G" and word.value in (0.0, 1.0, 2.0, 3.0)]
         self._code = codes[-1] if codes else self._code
         apart = any(rule.alone for rule in rules) or (len(ruled) == 1 and len(line.words) > 1)
         self._move(number, {word.name: word.value for word in line.words}, rules, apart=apart)
         return line
 
-    def _on_trust(self, line: Line, text: str, before: int) -> Line:
+    def _on_trust(self, line: Line, words: Sequence[str], ruled: Ruled, before: int) -> Line:
         """Take a block of the user's on trust if there are problems from a number on, and leave its words out.
 
         What it establishes counts. With a word that is not on the list, not in its place, or that the CL file would
         have to ask for, the block is taken on trust, and the reader gets no more of it than is understood.
         """
-        words = [word_text(word) for word in line.words]
-        ruled = self._rules.of(words)
-        compared = any(rule is not None and rule.compared for _, rule in ruled)
-        if not (line.skipped or len(self.problems) > before or compared):
+        if not (line.skipped or len(self.problems) > before or any(rule.compared for _, rule in ruled)):
             return line
         del self.problems[before:]
-        self.trusted.append((line.number, text))
+        block = line.number, " ".join(words)
+        self.trusted.append(block)
         if line.skipped or not all(word in self._accepted or _BESIDE_MOTION.fullmatch(word) for word in words):
-            self.unsure.append((line.number, text))
+            self.unsure.append(block)
         if len(ruled) < len(words):
             return line
-        kept = [
-            word
-            for word, (_, rule) in zip(line.words, ruled, strict=True)
-            if (rule is not None and not rule.compared)
-            or ("tool" in self._left and word.name == "T")  # stops for a tool are told by it
-        ]
+        left = [rule is UNLISTED or rule.compared for _, rule in ruled]
+        tool = "tool" in self._left  # stops for a tool are told by its number
+        kept = [word for word, out in zip(line.words, left, strict=True) if not out or (tool and word.name == "T")]
         return replace(line, words=tuple(kept))
 
     def _move(
@@ -201,10 +196,10 @@ class WordCheck:
         """Look at what a block and that before want of each other."""
         number, before, theirs = self._before
         for _, rule in theirs:
-            if rule is not None and rule.then is not None and not rule.then.fullmatch(text):
+            if rule.then is not None and not rule.then.fullmatch(text):
                 self._wrong(number, f"{shown(rule.pattern)} without {shown(rule.then)} after it")
         for word, rule in ruled:
-            if rule is not None and rule.behind is not None and not rule.behind.fullmatch(before):
+            if rule.behind is not None and not rule.behind.fullmatch(before):
                 self._wrong(line, f"{word} does not follow what it belongs to")
         self._before = line, text, ruled
 

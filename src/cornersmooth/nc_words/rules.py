@@ -1,6 +1,6 @@
 """The closed list of words of each control: what they are, what must hold before the tool moves, where they may stand.
 
-They are data (`nc_reader.word_tables`), with the manual that they are from. Keys:
+They are data of TOML tables (`nc_reader.word_tables`), with the manual that they are from. Keys:
 
 ``begin``, ``end``
     Blocks, as regular expressions, that a program begins and ends with.
@@ -8,50 +8,17 @@ They are data (`nc_reader.word_tables`), with the manual that they are from. Key
     What may stand before that: a mark of the transfer.
 ``orders``
     What a comment begins with that the control would obey.
-``[means]``
-    Words of spindle and coolant need no ``[[word]]``: their rules follow.
-``[[word]]``: their rules follow. What is no value here the control has no word for. A third
-    part says of what kind alone a word is the end (``M89 = "coolant OFF THRU"``). ``""``: not the word of a control
-    that this one is like.
-``[[word]]``
-    ``is``: the word, blanks left out. ``says``: what it means, for the documentation.
-
-    ``state``: what it changes; of a ``[[block]]``, too. Where the tool moves, every state must be what it was at the
-    first motion, but for those that ``follows`` the CL file, which others compare. ``off``: what must hold at the end
-    of the program. ``compared``: others compare it with the CL file.
-
-    ``first``: when it must have been said: one of these words before the first ``"motion"``; in programs of our own
-    before the first ``"retract"``, or before it is ``"used"``: before another word of its state.
-
-    ``needs``: a word that must stand in the same block, of whose state it may say more. ``must``: the same, for a word
-    that is nothing without. ``alone``: no other words may stand beside it. ``before``: ``"arc"``. ``after``: a word
-    that must have been said since the last time. ``then``, ``behind``: the next block, the block before. ``share``:
-    what the number in brackets may be of the tolerance. ``varies``: it may change within the program. ``rotary``: where
-    the rotary axes must have been sent before: to ``"zero"``, as, where a parameter says so, the part program turns
-    with the angles of that moment; or, in programs of our own, where the ``"next"`` motion has them. ``turns``: the
-    control turns them, and nobody says where to. ``never``: the control has no such word.
-    ``tool``: in a text with a ``cycle`` of the control, a tilted plane or cutter compensation (all ``cycle``), it may
-    differ from tool to tool. ``high``:
-    only behind a retract; a control with such a word wants the tool high at the end, too. ``late``: behind a retract it
-    may come as late as in the block that first moves Z. ``ends``: it must be switched off before the tool is changed.
-    ``outside``: it may not be said while a word that ``ends`` holds. ``drops``: a state that the control forgets with
-    it, and that must be said behind it. ``moves``: the tool moves, though the block names no axis.
-
-    In programs of our own: ``bars``: states of which no word that is ``tidy`` or ``ends`` may hold where it is said.
-    ``tidy``: it must be switched off before another tool and at the end. ``preset``: the one that is meant where the
-    head names none. ``down``: one of its state must hold where the tool comes down from a retract while a word like
-    this holds.
-``[[block]]``
-    A block that counts as a whole. ``retract``: it moves the tool away, which no motion may follow but an approach, in
-    which work offset or tool length are said again.
+``[[word]]``, ``[[block]]``
+    Words, and blocks that count as a whole: ``is``, blanks left out, and the fields of `WordRule`. Those of spindle and
+    coolant follow from ``[means]``.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cache, cached_property
+from dataclasses import dataclass
+from functools import cache
 from typing import Any, Final
 
 from cornersmooth.nc_reader.word_tables import word_table
@@ -66,39 +33,54 @@ _PATTERNS: Final = frozenset(("is", "needs", "must", "after", "then", "behind", 
 
 @dataclass(frozen=True)
 class WordRule:
-    """What the list says of a word; the module says what the fields mean."""
+    """What the list says of a word or a block. What programs of our own alone must keep is marked so."""
 
     pattern: re.Pattern[str]
-    says: str = ""
-    state: str = ""
-    off: bool = False
-    follows: bool = False
-    compared: bool = False
+    says: str = ""  #: what it means, for the documentation
+
+    # the block: words that must stand beside it (`needs` finds the rule, and may say more of the state of that word)
     needs: re.Pattern[str] | None = None
     must: re.Pattern[str] | None = None
-    alone: bool = False
-    before: str = ""
-    after: re.Pattern[str] | None = None
-    then: re.Pattern[str] | None = None
-    behind: re.Pattern[str] | None = None
-    share: float | None = None
-    never: bool = False
-    high: bool = False
-    retract: bool = False
-    rotary: str = ""
-    tool: bool = False
-    cycle: bool = False
-    turns: bool = False
-    late: bool = False
-    ends: bool = False
-    outside: bool = False
-    drops: str = ""
-    moves: bool = False
+    alone: bool = False  #: no other words may stand beside it
+    share: float | None = None  #: what the number in brackets may be of the tolerance
+    never: bool = False  #: the control has no such word
+
+    # blocks before and after
+    after: re.Pattern[str] | None = None  #: a word that must have been said since the last time
+    behind: re.Pattern[str] | None = None  #: the block before
+    then: re.Pattern[str] | None = None  #: the next block
+    before: str = ""  #: ``"arc"``: the next motion must be one, but for the word that held at first
+
+    # its state: where the tool moves, that must be what it was at the first motion
+    state: str = ""
+    follows: bool = False  #: but not this one: it follows the CL file, and others compare it
+    tool: bool = False  #: it may differ from tool to tool in a program with a `cycle`
+    cycle: bool = False  #: a hole cycle of the control, a tilted plane, cutter compensation
+    late: bool = False  #: after a retract it may come as late as in the block that first moves Z
+    compared: bool = False  #: others compare the word with the CL file
+    #: when one of its state must have been said: before the first ``"motion"``; in programs of our own before the first
+    #: ``"retract"``, or before another word of its state is ``"used"``
     first: str = ""
-    tidy: bool = False
-    preset: str = ""
-    bars: re.Pattern[str] | None = None
-    down: re.Pattern[str] | None = None
+    preset: str = ""  #: in programs of our own: the one that is meant where the head names none
+    down: re.Pattern[str] | None = None  #: so, too: one must hold on the way down from a retract under such a word
+    drops: str = ""  #: a state that the control forgets with it, and that must be said after it
+
+    # until when it may hold
+    off: bool = False  #: it switches the state off, which must hold at the end
+    ends: bool = False  #: tool tip control: it must be switched off before the tool is changed
+    outside: bool = False  #: it may not be said while a word that `ends` holds
+    tidy: bool = False  #: in programs of our own: it must be switched off before another tool and at the end
+    bars: re.Pattern[str] | None = None  #: so, too: states of which none that is `tidy` or `ends` may hold here
+
+    # where the tool is
+    #: the tool goes away, and none but an approach may follow, in which work offset or tool length are said again
+    retract: bool = False
+    high: bool = False  #: only after a retract; a control with such a word wants the tool high at the end, too
+    moves: bool = False  #: the tool moves, though the block names no axis
+    turns: bool = False  #: the control turns the rotary axes, and nobody says where to
+    #: where they must have been sent before: to ``"zero"``, as, where a parameter says so, the part program turns with
+    #: the angles of that moment; or, in programs of our own, where the ``"next"`` motion has them
+    rotary: str = ""
 
     @property
     def changes_tool(self) -> bool:
@@ -106,26 +88,21 @@ class WordRule:
         return self.compared and (self.high or self.after is not None)
 
 
+#: the rule of words that are not on the list, or not beside these
+UNLISTED: Final = WordRule(re.compile("(?!)"))
+
+
 @dataclass(frozen=True)
 class WordList:
     """The words of a control."""
 
-    begin: tuple[re.Pattern[str], ...] = ()
-    end: tuple[re.Pattern[str], ...] = ()
-    header: re.Pattern[str] | None = None
-    orders: re.Pattern[str] | None = None
+    begin: tuple[re.Pattern[str], ...]
+    end: tuple[re.Pattern[str], ...]
+    header: re.Pattern[str] | None
+    orders: re.Pattern[str] | None
     #: what is the control's own comes first
-    words: tuple[WordRule, ...] = ()
-    blocks: tuple[WordRule, ...] = field(default=())
-
-    @cached_property
-    def heads(self) -> dict[str, list[WordRule]]:
-        """Words of which one must come before the first motion, by state."""
-        found: dict[str, list[WordRule]] = {}
-        for rule in self.words:
-            if rule.first == "motion":
-                found.setdefault(rule.state, []).append(rule)
-        return found
+    words: tuple[WordRule, ...]
+    blocks: tuple[WordRule, ...]
 
 
 @cache

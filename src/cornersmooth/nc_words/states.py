@@ -19,14 +19,15 @@ import numpy as np
 
 from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.nc_reader.rotary import tool_vectors
-from cornersmooth.nc_words.blocks import NOT_LISTED, Ruled
+from cornersmooth.nc_words.blocks import Ruled
 from cornersmooth.nc_words.machine_positions import SAME, MachinePositions
 from cornersmooth.nc_words.rules import WordList, WordRule, any_of, shown
 
 #: a retract with the same tool, which only GOHOME of the CL file asks for
 GONE_ON: Final = "a retract that another motion of the same tool follows"
 
-#: code of states that the program never establishes
+#: codes of words that are not on the list or not in their place, and of states that the program never establishes
+NOT_LISTED: Final = "CS571"
 NOT_ESTABLISHED: Final = "CS572"
 
 #: name of the blocks around the motion, among what is left to the user
@@ -111,22 +112,21 @@ class WordStates:
 
     # complaints
 
-    def wrong(self, line: int, text: str, code: str = NOT_LISTED) -> None:
-        """Complain of a word or a state."""
-        self.problems.append(Problem(code, 0, line, text))
+    def wrong(self, line: int, *texts: str, code: str = NOT_LISTED) -> None:
+        """Complain of words or states."""
+        self.problems += [Problem(code, 0, line, text) for text in texts]
 
-    def unframed(self, line: int, text: str, code: str = NOT_LISTED) -> None:
+    def unframed(self, line: int, *texts: str, code: str = NOT_LISTED) -> None:
         """Complain of the blocks around the motion; where they are the user's own, they are taken on trust."""
         if FRAME in self._left:
-            self.trusted.append((line, text))
-            self.unsure.append((line, text))
+            self.trusted += [(line, text) for text in texts]
+            self.unsure += [(line, text) for text in texts]
         else:
-            self.wrong(line, text, code)
+            self.wrong(line, *texts, code=code)
 
     def _lost_since(self, line: int, texts: Iterable[str]) -> None:
         """Complain of what a program of our own has."""
-        for text in texts if self._made else ():
-            self.unframed(line, text)
+        self.unframed(line, *(texts if self._made else ()))
 
     # what holds
 
@@ -135,9 +135,9 @@ class WordStates:
         return [held for state, held in self._held.items() if state not in self._forgotten]
 
     @property
-    def _tip_control(self) -> str:
+    def _tip_control(self) -> list[str]:
         """Word of tool tip control that holds, if any."""
-        return next((held.text for held in self._in_force if held.rule.ends), "")
+        return [held.text for held in self._in_force if held.rule.ends]
 
     def _running(self) -> list[str]:
         """Words that are switched off after the last motion of a tool."""
@@ -160,12 +160,11 @@ class WordStates:
         """Take over what a block says, and complain of what is not in its place."""
         self._changed = True
         self._said |= set(words)
-        known = [(word, rule) for word, rule in ruled if rule is not None]
-        for word, rule in known:
+        for word, rule in ruled:
             self._place(line, word, rule)
-        for word, rule in known:
-            self._set(line, word, rule, known)
-        if any(rule.changes_tool for _, rule in known):
+        for word, rule in ruled:
+            self._set(line, word, rule, ruled)
+        if any(rule.changes_tool for _, rule in ruled):
             self._lost_since(line, [f"{' '.join(words)} under {word}" for word in self._running()])
 
     def _place(self, line: int, word: str, rule: WordRule) -> None:
@@ -185,21 +184,18 @@ class WordStates:
             self.angles, self._swivelled = {}, True
         if rule.retract:
             if self._unsaid_at_retract is None:
-                self._unsaid_at_retract = list(self._unsaid("retract", word))
+                self._unsaid_at_retract = [f"{wanted} must come before {word}" for _, wanted in self._unsaid("retract")]
             self._retract, self._high, self.above, self._over = line, True, True, False
-        if rule.changes_tool or word.startswith("TOOL CALL "):
+        if rule.changes_tool or rule.outside:
             self._retract = 0
-        if tip := self._tip_control:
-            if rule.changes_tool:
-                self.unframed(line, f"{word} under {tip}")
-            elif rule.outside:
-                self.wrong(line, f"{word} under {tip}")
+            tell = self.unframed if rule.changes_tool else self.wrong
+            tell(line, *[f"{word} under {tip}" for tip in self._tip_control])
         if rule.changes_tool and self._started:
             self._started, self._stopped = False, (word, line)
         if _SPINDLE.fullmatch(word):
             self._started, self._stopped = word != "M5", None
 
-    def _set(self, line: int, word: str, rule: WordRule, known: Sequence[tuple[str, WordRule]]) -> None:
+    def _set(self, line: int, word: str, rule: WordRule, ruled: Ruled) -> None:
         """Take over the state that a word sets, and complain of what a program of our own says around it."""
         if rule.drops in self._held:
             self._forgotten[rule.drops] = word
@@ -207,13 +203,14 @@ class WordStates:
             ended = [state for state, held in self._held.items() if held.rule.tidy and held.rule.compared]
             self._halted = dict.fromkeys(ended, word)
         if rule.state:
-            beside = [(other, its) for other, its in known if its.needs and its.needs.fullmatch(word)]
+            beside = [(other, its) for other, its in ruled if its.needs and its.needs.fullmatch(word)]
             more = [other for other, its in beside if not (its.compared or its.follows)]
             self._held[rule.state] = _Held(" ".join([word, *more]), rule, line)
             self._forgotten.pop(rule.state, None)
             self._halted.pop(rule.state, None)
             if not rule.off:
-                self._lost_since(line, self._unsaid("used", word, rule.state))
+                unsaid = self._unsaid("used", rule.state)
+                self._lost_since(line, [f"{wanted} must come before {word}" for _, wanted in unsaid])
                 if rule.state in self._approach:  # GOHOME: the same tool comes back as a new one does
                     self._retract = 0
             if rule.before and self._first is not None and word != self._first.get(rule.state):
@@ -228,11 +225,13 @@ class WordStates:
         if rule.ends and self._over:
             self._lost_since(line, [f"{word} after the motion to where the tool comes down"])
 
-    def _unsaid(self, when: str, word: str, state: str = "") -> Iterator[str]:
-        """Words that must have come before others of a state, or before the first retract."""
-        for rule in self._list.words:
-            if rule.first == when and state in ("", rule.state) and not any_of(rule.pattern, self._said):
-                yield f"{shown(rule.pattern)} must come before {word}"
+    def _unsaid(self, when: str, only: str = "") -> Iterator[tuple[str, str]]:
+        """States, and words of which one must have come before the first motion or retract, or before others of it."""
+        rules = [rule for rule in self._list.words if rule.first == when and only in ("", rule.state)]
+        for state in dict.fromkeys(rule.state for rule in rules):
+            wanted = [rule.pattern for rule in rules if rule.state == state]
+            if not any(any_of(pattern, self._said) for pattern in wanted):
+                yield state, " or ".join(map(shown, wanted))
 
     # where axes turn, and where the tool moves
 
@@ -240,8 +239,7 @@ class WordStates:
         """Take over rotary words; they may not turn the axes alone where a retract has left the tool."""
         self.angles |= {name: words[name] for name in ROTARY & words.keys()}
         if self.above and ROTARY & words.keys() and not LINEAR & words.keys():
-            ends = [held.text for held in self._in_force if held.rule.ends]
-            self._lost_since(line, [f"the rotary axes turn under {word}" for word in ends])
+            self._lost_since(line, [f"the rotary axes turn under {word}" for word in self._tip_control])
 
     def motion(
         self, line: int, words: Mapping[str, float], code: float, *, moves: bool = False, drills: bool = False
@@ -262,28 +260,26 @@ class WordStates:
             late = {state for state in self._late & self._held.keys() if self._held[state].off}
         for state, word in self._forgotten.items():
             if state not in self._left:
-                self.unframed(line, f"{state}: it must come after {word}, which deselects it", NOT_ESTABLISHED)
-        if self._first is None:
-            self._begin(line, late)
-        else:
-            if self._retract and not late:
-                self.wrong(self._retract, GONE_ON)
-                self._retract = 0
-            if self._arc is not None and code not in (2.0, 3.0):
-                self.wrong(self._arc[1], f"{self._arc[0]} where no arc follows")
-            self._compare(late, self._first)
+                self.unframed(line, f"{state}: it must come after {word}, which deselects it", code=NOT_ESTABLISHED)
+        first = self._begin(line, late) if self._first is None else self._first
+        self._compare(late, first)
+        if self._retract and not late:
+            self.wrong(self._retract, GONE_ON)
+            self._retract = 0
+        if self._arc is not None and code not in (2.0, 3.0):
+            self.wrong(self._arc[1], f"{self._arc[0]} where no arc follows")
         self._changed = self._high = self._started = False
         self._arc, self._stopped, self._halted, self._forgotten = None, None, {}, {}
 
-    def _begin(self, line: int, late: Set[str]) -> None:
-        """Look at what holds at the first motion."""
+    def _begin(self, line: int, late: Set[str]) -> dict[str, str]:
+        """Look at what holds at the first motion, and return it."""
         self._retract = 0
         self._lost_since(line, [*(self._unsaid_at_retract or ()), *self._wrong_offset()])
         self._first = {state: "" if state in late else held.text for state, held in self._held.items()}
-        for state, rules in self._list.heads.items():
-            if state not in self._left and not any(any_of(rule.pattern, self._said) for rule in rules):
-                wanted = " or ".join(shown(rule.pattern) for rule in rules)
-                self.unframed(line, f"{state}: {wanted} must come before the first motion", NOT_ESTABLISHED)
+        for state, wanted in self._unsaid("motion"):
+            if state not in self._left:
+                self.unframed(line, f"{state}: {wanted} must come before the first motion", code=NOT_ESTABLISHED)
+        return self._first
 
     def _compare(self, late: Set[str], first: dict[str, str]) -> None:
         """Complain of states that are not what they were at the first motion, where nobody else compares them."""
@@ -353,10 +349,8 @@ class WordStates:
         made_for = self._made.get("OFFSET", "")
         if held is None or _OFFSET in self._left or made_for == "NONE":
             return
-        match = held.rule.pattern.fullmatch(held.text)
-        said = match[1] if match and match.re.groups else held.text
         wanted = made_for or held.rule.preset
-        if wanted and said.replace(" ", "_") != wanted:
+        if wanted and re.split(r"=\+?", held.text)[-1].replace(" ", "_") != wanted:
             yield f"{held.text}, where the program was made for {wanted.replace('_', ' ')}"
 
     def end(self, line: int) -> None:
@@ -367,9 +361,9 @@ class WordStates:
             held = self._held[state]
             if not held.off:
                 text = f"{state}: {held.text} of line {held.line} still holds at the end"
-                self.unframed(line, text, NOT_ESTABLISHED)
+                self.unframed(line, text, code=NOT_ESTABLISHED)
         if not self._high and self._retracts:
-            self.unframed(line, "the tool is not retracted at the end", NOT_ESTABLISHED)
+            self.unframed(line, "the tool is not retracted at the end", code=NOT_ESTABLISHED)
         if self._first is None:
             return
         self._lost_since(line, [f"{word} still holds at the end" for word in self._running()])

@@ -28,7 +28,7 @@ class Memory:
     incremental: bool = False  #: G91 is in force, in which no motion is read
     high_speed: bool = False  #: look ahead of the kind that some controls ask for with curves is on
     spline_axes: frozenset[str] = frozenset()  #: those that have been said to be axes of splines
-    clamped: dict[str, bool] = field(default_factory=dict)  #: rotary axes that words have clamped, or let turn
+    clamped: dict[str, bool] = field(default_factory=dict)  #: rotary axes with a clamp: held, or words let them turn
     keeps_tip: bool | None = None  #: whether the kinematics do, where the machine's file says what switches that
     shorter_way: bool = False  #: whether rotary axes go it
     speed: float = math.nan  #: of the spindle
