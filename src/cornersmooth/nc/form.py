@@ -16,7 +16,7 @@ ROTARY_SHARE = 0.1
 #: share of ε that the tip may leave its line where the control knows nothing of the tip
 TIP_SHARE = 0.1
 
-#: share of ε that verification takes off for the lines that stand for blocks of rotary words
+#: share of ε that verification takes off for the lines that stand for blocks of rotary words, and for its proof
 LINE_SHARE = 0.005
 
 
