@@ -81,8 +81,8 @@ class Source:
         if not isinstance(self._text, bytes):
             self._text.close()
 
-    def begin_again(self) -> None:
-        """Read from the beginning again."""
+    def begin(self) -> None:
+        """Read from the beginning, again if need be."""
         self._place = 0
 
     def head(self, size: int) -> bytes:

@@ -17,6 +17,7 @@ import numpy as np
 
 from cornersmooth.model import Floats, Ints
 from cornersmooth.verify.chain import Path
+from cornersmooth.verify.cl_motion import parts_of
 
 #: what is reached of a row: by segment of the path the lowest and the highest fraction
 Reached: TypeAlias = dict[int, tuple[float, float]]
@@ -222,42 +223,31 @@ class Around:
         start: float,
         top: int,
         inner: Inner | None,
-        *,
-        fine: bool,
     ) -> Around:
         """Rows against the path from the place of the first up to a vertex.
 
-        They are vertices (k, 3h), the bends (k - 1,) of their steps, and their numbers (k,) for `Inner`. Their bends
-        are taken off the radius; `fine`: bent steps and segments are divided before, but no steps that are looked back
-        on: of these nothing is known but their ends.
+        They are vertices (k, 3h), the bends (k - 1,) of their steps, and their numbers (k,) for `Inner`. Bent steps and
+        segments are divided, but no steps that are looked back on: of these nothing is known but their ends.
         """
         own, bend, number = rows
         base = min(int(start), top - 1)
-        theirs = _parts(path.bend[base:top], radius if fine else np.inf)
-        ours = _parts(np.where(number[:-1] < 0.0, 0.0, bend), radius if fine and inner is not None else np.inf)
-        places = _divided(np.arange(base, top + 1, dtype=np.float64), theirs)
-        at = np.append(0, np.cumsum(ours))
+        theirs = parts_of(path.bend[base:top], FINE * radius, _MOST_PARTS)
+        known = np.zeros(len(bend)) if inner is None else np.where(number[:-1] < 0.0, 0.0, bend)
+        ours = parts_of(known, FINE * radius, _MOST_PARTS)
+        at, places = np.append(0, np.cumsum(ours)), _divided(np.arange(base, top + 1), theirs)
         points = np.empty((own.shape[1], at[-1] + 1))
         points[:, at] = own.T
         between = np.setdiff1d(np.arange(at[-1] + 1), at, assume_unique=True)
         if inner is not None and len(between):
             points[:, between] = inner(_divided(number, ours)[between]).T
-        beside = path.at(places) if fine else path.points[base : top + 1]
         bends = np.repeat(bend / ours**2, ours), np.repeat(path.bend[base:top] / theirs**2, theirs)
-        return cls(FreeSpace(points, beside.T, radius, *bends), at, places, start)
+        return cls(FreeSpace(points, path.at(places).T, radius, *bends), at, places, start)
 
     @property
     def row_reached(self) -> int:
         """The first row after the last of which something is reached; the last row if that is."""
         count = len(self.reached) - (not self.reached[-1])
         return min(int(np.searchsorted(self.at, count)), len(self.at) - 1)
-
-    @property
-    def bent(self) -> bool:
-        """Whether either motion is bent where something was reached."""
-        last = max(max(row, default=0) for row in self.reached) + 2
-        largest = max(self.space.path_bend[:last].max(), self.space.own_bend[: len(self.reached)].max(initial=0.0))
-        return bool(largest > FINE * self.space.radius)
 
     def inward(self, place: float) -> float:
         """A place of the whole path, counted here."""
@@ -307,14 +297,7 @@ class Around:
         return self.outward(highest + row[highest][1])
 
 
-def _parts(bend: Floats, radius: float) -> Ints:
-    """(k,) into how many parts steps are divided so that their bends are fine."""
-    parts = np.ceil(np.sqrt(np.minimum(bend / (FINE * radius), _MOST_PARTS**2)))
-    return np.maximum(parts, 1).astype(np.int64)
-
-
-def _divided(values: Floats, parts: Ints) -> Floats:
+def _divided(values: Floats | Ints, parts: Ints) -> Floats:
     """Ascending values (n + 1,) with as many equal parts between neighbours (n,) as asked for."""
-    step = np.repeat(np.arange(len(parts)), parts)
-    share = (np.arange(len(step)) - np.repeat(np.cumsum(parts) - parts, parts)) / parts[step]
-    return np.append(values[step] + share * np.diff(values)[step], values[-1])
+    at = np.append(0, np.cumsum(parts))
+    return np.interp(np.arange(at[-1] + 1), at, values)

@@ -232,13 +232,10 @@ class Walk:
             own = self._own[rows], self._bend[steps], self._number[rows]
             top = self._within_reach(begin, until, stop)
             ends = math.nan if until < end else None if unfinished else stop
-            for fine in (False, True):
-                around = Around.of(own, self.path, self.radius, float(self._place[begin]), top, inner, fine=fine)
-                goal = around.goal(self._place[rows], last - begin, ends)
-                if goal is not None:
-                    return self._settle(begin, around, goal)
-                if not around.bent:
-                    break
+            around = Around.of(own, self.path, self.radius, float(self._place[begin]), top, inner)
+            goal = around.goal(self._place[rows], last - begin, ends)
+            if goal is not None:
+                return self._settle(begin, around, goal)
             if not around.reached[0] and begin not in (known, 0):  # what bends take off leaves nothing of that place
                 continue
             if around.reached[-1] and until < end:

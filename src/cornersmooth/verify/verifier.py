@@ -62,6 +62,10 @@ _UNSURE_TOLD: Final = 3
 _LONG: Final = 30_000
 
 
+class _NotProvedError(Exception):
+    """The motions part, and a guess may be why."""
+
+
 class Verifier:
     """Measures an NC text against the CL program it was made from, and may begin while the text is still being written.
 
@@ -134,7 +138,6 @@ class Verifier:
             axis_length = length_of(tolerance, axis_tolerance)
         _check_bounds(tolerance=tolerance, axis_length=axis_length)
         self._program, self._words = program, words
-        self._apart = False
         self._processes = processes if can_fork() and len(program) >= _LONG else 1
         self._trusted, self._slower = tuple(trusted), slower
         self._own = (self._trusted, accepted, weights)
@@ -166,46 +169,36 @@ class Verifier:
         if isinstance(self._text, Source):
             self._text.finish()
         found: Verification = self._work() if self._helper is None else self._helper.result()
-        if found.motions_part and self._axis_tolerance is None:
-            found = self._each_alone(found)
-        return found
-
-    def _each_alone(self, together: Verification) -> Verification:
-        """What is found with tips and axis points on their own, where that tells more than both together."""
-        self._apart = True
-        if isinstance(self._text, Source):
-            self._text.begin_again()
-        found = self._work()
-        self._apart = not found.motions_part or (together.only_apart and not found.only_apart)
-        return replace(found, apart=True) if self._apart else together
+        if not found.motions_part or self._axis_tolerance is not None:
+            return found
+        alone = self._pass(apart=True)
+        better = not alone.motions_part or (found.only_apart and not alone.only_apart)
+        return replace(alone, apart=True) if better else found
 
     def _work(self) -> Verification:
         """Read and measure the text as far as it goes.
 
         First with guesses of where long stretches are cut, which can only prove that nothing is wrong.
         """
-        found = None if self._apart else self._pass(guess=True)
-        if found is None:
-            if isinstance(self._text, Source):
-                self._text.begin_again()
-            found = self._pass(guess=False)
-        assert found is not None
-        return found
+        with contextlib.suppress(_NotProvedError):
+            return self._pass(guess=True)
+        return self._pass()
 
-    def _pass(self, *, guess: bool) -> Verification | None:
-        """Read and measure the text; None where the motions seem to part, and a guess may be why."""
+    def _pass(self, *, guess: bool = False, apart: bool = False) -> Verification:
+        """Read and measure the text; `apart`: with tips and axis points on their own."""
         options, text = self._options, self._text
         if isinstance(text, NcProgram):
-            task = self._task(rotary=text.rotary)
             elements = Elements(**{column.name: getattr(text, column.name) for column in fields(Elements)})
-            found = self._found(
-                task, iter([elements]), list(text.events), lambda: (text, len(text.curves)), guess=guess
-            )
+            task, read = self._task(rotary=text.rotary, apart=apart), (text, len(text.curves))
+            found = self._found(task, iter([elements]), list(text.events), lambda: read, guess=guess)
             words = "the words of the text: they are looked at where it is read, not afterwards"
-            return found.not_verified(words) if found and self._words else found
+            return found.not_verified(words if self._words else "")
+        text.begin()
         steps = options.steps(text.head(DIGITS_SAMPLE))
         rotary = options.rotary(steps)
-        task = self._task(rotary=rotary is not None)  # takes memory, which who writes may need before there is text
+        task = self._task(
+            rotary=rotary is not None, apart=apart
+        )  # takes memory, which who writes may need before there is text
         lever = None if rotary is None else float(rotary.levers(task.original.trail.tip).max(initial=0.0))
         reader = Reader(self._name, options, steps, lever)
         machine = self._machine if options.dialect.retracts else None
@@ -221,18 +214,15 @@ class Verifier:
             nc = program_of(reader, [])
             return replace(nc, problems=(*nc.problems, *check.problems)), reader.curves
 
-        found = self._found(task, chunks, reader.events, said, guess=guess)
-        if found is None:
-            return None
-        found = found.not_verified(self._unverified(check))
+        found = self._found(task, chunks, reader.events, said, guess=guess).not_verified(self._unverified(check))
         beside = self._own_kinds - _OF_MOTION
         return replace(found, trusted=(*([(0, _own_table(beside))] if beside else []), *check.trusted))
 
-    def _task(self, *, rotary: bool) -> Task:
+    def _task(self, *, rotary: bool, apart: bool) -> Task:
         options = self._options
         lengths = options.tolerance, options.axis_length, self._axis_tolerance
         taken = sagitta(options.tolerance) if rotary else 0.0
-        return Task.of(self._program, *lengths, apart=self._apart, sagitta=taken)
+        return Task.of(self._program, *lengths, apart=apart, sagitta=taken)
 
     def _found(
         self,
@@ -242,11 +232,8 @@ class Verifier:
         said: Callable[[], tuple[NcProgram, int]],
         *,
         guess: bool,
-    ) -> Verification | None:
-        """Measure all that is read, and put everything together; `said`: of the text and its curves, then.
-
-        With a `guess` None where the motions part, unless there is one batch, of which nothing was guessed.
-        """
+    ) -> Verification:
+        """Measure all that is read, and put everything together; `said`: of the text and its curves, then."""
         program, batches = self._program, Batches(task, events, None if guess else Decider(task).decide)
         findings = Findings()
         places = WordPlaces(batches, events)
@@ -267,7 +254,7 @@ class Verifier:
         for number, found in enumerate(map_in_processes(work, items(), self._processes, busy=True)):
             findings.parted |= found.parted
             if guess and findings.parted and (number or batches.guessed):
-                return None
+                raise _NotProvedError
             for some in found.poses:
                 poses[:, some[0].astype(np.int64)] = some[1:]
             found.poses = []
