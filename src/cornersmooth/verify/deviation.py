@@ -6,6 +6,7 @@ keeps within them. Of tips and of axis points alone the nearest places are looke
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -136,22 +137,27 @@ def check_breaks(match: Match, found: Findings) -> None:
 def _say(match: Match, found: Findings, metric: Metric, one: Break) -> None:
     """Take down one break: what is off around it, or else that the order is wrong."""
     task, limit, around = match.task, match.tolerance + ARITHMETIC, _Around.of(match, one)
-    gap = around.note(match, found)
     off: dict[str, float] = {}
-    lines = _lines(match, one.place, int(around.rows[0]))
+    lines, turned = _lines(match, one.place, int(around.rows[0])), 0.0
     for name in COLUMNS:
-        distance, places, rows = around.distances(match, name)
+        distance, place, step = around.distances(match, name)
+        row = np.maximum(np.ceil(step), around.rows[0]).astype(np.int64)
         off[name] = float(distance.max())
         k = int(np.argmax(distance > limit)) if off[name] > limit else int(distance.argmax())  # there it begins
-        place, where = float(places[k]), _lines(match, float(places[k]), int(rows[k]))
+        where = _lines(match, float(place[k]), int(row[k]))
         if name == "both":
-            found.take_worst("together_tip", Where(float(gap.tip[0]), *where))
-            found.take_worst("together_axis_point", Where(float(gap.axis_point[0]), *where))
-            found.take_worst("orientation", Where(float(gap.angle[0]), *where))
+            gap = Gap.of(task, points_at(match.six, step).T - match.path.at(place))
+            around.note(match, found, gap, row)
+            farthest = int(distance[: len(around.rows)].argmax())
+            turned = float(gap.angle[farthest])
+            found.take_worst("together_tip", Where(float(gap.tip[farthest]), *where))
+            found.take_worst("together_axis_point", Where(float(gap.axis_point[farthest]), *where))
+            found.take_worst("orientation", Where(turned, *where))
             lines = where if off[name] > limit else lines
         elif off[name] > limit and metric in (name, "both") and not (name == "axis_point" and task.own_axis):
+            code = "CS521" if name == "tip" else "CS522"
             found.take_worst(name, Where(off[name], *where))
-            found.violations.append(Violation("CS521" if name == "tip" else "CS522", place, *where, off[name]))
+            found.violations.append(Violation(code, float(place[k]), *where, off[name]))
     if max(off["tip"], 0.0 if task.own_axis else off["axis_point"]) > limit:
         return
     if off["both"] <= limit and not one.proved:
@@ -159,7 +165,7 @@ def _say(match: Match, found: Findings, metric: Metric, one: Break) -> None:
         return
     code, amount = "CS523" if off["both"] <= limit else "CS525", off["both"]
     if code == "CS525" and task.own_axis:
-        code, amount = AXIS_OFF, float(np.degrees(gap.angle[0]))
+        code, amount = AXIS_OFF, float(np.degrees(turned))
     found.violations.append(Violation(code, one.place, *lines, amount))
 
 
@@ -188,47 +194,38 @@ class _Around:
         again = whole + 1 + np.flatnonzero(match.on[whole + 1 : end + 1])
         resumed = int(again[0]) if len(again) else end + 1
         last = min(max(resumed - 1, row), end, row + _MOST_ROWS)
-        here, stop = path.length_at(one.place), float(match.high[row] + 1)
-        vertices = np.arange(int(one.place) + 1, int(stop) + 1)
+        here, near = path.length_at(one.place), AROUND * match.tolerance
+        stop, vertices = float(match.high[row] + 1), np.zeros(0, np.int64)
         if last == resumed - 1 and len(again):
             stop = float(match.place[resumed])
-            vertices = vertices[: int(np.ceil(stop)) - int(one.place) - 1]
-        elif last < end or match.goes_on:  # no farther than the rows that are looked at
+            vertices = np.arange(int(one.place) + 1, math.ceil(stop))
+        elif last == end and not match.goes_on:
+            vertices = np.arange(int(one.place) + 1, int(stop) + 1)
+        else:  # no farther than the rows that are looked at
             way = np.diff(match.six[max(row - 1, 0) : last + 1], axis=0)
-            longest = LONGER * float(np.sqrt(np.einsum("ij,ij->i", way, way)).sum()) + AROUND * match.tolerance
-            length = here + longest
-            stop, vertices = min(stop, float(np.searchsorted(path.length, length))), vertices[:0]
-        radius = AROUND * match.tolerance
-        low, high = np.searchsorted(path.length, (here - radius, path.length_at(stop) + radius)).tolist()
+            longest = LONGER * float(np.linalg.norm(way, axis=1).sum()) + near
+            stop = min(stop, float(np.searchsorted(path.length, here + longest)))
+        low, high = np.searchsorted(path.length, (here - near, path.length_at(stop) + near)).tolist()
         low = min(max(low - 1, int(match.low[row])), int(match.high[row]))
         high = max(min(high, int(match.high[row]) + 1, low + _MOST_SEGMENTS), low + 1)
-        vertices = vertices[:_MOST_SEGMENTS]
         before = max(row - 1, 0)
         steps = np.arange(before, max(min(resumed, end, last + 1), before + 1))
-        return cls(np.arange(row, last + 1), np.arange(low, high), vertices, steps)
+        return cls(np.arange(row, last + 1), np.arange(low, high), vertices[:_MOST_SEGMENTS], steps)
 
-    def distances(self, match: Match, metric: Metric) -> tuple[Floats, Floats, Ints]:
-        """(k,) distances of vertices of both motions, mm; places and written vertices: those of the latter first."""
+    def distances(self, match: Match, metric: Metric) -> tuple[Floats, Floats, Floats]:
+        """(k,) distances of vertices of both motions, mm, and places on both: written vertices first."""
         columns, path = COLUMNS[metric], match.path.points
         at, off = _nearest(match.six[self.rows], path, self.segments, columns)
         step, other = _nearest(path[self.vertices], match.six, self.steps, columns)
-        return np.append(off, other), np.append(at, self.vertices), np.append(self.rows, self.after(step))
+        return np.append(off, other), np.append(at, self.vertices), np.append(self.rows, step)
 
-    def after(self, step: Floats) -> Ints:
-        """(k,) written vertices to which steps lead, of places on these."""
-        return np.maximum(np.ceil(step), self.steps[0] + 1).astype(np.int64)
-
-    def note(self, match: Match, found: Findings) -> Gap:
-        """Take down how far the original poses are from the written motion; that of the written vertex farthest off."""
-        task, six, trail = match.task, match.six, match.original.trail
-        poses = self.vertices[trail.fraction[self.vertices] == 1]
-        step, _ = _nearest(match.path.points[poses], six, self.steps, COLUMNS["both"])
-        gap = Gap.of(task, points_at(six, step).T - match.path.points[poses])
-        pose, lines = match.original.pose[trail.owner[poses]], match.nc_lines(self.after(step))
-        found.poses.append(np.array((pose, gap.tip, gap.axis_point, gap.angle, lines)))
-        at, off = _nearest(six[self.rows], match.path.points, self.segments, COLUMNS["both"])
-        k = slice(int(off.argmax()), int(off.argmax()) + 1)
-        return Gap.of(task, six[self.rows[k]] - match.path.at(at[k]))
+    def note(self, match: Match, found: Findings, gap: Gap, row: Ints) -> None:
+        """Take down how far original poses are from the written motion, of all that was looked at."""
+        trail = match.original.trail
+        whole = np.flatnonzero(trail.fraction[self.vertices] == 1)
+        pose, some = match.original.pose[trail.owner[self.vertices[whole]]], len(self.rows) + whole
+        lines = match.nc_lines(row[some])
+        found.poses.append(np.array((pose, gap.tip[some], gap.axis_point[some], gap.angle[some], lines)))
 
 
 def _nearest(point: Floats, vertices: Floats, segments: Ints, columns: slice) -> tuple[Floats, Floats]:
