@@ -91,11 +91,7 @@ class Path:
         low, high = np.searchsorted(length, sorted((here, there)))
         if min(here, there) < 0 or high == len(length):
             return abs(there - here)
-        ends = []
-        for place in (here, there):
-            k = min(int(np.searchsorted(length, place, side="right")), len(length) - 1)
-            share = (place - length[k - 1]) / max(length[k] - length[k - 1], np.finfo(np.float64).tiny)
-            ends.append(self.points[k - 1] + share * (self.points[k] - self.points[k - 1]))
+        ends = points_at(self.points, np.interp((here, there), length, np.arange(len(length)))).T
         return float(np.linalg.norm(np.vstack((self.points[low:high], ends[1])) - ends[0], axis=1).max())
 
 

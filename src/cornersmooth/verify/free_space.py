@@ -98,27 +98,18 @@ class FreeSpace:
 
     def along(self, row: int, place: float) -> Reached:
         """What is reached of a row from one place of it on, if it is free: that, and what is beyond without a break."""
-        count = self.path.shape[1] - 1
-        first = k = min(int(place), count - 1)
-        found: Reached = {k - 1: (1.0, 1.0)} if place == k > 0 else {}
-        step = 4
-        while k < count:
-            part = slice(k, min(k + step, count))
-            start = self.path[:, part]
-            way = self.path[:, part.start + 1 : part.stop + 1] - start
-            low, high = free_interval(self.own[:, row, None], start, way, self.row_radius(slice(row, row + 1), part)[0])
-            for one, other in zip(low.tolist(), high.tolist(), strict=True):
-                if k == first:
-                    if not one - _HAIR <= place - k <= other + _HAIR:
-                        return {}
-                    found[k] = place - k, max(other, place - k)
-                elif found[k - 1][1] >= 1.0 and one <= 0.0 <= other:
-                    found[k] = 0.0, other
-                else:
-                    return found
-                k += 1
-            step *= 4
-        return found
+        first = min(int(place), self.path.shape[1] - 2)
+        start, share = self.path[:, first:-1], place - first
+        radius = self.row_radius(slice(row, row + 1), slice(first, first + start.shape[1]))[0]
+        low, high = free_interval(self.own[:, row, None], start, self.path[:, first + 1 :] - start, radius)
+        if not low[0] - _HAIR <= share <= high[0] + _HAIR:
+            return {}
+        high[0] = max(high[0], share)
+        goes_on = (high[:-1] >= 1.0) & (low[1:] <= 0.0) & (high[1:] >= 0.0)
+        count = len(high) if goes_on.all() else 1 + int(np.argmin(goes_on))
+        found: Reached = {first - 1: (1.0, 1.0)} if place == first > 0 else {}
+        found[first] = share, float(high[0])
+        return found | {first + k: (0.0, end) for k, end in enumerate(high[1:count].tolist(), 1)}
 
     def sweep(self, row: int, reached: Reached) -> Iterator[tuple[int, Reached]]:
         """Go on from what is reached of a row; the last that is given out is the last row, or one with nothing."""
