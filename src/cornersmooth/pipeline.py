@@ -258,6 +258,7 @@ def postprocess(
                 written = nc.write(smoothed, whole, form=form, frame=frame, progress=told)
                 output.stream.write(_with_planned_feeds(whole.getvalue(), program, smoothed.settings, form, plan_feeds))
             output.stream.flush()
+        return_free_memory()
         verification = None
         if verifier is not None:
             with _timed(seconds, "verify"):

@@ -35,7 +35,7 @@ from cornersmooth.nc.rotary_words import rotary_way, within_reach
 from cornersmooth.nc.statement_writer import StatementWriter
 from cornersmooth.nc.warnings import add_warnings
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing.sampling import Rows, curve_rows, dense_rows
+from cornersmooth.smoothing.sampling import Rows, all_dense_rows, curve_rows, dense_rows
 
 __all__ = [
     "Control",
@@ -214,12 +214,15 @@ def _rows(smoothed: SmoothProgram, form: Form, circles: Circles, planes: Planes,
     if form.curves:
         return curve_rows(smoothed, divide=form.curve in _TURNING)
     long = smoothed.settings.lines == "long"
-    rows = coarse_rows(smoothed, circles.blocks) if long else dense_rows(smoothed, circles.blocks)
-    if form.rotary:
-        inside, way = planes.of >= 0 if planes.planes else None, rotary_way(rows, smoothed, form, findings)
-        rows = (part for part, _ in rotary_rows(way, smoothed, form, findings, long=long, in_planes=inside))
-    elif long:
-        rows = long_rows(rows, smoothed, form)
+    if not long and not form.rotary:
+        rows = dense_rows(smoothed, circles.blocks)
+    else:
+        whole = coarse_rows(smoothed, circles.blocks) if long else all_dense_rows(smoothed, circles.blocks)
+        if form.rotary:
+            inside, way = planes.of >= 0 if planes.planes else None, rotary_way(whole, smoothed, form, findings)
+            rows = (part for part, _ in rotary_rows(way, smoothed, form, findings, long=long, in_planes=inside))
+        else:
+            rows = long_rows(whole, smoothed, form)
     return with_arcs(rows, smoothed.program, circles)
 
 

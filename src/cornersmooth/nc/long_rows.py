@@ -12,11 +12,10 @@ from cornersmooth.kinematics import tip_position, tool_axis
 from cornersmooth.methods import METHODS
 from cornersmooth.model import Bools, Floats, Ints, SmoothProgram
 from cornersmooth.nc.form import Form
-from cornersmooth.nc.rotary_words import whole_rows
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.blending import largest_blends
 from cornersmooth.smoothing.long_lines import LineLimits, Vertices, fewest_lines, segments_of_rows, vertices
-from cornersmooth.smoothing.sampling import Rows, dense_rows
+from cornersmooth.smoothing.sampling import Rows, all_dense_rows
 from cornersmooth.vectors import unit
 
 #: rows handed on at a time: many long lines are tested at once
@@ -30,7 +29,7 @@ _COARSE = 1.0
 _LARGEST_STEP = 0.08
 
 
-def coarse_rows(smoothed: SmoothProgram, circles: Ints | None = None) -> Iterator[Rows]:
+def coarse_rows(smoothed: SmoothProgram, circles: Ints | None = None) -> Rows:
     """Dense rows without those that only the chord tolerance asks for.
 
     Chords from the joints of a transition to its middle keep ε where one parameter drives both curves; else all stay.
@@ -38,7 +37,7 @@ def coarse_rows(smoothed: SmoothProgram, circles: Ints | None = None) -> Iterato
     settings = smoothed.settings
     if METHODS[settings.method].one_parameter:
         settings = settings.but(chord_tolerance=_COARSE)
-    return dense_rows(replace(smoothed, settings=settings), circles)
+    return all_dense_rows(replace(smoothed, settings=settings), circles)
 
 
 def line_limits(settings: Settings, form: Form, largest_turn: float = 0.0) -> LineLimits:
@@ -76,9 +75,9 @@ def corner_blends(
     return np.where(rapid, limits.blend, found)
 
 
-def long_rows(rows: Iterator[Rows], smoothed: SmoothProgram, form: Form) -> Iterator[Rows]:
+def long_rows(rows: Rows, smoothed: SmoothProgram, form: Form) -> Iterator[Rows]:
     """Rows with tool vectors at which long lines end; arcs stay as they are."""
-    tip, axis, move, _ = whole_rows(rows)
+    tip, axis, move = rows.tip, rows.other, rows.move
     if not len(move):
         return
     limits = line_limits(smoothed.settings, form)

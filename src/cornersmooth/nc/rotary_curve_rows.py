@@ -32,7 +32,7 @@ from cornersmooth.rotary.curve_angles import CurveAngles, Curves, Guide, curve_a
 from cornersmooth.settings import WEIGHT_DECIMALS
 from cornersmooth.slices import joined_rows, some_rows, some_runs
 from cornersmooth.smoothing.runs.rows import STEPS_PER_UNIT, clamped, moves_at, section_ends
-from cornersmooth.smoothing.sampling import Rows, dense_rows, nodes
+from cornersmooth.smoothing.sampling import Rows, all_dense_rows, nodes
 from cornersmooth.smoothing.segments import lines_of
 from cornersmooth.vectors import norm, unit
 
@@ -132,7 +132,7 @@ def _way(smoothed: SmoothProgram, form: Form, findings: Findings) -> RotaryWay:
     while True:
         halves[more] = lines_of(smoothed, np.flatnonzero(more))
         notes = Findings()
-        way = rotary_way(dense_rows(smoothed, halves=halves), smoothed, form, notes)
+        way = rotary_way(all_dense_rows(smoothed, halves=halves), smoothed, form, notes)
         moves = way.move[way.left & (way.place < 1.0)]  # a cut is left within a curve
         more = corners.smoothed & ~lined & (np.isin(corners.pose, moves) | np.isin(corners.after, moves))
         if not more.any():

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,7 +18,7 @@ from cornersmooth.nc.form import Form
 from cornersmooth.nc.rewinds import from_zero
 from cornersmooth.rotary import rapid_moves, rewound_angles, rotary_angles, still_poses
 from cornersmooth.rotary.axis_findings import reach_error
-from cornersmooth.smoothing.sampling import Rows, dense_rows
+from cornersmooth.smoothing.sampling import Rows, all_dense_rows
 
 #: what a curve may turn the axis, over ε at H: tip and axis point may be off to opposite sides
 _SWING = 2.0
@@ -44,13 +42,14 @@ class RotaryWay:
     tolerance: Floats  #: (n,), degrees by which the axis may be off on the way to the row
 
 
-def rotary_way(rows: Iterator[Rows], smoothed: SmoothProgram, form: Form, findings: Findings) -> RotaryWay:
-    """Angles of rows with tool vectors; all rows are held at once, and their places on curves if the form has such.
+def rotary_way(rows: Rows, smoothed: SmoothProgram, form: Form, findings: Findings) -> RotaryWay:
+    """Angles of rows with tool vectors.
 
     Raises InputError where the machine cannot follow the path.
     """
     program, settings, machine = smoothed.program, smoothed.settings, machine_of(form).with_longest_tool()
-    tip, axis, move, place = whole_rows(rows, places=bool(form.curves))
+    tip, axis, move = rows.tip, rows.other, rows.move
+    place = np.zeros(0) if rows.place is None else rows.place
     if not len(move):
         none = np.zeros(0, np.bool_)
         return RotaryWay(tip, axis, move, np.zeros((0, 2)), np.zeros(0, np.int8), none, none, place, place)
@@ -81,30 +80,6 @@ def machine_of(form: Form) -> Machine:
     if form.machine is None:
         raise SettingsError("CS215", f"{form.control} form {form.name} needs a machine", "name it with --machine")
     return form.machine
-
-
-def whole_rows(rows: Iterator[Rows], *, places: bool = False) -> tuple[Floats, Floats, Ints, Floats]:
-    """Tip, axis, move and, if asked for, place of all dense rows.
-
-    What they were gathered in is given back part by part.
-    """
-    columns: tuple[deque[Any], ...] = (deque(), deque(), deque(), deque())
-    for chunk in rows:
-        for column, part in zip(columns, (chunk.tip, chunk.other, chunk.move, chunk.place), strict=True):
-            column.append(part)
-        if not places:
-            columns[3].clear()
-    total = sum(map(len, columns[2]))
-    tip, axis, move = np.empty((total, 3)), np.empty((total, 3)), np.empty(total, np.int64)
-    place = np.empty(total if places else 0)
-    for whole, parts in zip((tip, axis, move, place), columns, strict=True):
-        begin = 0
-        while parts:
-            part = parts.popleft()
-            whole[begin : begin + len(part)] = part
-            begin += len(part)
-        return_free_memory()
-    return tip, axis, move, place
 
 
 def _check_reach(machine: Machine, program: Program, axis: Floats, move: Ints, tolerance: float) -> None:
@@ -149,7 +124,7 @@ def within_reach(smoothed: SmoothProgram, form: Form) -> SmoothProgram:
     if not near.any():
         return smoothed
     try:
-        rotary_way(dense_rows(smoothed), smoothed, form, Findings())
+        rotary_way(all_dense_rows(smoothed), smoothed, form, Findings())
     except InputError:
         from cornersmooth.smoothing.global_runs import corner_by_corner  # which takes long to load
 

@@ -16,7 +16,7 @@ from cornersmooth.geometry import nurbs
 from cornersmooth.geometry.arcs import arc_lines, arc_points, divided
 from cornersmooth.geometry.ragged import ranges, starts
 from cornersmooth.model import Bools, Floats, Ints, SmoothProgram
-from cornersmooth.slices import joined_rows
+from cornersmooth.slices import joined_rows, some_rows
 from cornersmooth.smoothing.construction import construction_of
 from cornersmooth.smoothing.runs.rows import NO_ROWS, SectionRows, run_lines, section_rows, some_at_once
 from cornersmooth.smoothing.segments import Segments, inner_points, lines_per_half, segments_of
@@ -49,7 +49,7 @@ class Rows:
     #: (r,): Rows at which the tool comes back into a cut that it has left at the row before; None where there is
     #: none.
     left: Bools | None = None
-    #: (r,): Of dense rows: share of the parameter of the curve that they are on, above 0; NaN on straight motion.
+    #: (r,): Of `all_dense_rows`: share of the parameter of the curve that they are on, above 0; NaN on straight motion.
     place: Floats | None = None
 
 
@@ -67,15 +67,27 @@ class _Batch:
 KNOTS = (0.0, 0.0, 0.0, 0.0, 0.5)
 
 
-def dense_rows(
-    smoothed: SmoothProgram, circles: Ints | None = None, poses: int = 16384, *, halves: Ints | None = None
-) -> Iterator[Rows]:
+def dense_rows(smoothed: SmoothProgram, circles: Ints | None = None, poses: int = 16384) -> Iterator[Rows]:
     """Rows of the smoothed motion as lines with tool vectors, in batches of about `poses` poses.
 
-    `circles` (k,) is the number of circular arcs that each arc of the program is written as, 0 for lines. `halves` (k,)
-    are lines for each half of the transitions in place of `lines_per_half`: straight lines are left whole then.
+    `circles` (k,) is the number of circular arcs that each arc of the program is written as, 0 for lines.
     """
-    return _rows(smoothed, curves=False, divide=halves is None, circles=circles, poses=poses, halves=halves)
+    layout = _Layout.of(smoothed, divide=True, circles=circles)
+    return (layout.filled(own, layout.rows(own)) for own in layout.batches(poses))
+
+
+def all_dense_rows(smoothed: SmoothProgram, circles: Ints | None = None, *, halves: Ints | None = None) -> Rows:
+    """All rows of `dense_rows` at once, made in the place where they stay.
+
+    `halves` (k,) are lines for each half of the transitions in place of `lines_per_half`: straight lines are left whole
+    then, and the rows have their `Rows.place`.
+    """
+    layout = _Layout.of(smoothed, divide=halves is None, circles=circles, halves=halves)
+    whole, stop = layout.rows(slice(None)), 0
+    for own in layout.batches():
+        begin, stop = stop, stop + int(layout.counts[own].sum())
+        layout.filled(own, some_rows(whole, slice(begin, stop)))
+    return whole
 
 
 def curve_rows(smoothed: SmoothProgram, *, divide: bool = False, poses: int = 16384) -> Iterator[Rows]:
@@ -83,49 +95,96 @@ def curve_rows(smoothed: SmoothProgram, *, divide: bool = False, poses: int = 16
 
     `divide` says whether lines in which the axis turns much are divided: not all controls run the axis point straight.
     """
-    none = np.zeros(0, np.int64)
-    return _rows(smoothed, curves=True, divide=divide, circles=None, poses=poses, halves=none)
+    layout = _Layout.of(smoothed, curves=True, divide=divide)
+    return (layout.filled(own, layout.rows(own)) for own in layout.batches(poses))
 
 
-def _rows(
-    smoothed: SmoothProgram, *, curves: bool, divide: bool, circles: Ints | None, poses: int, halves: Ints | None
-) -> Iterator[Rows]:
-    program, height = smoothed.program, smoothed.settings.axis_length
-    segments = segments_of(smoothed, dense=divide)
-    halves = lines_per_half(smoothed) if halves is None else halves
-    runs, replaced = _of_runs(smoothed, curves=curves)
-    segments.lines[replaced] = 1
-    counts = np.where(segments.has_line, segments.lines, 0)
-    rounded = np.flatnonzero(segments.row >= 0)
-    counts[rounded] += 5 if curves else 2 * np.abs(halves[segments.row[rounded]])
-    counts[segments.skip] = 0
-    counts = np.where(replaced, np.bincount(runs.move, minlength=len(counts)), counts)
-    if len(program.arcs):
-        lines = arc_lines(program, smoothed.settings)
-        counts[program.arcs.pose] = lines if circles is None else np.where(circles > 0, circles, lines)
-    for batch in _batches(counts, poses, curves=curves):
-        rows = batch.rows
-        sharp = (segments.row[batch.poses] < 0) & (batch.last > batch.first)
+@dataclass(frozen=True)
+class _Layout:
+    """How many rows each of n poses makes, and what of."""
+
+    smoothed: SmoothProgram
+    segments: Segments
+    halves: Ints  # (k,) lines for each half of the transitions; none in curves
+    counts: Ints  # (n,) rows
+    runs: SectionRows
+    replaced: Bools  # (n,) poses with rows of runs
+    curves: bool
+    divide: bool  # whether lines in which the axis turns much are several
+    places: bool  # whether rows have their places on curves
+
+    @classmethod
+    def of(
+        cls,
+        smoothed: SmoothProgram,
+        *,
+        curves: bool = False,
+        divide: bool,
+        circles: Ints | None = None,
+        halves: Ints | None = None,
+    ) -> _Layout:
+        program, places = smoothed.program, halves is not None
+        segments = segments_of(smoothed, dense=divide)
+        if halves is None:
+            halves = np.zeros(0, np.int64) if curves else lines_per_half(smoothed)
+        runs, replaced = _of_runs(smoothed, curves=curves)
+        segments.lines[replaced] = 1
+        counts = np.where(segments.has_line, segments.lines, 0)
+        rounded = np.flatnonzero(segments.row >= 0)
+        counts[rounded] += 5 if curves else 2 * np.abs(halves[segments.row[rounded]])
+        counts[segments.skip] = 0
+        if smoothed.runs is not None:
+            counts = np.where(replaced, np.bincount(runs.move, minlength=len(counts)), counts)
+        if len(program.arcs):
+            lines = arc_lines(program, smoothed.settings)
+            counts[program.arcs.pose] = lines if circles is None else np.where(circles > 0, circles, lines)
+        return cls(smoothed, segments, halves, counts, runs, replaced, curves, divide, places)
+
+    def batches(self, poses: int = 16384) -> Iterator[slice]:
+        """Parts of the poses."""
+        return (slice(begin, begin + poses) for begin in range(0, len(self.counts), poses))
+
+    def rows(self, own: slice) -> Rows:
+        """Rows of some poses, to be filled."""
+        counts = self.counts[own]
+        total = int(counts.sum())
+        return Rows(
+            np.zeros((total, 3)),
+            np.zeros((total, 3)),
+            np.repeat(np.arange(len(self.counts))[own], counts),
+            np.zeros(total, np.int8),
+            np.zeros(total, np.bool_),
+            spline=np.tile((0.0, 1.0, 0.0), (total, 1)) if self.curves else None,
+            place=np.full(total, np.nan) if self.places else None,
+        )
+
+    def filled(self, own: slice, rows: Rows) -> Rows:
+        """The rows of some poses, which are filled in place."""
+        smoothed, segments, runs = self.smoothed, self.segments, self.runs
+        program, counts = smoothed.program, self.counts[own]
+        last = np.cumsum(counts)
+        batch = _Batch(np.arange(len(self.counts))[own], last - counts, last, rows)
+        sharp = (segments.row[own] < 0) & (batch.last > batch.first)
         pose, at = batch.poses[sharp], batch.last[sharp] - 1
         rows.tip[at], rows.other[at] = program.tip[pose], program.axis[pose]
-        if divide:
+        if self.divide:
             _fill_divided(smoothed, segments, batch)
-        _fill_arcs(smoothed, batch, counts)
-        if curves:
-            rows.other[:] = rows.tip + height * rows.other
+        _fill_arcs(smoothed, batch, self.counts)
+        if self.curves:
+            rows.other[:] = rows.tip + smoothed.settings.axis_length * rows.other
             _fill_curves(smoothed, segments, batch)
         else:
-            _fill_transitions(smoothed, segments, batch, halves)
-        here = np.flatnonzero(replaced[batch.poses])
-        at = ranges(batch.first[here], batch.last[here] - batch.first[here])
-        own = slice(*np.searchsorted(runs.move, (batch.poses[0], batch.poses[-1] + 1)))
-        rows.tip[at], rows.other[at] = runs.points[own, :3], runs.points[own, 3:]
+            _fill_transitions(smoothed, segments, batch, self.halves)
+        here = np.flatnonzero(self.replaced[own])
+        at = ranges(batch.first[here], counts[here])
+        part = slice(*np.searchsorted(runs.move, (batch.poses[0], batch.poses[-1] + 1)))
+        rows.tip[at], rows.other[at] = runs.points[part, :3], runs.points[part, 3:]
         if rows.place is not None:
-            rows.place[at] = runs.knot[own]
+            rows.place[at] = runs.knot[part]
         if rows.spline is not None:
-            rows.curve[at], rows.joined[at] = runs.number[own], runs.number[own] == 1
-            rows.spline[at, 0], rows.spline[at, 2] = runs.knot[own], runs.last_knot[own]
-        yield rows
+            rows.curve[at], rows.joined[at] = runs.number[part], runs.number[part] == 1
+            rows.spline[at, 0], rows.spline[at, 2] = runs.knot[part], runs.last_knot[part]
+        return rows
 
 
 def _of_runs(smoothed: SmoothProgram, *, curves: bool) -> tuple[SectionRows, Bools]:
@@ -138,24 +197,6 @@ def _of_runs(smoothed: SmoothProgram, *, curves: bool) -> tuple[SectionRows, Boo
     parts = some_at_once(runs)
     made = (section_rows(p, program) if curves else run_lines(p, program, smoothed.settings) for p in parts)
     return joined_rows(made), replaced
-
-
-def _batches(counts: Ints, poses: int, *, curves: bool) -> Iterator[_Batch]:
-    """Batches of empty rows, `counts` of them for each pose."""
-    for begin in range(0, len(counts), poses):
-        own = np.arange(begin, min(begin + poses, len(counts)))
-        last = np.cumsum(counts[own])
-        total = int(last[-1])
-        rows = Rows(
-            np.zeros((total, 3)),
-            np.zeros((total, 3)),
-            np.repeat(own, counts[own]),
-            np.zeros(total, np.int8),
-            np.zeros(total, np.bool_),
-            spline=np.tile((0.0, 1.0, 0.0), (total, 1)) if curves else None,
-            place=None if curves else np.full(total, np.nan),
-        )
-        yield _Batch(own, last - counts[own], last, rows)
 
 
 def _fill_arcs(smoothed: SmoothProgram, batch: _Batch, counts: Ints) -> None:
@@ -204,8 +245,8 @@ def _fill_transitions(smoothed: SmoothProgram, segments: Segments, batch: _Batch
         points, levers = construction.points(smoothed, rows[chosen], u)
         where = (last[chosen] - len(u))[:, None] + np.arange(len(u))
         batch.rows.tip[where], batch.rows.other[where] = points[:, 1:], unit(levers[:, 1:])
-        assert batch.rows.place is not None
-        batch.rows.place[where] = u
+        if batch.rows.place is not None:
+            batch.rows.place[where] = u
         batch.rows.move[where[:, len(u) // 2 :]] = smoothed.corners.after[rows[chosen]][:, None]
         first = segments.has_line[poses[chosen]]
         at = where[first, 0] - 1

@@ -104,8 +104,7 @@ def original_motion(program: Program, tolerance: float, axis_length: float) -> O
     # an arc wants a start: where that is only stated the tool is sent there
     stated[:-1] &= program.kind[1:] != Move.ARC
     pose = np.flatnonzero(~stated)
-    # nearly always all poses but the first: no copy then
-    chosen = slice(pose[0], pose[-1] + 1) if len(pose) and pose[-1] - pose[0] == len(pose) - 1 else pose
+    chosen = selecting(pose)
     tip, axis = program.tip[chosen], program.axis[chosen]
     bend = np.zeros(len(pose))
     bend[1:] = axis_length * turn_bend(axis[:-1], axis[1:])
@@ -127,6 +126,11 @@ def original_motion(program: Program, tolerance: float, axis_length: float) -> O
     inner = np.flatnonzero(fraction < 1)
     tip[inner], axis[inner] = bare.at(owner[inner], fraction[inner])
     return Original(program, pose, Trail(tip, axis, owner, fraction, last, (bend / cuts**2)[owner][1:]))
+
+
+def selecting(pose: Ints) -> slice | Ints:
+    """What selects poses (m,): a slice, which copies nothing, where they follow one another, as nearly always."""
+    return slice(pose[0], pose[-1] + 1) if len(pose) and pose[-1] - pose[0] == len(pose) - 1 else pose
 
 
 def parts_of(bend: Floats, share: float, most: int) -> Ints:

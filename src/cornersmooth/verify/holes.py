@@ -11,7 +11,7 @@ from cornersmooth.nc_reader.ahead import Ahead
 from cornersmooth.nc_reader.elements import Element, Problem
 from cornersmooth.nc_reader.tool import directions, leads_somewhere
 from cornersmooth.statements.cycles import Drilling
-from cornersmooth.verify.cl_motion import Original
+from cornersmooth.verify.cl_motion import Original, selecting
 from cornersmooth.verify.motions import digit_errors
 from cornersmooth.verify.task import ARITHMETIC
 
@@ -24,9 +24,9 @@ class HoleLines:
 
     def __init__(self, original: Original, ahead: Ahead, axis_length: float, tolerance: float) -> None:
         self.ahead, self.axis_length = ahead, axis_length
-        program, nc = original.program, ahead.nc
-        self.tip, self.axis = program.tip[original.pose], program.axis[original.pose]
-        self.line, self.kind = program.line[original.pose], program.kind[original.pose]
+        program, nc, chosen = original.program, ahead.nc, selecting(original.pose)
+        self.tip, self.axis = program.tip[chosen], program.axis[chosen]
+        self.line, self.kind = program.line[chosen], program.kind[chosen]
         axis_step = nc.second_step * (axis_length if nc.second_is == "vector" else 1.0)
         #: distance that the printed digits account for, mm
         self.room = min(nc.tip_step + axis_step, tolerance)
