@@ -61,6 +61,11 @@ def test_rapids_along_the_tool_stand_at_both_ends(case: Case, units: str) -> Non
     data = ("\n".join(lines) + "\n").encode()
     form = case.choose()
     found = read_nc(data, control=case.control, machine=form.machine, tcp=case.tcp)
+    # a program that has been read before is measured alike, and stays as it is
+    ends = found.tip.copy()
+    options = {"control": case.control, "machine": form.machine, "tcp": case.tcp}
+    assert verify(program, found, tolerance=tolerance, axis_length=H, skip_cycles=True, **options).problems == ()
+    np.testing.assert_array_equal(found.tip, ends)
     rapid = found.kind == Element.RAPID
     axis = found.second if found.second_is == "vector" else found.second - found.tip
     up = axis[0] / np.linalg.norm(axis[0])
@@ -117,3 +122,29 @@ def test_a_rapid_away_from_a_hole_that_is_not_tapped_is_the_cl_files_own() -> No
     smoothed = smooth(program, fit_settings(Settings(tolerance=EPS), form, "mm"))
     write(smoothed, stream, form=form, frame=Frame(skip_cycles=True))
     assert problems(case, program, stream.getvalue().decode().splitlines(), EPS) == ()
+
+
+#: a cut that is left after 10 mm, 5 mm upwards; what it is left and gone on with, and what is wrong with the motion
+WAYS = {
+    "at feed": (["G0 X10. Z5."], ["G0 Z5.", "G1 Z0. F80."], set()),
+    "at feed, within a move": (["G1 X6.", "G0 Z5."], ["G0 Z5.", "G1 Z0. F80."], set()),
+    "in rapid": (["G0 X10. Z5."], ["G0 Z0."], {"CS582"}),
+    "in rapid, at twice": (["G0 X10. Z5."], ["G0 Z5.", "G0 Z0."], {"CS582"}),
+    "in rapid from hardly above": (["G0 X10. Z0.5"], ["G0 Z0."], {"CS582"}),
+    "at feed from elsewhere, within a move": (["G1 X6.", "G0 Z5."], ["G1 Z0. F80."], {"CS582"}),
+    "in rapid, within a move": (["G1 X6.", "G0 Z5."], ["G0 Z0."], {"CS582"}),
+    "at feed from hardly above": (["G0 X10. Z0.5"], ["G0 Z5.", "G1 Z0. F80."], {"CS533"}),
+    "at feed to hardly above": (["G0 X10. Z5."], ["G0 Z0.5", "G1 Z0. F80."], {"CS533"}),
+}
+
+
+@pytest.mark.parametrize(("out", "back", "wrong"), WAYS.values(), ids=WAYS)
+def test_a_cut_goes_on_at_feed_from_clear_above(out: list[str], back: list[str], wrong: set[str]) -> None:
+    cl = "UNITS/MM\nRAPID\nGOTO/0,0,0,0,0,1\nFEDRAT/80,MMPM\nGOTO/10,0,0\nGOTO/20,0,0\nGOTO/20,9,0\nFINI\n"
+    place = "X6. Y0." if "G1 X6." in out else "X10. Y0."
+    lines = ["G21 G90 G94 G17 G40 G49 G80", "G91 G28 Z0.", "G90", "G54", "G43.5 H1", "G0 X0. Y0. Z0. I0. J0. K1."]
+    lines += ["G1 X10. F80." if "G1 X6." not in out else "G1 X3. F80.", *out, "G91 G28 Z0.", "G90"]
+    lines += [f"G0 {place}", *back, "G1 X20.", "G1 Y9.", "G91 G28 Z0.", "G90", "G49", "M30"]
+    found = verify(read(cl.encode()), ("\n".join(lines) + "\n").encode(), tolerance=EPS, axis_length=H)
+    assert {one.code for one in found.problems} & {"CS531", "CS532", "CS533", "CS536", "CS582"} == wrong
+    assert len(found.rewinds) == (not wrong)

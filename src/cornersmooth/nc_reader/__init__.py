@@ -19,7 +19,7 @@ Where is what:
 - what a text is: `source` (bytes), `dialects` (grammar), `word_tables` (words and what they mean)
 - bytes to tables: `lexer`, `words`, `block_tables`, `line_patterns`
 - tables to elements: `reader` holds the modal state, `execution` executes: `arcs`, `splines`, `rotary`;
-  `needed_states` says which words want another state; `retracts` leads back from retracts, and back into cuts
+  `needed_states` says which words want another state; `retracts` leads back from retracts
 - what comes out: `elements`; `ahead` reads on as far as need be, `curves` evaluates, `reading` puts a
   whole text together
 """

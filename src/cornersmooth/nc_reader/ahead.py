@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 from cornersmooth.nc_reader.elements import Elements
 
@@ -32,13 +33,18 @@ class Ahead:
             parts = [] if self._held is None else [self._held]
             while self.count < wanted and (chunk := next(self._chunks, None)) is not None:
                 self.count += len(chunk)
-                parts.append(chunk)
+                parts.append(replace(chunk, tip=chunk.tip.copy(), second=chunk.second.copy()))  # see `put`
             self._held = Elements.joined(parts) if parts else None
         return element < self.count
 
     def part(self, first: int, stop: int) -> Elements:
         """Elements from `first` to `stop`, the latter excluded, counted anew."""
         return self.nc.part(first - self.base, stop - self.base)
+
+    def put(self, element: int, other: int) -> None:
+        """Put an element to where another ends."""
+        for values in (self.nc.tip, self.nc.second):
+            values[element - self.base] = values[other - self.base]
 
     def forget(self, element: int) -> None:
         """Drop all elements before one."""

@@ -241,9 +241,7 @@ class NcProgram(Elements):
     units: Units
     blocks: int  #: those that are not empty, ``%`` and comments left out
     means: Means  #: what words of the control say beside the motion
-    #: cuts that are left along the tool for a retract and gone on with: the elements along the tool, out and above, and
-    #: NC lines of leaving and of coming back
-    left_cuts: tuple[tuple[int, int, int, int], ...] = ()
+    retracts: tuple[int, ...] = ()  #: elements before which an axis goes to a position of the machine, ascending
     unlooked: tuple[tuple[int, str], ...] = ()  #: NC lines, and what of the motion was not looked at there
     coarse: int = 0  #: NC line from which on digits of X Y Z are too few for the tolerance; 0 for none
 

@@ -81,10 +81,7 @@ class Reader:
         self.plane: TiltedPlane | None = None
         #: whether a plane that is off again has left the rotary axes where no word says
         self._left_turned = False
-        #: the last element that was given out, if any
-        self.given: list[Elements] = []
-        #: elements up to a rapid along the tool before a retract that nobody asked for
-        self.withdrawn = -1
+        self._last: Floats | None = None  # where the last element that was given out ends
 
     def lines(self, source: Readable) -> Iterator[Table | Line]:
         """Read lines, and take note of the digits of all of them."""
@@ -103,10 +100,7 @@ class Reader:
                 self.rows(item)
             else:
                 self.line(item)
-            waiting = self.elements - self.given_out
-            # the last element may be a way up to a retract, which is then changed
-            goes_up = waiting < 2 * GIVEN_OUT and bool(self.ready) and self.ready[-1].kind[-1] == Element.RAPID
-            if self.placed and waiting >= GIVEN_OUT and not (self.retracts.cut_is_left or goes_up):
+            if self.placed and self.elements - self.given_out >= GIVEN_OUT:
                 yield self._collected()
         self.flush()
         free = [name for name, clamped in self.memory.clamped.items() if not clamped]
@@ -134,7 +128,7 @@ class Reader:
         elif line.words:
             self.flush()
             self.dialect.words(line, self)
-            self.events += [replace(event, element=self._place) for event in self.late]
+            self.events += [replace(event, element=self.elements) for event in self.late]
             self.late = []
 
     def flush(self) -> None:
@@ -227,7 +221,7 @@ class Reader:
             self.wrong("CS506", line, f"a tilted plane under {self.tip_control}")
         self._above(line, "a tilted plane where the tool is not retracted")
         self.plane, self._told, self._left_turned = plane, set(), False
-        self.retracts.open = True
+        self.retracts.leave(self.elements)
         self.modal = self.modal.but(tip=(math.nan,) * 3)
         if plane.turned:
             self._turn(line)
@@ -284,11 +278,11 @@ class Reader:
     def _take_tool(self) -> None:
         """Go on with the length of another tool."""
         assert self.rotary is not None
-        before, last = self.rotary.machine, [*self.given, *self.ready][-1:]
+        before, last = self.rotary.machine, self.ready[-1].tip[-1] if self.ready else self._last
         machine = before.with_tool(int(self._tool))
         self.rotary = replace(self.rotary, machine=machine)
-        if last and machine.tool_length != before.tool_length:
-            self._left_at = last[0].tip[-1]
+        if machine.tool_length != before.tool_length:
+            self._left_at = last
 
     def _know_points(self, run: Elements) -> None:
         """From here on U V W are a point on the axis: what was said before of the axis is no such point."""
@@ -321,7 +315,6 @@ class Reader:
             room = min(plane.room, self._widest("vector")[1] / 2.0)
             elements.second_room[:], elements.tip_room[:] = room, ASIDE * elements.tip_step
         self.ready.append(elements)
-        self.retracts.take(self.ready[-1], self.elements)
         self.elements += len(run.kind)
         self.curves += len(run.curves)
         if not self.placed and (run.kind != Element.RAPID).any():
@@ -358,7 +351,7 @@ class Reader:
         """Give out what is ready."""
         found = Elements.joined(self.ready)
         self.ready, self.given_out = [], self.elements
-        self.given = [found.part(max(len(found) - 1, 0), len(found))]
+        self._last = found.tip[-1].copy()
         room = np.zeros(len(found))
         if self.rotary is not None:
             room = self.rotary.pole_room(found.second)
@@ -371,24 +364,18 @@ class Reader:
         """Units in force."""
         return "inch" if self.modal.inch else "mm"
 
-    @property
-    def _place(self) -> int:
-        """Element that words stand before."""
-        return self.elements - (self.elements == self.withdrawn)
-
     def event(self, line: Line, letter: str, value: float, text: str = "") -> None:
         """Say a word that stands beside the motion."""
         self.flush()
         if letter == "T":
             self._tool = value
-            self.retracts.forget()
         elif letter == "S":
             self.memory.speed = value
         elif (letter, value) == ("M", 6.0) and self.rotary is not None:
             self._take_tool()
         if letter == "M" and self.rotary is not None and take_clamp(value, self.rotary.machine, self.memory):
             return
-        event = Event(self._place, line.number, letter, value, text)
+        event = Event(self.elements, line.number, letter, value, text)
         (self.late if self.dialect.after_motion(letter, value) else self.events).append(event)
 
     def move(self, line: Line, row: dict[str, float], *, later: bool = False) -> None:
@@ -411,12 +398,7 @@ class Reader:
 
     def leave(self, axes: str) -> None:
         """Say that axes go to positions of the machine."""
-        if self.retracts.leave(self.given, self.ready, self.elements):  # words after it belong where it comes from
-            self.withdrawn = self.elements
-            place = len(self.events)
-            while place and self.events[place - 1].element == self.elements:
-                place -= 1
-            self.events[place:] = [replace(event, element=event.element - 1) for event in self.events[place:]]
+        self.retracts.leave(self.elements)
         gone = "XYZ" if self.plane is not None else axes
         tip = tuple(math.nan if axis in gone else at for axis, at in zip("XYZ", self.modal.tip, strict=True))
         self.modal = self.modal.but(tip=tip)

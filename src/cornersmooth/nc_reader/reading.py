@@ -151,7 +151,7 @@ def program_of(reader: Reader, parts: list[Elements]) -> NcProgram:
         units=reader.units,
         blocks=reader.blocks,
         means=reader.dialect.means,
-        left_cuts=tuple(reader.retracts.left_cuts),
+        retracts=tuple(reader.retracts.places),
         unlooked=tuple(reader.unlooked),
         coarse=reader.coarse,
     )

@@ -57,7 +57,7 @@ def deviation_along(
     """
     task = Task.of(program, tolerance, axis_length, axis_tolerance)
     parts = [Distribution(*np.zeros((6, 0)), *np.zeros((4, 0), np.int64))]
-    for batch in Batches(task, nc.events, Decider(task).decide).of([nc]):
+    for batch in Batches(task, nc.events, nc.retracts, Decider(task).decide).of([nc]):
         matched = Match.of(task, batch)
         parts += [_of_elements(matched, batch.offset, samples), _of_poses(matched)]
     found = joined_rows(parts)

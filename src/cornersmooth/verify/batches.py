@@ -20,6 +20,7 @@ from cornersmooth.nc_reader.ahead import Ahead
 from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem
 from cornersmooth.nc_reader.tool import directions
 from cornersmooth.statements.tool_changes import ToolChanges
+from cornersmooth.verify.along_tool import AlongTool
 from cornersmooth.verify.decision import Batch, Decision
 from cornersmooth.verify.motions import written_motion
 from cornersmooth.verify.nearest import largest_square, nearest_places
@@ -40,14 +41,20 @@ _NEAR: Final = 0.05
 
 
 class Batches:
-    """Makes batches of the elements of a text, as they come, counted in the whole text; its `events` grow along.
+    """Makes batches of the elements of a text, as they come, counted in all of it; `events`, `retracts` grow along.
 
     Each is given out decided by `decide`; without that the places on the CL path where long stretches are cut are
     guessed.
     """
 
-    def __init__(self, task: Task, events: Sequence[Event], decide: Callable[[Batch], Decision] | None = None) -> None:
-        self.task, self._events, self._decide = task, events, decide
+    def __init__(
+        self,
+        task: Task,
+        events: Sequence[Event],
+        retracts: Sequence[int],
+        decide: Callable[[Batch], Decision] | None = None,
+    ) -> None:
+        self.task, self._events, self._retracts, self._decide = task, events, retracts, decide
         self.problems: list[Problem] = []
         #: stops that are reached, three numbers for each: the element, and the CL path lengths where it is and where it
         #: begins
@@ -57,6 +64,9 @@ class Batches:
         self.dwells: list[tuple[int, float]] = []
         self.taps: list[int] = []
         self.left_out: list[Problem] = []
+        #: as of `AlongTool`
+        self.rewinds: list[tuple[int, int]] = []
+        self.still: set[int] = set()
         self.elements = 0
         # the stretch that has no end yet: where it begins, as a move and in the text, and on the CL path; and the last
         # move that it may have
@@ -72,7 +82,9 @@ class Batches:
         original = self.task.original
         ahead = self._ahead = Ahead(nc for nc in chunks if len(nc))
         if ahead.has(0) and len(original.pose):
-            stops = Stops(self.task, ahead, ToolChanges(original.program, self._events))
+            along = AlongTool(ahead, self._retracts, self._events)
+            stops = Stops(self.task, ahead, ToolChanges(original.program, self._events), along)
+            self.rewinds, self.still = along.rewinds, along.still
             self.holes, self.dwells = stops.elements, stops.dwells
             self.taps, self.left_out = stops.taps, stops.left_out
             for part in stops.parts():

@@ -76,6 +76,16 @@ class HoleLines:
             self._known[what, move] = first, values
         return values[element - first]
 
+    def forget(self) -> None:
+        """Forget what is known of elements: one has been put elsewhere."""
+        self._known.clear()
+
+    def goes_to(self, element: int, *, rapid: bool) -> bool:
+        """Whether the CL file goes to where an element ends, if need be in rapid; it does in and over all its holes."""
+        moves, holes = np.flatnonzero((self.kind == Move.RAPID) | (not rapid)), np.flatnonzero(self.kind == Move.HOLE)
+        there = self.exact(moves, np.full(len(moves), element))
+        return bool(there.any() or not np.isnan(self.heights(holes, np.full(len(holes), element))).all())
+
     def feeds(self, element: int) -> bool:
         """Whether an element is no rapid."""
         return int(self.ahead.nc.kind[element - self.ahead.base]) != Element.RAPID

@@ -25,6 +25,7 @@ from cornersmooth.nc_reader.elements import Element, Elements, Problem
 from cornersmooth.nc_reader.tool import beyond_digits, directions, moving_rapids
 from cornersmooth.statements.cycles import Drilling, drillings
 from cornersmooth.statements.tool_changes import ToolChanges
+from cornersmooth.verify.along_tool import AlongTool
 from cornersmooth.verify.holes import HoleLines
 from cornersmooth.verify.motions import digit_errors
 from cornersmooth.verify.nearest import COLUMNS, on_segments
@@ -87,8 +88,8 @@ class _Trace:
 class Stops:
     """Finds the elements, at least one, that reach the stops of the CL file, and checks them and the holes."""
 
-    def __init__(self, task: Task, ahead: Ahead, changes: ToolChanges) -> None:
-        self._task, self._ahead, self._changes = task, ahead, changes
+    def __init__(self, task: Task, ahead: Ahead, changes: ToolChanges, along: AlongTool) -> None:
+        self._task, self._ahead, self._changes, self._along = task, ahead, changes, along
         self.lines = HoleLines(task.original, ahead, task.axis_length, task.tolerance)
         #: elements that belong to holes, ascending, three numbers for each: its own, the first move that it may belong
         #: to, and the last: over holes that are not drilled the tool may be there for the next
@@ -175,7 +176,9 @@ class Stops:
         size = _FIRST_LOOK if hole else TOGETHER
         begin = element
         while ahead.has(element) and element - begin < TOGETHER:
-            stop = min(ahead.count, element + size)
+            stop = int(min(ahead.count, element + size, self._along.next_retract(element)))
+            if stop == element:
+                return element
             rapids = moving_rapids(ahead.nc, max(element - ahead.base, 1), stop - ahead.base) + ahead.base
             if hole:
                 window = np.arange(element, stop)
@@ -206,6 +209,8 @@ class Stops:
     def _after(self, alive: list[_Trace], element: int) -> list[_Trace]:
         """Traces after an element, from those before it."""
         found: dict[tuple[int, int], _Trace] = {}
+        if self._along.comes_back(element):
+            self._check_return(element)
 
         def put(one: _Trace) -> None:
             known = found.setdefault(one.key, one)
@@ -227,10 +232,21 @@ class Stops:
                 best = min(one.cost for one in after)
                 after = good if any(one.cost == best for one in good) else after
             return after
+        if self._along.stays(element):
+            self.lines.forget()
+            return self._after(alive, element)
         for trace in alive:
             for one in self._with_fault(trace, element):
                 put(one)
         return sorted(found.values(), key=lambda one: one.cost)[:_AFTER_FAULT]
+
+    def _check_return(self, element: int) -> None:
+        """Complain of an element that goes on with a cut, but if the CL file has a pose where that was left."""
+        lines, rapid = self.lines, not self.lines.feeds(element)
+        if not lines.goes_to(element - 1, rapid=rapid):
+            at_feed = "the tool goes on at feed with a cut that it has left, and does not come from above"
+            text = "the tool comes back in rapid to where it has left a cut" if rapid else at_feed
+            self.problems.append(Problem("CS582", 0, lines.nc_line(element), text))
 
     def _from(self, trace: _Trace, element: int) -> Iterator[_Trace]:
         """Traces to which an element leads from one without a fault."""

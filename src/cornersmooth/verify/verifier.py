@@ -34,7 +34,6 @@ from cornersmooth.verify.deviation import check_breaks, measure_original, measur
 from cornersmooth.verify.feeds import check_feeds
 from cornersmooth.verify.findings import Findings, Where, problems_of
 from cornersmooth.verify.match import Match
-from cornersmooth.verify.own_rapids import OwnRapids
 from cornersmooth.verify.result import Verification
 from cornersmooth.verify.task import Task, length_of
 from cornersmooth.verify.word_places import WordPlaces, place_words
@@ -190,7 +189,7 @@ class Verifier:
         if isinstance(text, NcProgram):
             elements = Elements(**{column.name: getattr(text, column.name) for column in fields(Elements)})
             task, read = self._task(rotary=text.rotary, apart=apart), (text, len(text.curves))
-            found = self._found(task, iter([elements]), list(text.events), lambda: read, guess=guess)
+            found = self._found(task, iter([elements]), list(text.events), text.retracts, lambda: read, guess=guess)
             words = "the words of the text: they are looked at where it is read, not afterwards"
             return found.not_verified(words if self._words else "")
         text.begin()
@@ -205,8 +204,6 @@ class Verifier:
         scale, switches = self._program.mm_per_unit, options.dialect.switches
         positions = MachinePositions(machine, scale, switches=switches, tcp=options.tcp)
         check = WordCheck(options.control, options.dialect.lexer, options.tolerance / scale, *self._own, positions)
-        own_rapids = OwnRapids(task.original)
-        reader.retracts.added, reader.retracts.asked = own_rapids.added, own_rapids.goes_to
         lines = reader.lines(text)
         chunks = reader.chunks(check.watch(lines) if self._words else lines)
 
@@ -214,7 +211,8 @@ class Verifier:
             nc = program_of(reader, [])
             return replace(nc, problems=(*nc.problems, *check.problems)), reader.curves
 
-        found = self._found(task, chunks, reader.events, said, guess=guess).not_verified(self._unverified(check))
+        found = self._found(task, chunks, reader.events, reader.retracts.places, said, guess=guess)
+        found = found.not_verified(self._unverified(check))
         beside = self._own_kinds - _OF_MOTION
         return replace(found, trusted=(*([(0, _own_table(beside))] if beside else []), *check.trusted))
 
@@ -229,12 +227,13 @@ class Verifier:
         task: Task,
         chunks: Iterator[Elements],
         events: list[Event],
+        retracts: Sequence[int],
         said: Callable[[], tuple[NcProgram, int]],
         *,
         guess: bool,
     ) -> Verification:
         """Measure all that is read, and put everything together; `said`: of the text and its curves, then."""
-        program, batches = self._program, Batches(task, events, None if guess else Decider(task).decide)
+        program, batches = self._program, Batches(task, events, retracts, None if guess else Decider(task).decide)
         findings = Findings()
         places = WordPlaces(batches, events)
         poses = np.concatenate((np.full((3, len(program)), np.nan), np.zeros((1, len(program)))))
@@ -287,7 +286,7 @@ class Verifier:
             elements=batches.elements,
             curves=curves,
             left_out=len(batches.left_out) if self._skip_cycles else 0,
-            rewinds=tuple((out, back) for *_, out, back in nc.left_cuts),
+            rewinds=tuple(batches.rewinds),
         )
 
     @property

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Iterable, Set
+from dataclasses import replace
 from itertools import count
 from typing import Final
 
@@ -101,6 +102,8 @@ class WordPlaces:
         machine wants them, not where AUXFUN has them.
         """
         batches, path, original = self._batches, self._task.path, self._task.original
+        still = batches.still
+        self._still |= still
         program = original.program
         length = float(path.length[-1]) if len(original.pose) else 0.0
         hole, move, after = np.frombuffer(batches.holes, np.int64).reshape(-1, 3).T.copy()
@@ -117,7 +120,9 @@ class WordPlaces:
         theirs = asked(program, statements, length, means, self._of_holes())
         theirs = [token for token in theirs if token.kind != "auxiliary" or token.value not in clamps]
         here = list(map(self._of, self._events))
-        wrong = compare(theirs, said(self._events, here, means), self.margin, means, path.way_apart, own)
+        # behind a rapid that leads nowhere they belong with those before it
+        of = [replace(one, element=one.element - 1) if one.element - 1 in still else one for one in self._events]
+        wrong = compare(theirs, said(of, here, means), self.margin, means, path.way_apart, own)
         said_there = zip(statements, program.statements, strict=True)
         homes = [at for at, statement in said_there if statement.word == "GOHOME"]
         at_home = {
