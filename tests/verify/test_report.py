@@ -119,7 +119,7 @@ def test_distribution_along_the_path():
     pose = int(np.flatnonzero(program.line == along.cl_line[worst])[0])
     assert found.pose_tip[pose] == pytest.approx(along.tip[worst], abs=1e-9)
     # both poses of every row can be found again
-    nc, motion = read_nc(encode(lines)), original_motion(program, 0.02, 10.0)
+    nc, (motion, *_) = read_nc(encode(lines)), original_motion(program, 0.02, 10.0)
     sampled = np.flatnonzero(along.element >= 0)
     assert len(sampled) > 16 * program.chains[0, 1]
     written, _ = written_at(nc, along.element[sampled], along.fraction[sampled])

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
-from cornersmooth.model import Move, Program, Statement
+from cornersmooth.model import Ints, Move, Program, Statement
 from cornersmooth.nc_reader.word_tables import Means
 from cornersmooth.statements.tokens import PAUSES, SPEED_DECIMALS, Token, of_m
 
@@ -34,7 +35,6 @@ class Asking:
         self.place, self.line, self.moment = 0.0, 0, 0
         self.running, self.speed, self.diameter = "CLW", 0.0, 0.0
         self.tool, self.offset, self.offset_at = -1.0, 1.0, (-1, 0)
-        self.moving = np.flatnonzero(program.kind != Move.FROM)
         said = {statement.word for statement in program.statements}
         self.handlers: dict[str, Callable[[list[str], list[float], Statement], None]] = {
             "LOADTL": self.load,
@@ -54,6 +54,11 @@ class Asking:
         }
         if not said & {"LOADTL", "LOAD", "TURRET"}:
             self.handlers["TOOLNO"] = self.load
+
+    @cached_property
+    def moving(self) -> Ints:
+        """(m,) poses that are moved to."""
+        return np.flatnonzero(self.program.kind != Move.FROM)
 
     def take(self, statement: Statement, place: float) -> None:
         """Note one statement."""

@@ -33,18 +33,15 @@ _MOST_PARTS: Final = 1 << 13
 
 @dataclass(frozen=True)
 class Trail:
-    """Vertices of a motion, v of them."""
+    """Vertices of a motion, v of them: what their points belong to."""
 
-    #: (v, 3): mm, unit vectors
-    tip: Floats
-    axis: Floats
     owner: Ints  #: (v,): index of the move that leads to each vertex
     fraction: Floats  #: (v,): where on it, 1 at its end
     last: Ints  #: (m,): vertex at the end of each move
     bend: Floats  #: (v - 1,) mm: of the segment to the next vertex
 
     def __len__(self) -> int:
-        return len(self.tip)
+        return len(self.owner)
 
 
 @dataclass(frozen=True)
@@ -98,8 +95,8 @@ class Original:
         return tip, unit(axis)
 
 
-def original_motion(program: Program, tolerance: float, axis_length: float) -> Original:
-    """Make the trail of the CL motion."""
+def original_motion(program: Program, tolerance: float, axis_length: float) -> tuple[Original, Floats, Floats]:
+    """Make the trail of the CL motion, with tips (mm) and unit axes (v, 3) of its vertices."""
     stated = program.kind == Move.FROM
     # an arc wants a start: where that is only stated the tool is sent there
     stated[:-1] &= program.kind[1:] != Move.ARC
@@ -118,14 +115,14 @@ def original_motion(program: Program, tolerance: float, axis_length: float) -> O
     bend[program.kind[chosen] == Move.RAPID] = 0.0  # the way of a rapid is the machine's
     cuts = parts_of(bend, CL_SHARE * tolerance, _MOST_PARTS)
     index = np.arange(len(pose))
-    bare = Original(program, pose, Trail(tip, axis, index, np.broadcast_to(1.0, len(pose)), index, bend[1:]))
+    bare = Original(program, pose, Trail(index, np.broadcast_to(1.0, len(pose)), index, bend[1:]))
     if not len(pose) or cuts.max() == 1:
-        return bare
+        return bare, tip, axis
     owner, fraction, last = divided(cuts)
     tip, axis = tip.take(owner, axis=0), axis.take(owner, axis=0)
     inner = np.flatnonzero(fraction < 1)
     tip[inner], axis[inner] = bare.at(owner[inner], fraction[inner])
-    return Original(program, pose, Trail(tip, axis, owner, fraction, last, (bend / cuts**2)[owner][1:]))
+    return Original(program, pose, Trail(owner, fraction, last, (bend / cuts**2)[owner][1:])), tip, axis
 
 
 def selecting(pose: Ints) -> slice | Ints:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -68,16 +68,12 @@ class Task:
         if axis_tolerance is not None:
             axis_length = length_of(tolerance, axis_tolerance)
         tolerance -= sagitta
-        original = original_motion(program, tolerance, axis_length)
-        trail = original.trail
-        six = side_by_side(trail.tip, trail.axis, axis_length, own_axis)
-        # tips are held once only
-        original = replace(original, trail=replace(trail, tip=six[:, :3]))
+        original, tip, axis = original_motion(program, tolerance, axis_length)
 
         def exact(place: Floats) -> Floats:
             return side_by_side(*original.pose_at(place), axis_length, own_axis)
 
-        path = Path.of(six, trail.bend, exact)
+        path = Path.of(side_by_side(tip, axis, axis_length, own_axis), original.trail.bend, exact)
         return cls(original, path, _exact_poses(original), tolerance, axis_length, axis_tolerance, apart, sagitta)
 
     def six(self, tip: Floats, axis: Floats) -> Floats:

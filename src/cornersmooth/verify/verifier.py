@@ -198,7 +198,7 @@ class Verifier:
         task = self._task(
             rotary=rotary is not None, apart=apart
         )  # takes memory, which who writes may need before there is text
-        lever = None if rotary is None else float(rotary.levers(task.original.trail.tip).max(initial=0.0))
+        lever = None if rotary is None else float(rotary.levers(task.path.points[:, :3]).max(initial=0.0))
         reader = Reader(self._name, options, steps, lever)
         machine = self._machine if options.dialect.retracts else None
         scale, switches = self._program.mm_per_unit, options.dialect.switches
@@ -236,11 +236,12 @@ class Verifier:
         program, batches = self._program, Batches(task, events, retracts, None if guess else Decider(task).decide)
         findings = Findings()
         places = WordPlaces(batches, events)
-        poses = np.concatenate((np.full((3, len(program)), np.nan), np.zeros((1, len(program)))))
+        poses = np.empty((4, len(program)))
         if self._slower:
             chunks = (part.at_most() for part in chunks)
 
         def items() -> Iterator[tuple[Batch, dict[str, Where]]]:
+            poses[:3], poses[3] = np.nan, 0.0  # not before other processes are forked, which would keep them
             for batch in batches.of(places.watch(chunks)):
                 yield batch, findings.worst.copy()
 
