@@ -16,9 +16,16 @@ from cornersmooth.nc_words.blocks import Ruled, WordRules
 from cornersmooth.nc_words.machine_positions import MachinePositions
 from cornersmooth.nc_words.rules import UNLISTED, WordList, WordRule, shown, word_list, word_text
 from cornersmooth.nc_words.states import LINEAR, ROTARY, WordStates
+from cornersmooth.statements.comparison import KINDS
 
 #: words that bear on no motion: tool, spindle, stops, coolant (ISO 6983-1, M0 to M9 and M19)
 _BESIDE_MOTION: Final = re.compile(r"T\d+|S\d+(\.\d*)?|M(\d|19)|TOOL CALL \d+( Z)?( S\d+)?")
+
+#: kinds of statements that bear on the motion: where the path is moved to
+_OF_MOTION: Final = frozenset(("compensation", "register", "offset"))
+
+#: blocks that were not looked at and are told one by one
+_UNSURE_TOLD: Final = 3
 
 _CONTROL_CHARACTERS: Final = re.compile(r"[\x00-\x08\x0a-\x1f\x7f]")
 
@@ -62,6 +69,9 @@ class WordCheck:
         self.problems, self._wrong = self._states.problems, self._states.wrong
         #: blocks taken on trust, line and text, and those of them that may bear on the motion
         self.trusted, self.unsure = self._states.trusted, self._states.unsure
+        kinds = KINDS & trusted
+        self._moving = _own_table(kinds & _OF_MOTION)
+        self.trusted += [(0, text) for text in _own_table(kinds - _OF_MOTION)]
         self._line = 0  # of the last block
         self._wanted = self.list.begin  # blocks of the begin that are still to come
         self._opening = ""
@@ -79,6 +89,14 @@ class WordCheck:
             else:
                 yield self._block(item)
         self._end()
+
+    @property
+    def unlooked(self) -> str:
+        """What was not looked at and may bear on the motion; empty for nothing."""
+        told = [f"{block}, NC line {line}" for line, block in self.unsure[:_UNSURE_TOLD]]
+        if more := len(self.unsure) - len(told):
+            told.append(f"{more} more blocks of your own")
+        return "; ".join(told + self._moving)
 
     def _text(self, block: str) -> str:
         """A block of the user's as the lists have it; empty where it has no words."""
@@ -234,3 +252,7 @@ class WordCheck:
         elif self._opening.partition(" ")[2] != texts[-1].partition(" ")[2]:
             self._states.unframed(self._tail[-1][0], f"{texts[-1]} ends what {self._opening} began")
         self._states.end(first)
+
+
+def _own_table(kinds: Set[str]) -> list[str]:
+    return [f"what your own table says of {', '.join(sorted(kinds))}"] if kinds else []

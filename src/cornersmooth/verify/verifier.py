@@ -51,12 +51,6 @@ CHECKS: Final[tuple[Callable[[Match, Findings], None], ...]] = (
     place_words,
 )
 
-#: kinds of statements that bear on the motion: where the path is moved to
-_OF_MOTION: Final = frozenset(("compensation", "register", "offset"))
-
-#: blocks that were not looked at and are told one by one
-_UNSURE_TOLD: Final = 3
-
 #: poses from which on it is worth while to let other processes work
 _LONG: Final = 30_000
 
@@ -212,9 +206,8 @@ class Verifier:
             return replace(nc, problems=(*nc.problems, *check.problems)), reader.curves
 
         found = self._found(task, chunks, reader.events, reader.retracts.places, said, guess=guess)
-        found = found.not_verified(self._unverified(check))
-        beside = self._own_kinds - _OF_MOTION
-        return replace(found, trusted=(*([(0, _own_table(beside))] if beside else []), *check.trusted))
+        unlooked = check.unlooked if self._words else "words beside the motion, which a table of your own may define"
+        return replace(found.not_verified(unlooked), trusted=tuple(check.trusted))
 
     def _task(self, *, rotary: bool, apart: bool) -> Task:
         options = self._options
@@ -294,21 +287,6 @@ class Verifier:
     def _own_kinds(self) -> frozenset[str]:
         """Kinds of statements that the user says in words of his own."""
         return KINDS & set(self._trusted)
-
-    def _unverified(self, check: WordCheck) -> str:
-        """What of the text was not looked at and may bear on the motion."""
-        if not self._words:
-            return "words beside the motion, which a table of your own may define"
-        unsure = [f"{block}, NC line {line}" for line, block in check.unsure[:_UNSURE_TOLD]]
-        if len(check.unsure) > _UNSURE_TOLD:
-            unsure.append(f"{len(check.unsure) - _UNSURE_TOLD} more blocks of your own")
-        if moving := self._own_kinds & _OF_MOTION:
-            unsure.append(_own_table(moving))
-        return "; ".join(unsure)
-
-
-def _own_table(kinds: Set[str]) -> str:
-    return f"what your own table says of {', '.join(sorted(kinds))}"
 
 
 @taking_what(Verifier)
