@@ -13,7 +13,7 @@ from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.verify.chain import Path, passed
 from cornersmooth.verify.cl_motion import Original
 from cornersmooth.verify.decision import Batch, Decider, Decision
-from cornersmooth.verify.free_space import FreeSpace
+from cornersmooth.verify.free_space import FreeSpace, holds
 from cornersmooth.verify.passage import AROUND
 from cornersmooth.verify.task import Task
 
@@ -165,7 +165,7 @@ class Match(Batch, Decision):
         space = FreeSpace(own, path, radius, bend, np.zeros(top - bottom))
         forward = [space.along(0, start - bottom)]
         forward += [reached for _, reached in space.sweep(0, forward[0])]
-        if len(forward) <= last - first or not forward[-1]:
+        if len(forward) <= last - first or not holds(forward[-1], end - bottom, top - bottom - 1):
             return there
         places = space.between(forward, end - bottom)[vertex - first]
         for k, (low, high) in places.items():

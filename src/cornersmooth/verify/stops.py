@@ -275,9 +275,10 @@ class Stops:
         if self._over(k, element) and (not feeds or element > trace.begin or lines.over(move, max(element - 1, 0))):
             yield trace
         if feeds and self._fed[k]:
-            out = element - 1 if lines.at(move + 1, element - 1) else element
-            if out < element or out_of_hole(self._task, self._ahead.nc, element - self._ahead.base, move)[1]:
-                yield self._finished(trace, _Trace(k, out, False, trace), element)
+            base, block = self._ahead.base, self._block(element)
+            out = element - 1 if lines.at(move + 1, element - 1) else block.stop - 1
+            if out < element or out_of_hole(self._task, self._ahead.nc, block.stop - 1 - base, move, len(block))[1]:
+                yield trace if out > element else self._finished(trace, _Trace(k, out, False, trace), element)
         elif rapid and lines.at(following, element) and self._done(k, element):
             yield self._finished(trace, _Trace(k + 1, element, False, trace), element)
 
@@ -409,6 +410,12 @@ class Stops:
         """Whether a feed move may follow a stop; it is only asked for before holes, else the decision says it."""
         return self._fed[stop] or not self._hole[stop + 1] or self.lines.at(self._move[stop + 1] - 1, element)
 
+    def _block(self, element: int) -> range:
+        """Elements that a block is: rotary words make several lines of one."""
+        line, base = self._ahead.nc.line, self._ahead.base
+        first, stop = (int(np.searchsorted(line, line[element - base], side=side)) for side in ("left", "right"))
+        return range(base + first, base + stop)
+
     def _negligible(self, element: int) -> bool:
         """Whether an element moves the tool by no more than digits show."""
         nc, at = self._ahead.nc, element - self._ahead.base
@@ -485,12 +492,17 @@ class Stops:
             self.taps.append(move)
 
 
-def out_of_hole(task: Task, nc: Elements, element: int, move: int) -> tuple[float, bool]:
-    """Place on the move after a hole nearest to the end of an element, and whether that leads there straight, to ε."""
-    tip, last = nc.tip[element : element + 1], task.original.trail.last
+def out_of_hole(task: Task, nc: Elements, element: int, move: int, lines: int = 1) -> tuple[float, bool]:
+    """Place on the move after a hole nearest to the end of an element, and whether a block leads there straight, to ε.
+
+    The element is the last of so many lines that the block is.
+    """
+    tip, last, limit = nc.tip[element : element + 1], task.original.trail.last, task.radius**2
     six = task.six(tip, directions(nc, tip, nc.second[element : element + 1]))
     segment = np.arange(int(last[move]), int(last[move + 1]))
     share, square = on_segments(six[None], task.path.points, segment[None], COLUMNS["both"])
     nearest = int(np.argmin(square))
-    straight = nc.kind[element] == Element.LINE
-    return float(segment[nearest] + share[0, nearest]), bool(straight and square[0, nearest] <= task.radius**2)
+    way = nc.tip[max(element - lines, 0) : element + 1]
+    _, beside = on_segments(way[1:-1, None], way[[0, -1]], np.zeros((lines - 1, 1), np.int64), COLUMNS["tip"])
+    straight = nc.kind[element] == Element.LINE and (beside <= limit).all()
+    return float(segment[nearest] + share[0, nearest]), bool(straight and square[0, nearest] <= limit)
