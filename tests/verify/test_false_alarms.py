@@ -700,6 +700,36 @@ def test_timed_blocks_may_be_of_any_tolerance_up_to_the_one_of_the_check(toleran
         assert [(problem.code, problem.nc_line) for problem in found] == [("CS541", timed + 1)]
 
 
+#: without tip control, all blocks timed, in moves with feeds of their own
+TIMED = Alarm(
+    Case("fanuc", "g1", "xyzbc-trt", tcp=False),
+    0.005,
+    10.0,
+    """GOTO/0,0,0,0,0.1045285,0.9945219
+FEDRAT/MMPM,400.0
+GOTO/8,1,0,0.1045285,0,0.9945219
+FEDRAT/MMPM,700.0
+GOTO/15,5,1,0.1736482,0,0.9848078
+""",
+)
+
+
+def test_feed_of_the_neighbour_is_found_where_blocks_are_timed() -> None:
+    lines = TIMED.text.splitlines()
+    assert TIMED.verified(TIMED.text).problems == ()
+    timed = [k for k in range(lines.index("G93") + 1, len(lines)) if " F" in lines[k]]
+    for factor, some in ((7 / 4, timed[: len(timed) // 4]), (4 / 7, timed[-len(timed) // 4 :])):
+        wrong = list(lines)
+        for k in some:
+            words, rate = lines[k].split(" F")
+            wrong[k] = f"{words} F{factor * float(rate):.3f}"
+        found = TIMED.verified("\n".join(wrong)).problems
+        assert [(problem.code, problem.nc_line) for problem in found] == [("CS541", some[0] + 1)]
+        for k in some[:: len(some) // 4]:
+            found = TIMED.verified("\n".join([*lines[:k], wrong[k], *lines[k + 1 :]])).problems
+            assert [(problem.code, problem.nc_line) for problem in found] == [("CS541", k + 1)]
+
+
 def test_time_of_a_dwell_in_revolutions_is_compared() -> None:
     text = DWELL_IN_REVOLUTIONS.text
     assert "G4 P200" in text
