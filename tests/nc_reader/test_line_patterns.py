@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 import re
 from itertools import product
+from operator import itemgetter
 
 import numpy as np
 import pytest
@@ -65,8 +66,17 @@ def read(call):
     try:
         found.extend(lines_apart(call))
     except Exception as error:
-        return found, str(error)
-    return found, ""
+        return sorted(found, key=itemgetter(0)), str(error)
+    return sorted(found, key=itemgetter(0)), ""  # blank lines within a run come after it
+
+
+def same_alone(data, dialect):
+    """How many lines are read in runs; each says what it says alone."""
+    together, _ = read(block_tables.read_lines(data, None, dialect.lexer))
+    for (number, said), line in zip(together, data.split(b"\n")[:-1], strict=True):
+        alone = dialect.lexer.line(line, number, None)
+        assert said == (alone if not isinstance(said, dict) else dialect.row(alone))
+    return sum(isinstance(said, dict) for _, said in together)
 
 
 @pytest.mark.parametrize(
@@ -84,6 +94,29 @@ def test_lines_in_runs_say_what_each_says_alone(control, seed, odd):
         with pytest.raises(InputError) as error:
             dialect.lexer.line(data.split(b"\n")[200], 201, None)
         assert str(error.value) == wrong
+
+
+def test_zero_without_a_point_does_not_let_other_numbers_without_one_through():
+    assert same_alone(b"G1 X0 Y1.5\nX0 Y1.5\nX5 Y2.5\nN1 X0 Y3.5\n", dialect_of("fanuc")) == 3
+    assert same_alone(b"G1 X0 Y1.5\nX5 Y1.5\n", dialect_of("linuxcnc")) == 2
+
+
+@pytest.mark.parametrize("control", SHAPES)
+def test_lines_that_each_have_a_shape_of_their_own_are_read_in_runs(control, monkeypatch):
+    monkeypatch.setattr(block_tables, "CHUNK", 4000)
+    rng, data = random.Random(5), []
+    for number in range(600):
+        words = [f"{letter}{rng.uniform(-10, 900):.{rng.randrange(9)}f}".ljust(5, "0") for letter in "XYZ"]
+        words = [word if "." in word else word + "." for word in words]
+        data.append(f"{number} L " + " ".join(words) if control == "heidenhain" else f"N{number} " + " ".join(words))
+    assert same_alone("\n".join(data + ["G1 X1.5"]).encode() + b"\n", dialect_of(control)) >= 600
+
+
+def test_lines_without_words_do_not_end_a_run():
+    lexer = dialect_of("fanuc").lexer
+    first, *rest = block_tables.read_lines(b"G1 X1.5\n\n \r\nX2.5\n", None, lexer)
+    assert first.line.tolist() == [1, 4]
+    assert [line.number for line in rest] == [2, 3]
 
 
 def test_digits_that_stand_for_themselves_make_another_pattern():
@@ -110,15 +143,6 @@ def test_fast_path_is_taken():
     assert columns["Y"].tolist() == [-2.25, 2.25]
     assert np.isnan(columns["Z"][0])
     assert columns["Z"][1] == 12345.678
-
-
-def same_alone(data, dialect):
-    """How many lines are read in runs; each says what it says alone."""
-    together = list(lines_apart(block_tables.read_lines(data, None, dialect.lexer)))
-    for (number, said), line in zip(together, data.split(b"\n")[:-1], strict=True):
-        alone = dialect.lexer.line(line, number, None)
-        assert said == (alone if not isinstance(said, dict) else dialect.row(alone))
-    return sum(isinstance(said, dict) for _, said in together)
 
 
 def test_shapes_with_one_key_or_with_keys_that_begin_alike_are_told_apart(monkeypatch):

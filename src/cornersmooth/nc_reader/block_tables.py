@@ -78,9 +78,7 @@ def _in_order(lines: Lines, number: int, lexer: Lexer, name: str | None) -> Gene
     """
     bulk = lines.bulk()
     within = bulk.copy()
-    if lexer.aside is not None:
-        others = np.flatnonzero(~bulk).tolist()
-        within[[row for row in others if lexer.aside.fullmatch(lines.line(row))]] = True
+    within[[row for row in np.flatnonzero(~bulk).tolist() if lexer.aside.fullmatch(lines.line(row))]] = True
     edges = np.flatnonzero(np.diff(within, prepend=~within[0], append=~within[-1]))
     for start, stop in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
         rows = start + np.flatnonzero(bulk[start:stop])

@@ -36,8 +36,8 @@ class Lexer:
     block_number = re.compile(r"N[ \t]*(\d+)[ \t]*")
     #: what a line begins with that can begin a curve, behind a line end
     begins: re.Pattern[bytes]
-    #: lines between motion blocks that say nothing of the motion; None for a control without such
-    aside: re.Pattern[bytes] | None = None
+    #: lines between motion blocks that say nothing of the motion
+    aside = re.compile(rb"[ \t\r]*")
     #: names of words that make a block move the tool or belong to a curve
     places: frozenset[str] = frozenset()
     #: names of words that are worth something else without a decimal point: read on their own, to be complained of

@@ -9,6 +9,7 @@ or two, and the value is that integer over a power of ten: exactly what `float` 
 from __future__ import annotations
 
 import re
+from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -25,8 +26,9 @@ from cornersmooth.text.eight_digits import DIGITS, LAST_DIGITS, Bytes, Words, jo
 #: line ends that must stand before a chunk, so that words beyond its begin can be fetched
 MARGIN: Final = 24
 
-#: digits of a number that is read here: integers of so many are exact in float64
+#: digits of a number that is read here: integers of so many are exact in float64; and digits before its point
 _MOST_DIGITS: Final = 15
+_MOST_WHOLE: Final = 12
 #: digits of a line that stand for themselves, at most: so many fit an integer
 _MOST_PLACES: Final = 18
 #: bytes of a line, its end included, that is read in runs; bytes that are compared at a time
@@ -34,6 +36,8 @@ _LONGEST: Final = 512
 _PART: Final = 128
 #: bits of a key that lead to a shape
 _KEY_BITS: Final = 16
+#: stands for a number with a point
+_MARK: Final = b"\x01"
 _NUMBER: Final = re.compile(rb"(?P<sign>[-+]?)(?P<whole>\d*)(?P<point>\.?)(?P<part>\d*)(?P<power>E[-+]?\d+)?")
 
 #: the bytes after the point, for so many decimals; all where there is no point
@@ -48,19 +52,18 @@ _FACTORS = np.multiply.accumulate(np.full(_LONGEST // DIGITS, 0x9E3779B97F4A7C15
 
 
 @dataclass(frozen=True)
-class LinePattern:
-    """What the lines of one pattern have in common."""
+class _Kind:
+    """What lines have in common that differ in their numbers with a point alone.
+
+    Places are counted from the begin of the next of these numbers, or from the end of the line.
+    """
 
     #: columns, those of `constants` at the end; None for lines that are read on their own
-    names: tuple[str, ...] | None
-    constants: bytes  #: float64 of the columns that are the same in all lines
-    #: for each other column six int64: where in the line the number begins and ends, its digits, its decimals (-1
-    #: without a point), 1 with a minus sign, 1 where it is left to `float`
-    fields: bytes
-
-
-#: stands for lines that are read on their own
-_ALONE: Final = LinePattern(None, b"", b"")
+    names: tuple[str, ...] | None = None
+    constants: tuple[float, ...] = ()  #: columns that are the same in all lines
+    #: for each other column: the next number with a point, what is taken of its row in `_pointed`, what is added
+    columns: tuple[tuple[int, tuple[int, ...], tuple[int, ...]], ...] = ()
+    places: tuple[tuple[int, int], ...] = ()  #: of digits that stand for themselves: the next such number, and where
 
 
 class LinePatterns:
@@ -72,6 +75,12 @@ class LinePatterns:
 
     def __init__(self, lexer: Lexer) -> None:
         self._lexer = lexer
+        #: lines in which the digits of all stand that are new
+        self.fresh: list[bytes] = []
+        self._forget()
+
+    def _forget(self) -> None:
+        """Know no patterns."""
         #: of each shape its key and its bytes; the first is that of lines that are too long
         self._keys, self._bytes = np.zeros(1, np.uint64), np.zeros((1, _LONGEST // DIGITS), np.uint64)
         #: shapes by their keys, and the one met last of those whose keys begin alike
@@ -79,31 +88,32 @@ class LinePatterns:
         #: of each shape: where digits stand for themselves, -1 behind those; the digits met first, and their pattern
         self._places, self._usual = np.full((1, _MOST_PLACES), -1), np.zeros((1, 2), np.int64)
         self._others: dict[tuple[int, int], int] = {}  # patterns of a shape with other digits
-        self.known = [_ALONE]
-        #: a line of each pattern that is new
-        self.fresh: list[bytes] = []
+        #: kinds by their lines, and those with the same columns by these
+        self._kinds: dict[bytes, int] = {}
+        self._most: dict[bytes, Ints] = {}  # decimals of their numbers so far
+        self._groups: dict[tuple[Any, int], int] = {}
+        self.kinds = [_Kind()]
+        #: (p, 3): of each pattern its kind, the number of its columns, and where its rows of `fields` begin; the first
+        #: is that of lines that are read on their own
+        self.known = np.zeros((1, 3), np.int64)
+        #: (f, 6): where in the line a number begins, its bytes, its digits, its decimals (-1 without a point), 1 with
+        #: a minus sign, 1 where it is left to `float`
+        self.fields = np.zeros((0, 6), np.int64)
 
     def label(self, text: bytes, start: Ints, size: Ints) -> Ints:
         """(l,) rows of `known`: the pattern of each line of a text; its first byte, and its size with its end."""
         raw = np.frombuffer(text, np.uint8)
         shape = self._shape(text, raw, start, size)
         self.fresh += [_line(text, start[row]) for row in np.flatnonzero(shape == 0).tolist()]
-        digits = np.zeros(len(shape), np.int64)
-        rows: Any = slice(None)
-        for column in self._places.T:
-            at = column[shape[rows]]
-            rows, at = np.flatnonzero(at >= 0) if isinstance(rows, slice) else rows[at >= 0], at[at >= 0]
-            if not len(rows):
-                break
-            digits[rows] = 10 * digits[rows] + (raw[start[rows] + at] & 15)
+        digits = _digits(raw, start, self._places, shape)
         label = self._usual[:, 1][shape]
         others = np.flatnonzero(self._usual[:, 0][shape] != digits)
-        for row, key in zip(
-            others.tolist(), zip(shape[others].tolist(), digits[others].tolist(), strict=True), strict=True
-        ):
-            if key not in self._others:
-                self._others[key] = self._add(_line(text, start[row]))[-1]
-            label[row] = self._others[key]
+        keys = list(zip(shape[others].tolist(), digits[others].tolist(), strict=True))
+        new = {key: row for key, row in zip(keys, others.tolist(), strict=True) if key not in self._others}
+        if new:
+            _, _, patterns = self._add([_line(text, start[row]) for row in new.values()])
+            self._others.update(zip(new, patterns.tolist(), strict=True))
+        label[others] = [self._others[key] for key in keys]
         return label
 
     def _shape(self, text: bytes, raw: Bytes, start: Ints, size: Ints) -> Ints:
@@ -119,6 +129,9 @@ class LinePatterns:
         if len(unknown):
             found, first, inverse = np.unique(key[unknown], return_index=True, return_inverse=True)
             new = np.sort(unknown[first[[one not in self._rows for one in found.tolist()]]])
+            if len(new) and len(self._rows) > len(start):  # few of them are met again
+                self._forget()
+                return self._shape(text, raw, start, size)
             if len(new):
                 self._learn(key[new], marks, start[new], size[new], [_line(text, begin) for begin in start[new]])
             shape[unknown] = np.array([self._rows[one] for one in found.tolist()])[inverse]
@@ -137,49 +150,139 @@ class LinePatterns:
         for rows, columns, words in _parts(marks, start, size):
             own[rows, columns] = words
         self._keys, self._bytes = np.append(self._keys, key), np.concatenate((self._bytes, own))
-        added = np.array([self._add(line) for line in lines])
-        self._places = np.concatenate((self._places, added[:, :-2]))
-        self._usual = np.concatenate((self._usual, added[:, -2:]))
+        places, digits, patterns = self._add(lines)
+        self._places = np.concatenate((self._places, places))
+        self._usual = np.concatenate((self._usual, np.stack((digits, patterns), axis=1)))
 
-    def _add(self, line: bytes) -> list[int]:
-        """Take a line of a new pattern apart: places of digits that stand for themselves, these, and its number."""
-        places, pattern = self._take(line)
-        self.known.append(pattern)
-        self.fresh.append(line)
-        digits = int(bytes(line[place] for place in places) or b"0")
-        return [*places, *[-1] * (_MOST_PLACES - len(places)), digits, len(self.known) - 1]
+    def _add(self, lines: list[bytes]) -> tuple[Ints, Ints, Ints]:
+        """Take lines of new patterns apart: places of digits that stand for themselves, these, and rows of `kind`."""
+        text = b"\n".join((*lines, b""))
+        raw = np.frombuffer(text, np.uint8)
+        ends = np.flatnonzero(raw == ord("\n"))
+        start = np.append(0, ends[:-1] + 1)
+        numbers, kinds = _pointed(raw)
+        first = np.searchsorted(numbers[:, 0], start)
+        numbers[:, 0] -= np.repeat(start, np.diff(first, append=len(numbers)))
+        rows_of: dict[bytes, list[int]] = {}
+        for row, name in zip(range(len(lines)), kinds.split(b"\n")[:-1], strict=True):
+            rows_of.setdefault(name, []).append(row)
+        places, known = np.full((len(lines), _MOST_PLACES), -1), np.zeros((len(lines), 3), np.int64)
+        fields, count = [self.fields], len(self.fields)
+        for name, mine in rows_of.items():
+            rows = np.array(mine)
+            own = numbers[first[rows][:, None] + np.arange(name.count(_MARK))]
+            decimals = own[:, :, 3]
+            own = np.append(own, np.zeros((len(rows), 1, 6), np.int64), axis=1)
+            own[:, -1, 0] = ends[rows] - start[rows]
+            if name not in self._kinds:
+                self._kinds[name] = len(self.kinds)
+                self.kinds.append(self._take(lines[mine[0]], own[0]))
+                self._most[name] = np.full(decimals.shape[1], -1)
+                self.fresh.append(lines[mine[0]])
+            if (decimals > self._most[name]).any():
+                self.fresh += [lines[mine[row]] for row in set(decimals.argmax(axis=0).tolist())]
+                self._most[name] = np.maximum(self._most[name], decimals.max(axis=0))
+            one = self.kinds[self._kinds[name]]
+            group = self._groups.setdefault((one.names, len(one.columns)), len(self._groups))
+            known[rows, 0], known[rows, 1] = self._kinds[name], group
+            known[rows, 2] = count + len(one.columns) * np.arange(len(rows))
+            for column, (number, offset) in enumerate(one.places):
+                places[rows, column] = own[:, number, 0] + offset
+            found = [own[:, number] * taken + added for number, taken, added in one.columns]
+            fields += [np.stack(found, axis=1).reshape(-1, 6)] if found else []
+            count += len(one.columns) * len(rows)
+        patterns = len(self.known) + np.arange(len(lines))
+        self.known, self.fields = np.concatenate((self.known, known)), np.concatenate(fields)
+        return places, _digits(raw, start, places, np.arange(len(lines))), patterns
 
-    def _take(self, line: bytes) -> tuple[list[int], LinePattern]:
-        """Places of the digits of a line that stand for themselves, and its pattern."""
+    def _take(self, line: bytes, numbers: Ints) -> _Kind:
+        """Kind of a line; `numbers` are those of it with a point, and its end."""
         try:
             found = self._lexer.line(line, 0, None)
         except InputError:
-            return [], _ALONE
-        spans = [(word.start, word.stop) for word in (*found.words, found.block_number) if word is not None]
+            return _Kind()
+        words = [word for word in (*found.words, found.block_number) if word is not None]
+        # zero may be written without a point, where other numbers may not
+        spans = [(w.start, w.stop) for w in words if w.name not in self._lexer.points or "." in w.text]
         spans += [match.span() for match in self._lexer.comment.finditer(line.decode("latin-1"))]
         fixed = bytearray(line)
         for start, stop in spans:
             fixed[start:stop] = b" " * (stop - start)
-        places = [match.start() for match in re.finditer(rb"\d", fixed)]
+        begins = numbers[:, 0].tolist()
+        at = [match.start() for match in re.finditer(rb"\d", fixed)]
+        if len(at) > _MOST_PLACES:
+            return _Kind()
+        after = [bisect_left(begins, place) for place in at]
+        places = tuple((k, place - begins[k]) for k, place in zip(after, at, strict=True))
+        alone = _Kind(places=places)
         columns = None if found.comments or found.skipped else self._lexer.motion(found)
-        if columns is None or len(places) > _MOST_PLACES:
-            return places if len(places) <= _MOST_PLACES else [], _ALONE
+        if columns is None:
+            return alone
         own = {name: word for name, word in columns.items() if isinstance(word, Word) and not word.fixed}
-        constants = {
+        rest = {
             name: word.value if isinstance(word, Word) else word for name, word in columns.items() if name not in own
         }
-        fields = []
+        read = []
         for word in own.values():
             match = _NUMBER.fullmatch(line, word.start, word.stop)
-            if match is None:
-                return places, _ALONE
-            decimals = len(match["part"]) if match["point"] else -1
-            digits = len(match["whole"]) + len(match["part"])
-            left = match["power"] is not None or digits > _MOST_DIGITS or decimals > DIGITS
-            number = (0, -1) if left else (digits, decimals)
-            fields.append((*match.span(), *number, match["sign"] == b"-", left))
-        values = np.array([*constants.values()]).tobytes(), np.array(fields, np.int64).tobytes()
-        return places, LinePattern((*own, *constants), *values)
+            if match is None or len(match["whole"]) > _MOST_WHOLE:
+                return alone
+            k, power = bisect_left(begins, word.start), match["power"] is not None
+            if begins[k] == word.start:
+                more = word.stop - word.start - int(numbers[k, 1])
+                read.append((k, (1, 1, 1, 1, 1, 1), (0, more, 0, 0, 0, int(power))))
+                if (more > 0) != power:
+                    return alone
+            elif match["point"]:
+                return alone
+            else:
+                size, minus = len(match["whole"]), int(match["sign"] == b"-")
+                number = (word.start - begins[k], word.stop - word.start, size, -1, minus, int(power))
+                read.append((k, (1, 0, 0, 0, 0, 0), number))
+        if {k for k, taken, _ in read if all(taken)} != set(range(len(begins) - 1)):
+            return alone
+        return _Kind((*own, *rest), tuple(rest.values()), tuple(read), places)
+
+
+def _digits(raw: Bytes, start: Ints, places: Ints, shape: Ints) -> Ints:
+    """(l,) digits at the places of the shape of each line, as one number."""
+    digits = np.zeros(len(shape), np.int64)
+    rows: Any = slice(None)
+    for column in places.T:
+        at = column[shape[rows]]
+        rows, at = np.flatnonzero(at >= 0) if isinstance(rows, slice) else rows[at >= 0], at[at >= 0]
+        if not len(rows):
+            break
+        digits[rows] = 10 * digits[rows] + (raw[start[rows] + at] & 15)
+    return digits
+
+
+def _pointed(raw: Bytes) -> tuple[Ints, bytes]:
+    """Numbers of a text with a point, but for G words: rows of `LinePatterns.fields`; and the text with their marks."""
+    is_point = raw == ord(".")
+    edges = np.flatnonzero(np.diff(is_point | (raw - np.uint8(ord("0")) <= 9), prepend=False, append=False))
+    begin, end, point = edges[::2], edges[1::2], np.append(np.flatnonzero(is_point), [len(raw)] * 2)
+    first = np.searchsorted(point, begin)
+    point, second, before = point[first], point[first + 1], raw[begin - 1]
+    fits = (point < end) & (second >= end) & (end - begin > 1) & (point - begin <= _MOST_WHOLE)
+    fits &= before & 0xDF != ord("G")
+    heads = (before == ord("\n")) | ((before == ord("N")) & (raw[begin - 2] == ord("\n")))
+    heads &= point >= end  # block numbers
+    begin = begin - (fits & ((before == ord("+")) | (before == ord("-"))))
+    marked, inside, cut = (
+        np.where(raw == _MARK[0], np.uint8(ord("?")), raw),
+        np.zeros(len(raw) + 1, np.int8),
+        fits | heads,
+    )
+    marked[begin[cut]] = np.where(fits[cut], _MARK[0], ord("0"))
+    inside[begin[cut] + 1] += 1
+    inside[end[cut]] -= 1
+    kept = np.cumsum(inside[:-1], dtype=np.int8) == 0
+    begin, end, point, minus = begin[fits], end[fits], point[fits], before[fits] == ord("-")
+    signed = raw[begin] < ord(".")
+    digits, decimals = end - begin - signed - 1, end - point - 1
+    left = (digits > _MOST_DIGITS) | (decimals > DIGITS)
+    return np.stack((begin, end - begin, digits, decimals, minus, left), axis=1), marked[kept].tobytes()
 
 
 def _parts(marks: Bytes, start: Ints, size: Ints) -> Iterator[tuple[Any, slice, Words]]:
@@ -205,8 +308,8 @@ class Lines:
     text: bytes  #: between line ends, so that words beyond its own can be fetched
     words: NDArray[np.void]  #: what stands from every place of it on
     start: Ints  #: (l,): first byte of every line
-    label: Ints  #: (l,): row of `patterns`
-    patterns: list[LinePattern]
+    label: Ints  #: (l,): row of `LinePatterns.known`
+    patterns: LinePatterns
 
     @classmethod
     def of(cls, text: bytes, patterns: LinePatterns) -> Lines:
@@ -215,7 +318,7 @@ class Lines:
         raw = np.frombuffer(text, np.uint8)
         ends = np.flatnonzero(raw == ord("\n"))[MARGIN - 1 : -_PART]
         start, size = ends[:-1] + 1, np.diff(ends)
-        return cls(text, words_of(raw), start, patterns.label(text, start, size), patterns.known)
+        return cls(text, words_of(raw), start, patterns.label(text, start, size), patterns)
 
     def line(self, row: int) -> bytes:
         """One of them, without its end."""
@@ -223,7 +326,8 @@ class Lines:
 
     def bulk(self) -> Bools:
         """(l,) whether each line can be read in a run."""
-        return np.array([pattern.names is not None for pattern in self.patterns])[self.label]
+        alone = [kind.names is None for kind in self.patterns.kinds]
+        return ~np.array(alone)[self.patterns.known[:, 0]][self.label]
 
     def columns(self, chosen: Ints) -> dict[str, Floats]:
         """Numbers of lines that stand in a run, NaN where a line has none."""
@@ -242,24 +346,24 @@ class Lines:
     def _groups(self, chosen: slice | Ints) -> Iterator[tuple[Any, tuple[str, ...], Sequence[Floats]]]:
         """Lines of a run by the letters that they have: rows, names of columns, and the numbers for each."""
         label, starts = self.label[chosen], self.start[chosen]
-        used = np.flatnonzero(np.bincount(label, minlength=len(self.patterns))).tolist()
-        of_names: dict[tuple[str, ...], list[int]] = {}
-        for k in used:
-            of_names.setdefault(self.patterns[k].names or (), []).append(k)
-        kind, place = np.zeros((2, len(self.patterns)), np.int64)
-        for number, mine in enumerate(of_names.values()):
-            kind[mine], place[mine] = number, np.arange(len(mine))
-        kinds = kind[label] if len(of_names) > 1 else None
-        for number, (names, mine) in enumerate(of_names.items()):
-            rows = slice(None) if kinds is None else np.flatnonzero(kinds == number)
-            start, own = starts[rows], place[label[rows]]
-            fields = np.frombuffer(b"".join([self.patterns[k].fields for k in mine]), np.int64)
-            constants = np.frombuffer(b"".join([self.patterns[k].constants for k in mine])).reshape(len(mine), -1)
-            numbers = self._numbers(start, own, fields.reshape(len(mine), -1, 6))
-            yield rows, names, [*numbers, *(column.take(own) for column in constants.T)]
+        known, kinds, fields = self.patterns.known, self.patterns.kinds, self.patterns.fields
+        used = np.flatnonzero(np.bincount(label, minlength=len(known)))
+        kind, group, first = known[used].T
+        numbers, place = np.unique(group).tolist(), np.zeros(len(known), np.int64)
+        groups = known[:, 1][label] if len(numbers) > 1 else None
+        for number in numbers:
+            mine = group == number
+            one = kinds[kind[mine.argmax()]]
+            place[used[mine]] = np.arange(np.count_nonzero(mine))
+            rows = slice(None) if groups is None else np.flatnonzero(groups == number)
+            own = place[label[rows]]
+            table = fields[first[mine][:, None] + np.arange(len(one.columns))]
+            constants = np.array([kinds[k].constants for k in kind[mine].tolist()])
+            values = self._numbers(starts[rows], own, table)
+            yield rows, one.names or (), [*values, *(column.take(own) for column in constants.T)]
 
     def _numbers(self, start: Ints, label: Ints, table: Ints) -> list[Floats]:
-        """Numbers of lines with the same letters, one array for each of them; `table` as in `LinePattern.fields`."""
+        """Numbers of lines with the same letters, one array for each of them; `table` as in `LinePatterns.fields`."""
 
         def each(values: Any) -> Any:
             """Value for every line, or the one of all."""
@@ -299,15 +403,16 @@ class Lines:
 
 
 def _columns(table: Ints) -> Iterator[tuple[Any, ...]]:
-    """How to read the numbers of lines with the same letters, of which `table` is as in `LinePattern.fields`.
+    """How to read the numbers of lines with the same letters, of which `table` is as in `LinePatterns.fields`.
 
     Of each number, one value for every pattern or the one of all: where it begins and ends; eight bytes before its end;
     those of its last eight digits that are after the point, and before it; what to divide by; where digits before those
     eight are, and which. Then of any pattern: whether there is a point, more bytes than a word has, digits before the
     last eight, or one is left to `float`.
     """
-    first, end, digits, decimals, minus, left = np.ascontiguousarray(table.transpose(2, 0, 1))
-    size = digits + (decimals >= 0)
+    first, count, digits, decimals, minus, left = np.ascontiguousarray(table.transpose(2, 0, 1))
+    digits, decimals = np.where(left > 0, 0, digits), np.where(left > 0, -1, decimals)
+    end, size = first + count, digits + (decimals >= 0)
     divisor = np.where(minus > 0, -1.0, 1.0) * _TENS[np.maximum(decimals, 0)]
     lead = np.maximum(digits - DIGITS, 0)
     lead_begin = end - 2 * DIGITS - (decimals >= 0)

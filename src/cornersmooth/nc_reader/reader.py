@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 #: share of the tolerance, at the axis point, that a tool without words for its axis may lean
 FIXED_SHARE: Final = 0.1
 
-#: runs of fewer blocks are executed together: each folded block of Klartext is a run of its own
+#: runs of fewer blocks are executed together
 FEW_ROWS: Final = 64
 
 #: elements that are given out together

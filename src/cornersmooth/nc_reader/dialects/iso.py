@@ -256,4 +256,4 @@ class _LinuxLexer(_IsoLexer):
     """The same, where a comment may begin with a semicolon."""
 
     comment = re.compile(r"\(([^)]*)\)|;(.*)$")
-    aside = re.compile(rb"(N\d+ )?G64 P[\d.]+ Q0")
+    aside = re.compile(rb"[ \t\r]*|(?:N\d+ )?G64 P[\d.]+ Q0")
