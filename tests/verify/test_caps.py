@@ -165,6 +165,22 @@ def test_rapids_keep_the_heights_of_the_cycle(heights: tuple[str, str, str], ver
     assert judged(DRILL, drilled(*heights)) == verdict
 
 
+@pytest.mark.parametrize(
+    ("out", "verdict"),
+    [
+        (["G1 Z20."], Verdict.PASSED),
+        (["G18 G3 X0. Z20. R8.", "G17"], Verdict.FAILED),  # 8 mm aside
+        (["G1 X8. Z12.", "G1 X0. Z20."], Verdict.FAILED),
+    ],
+)
+def test_the_way_at_feed_out_of_a_hole_is_looked_at(out: list[str], verdict: Verdict) -> None:
+    hole = ["CYCLE/DRILL,FEDTO,8,MMPM,100,RAPTO,2,RTRCTO,4", "GOTO/0,0,0", "CYCLE/OFF"]
+    start = ["LOADTL/1", "SPINDL/500,RPM,CLW", "RAPID", "GOTO/0,0,30"]
+    source = cl(*start, *hole, "FEDRAT/100,MMPM", "GOTO/0,0,20", "GOTO/20,0,20")
+    lines = ["G0 X0. Y0. Z30.", "G0 Z2.", "G1 Z-8. F100.", "G0 Z4.", out[0] + " F100.", *out[1:], "G1 X20."]
+    assert judged(source, program(*lines, start=("T1 M6", "S500 M3", "G54", "G43 H1"))) == verdict
+
+
 def test_comments_vouch_for_no_hole() -> None:
     comments = [f"(NOT DRILLED X{x}. Y0. Z0.)" for x in (10, 90)]
     text = program("G0 X0. Y0. Z50.", *comments, start=("T1 M6", "S500 M3", "G54", "G43 H1"))

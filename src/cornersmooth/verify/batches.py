@@ -127,7 +127,7 @@ class Batches:
             line = int(original.program.line[original.pose[move]])
             self.problems.append(Problem("CS532", line, int(nc.line[at]), text))
         # out of a hole the way begins anywhere
-        place = out_of_hole(task, nc, at, move)[0] if kind == Move.HOLE else float(last_vertex[move])
+        place = out_of_hole(task, nc, at, move) if kind == Move.HOLE else float(last_vertex[move])
         self._move, self._element, self._continued, self._told = move, element, False, False
         self._place = place
         before = last_vertex[max(move - (kind == Move.RAPID), 0)]

@@ -13,6 +13,7 @@ from cornersmooth.nc_reader.tool import directions, leads_somewhere
 from cornersmooth.statements.cycles import Drilling
 from cornersmooth.verify.cl_motion import Original, selecting
 from cornersmooth.verify.motions import digit_errors
+from cornersmooth.verify.nearest import COLUMNS, on_segments
 from cornersmooth.verify.task import ARITHMETIC
 
 #: elements that are compared with a pose together, as the next ones will be wanted, too
@@ -23,7 +24,7 @@ class HoleLines:
     """Compares ends of elements with poses and holes of the CL file; lengths in mm."""
 
     def __init__(self, original: Original, ahead: Ahead, axis_length: float, tolerance: float) -> None:
-        self.ahead, self.axis_length = ahead, axis_length
+        self.ahead, self.axis_length, self.tolerance = ahead, axis_length, tolerance
         program, nc, chosen = original.program, ahead.nc, selecting(original.pose)
         self.tip, self.axis = program.tip[chosen], program.axis[chosen]
         self.line, self.kind = program.line[chosen], program.kind[chosen]
@@ -100,6 +101,20 @@ class HoleLines:
         ways = (values[own] - values[np.maximum(own - 1, 0)] for values in (nc.tip, nc.second))
         return (own > 0) & self._straight(own) & ~leads_somewhere(nc, *ways)
 
+    def block(self, element: int) -> range:
+        """Elements of the block of one: rotary words make several lines of it."""
+        line, base = self.ahead.nc.line, self.ahead.base
+        first, stop = (int(np.searchsorted(line, line[element - base], side=side)) for side in ("left", "right"))
+        return range(base + first, base + stop)
+
+    def is_straight(self, block: range) -> bool:
+        """Whether the tip goes straight on elements, within the tolerance."""
+        nc, own = self.ahead.nc, np.array(block) - self.ahead.base
+        way = nc.tip[[max(own[0] - 1, 0), *own]]
+        chord = np.zeros((len(own) - 1, 1), np.int64)
+        _, beside = on_segments(way[1:-1, None], way[[0, -1]], chord, COLUMNS["tip"])
+        return bool(self._straight(own).all() and (beside <= self.tolerance**2).all())
+
     def _straight(self, own: Ints) -> Bools:
         """(k,) whether elements at hand are no arcs and no curves."""
         kind = self.ahead.nc.kind[own]
@@ -115,6 +130,21 @@ class HoleLines:
     def nc_line(self, element: int) -> int:
         """NC line of an element."""
         return int(self.ahead.nc.line[element - self.ahead.base])
+
+    def problem(self, code: str, move: int, element: int, text: str, amount: float = math.nan) -> Problem:
+        """Something wrong at a move, or beyond the last, and at an element, or at none if that is negative."""
+        nc_line = self.nc_line(element) if element >= 0 else 0
+        return Problem(code, int(self.line[min(move, len(self.line) - 1)]), nc_line, text, amount)
+
+    def off(self, move: int, element: int) -> float:
+        """By how much, mm, an element misses the pose of a move."""
+        own = np.array([element - self.ahead.base])
+        return float(digit_errors(self.ahead.nc, own, self.tip[[move]], self.axis[[move]], self.axis_length)[1][0])
+
+    def leads(self, first: int, stop: int) -> bool:
+        """Whether moves, up to `stop` that excluded, lead anywhere from the pose of the first."""
+        tip, axis = (np.linalg.norm(values[first:stop] - values[first], axis=1) for values in (self.tip, self.axis))
+        return bool(max(tip.max(), self.axis_length * axis.max()) > self.room)
 
     def tapped(self, feeds: list[int], cycle: Drilling) -> bool:
         """Whether the first of the feed moves in a hole is that of its thread."""
@@ -146,8 +176,7 @@ class HoleLines:
         found: list[Problem] = []
 
         def say(code: str, element: int, text: str, amount: float = math.nan) -> None:
-            line = self.nc_line(element) if element >= 0 else 0
-            found.append(Problem(code, int(self.line[move]), line, text, amount))
+            found.append(self.problem(code, move, element, text, amount))
 
         if math.isnan(cycle.depth) or (cycle.tap and not self.tapped(feeds, cycle)):
             if feeds:

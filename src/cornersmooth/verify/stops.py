@@ -13,21 +13,22 @@ from __future__ import annotations
 
 import math
 from array import array
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import cache
+from itertools import pairwise
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from cornersmooth.model import Ints, Move
 from cornersmooth.nc_reader.ahead import Ahead
-from cornersmooth.nc_reader.elements import Element, Elements, Problem
+from cornersmooth.nc_reader.elements import Elements, Problem
 from cornersmooth.nc_reader.tool import beyond_digits, directions, moving_rapids
 from cornersmooth.statements.cycles import Drilling, drillings
 from cornersmooth.statements.tool_changes import ToolChanges
 from cornersmooth.verify.along_tool import AlongTool
 from cornersmooth.verify.holes import HoleLines
-from cornersmooth.verify.motions import digit_errors
 from cornersmooth.verify.nearest import COLUMNS, on_segments
 from cornersmooth.verify.task import Task
 
@@ -43,8 +44,6 @@ BEFORE: Final = 16
 
 #: elements looked through at a time where only one thing can happen, at first
 _FIRST_LOOK: Final = 16
-
-_ELSEWHERE: Final = "motion that the CL file does not have"
 
 
 class Step(NamedTuple):
@@ -69,8 +68,8 @@ class _Trace:
 
     stop: int  #: number of the last stop
     begin: int  #: the first element in a hole, or the first that is after a stop, as of `Step`
-    inside: bool  #: whether it is in a hole
-    back: _Trace | None  #: what it was before
+    inside: bool = False  #: whether it is in a hole
+    back: _Trace | None = None  #: what it was before
     end: int = 0  #: first element that does not belong to the hole before
     problems: tuple[Problem, ...] = ()  #: what is wrong on the way from there
     cost: tuple[int, int] = (0, 0)  #: faults so far, and holes left out
@@ -80,9 +79,9 @@ class _Trace:
         """Traces with the same go on alike."""
         return self.stop, self.begin if self.inside else -1
 
-    def since(self, alive: list[_Trace]) -> float:
-        """Of two that are as good that with more goes on: one that stays, or comes from a hole that began later."""
-        return math.inf if self in alive or self.back is None else self.back.begin
+    def with_fault(self, problem: Problem) -> _Trace:
+        """The same, with one more problem."""
+        return replace(self, problems=(*self.problems, problem), cost=(self.cost[0] + 1, self.cost[1]))
 
 
 class Stops:
@@ -106,70 +105,54 @@ class Stops:
         self._find_stops()
 
     def _find_stops(self) -> None:
-        original, lines = self._task.original, self.lines
-        kind, pose, step = lines.kind, original.pose, self._ahead.nc.tip_step
-        rapid, hole = kind == Move.RAPID, kind == Move.HOLE
-        moved = np.append(True, hole[:-1])  # out of a hole a rapid comes from anywhere
-        for values, length in ((lines.tip, 1.0), (lines.axis, lines.axis_length)):
-            moved[1:] |= (np.diff(np.round(length * values / step), axis=0) != 0).any(axis=1)
-        chosen = hole | (rapid & moved)
-        chosen[:1] = True
+        """Find holes, and rapids that move the tool by more than digits show or come out of a hole, from anywhere."""
+        lines, original = self.lines, self._task.original
+        hole, rapid = lines.kind == Move.HOLE, np.flatnonzero(lines.kind == Move.RAPID)
+        before = np.maximum(rapid - 1, 0)
+        turned = np.linalg.norm(lines.axis[rapid] - lines.axis[before], axis=1) * lines.axis_length > lines.room
+        moved = turned | hole[before] | beyond_digits(self._ahead.nc, lines.tip[rapid] - lines.tip[before])
+        chosen = hole.copy()
+        chosen[rapid[moved]] = chosen[:1] = True
+        fed = ~chosen
+        fed[rapid] = False
         self.moves: Ints = np.flatnonzero(chosen)
-        before = self.moves - 1
-        self._move: list[int] = [*self.moves.tolist(), len(kind)]
+        self._move: list[int] = [*self.moves.tolist(), len(chosen)]
         self._hole: list[bool] = [*hole[self.moves].tolist(), False]
-        #: whether each stop moves the tool by no more than digits show
-        slack = ~(beyond_digits(self._ahead.nc, lines.tip[self.moves] - lines.tip[before]))
-        slack &= np.linalg.norm(lines.axis[self.moves] - lines.axis[before], axis=1) * lines.axis_length <= lines.room
-        slack &= ~hole[self.moves] & ~hole[before]
-        slack[0] = False
-        self._slack: list[bool] = slack.tolist()
-        away = np.linalg.norm(lines.tip - np.repeat(lines.tip[self.moves], np.diff(self._move), axis=0), axis=1)
-        turn = np.linalg.norm(lines.axis - np.repeat(lines.axis[self.moves], np.diff(self._move), axis=0), axis=1)
-        leads = np.maximum(away, lines.axis_length * turn) > lines.room
-        #: whether feed moves follow each stop, and whether they lead anywhere from it
-        self._fed: list[bool] = (np.add.reduceat(~rapid & ~chosen, self.moves) > 0).tolist()
-        self._leads: list[bool] = np.logical_or.reduceat(leads, self.moves).tolist()
-        cycles = drillings(original.program, pose[hole].tolist())
-        self._cycles: dict[int, Drilling] = dict(zip(np.flatnonzero(hole).tolist(), cycles, strict=True))
         self._holes = np.flatnonzero(hole[self.moves])  # among the stops
+        #: whether feed moves follow each stop, and whether moves before the next lead anywhere from it
+        self._fed: list[bool] = np.logical_or.reduceat(fed, self.moves).tolist()
+        self._leads = cache(lambda stop: lines.leads(self._move[stop], self._move[stop + 1]))
+        cycles = drillings(original.program, original.pose[hole].tolist())
+        self._cycles: dict[int, Drilling] = dict(zip(np.flatnonzero(hole).tolist(), cycles, strict=True))
 
     # ------------------------------------------------------------------ reading
 
     def parts(self) -> Iterator[Part]:
         """Give out what is certain as it is read; all but the last `BEFORE` of that may be forgotten then."""
         ahead = self._ahead
-        alive, element, given = [_Trace(-1, -1, False, None)], 0, 0
+        alive, element, given = [_Trace(-1, -1)], 0, 0
         while ahead.has(element):
-            stop = self._pass(alive[0], element) if len(alive) == 1 else element
-            if stop == element:
-                alive = self._after(alive, element)
-                stop += 1
+            following = self._pass(alive[0], element) if len(alive) == 1 else element
+            if following == element:
+                alive, following = self._after(alive, element), element + 1
+            element = following
+            if element - given >= TOGETHER:
+                best = min(alive, key=lambda one: one.cost)
+                alive = [best] if best.cost[0] else alive  # after a fault that will do
             if len(alive) == 1:
                 self._take(alive[0])
-            element = stop
-            if element - given >= TOGETHER and (sure := self._settle(alive, element)) > given:
-                yield Part(sure, self._steps)
-                given, self._steps = sure, []
+                sure = min(element, alive[0].begin) if alive[0].inside else element
+                if sure - given >= TOGETHER:
+                    yield Part(sure, self._steps)
+                    given, self._steps = sure, []
         self._end(alive, element)
         yield Part(element, self._steps)
-
-    def _settle(self, alive: list[_Trace], element: int) -> int:
-        """Take down what all traces have in common; return the first element that is not certain."""
-        best = min(alive, key=lambda one: one.cost)
-        if best.cost[0]:  # after a fault that will do
-            alive[:] = [best]
-        if len(alive) > 1:
-            return 0
-        self._take(best)
-        return min(element, alive[0].begin) if alive[0].inside else element
 
     def _pass(self, trace: _Trace, element: int) -> int:
         """First element from one on with which anything but going on along feed moves or the next rapids can happen."""
         ahead, lines, k = self._ahead, self.lines, trace.stop
         if trace.inside or k < 0:
             return element
-        last = k + 1 == len(self.moves)
         hole = self._hole[k + 1]
         if hole and (not self._fed[k] or lines.at(self._move[k + 1] - 1, element - 1)):
             return element
@@ -184,10 +167,12 @@ class Stops:
                 window = np.arange(element, stop)
                 there = lines.exact(np.full(len(window), self._move[k + 1] - 1), window)
                 rapids = np.concatenate((rapids, window[there] + 1))
-            elif len(rapids) and not last:
-                stops = self.moves[k + 1 : min(k + 1 + len(rapids), self._next_hole(k + 1))]
+            elif len(rapids):
+                nearest = np.searchsorted(self._holes, k + 1)
+                last = int(self._holes[nearest]) if nearest < len(self._holes) else len(self.moves)
+                stops = self.moves[k + 1 : min(k + 1 + len(rapids), last)]
                 exact = lines.exact(stops, rapids[: len(stops)])
-                count = len(stops) if exact.all() else int(np.argmin(exact))
+                count = int(np.argmin(np.append(exact, False)))
                 if count:
                     self._take(trace)
                     for one in rapids[:count].tolist():
@@ -199,45 +184,33 @@ class Stops:
             element, size = stop, 2 * size
         return element
 
-    def _next_hole(self, stop: int) -> int:
-        """The first stop from one on that is a hole."""
-        at = int(np.searchsorted(self._holes, stop))
-        return int(self._holes[at]) if at < len(self._holes) else len(self.moves)
-
     # ------------------------------------------------------------------ the automaton
 
     def _after(self, alive: list[_Trace], element: int) -> list[_Trace]:
         """Traces after an element, from those before it."""
-        found: dict[tuple[int, int], _Trace] = {}
         if self._along.comes_back(element):
             self._check_return(element)
-
-        def put(one: _Trace) -> None:
-            known = found.setdefault(one.key, one)
-            if (one.cost, -one.since(alive)) < (known.cost, -known.since(alive)):
-                found[one.key] = one
-
         stands = self.lines.stands(element)
         if stands and self.lines.feeds(element):
             return alive
+        found: dict[tuple[int, int], _Trace] = {}
+
+        def put(traces: Iterable[_Trace]) -> None:
+            for one in traces:
+                if one.cost < found.setdefault(one.key, one).cost:
+                    found[one.key] = one
+
         if stands:  # a rapid for the digits of a stop alone
-            found = {one.key: one for one in alive}
+            put(alive)
         for trace in alive:
-            for one in self._takes(trace, element) if stands else self._from(trace, element):
-                put(one)
+            put(self._takes(trace, element) if stands else self._from(trace, element))
         if found:
-            after = list(found.values())
-            if len(after) > 1:  # what is wrong with a hole whatever follows ends where another trace is as good
-                good = [one for one in after if not self._is_spoiled(one, element)]
-                best = min(one.cost for one in after)
-                after = good if any(one.cost == best for one in good) else after
-            return after
+            return list(found.values())
         if self._along.stays(element):
             self.lines.forget()
             return self._after(alive, element)
         for trace in alive:
-            for one in self._with_fault(trace, element):
-                put(one)
+            put(self._with_fault(trace, element))
         return sorted(found.values(), key=lambda one: one.cost)[:_AFTER_FAULT]
 
     def _check_return(self, element: int) -> None:
@@ -250,119 +223,98 @@ class Stops:
 
     def _from(self, trace: _Trace, element: int) -> Iterator[_Trace]:
         """Traces to which an element leads from one without a fault."""
-        here: _Trace | None = trace
         taken = False
-        while here is not None:
+        for here in self._on(trace, element):
             for one in self._takes(here, element):
                 taken = True
                 yield one
             # of holes that may be left out the first that the element may belong to
             if taken and here is not trace and here.inside and not self._over(here.stop, element):
                 return
+
+    def _on(self, trace: _Trace, element: int) -> Iterator[_Trace]:
+        """A trace, and those at later stops before an element, which begins a hole or need not be in the program."""
+        here: _Trace | None = trace
+        while here is not None:
+            yield here
             here = self._goes_on(here, element)
 
     def _takes(self, trace: _Trace, element: int) -> Iterator[_Trace]:
         """Traces after an element that stays at a stop, reaches the next, or leads out of a hole."""
         lines, k = self.lines, trace.stop
         move, following, feeds = self._move[k], self._move[k + 1], lines.feeds(element)
-        rapid = k + 1 < len(self.moves) and not self._hole[k + 1] and (not feeds or k < 0)
+        reaches = k + 1 < len(self.moves) and not self._hole[k + 1] and (not feeds or k < 0)
+        reaches = reaches and lines.at(following, element)
         if not trace.inside:
-            if rapid and lines.at(following, element):
+            if reaches:
                 yield _Trace(k + 1, element, False, trace, cost=trace.cost)
             elif k >= 0 and (self._is_fed(k, element) if feeds else self._negligible(element)):
                 yield trace
             return
-        if self._over(k, element) and (not feeds or element > trace.begin or lines.over(move, max(element - 1, 0))):
+        if self._over(k, element):
             yield trace
         if feeds and self._fed[k]:
-            base, block = self._ahead.base, self._block(element)
+            block = lines.block(element)
             out = element - 1 if lines.at(move + 1, element - 1) else block.stop - 1
-            if out < element or out_of_hole(self._task, self._ahead.nc, block.stop - 1 - base, move, len(block))[1]:
+            if out < element or lines.is_straight(block):  # on the way out nothing else is looked at
                 yield trace if out > element else self._finished(trace, _Trace(k, out, False, trace), element)
-        elif rapid and lines.at(following, element) and self._done(k, element):
+        elif reaches and self._done(k, element):
             yield self._finished(trace, _Trace(k + 1, element, False, trace), element)
 
     def _goes_on(self, trace: _Trace, element: int) -> _Trace | None:
         """Trace at the next stop before an element: it begins a hole, or nothing need be there in the program."""
-        lines, k = self.lines, trace.stop
-        following, t = self._move[k + 1], k + 1
+        lines, k, t = self.lines, trace.stop, trace.stop + 1
         if t == len(self.moves):
             return None
         if trace.inside:
             passes = self._done(k, element)
         else:
             begin = trace.begin - (k >= 0 and self._hole[k])  # out of a hole the first feed move may be the last, too
-            passes = k < 0 or not self._leads[k] or (element - 1 > begin and lines.at(following - 1, element - 1))
-        if not passes:
+            passes = k < 0 or not self._leads(k) or (element - 1 > begin and lines.at(self._move[t] - 1, element - 1))
+        if passes and self._hole[t] and (self._over(t, element) or self._may_be_left_out(t)):
+            there = self._finished(trace, _Trace(t, element, True, trace), element)
+            return None if there.problems else there
+        if not passes or not trace.inside or self._hole[t] or not lines.at(self._move[t], element - 1):
             return None
-        if self._hole[t]:
-            if not (self._over(t, element) or self._may_be_left_out(t)):
-                return None
-            there = _Trace(t, element, True, trace, cost=trace.cost)
-        elif trace.inside and lines.at(following, element - 1):
-            move = self._move[k]
-            if lines.fed_above(move, element - 1, self._cycles[move]):  # a rapid written as a feed move
-                return None
-            there = _Trace(t, element - 1, False, trace)
-        elif not trace.inside and self._slack[t]:
-            there = _Trace(t, trace.begin, False, trace, cost=trace.cost)
-        else:
+        if lines.fed_above(self._move[k], element - 1, self._cycles[self._move[k]]):  # a rapid written as a feed move
             return None
-        if trace.inside:
-            there = self._finished(trace, there, element)
-        return there if not (there.inside and there.problems) else None
+        return self._finished(trace, _Trace(t, element - 1, False, trace), element)
 
     def _with_fault(self, trace: _Trace, element: int) -> Iterator[_Trace]:
         """Traces to which an element leads from one with a fault."""
-        lines, nc, own = self.lines, self._ahead.nc, element - self._ahead.base
-        feeds = lines.feeds(element)
+        lines, feeds, first = self.lines, self.lines.feeds(element), trace.stop + 1
         surplus = ("CS533", "a rapid that the CL file does not have, or a feed move written as one")
         code, text = ("CS536", "feed moves that the CL file does not have") if feeds else surplus
-        line = int(lines.line[min(self._move[trace.stop + 1], len(lines.line) - 1)])
-        yield self._wrong(replace(trace), Problem(code, line, int(nc.line[own]), text))
-        stop = min(trace.stop + 1 + _AFTER_FAULT, len(self.moves))
-        moves = self.moves[trace.stop + 1 : stop]
+        yield trace.with_fault(lines.problem(code, self._move[first], element, text))
+        moves = self.moves[first : first + _AFTER_FAULT]
         elements = np.full(len(moves), element)
         hole = lines.kind[moves] == Move.HOLE
         fits = np.where(hole, ~np.isnan(lines.heights(moves, elements)), lines.exact(moves, elements) & (not feeds))
         here = trace
-        for t, fit in zip(range(trace.stop + 1, stop), fits.tolist(), strict=True):
-            if here.inside and feeds and self._fed[here.stop]:
-                yield self._finished(here, _Trace(here.stop, element, False, here), element)
-            if fit:
-                there = self._finished(here, _Trace(t, element, self._hole[t], here), element)
-                problem = Problem("CS534", int(lines.line[moves[0]]), int(nc.line[own]), _ELSEWHERE)
-                yield there if there.cost[0] > trace.cost[0] else self._wrong(there, problem)
-            if t == trace.stop + 1 and not self._hole[t] and (not feeds or t == 0):
-                move = self._move[t]
-                own_amount = digit_errors(nc, np.array([own]), lines.tip[[move]], lines.axis[[move]], lines.axis_length)
-                there = self._finished(here, _Trace(t, element, False, here), element)
-                where, amount = (int(lines.line[move]), int(nc.line[own])), float(own_amount[1][0])
-                problem = Problem("CS531", *where, "a rapid does not end at its pose", amount)
-                yield self._wrong(there, problem)
+        for t, fit in enumerate(fits.tolist(), first):
+            there = self._finished(here, _Trace(t, element, self._hole[t], here), element)
+            if fit and there.cost[0] > trace.cost[0]:
+                yield there
+            elif fit:
+                text = "motion that the CL file does not have"
+                yield there.with_fault(lines.problem("CS534", self._move[first], element, text))
+            elif t == first and not self._hole[t] and (not feeds or t == 0):
+                amount = lines.off(self._move[t], element)
+                text = "a rapid does not end at its pose"
+                yield there.with_fault(lines.problem("CS531", self._move[t], element, text, amount))
             here = self._without(here, t, element)
-
-    @staticmethod
-    def _wrong(trace: _Trace, problem: Problem) -> _Trace:
-        """The trace with one more problem."""
-        trace.problems += (problem,)
-        trace.cost = trace.cost[0] + 1, trace.cost[1]
-        return trace
 
     def _without(self, trace: _Trace, stop: int, element: int) -> _Trace:
         """Trace at the next stop, which is missing before an element; of a hole that is said when it is left."""
         if self._hole[stop]:
             return self._finished(trace, _Trace(stop, element, True, trace), element)
         there = self._finished(trace, _Trace(stop, element - 1 if trace.inside else trace.begin, False, trace), element)
-        if self._slack[stop]:
-            return there
         lines, move, ahead = self.lines, self._move[stop], self._ahead
         first = max(min(trace.begin, element - 1), ahead.base)
         away = ahead.nc.tip[first - ahead.base : max(element, first + 1) - ahead.base] - lines.tip[move]
         near = first + int(np.argmin(np.linalg.norm(away, axis=1)))
         text = "a rapid of the CL file is missing, or is written as a feed move"
-        problem = Problem("CS532", int(lines.line[move]), lines.nc_line(near), text)
-        return self._wrong(there, problem)
+        return there.with_fault(lines.problem("CS532", move, near, text))
 
     def _finished(self, trace: _Trace, there: _Trace, element: int) -> _Trace:
         """The trace out of another before an element, with what is wrong with the hole that it comes from."""
@@ -377,8 +329,7 @@ class Stops:
             there.end += lines.height(move, element) > before  # the way up is the hole's, wherever else it leads
         found, left = lines.check(move, range(trace.begin, there.end), self._cycles[move])
         if there.stop > k and not self._done(k, element):
-            line = int(lines.line[move + 1])
-            found.append(Problem("CS535", line, lines.nc_line(element - 1), "feed moves of the CL file are missing"))
+            found.append(lines.problem("CS535", move + 1, element - 1, "feed moves of the CL file are missing"))
         there.problems, there.cost = tuple(found), (trace.cost[0] + len(found), trace.cost[1] + left)
         return there
 
@@ -399,22 +350,9 @@ class Stops:
         """Whether no move between a hole and the next stop leads away from where the tool is before an element."""
         return all(self.lines.at(move, element - 1) for move in range(self._move[stop] + 1, self._move[stop + 1]))
 
-    def _is_spoiled(self, trace: _Trace, element: int) -> bool:
-        """Whether something is wrong with the hole that a trace is in, up to an element, whatever follows."""
-        if not trace.inside:
-            return False
-        move = self._move[trace.stop]
-        return bool(self.lines.check(move, range(trace.begin, element + 1), self._cycles[move], left=False)[0])
-
     def _is_fed(self, stop: int, element: int) -> bool:
         """Whether a feed move may follow a stop; it is only asked for before holes, else the decision says it."""
         return self._fed[stop] or not self._hole[stop + 1] or self.lines.at(self._move[stop + 1] - 1, element)
-
-    def _block(self, element: int) -> range:
-        """Elements that a block is: rotary words make several lines of one."""
-        line, base = self._ahead.nc.line, self._ahead.base
-        first, stop = (int(np.searchsorted(line, line[element - base], side=side)) for side in ("left", "right"))
-        return range(base + first, base + stop)
 
     def _negligible(self, element: int) -> bool:
         """Whether an element moves the tool by no more than digits show."""
@@ -428,31 +366,23 @@ class Stops:
     def _end(self, alive: list[_Trace], element: int) -> None:
         """Take down the rest at the end of the program."""
         last = len(self.moves) - 1
-        ends = []
-        for trace in sorted(alive, key=lambda one: -one.stop):
-            here: _Trace | None = trace
-            while here is not None:
-                if here.stop == last:
-                    ends.append(self._finished(here, _Trace(last + 1, element, True, here), element))
-                here = self._goes_on(here, element)
-        if not ends or min(ends, key=lambda one: one.cost).cost[0] > min(alive, key=lambda one: one.cost).cost[0]:
-            here = min(alive, key=lambda one: one.cost)
-            for t in range(here.stop + 1, last + 1):
-                here = self._without(here, t, element)
-            ends.append(self._finished(here, _Trace(last + 1, element, True, here), element))
+        best = min(alive, key=lambda one: one.cost)
+        alive = sorted(alive, key=lambda one: -one.stop)
+        ends = [here for trace in alive for here in self._on(trace, element) if here.stop == last]
+        ends = [self._finished(here, _Trace(last + 1, element, True, here), element) for here in ends]
+        if not ends or min(one.cost for one in ends)[0] > best.cost[0]:
+            for t in range(best.stop + 1, last + 1):
+                best = self._without(best, t, element)
+            ends.append(self._finished(best, _Trace(last + 1, element, True, best), element))
         self._take(min(ends, key=lambda one: one.cost))
 
     def _take(self, trace: _Trace) -> None:
         """Take down what has happened up to a trace."""
-        chain = []
-        one = trace
-        while one.back is not None:
-            chain.append(one)
-            one = one.back
-        self.problems += one.problems
-        for one in reversed(chain):
-            before = one.back
-            assert before is not None
+        chain = [trace]
+        while (before := chain[-1].back) is not None:
+            chain.append(before)
+        self.problems += chain[-1].problems
+        for before, one in pairwise(reversed(chain)):
             self.problems += one.problems
             if before.inside:
                 self._drilled(before, one.end, left=one.cost[1] > before.cost[1])
@@ -482,9 +412,8 @@ class Stops:
                     last += 1
                 self.elements.extend((one, move, self._move[last]))
         if left:
-            near = lines.nc_line(group[0]) if group else 0
             text = f"a hole of the CL file is not {'tapped' if cycle.tap else 'drilled'}"
-            self.left_out.append(Problem("CS561", int(lines.line[move]), near, text))
+            self.left_out.append(lines.problem("CS561", move, group[0] if group else -1, text))
             return
         if group and cycle.dwell:
             self.dwells.append((move, cycle.dwell))
@@ -492,17 +421,11 @@ class Stops:
             self.taps.append(move)
 
 
-def out_of_hole(task: Task, nc: Elements, element: int, move: int, lines: int = 1) -> tuple[float, bool]:
-    """Place on the move after a hole nearest to the end of an element, and whether a block leads there straight, to ε.
-
-    The element is the last of so many lines that the block is.
-    """
-    tip, last, limit = nc.tip[element : element + 1], task.original.trail.last, task.radius**2
+def out_of_hole(task: Task, nc: Elements, element: int, move: int) -> float:
+    """Place on the move after a hole that is nearest to the end of an element."""
+    tip, last = nc.tip[element : element + 1], task.original.trail.last
     six = task.six(tip, directions(nc, tip, nc.second[element : element + 1]))
     segment = np.arange(int(last[move]), int(last[move + 1]))
     share, square = on_segments(six[None], task.path.points, segment[None], COLUMNS["both"])
     nearest = int(np.argmin(square))
-    way = nc.tip[max(element - lines, 0) : element + 1]
-    _, beside = on_segments(way[1:-1, None], way[[0, -1]], np.zeros((lines - 1, 1), np.int64), COLUMNS["tip"])
-    straight = nc.kind[element] == Element.LINE and (beside <= limit).all()
-    return float(segment[nearest] + share[0, nearest]), bool(straight and square[0, nearest] <= limit)
+    return float(segment[nearest] + share[0, nearest])
