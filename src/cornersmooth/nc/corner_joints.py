@@ -8,7 +8,7 @@ curve goes on with the rate of the straight line beside it.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from cornersmooth.rotary.curve_angles import Curves
 from cornersmooth.rotary.subdivision import insertions, runs_evenly
 from cornersmooth.settings import Settings
 from cornersmooth.slices import some_rows
-from cornersmooth.smoothing.segments import Segments, segments_of
+from cornersmooth.smoothing.segments import segments_of
 
 #: share of what rotary axes may take of ε that a curve may use: the rest is for the digits of its control points
 SHARE = 0.95
@@ -58,14 +58,6 @@ class _Legs:
     entry: Floats
     leave: Floats
 
-    @classmethod
-    def of_corners(cls, corners: Corners, segments: Segments, begin: Ints, end: Ints) -> _Legs:
-        """Legs of corners whose curves lie between these rows."""
-        of, to = np.concatenate((corners.before, corners.pose)), np.concatenate((corners.pose, corners.after))
-        inward, line, joint = np.arange(len(to)) < len(corners), segments.has_line[to], np.concatenate((begin, end))
-        entry, leave = segments.entry[to], segments.exit[to]
-        return cls(inward, of, to, joint, line, entry, leave)
-
 
 @dataclass(frozen=True)
 class Joints:
@@ -74,12 +66,14 @@ class Joints:
     smoothed: SmoothProgram
     form: Form
     way: RotaryWay  #: angles and axes at joints change in place
-    segments: Segments
+    #: has_line, entry, leave: (n,) as in `Segments`
+    has_line: Bools
+    entry: Floats
+    leave: Floats
     least: float  #: degrees that rotary axes may take of ε in any case
-    #: angles, last: (n, 2), degrees, and (n,); at each pose, NaN where none is written, and the row of the way there
-    angles: Floats
-    last: Ints
-    turns: Ints  #: (rows of the way + 1,) how often solution and turn may have changed before each
+    straight: float  #: and on straight motion
+    angles: Floats  #: (n, 2), degrees; at each pose, NaN where none is written
+    free: Ints  #: rows of the way before which solution and turn may have changed
     allowed: Floats  #: (n,), degrees; on the straight motion to each pose and on curves beside it
 
     @classmethod
@@ -88,25 +82,35 @@ class Joints:
         program, settings, corners, n = smoothed.program, smoothed.settings, smoothed.corners, len(smoothed.program)
         least = form.rotary_tolerance(settings.tolerance, settings.axis_scale)
         straight = float(left_to_axes(settings, form, np.zeros(1))[0])
-        tolerance = np.where(np.isnan(way.place) & (program.kind[way.move] == Move.LINEAR), straight, way.tolerance)
         # the last row of the move to a corner is in the middle of its curve
-        angles, branch, last = np.full((n, 2), np.nan), np.full(n, -1), np.zeros(n, np.int64)
-        angles[way.move], branch[way.move], last[way.move] = way.angles, way.branch, np.arange(len(way.move))
+        angles, branch = np.full((n, 2), np.nan), np.full(n, -1, np.int8)
+        angles[way.move], branch[way.move] = way.angles, way.branch
         allowed = np.full(n, straight)
         for begin in range(0, len(corner), _TOGETHER):
             own = corner[begin : begin + _TOGETHER]
             pose = corners.pose[own]
-            angles[pose], _ = continued(machine_of(form), program.axis[pose], angles[pose], branch[pose], least / 2)
+            known = angles[pose], branch[pose].astype(np.int64)
+            angles[pose], _ = continued(machine_of(form), program.axis[pose], *known, least / 2)
             taken = np.maximum(left_to_axes(settings, form, corners.axis_error[own]), least)
             for beside in (pose, corners.after[own]):
                 np.minimum.at(allowed, beside, taken)
-        way, turns = replace(way, tolerance=tolerance), np.concatenate(([0], np.cumsum(way.free)))
-        return cls(smoothed, form, way, segments_of(smoothed, dense=False), least, angles, last, turns, allowed)
+        lines = segments_of(smoothed, dense=False)
+        ends = lines.has_line, lines.entry, lines.exit
+        return cls(smoothed, form, way, *ends, least, straight, angles, np.flatnonzero(way.free), allowed)
+
+    def turns(self, row: Ints) -> Ints:
+        """(m,) how often solution and turn may have changed up to rows of the way."""
+        return np.searchsorted(self.free, row, side="right")
+
+    def tolerance(self, rows: slice) -> Floats:
+        """(m,) degrees: that of some rows of the way, which is another on straight lines."""
+        line = np.isnan(self.way.place[rows]) & (self.smoothed.program.kind[self.way.move[rows]] == Move.LINEAR)
+        return np.where(line, self.straight, self.way.tolerance[rows])
 
     def curves(self, corners: Corners, begin: Ints, end: Ints) -> Curves:
         """Curves of some corners between rows of the way; joints of even segments are put on their lines."""
         program, settings, way, count = self.smoothed.program, self.smoothed.settings, self.way, len(corners)
-        legs = _Legs.of_corners(corners, self.segments, begin, end)
+        legs = self._legs(corners, begin, end)
         from_angles, to_angles, even = self._pose_angles(legs)
         of, to = legs.of[even], legs.to[even]
         even[even] = runs_evenly(
@@ -147,14 +151,20 @@ class Joints:
         tolerance = np.maximum(left_to_axes(settings, self.form, corners.axis_error), SHARE * self.least)
         return Curves(splines, points.reshape(-1, 7), ends, tolerance)
 
+    def _legs(self, corners: Corners, begin: Ints, end: Ints) -> _Legs:
+        """Legs of corners whose curves lie between these rows."""
+        of, to = np.concatenate((corners.before, corners.pose)), np.concatenate((corners.pose, corners.after))
+        inward, joint = np.arange(len(to)) < len(corners), np.concatenate((begin, end))
+        return _Legs(inward, of, to, joint, self.has_line[to], self.entry[to], self.leave[to])
+
     def _pose_angles(self, legs: _Legs) -> tuple[Floats, Floats, Bools]:
         """Angles (m, 2) at both ends of legs, and whether one follows from the other in a cut."""
         program, machine = self.smoothed.program, machine_of(self.form)
         from_angles, stated = self.angles[legs.of], np.isnan(self.angles[legs.of, 0])  # no row leads to such a pose
         near, axis = self.way.angles[legs.joint[stated]], program.axis[legs.of[stated]]
         from_angles[stated], _ = continued(machine, axis, near, np.full(len(near), -1), self.least / 2)
-        follows = self.turns[self.last[legs.to] + 1] == self.turns[self.last[legs.of] + 1]
-        return from_angles, self.angles[legs.to], follows & ~stated
+        of, to = (self.turns(np.searchsorted(self.way.move, pose, side="right") - 1) for pose in (legs.of, legs.to))
+        return from_angles, self.angles[legs.to], (of == to) & ~stated
 
     def _line_rates(self, legs: _Legs) -> Floats:
         """(m, 2) degrees by the fraction of the segment: rates of lines beside joints, as they will be divided."""
@@ -162,14 +172,15 @@ class Joints:
         if not len(row):
             return np.zeros((0, 2))
         first, last = int(row.min()), int(row.max())
-        way, rapid = some_rows(self.way, slice(first, last + 2)), np.ones(last + 2 - first, np.bool_)
+        rows = slice(first, last + 2)
+        way, rapid = some_rows(self.way, rows), np.ones(last + 2 - first, np.bool_)
         rapid[row + 1 - first] = False
         more = insertions(
             machine_of(self.form),
             way.tip,
             way.axis,
             way.angles,
-            tolerance=way.tolerance,
+            tolerance=self.tolerance(rows),
             rapid=rapid,
             max_step=largest_turn(self.smoothed.settings),
             line=self.smoothed.program.line[way.move],

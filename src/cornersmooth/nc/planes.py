@@ -17,6 +17,7 @@ from itertools import pairwise
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cornersmooth.errors import InputError
 from cornersmooth.geometry.arcs import arc_points, divided
@@ -59,7 +60,7 @@ class Plane:
 class Planes:
     """The tilted planes of a program."""
 
-    of: Ints  #: (n,) plane of each pose, -1 for none
+    of: NDArray[np.int32]  #: (n,) plane of each pose, -1 for none
     planes: tuple[Plane, ...] = ()
 
     def frames(self, poses: Ints) -> Floats:
@@ -78,7 +79,7 @@ def plan_planes(
     but for holes that are cycles of the control, which tool tip control does not take: they stand in a plane that is
     not tilted. Poses of `upright` tools need none. `drills` is as in `upright_poses`.
     """
-    of = np.full(len(program), -1, np.int64)
+    of = np.full(len(program), -1, np.int32)
     if form.plane is None:
         return Planes(of)
     planes: dict[tuple[str, ...], int] = {}

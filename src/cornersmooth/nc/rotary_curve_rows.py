@@ -158,46 +158,59 @@ class _Work:
     smoothed: SmoothProgram
     way: RotaryWay
     joints: Joints
-    corner: Ints  #: rows of `Corners` that are smoothed
-    #: pose, length, order: (r,); of each curve its first, and its longest parameter, steps; the curves in path order
-    pose: Ints
-    length: Floats
-    order: Ints
-    row: Ints  #: rows of the way on curves, but for those where they start
-    first: Ints  #: (r + 1,) which of these are those of each curve, in path order
+    longest: Floats  #: parameters of runs, steps
+    # with millions of corners every array counts
+    corner: NDArray[np.int32]  #: rows of `Corners` that are smoothed
+    #: pose, order: (r,); first of each curve, and the curves in path order
+    pose: NDArray[np.int32]
+    order: NDArray[np.int32]
+    row: NDArray[np.int32]  #: rows of the way on curves, but for those where they start
+    first: NDArray[np.int32]  #: (r + 1,) which of these are those of each curve, in path order
 
     @classmethod
     def of(cls, smoothed: SmoothProgram, form: Form, way: RotaryWay) -> _Work:
         """Work out what concerns all curves."""
         runs, corner = smoothed.runs, np.flatnonzero(smoothed.corners.smoothed)
-        poses, lengths = smoothed.corners.pose[corner], np.full(len(corner), STEPS)
+        poses, longest = smoothed.corners.pose[corner], np.zeros(0)
         if runs is not None:
             poses = np.concatenate((poses, runs.pose[starts(runs.count)[:-1]]))
-            lengths = np.concatenate((lengths, runs.knot[starts(runs.knot_count)[1:] - 1]))
+            longest = runs.knot[starts(runs.knot_count)[1:] - 1]
         row = np.flatnonzero(~np.isnan(way.place) & ~way.left)
         first = np.append(np.flatnonzero(np.diff(way.place[row], prepend=2.0) <= 0.0), len(row))
         assert len(first) == len(poses) + 1
         joints = Joints.of(smoothed, form, way, corner)
-        return cls(smoothed, joints.way, joints, corner, poses, lengths, np.argsort(poses), row, first)
+        return cls(
+            smoothed,
+            way,
+            joints,
+            longest,
+            *(each.astype(np.int32) for each in (corner, poses, np.argsort(poses), row, first)),
+        )
 
     def parts(self) -> Iterator[_Part]:
         """All rows, from that which the part before ends with, and sections of some curves."""
-        size, runs, begin = np.full(len(self.pose), _CONTROLS), self.smoothed.runs, 0
-        if runs is not None:
-            size[len(self.corner) :] = runs.knot_count + 2
-        for one, other in pairwise(batches(size[self.order], _TOGETHER).tolist()):
+        begin = 0
+        for one, other in pairwise(self._batches()):
             whole = other == len(self.order)
             end = len(self.way.move) - 1 if whole else int(self.row[self.first[other] - 1])
             yield self._part(one, other, begin, end)
             begin = end
 
+    def _batches(self) -> list[int]:
+        """Numbers of curves in path order at which parts begin, and their end."""
+        size, runs = np.full(len(self.pose), _CONTROLS), self.smoothed.runs
+        if runs is not None:
+            size[len(self.corner) :] = runs.knot_count + 2
+        return batches(size[self.order], _TOGETHER).tolist()
+
     def _part(self, one: int, other: int, begin: int, end: int) -> _Part:
         """Curves from one on, in path order, to before another, and the rows of the way that are with them."""
-        own = np.sort(self.order[one:other])
+        own = np.sort(self.order[one:other]).astype(np.int64)
         rows, count = self._places(own, one), int(np.searchsorted(own, len(self.corner)))
         runs = self.smoothed.runs if count < len(own) else None
         joints = [row[:count] for row in rows.ends]
-        corners = some_rows(self.smoothed.corners, self.corner[own[:count]])
+        pose, corner = self.pose[own].astype(np.int64), self.corner[own[:count]].astype(np.int64)
+        corners = some_rows(self.smoothed.corners, corner)
         made = [self.joints.curves(corners, *joints)] if count else []
         if runs is not None:
             runs = some_runs(runs, np.isin(np.arange(len(runs)), own[count:] - len(self.corner)))
@@ -207,21 +220,28 @@ class _Work:
         fitted = curve_angles(
             curves.some(kept), self._machine, self._guide(rows).some(kept), cone=self.joints.least / 2
         )
-        whole = self.pose[own[:count]][kept[:count]]
+        whole = pose[:count][kept[:count]]
         sections = self._sections(fitted, whole, None if runs is None else some_runs(runs, kept[count:]))
-        lost = np.concatenate((self.pose[own[~kept]], sections.move[~sections.good]))
+        lost = np.concatenate((pose[~kept], sections.move[~sections.good]))
         number = np.flatnonzero(kept)  # of the curves that have sections
         kept[number[sections.curve[~sections.good]]] = False
-        lines, before = self._lines(curves, self.corner[own[:count]], np.flatnonzero(~kept[:count]), rows)
-        way, section = self._with_sections(rows, number, sections, lines, before, begin, end)
+        lines, before = self._lines(curves, corner, np.flatnonzero(~kept[:count]), rows)
+        here, on_curve = slice(begin, end + 1), rows.s > 0.0
+        tolerance = self.joints.tolerance(here)
+        tolerance[rows.row[on_curve] - begin] = curves.tolerance[rows.curve[on_curve]]
+        path = replace(some_rows(self.way, here), tolerance=tolerance)
+        way, section = _with_sections(path, rows, number, sections, lines, before, begin)
         return _Part(way, section, sections, lost, end)
 
     def _places(self, curves: Ints, one: int) -> _Places:
         """Rows of some curves, those from one on in path order."""
         path = one + np.argsort(np.argsort(self.pose[curves]))
-        curve, place = spread(np.diff(self.first)[path] + 1)
-        at = self.row[self.first[path[curve]] + np.maximum(place - 1, 0)] - (place == 0)
-        s = np.where(place > 0, self.way.place[at] * self.length[curves[curve]], 0.0)
+        curve, place = spread(self.first[path + 1] - self.first[path] + 1)
+        at = self.row[self.first[path[curve]] + np.maximum(place - 1, 0)].astype(np.int64) - (place == 0)
+        length = np.full(len(curves), STEPS)
+        of_runs = curves >= len(self.corner)
+        length[of_runs] = self.longest[curves[of_runs] - len(self.corner)]
+        s = np.where(place > 0, self.way.place[at] * length[curve], 0.0)
         whole = np.rint(s)  # as poses and knots are
         return _Places(curve, at, np.where(np.abs(s - whole) < 1e-6, whole, s))
 
@@ -232,8 +252,7 @@ class _Work:
         control = curves.points[curves.splines.control_first[:-1]]
         off = norm(way.tip[begin] - control[:, :3]) + norm(unit(way.axis[begin]) - unit(control[:, 3:6]))
         near = off <= max(settings.shortest_line, settings.duplicate_distance)
-        way.tolerance[rows.row[rows.s > 0.0]] = curves.tolerance[rows.curve[rows.s > 0.0]]
-        suits: Bools = (begin >= 0) & near & (self.joints.turns[end + 1] == self.joints.turns[begin + 1])
+        suits: Bools = (begin >= 0) & near & (self.joints.turns(end) == self.joints.turns(begin))
         return suits
 
     @property
@@ -264,7 +283,7 @@ class _Work:
             free=none,
             left=none,
             place=u,
-            tolerance=self.way.tolerance[rows.row[place + 1]],
+            tolerance=curves.tolerance[curve],
         ), rows.row[place]
 
     def _runs(self, runs: Runs, rows: _Places) -> Curves:
@@ -306,66 +325,66 @@ class _Work:
         good[owner[outside > LIMIT_SLACK]] = False
         return _Sections(fitted.curves, number.astype(np.int8), points, spline, counts, move, curve, begin, end, good)
 
-    def _with_sections(
-        self,
-        rows: _Places,
-        curve: Ints,
-        sections: _Sections,
-        lines: RotaryWay,
-        before: Ints,
-        first: int,
-        last: int,
-    ) -> tuple[RotaryWay, Ints]:
-        """Rows of the way, good sections in the place of those within, and the section that ends in each, -1 for none.
 
-        Rows where other lines meet sections are added, and lines after the rows before them. The angles of the way
-        change in place.
-        """
-        path, row = some_rows(self.way, slice(first, last + 1)), rows.row - first
-        counts = np.bincount(rows.curve)
-        base = starts(np.floor(rows.s[starts(counts)[1:] - 1]).astype(np.int64) + 2)[:-1].astype(np.float64)
-        keys = rows.s + base[rows.curve]
-        chosen = np.flatnonzero(sections.good)
-        shift = base[curve[sections.curve]]
-        begin, end = (sections.begin + shift)[chosen], (sections.end + shift)[chosen]
-        # rows strictly within
-        of = np.searchsorted(begin, keys, side="left") - 1
-        within = (of >= 0) & (keys < end[np.maximum(of, 0)]) if len(chosen) else np.zeros(len(keys), np.bool_)
-        kept = np.ones(len(path.move), np.bool_)
-        kept[row[within]] = False
-        # where sections end and begin, and the number of the section, good or not, that ends there
-        place = np.concatenate((end, begin))
-        number = np.concatenate((chosen, chosen - 1))
-        point = np.concatenate((sections.first[chosen + 1] - 1, sections.first[chosen]))
-        place, once = np.unique(place, return_index=True)
-        number, point, ends = number[once], point[once], once < len(chosen)
-        known = np.searchsorted(keys, place)
-        meets = keys[known] == place
-        section = np.full(len(path.move), -1)
-        at = row[known[meets]]
-        path.angles[at] = sections.points[point[meets], 3:]
-        section[at[ends[meets]]] = number[meets & ends]
-        new = np.flatnonzero(~meets)
-        after, s = row[known[new] - 1], np.where(ends, sections.end[number], sections.begin[number + ~ends])[new]
-        none = np.zeros(len(new), np.bool_)
-        more = RotaryWay(
-            tip=sections.points[point[new], :3],
-            axis=unit(sections.curves.lever(sections.curve[number[new] + ~ends[new]], s)),
-            move=sections.move[number[new]],
-            angles=sections.points[point[new], 3:],
-            branch=np.zeros(len(new), np.int8),
-            free=none,
-            left=none,
-            place=np.zeros(len(new)),
-            tolerance=path.tolerance[after + 1],
-        )
-        more, after = joined_rows((more, lines)), np.concatenate((after, before - first))
-        at = np.append(0, np.cumsum(kept))[after + 1]
-        columns = vars(path).items()
-        found = RotaryWay(**{name: np.insert(column[kept], at, vars(more)[name], 0) for name, column in columns})
-        ended = np.concatenate((np.where(ends[new], number[new], -1), np.full(len(before), -1)))
-        whole = np.insert(section[kept], at, ended)
-        return replace(found, free=found.free | (whole >= 0)), whole
+def _with_sections(
+    path: RotaryWay,
+    rows: _Places,
+    curve: Ints,
+    sections: _Sections,
+    lines: RotaryWay,
+    before: Ints,
+    first: int,
+) -> tuple[RotaryWay, Ints]:
+    """Rows of the way, good sections in the place of those within, and the section that ends in each, -1 for none.
+
+    `first` is the first of the rows in the whole way. Rows where other lines meet sections are added, and lines after
+    the rows before them. The angles of the way change in place.
+    """
+    row = rows.row - first
+    counts = np.bincount(rows.curve)
+    base = starts(np.floor(rows.s[starts(counts)[1:] - 1]).astype(np.int64) + 2)[:-1].astype(np.float64)
+    keys = rows.s + base[rows.curve]
+    chosen = np.flatnonzero(sections.good)
+    shift = base[curve[sections.curve]]
+    begin, end = (sections.begin + shift)[chosen], (sections.end + shift)[chosen]
+    # rows strictly within
+    of = np.searchsorted(begin, keys, side="left") - 1
+    within = (of >= 0) & (keys < end[np.maximum(of, 0)]) if len(chosen) else np.zeros(len(keys), np.bool_)
+    kept = np.ones(len(path.move), np.bool_)
+    kept[row[within]] = False
+    # where sections end and begin, and the number of the section, good or not, that ends there
+    place = np.concatenate((end, begin))
+    number = np.concatenate((chosen, chosen - 1))
+    point = np.concatenate((sections.first[chosen + 1] - 1, sections.first[chosen]))
+    place, once = np.unique(place, return_index=True)
+    number, point, ends = number[once], point[once], once < len(chosen)
+    known = np.searchsorted(keys, place)
+    meets = keys[known] == place
+    section = np.full(len(path.move), -1)
+    at = row[known[meets]]
+    path.angles[at] = sections.points[point[meets], 3:]
+    section[at[ends[meets]]] = number[meets & ends]
+    new = np.flatnonzero(~meets)
+    after, s = row[known[new] - 1], np.where(ends, sections.end[number], sections.begin[number + ~ends])[new]
+    none = np.zeros(len(new), np.bool_)
+    more = RotaryWay(
+        tip=sections.points[point[new], :3],
+        axis=unit(sections.curves.lever(sections.curve[number[new] + ~ends[new]], s)),
+        move=sections.move[number[new]],
+        angles=sections.points[point[new], 3:],
+        branch=np.zeros(len(new), np.int8),
+        free=none,
+        left=none,
+        place=np.zeros(len(new)),
+        tolerance=path.tolerance[after + 1],
+    )
+    more, after = joined_rows((more, lines)), np.concatenate((after, before - first))
+    at = np.append(0, np.cumsum(kept))[after + 1]
+    columns = vars(path).items()
+    found = RotaryWay(**{name: np.insert(column[kept], at, vars(more)[name], 0) for name, column in columns})
+    ended = np.concatenate((np.where(ends[new], number[new], -1), np.full(len(before), -1)))
+    whole = np.insert(section[kept], at, ended)
+    return replace(found, free=found.free | (whole >= 0)), whole
 
 
 def _written_weights(weight: Floats, owner: Ints, count: int) -> Floats:
