@@ -11,7 +11,6 @@ from cornersmooth.nc_reader.elements import NcProgram
 from cornersmooth.nc_reader.tool import written_at
 from cornersmooth.slices import joined_rows, some_rows
 from cornersmooth.verify.batches import Batches
-from cornersmooth.verify.decision import Decider
 from cornersmooth.verify.deviation import Gap, of_original
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.nearest import nearest_places
@@ -57,7 +56,7 @@ def deviation_along(
     """
     task = Task.of(program, tolerance, axis_length, axis_tolerance)
     parts = [Distribution(*np.zeros((6, 0)), *np.zeros((4, 0), np.int64))]
-    for batch in Batches(task, nc.events, nc.retracts, Decider(task).decide).of([nc]):
+    for batch in Batches(task, nc.events, nc.retracts).of([nc]):
         matched = Match.of(task, batch)
         parts += [_of_elements(matched, batch.offset, samples), _of_poses(matched)]
     found = joined_rows(parts)

@@ -1,29 +1,28 @@
 """The written motion in batches, each with the stretches of the CL path that it is run beside.
 
 A *stretch* is the run of feed moves between two stops (see `stops`). Many short stretches make a batch; a long one is
-cut anywhere. Where the place of a cut on the CL path is only guessed, each batch can be decided by itself: if the
-motions can be run beside each other through all guessed places, they can be. If not, they may be nevertheless.
+cut anywhere. The place of a cut on the CL path is guessed, so each batch can be decided by itself: where the motions
+can be run beside each other through all guessed places, they can be. Where not, it is not proved that they cannot.
 """
 
 from __future__ import annotations
 
 from array import array
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import replace
-from typing import Final
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Final, TypeAlias
 
 import numpy as np
 
-from cornersmooth.model import Ints, Move
+from cornersmooth.model import Floats, Ints, Move
 from cornersmooth.nc_reader.ahead import Ahead
 from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem
 from cornersmooth.nc_reader.tool import directions
 from cornersmooth.statements.tool_changes import ToolChanges
 from cornersmooth.verify.along_tool import AlongTool
-from cornersmooth.verify.decision import Batch, Decision
+from cornersmooth.verify.decision import Batch
 from cornersmooth.verify.motions import written_motion
-from cornersmooth.verify.nearest import largest_square, nearest_places
+from cornersmooth.verify.nearest import COLUMNS, largest_square, nearest_places
 from cornersmooth.verify.passage import AROUND, LONGER
 from cornersmooth.verify.stops import BEFORE, Part, Stops, out_of_hole
 from cornersmooth.verify.task import ARITHMETIC, Task
@@ -33,28 +32,22 @@ BATCH: Final = 1 << 14
 
 #: a stretch, see `Batch.stretches`
 _STRETCH: Final = np.dtype(
-    [("first", np.int64), ("last", np.int64), ("start", np.float64), ("end", np.float64), ("stop", np.int64)]
+    [("first", "i8"), ("last", "i8"), ("start", "f8", 3), ("end", "f8", 3), ("stop", "i8"), ("guessed", "?")]
 )
 
 #: share of the way, on either side, within which a place is guessed at first (speed only)
 _NEAR: Final = 0.05
 
 
+#: a row of it
+_Row: TypeAlias = tuple[int, int, Floats, Floats, int, bool]
+
+
 class Batches:
-    """Makes batches of the elements of a text, as they come, counted in all of it; `events`, `retracts` grow along.
+    """Makes batches of the elements of a text, as they come, counted in all of it; `events`, `retracts` grow along."""
 
-    Each is given out decided by `decide`; without that the places on the CL path where long stretches are cut are
-    guessed.
-    """
-
-    def __init__(
-        self,
-        task: Task,
-        events: Sequence[Event],
-        retracts: Sequence[int],
-        decide: Callable[[Batch], Decision] | None = None,
-    ) -> None:
-        self.task, self._events, self._retracts, self._decide = task, events, retracts, decide
+    def __init__(self, task: Task, events: Sequence[Event], retracts: Sequence[int]) -> None:
+        self.task, self._events, self._retracts = task, events, retracts
         self.problems: list[Problem] = []
         #: stops that are reached, three numbers for each: the element, and the CL path lengths where it is and where it
         #: begins
@@ -68,14 +61,13 @@ class Batches:
         self.rewinds: list[tuple[int, int]] = []
         self.still: set[int] = set()
         self.elements = 0
-        # the stretch that has no end yet: where it begins, as a move and in the text, and on the CL path; and the last
-        # move that it may have
-        self._move, self._element, self._move_last, self._place = -1, 0, -1, 0.0
-        self._continued = False
+        # the stretch that has no end yet: where it begins, as a move and in the text, and (3,) on the CL path, perhaps
+        # guessed; and the last move that it may have
+        self._move, self._element, self._move_last, self._place = -1, 0, -1, np.zeros(3)
+        self._continued = self._guessed = False
         self._told = False  # whether a lack of motion between its stops has been said
-        self.guessed = False  #: whether any place was
         self._ratio = 1.0  # how long the CL path is beside the written one, of the last batch that was cut
-        self._pending: list[tuple[int, int, float, float, int]] = []
+        self._pending: list[_Row] = []
 
     def of(self, chunks: Iterable[Elements]) -> Iterator[Batch]:
         """Give out all batches of a text."""
@@ -128,8 +120,8 @@ class Batches:
             self.problems.append(Problem("CS532", line, int(nc.line[at]), text))
         # out of a hole the way begins anywhere
         place = out_of_hole(task, nc, at, move) if kind == Move.HOLE else float(last_vertex[move])
-        self._move, self._element, self._continued, self._told = move, element, False, False
-        self._place = place
+        self._move, self._element, self._place = move, element, np.full(3, place)
+        self._continued = self._guessed = self._told = False
         before = last_vertex[max(move - (kind == Move.RAPID), 0)]
         self.stops.extend((element, path.length_at(place), float(path.length[before])))
 
@@ -146,9 +138,10 @@ class Batches:
         while element_last - self._element > BATCH + BATCH // 2:
             yield from self._cut(self._element + BATCH, stop)
         waiting = self._pending
-        if waiting and (element_last - waiting[0][0] > BATCH or stop - waiting[0][2] > 2 * BATCH):
+        if waiting and (element_last - waiting[0][0] > BATCH or stop - waiting[0][2][0] > 2 * BATCH):
             yield from self._flush()
-        self._pending.append((self._element, element_last, min(self._place, stop), stop, stop))
+        start, end = np.minimum(self._place, stop), np.full(3, float(stop))
+        self._pending.append((self._element, element_last, start, end, stop, self._guessed))
 
     def _cut_open(self, last: int) -> Iterator[Batch]:
         """Give out what is held of a stretch whose end is not known yet, but its last element."""
@@ -164,35 +157,33 @@ class Batches:
     def _cut(self, element: int, stop: int) -> Iterator[Batch]:
         """Give out a long stretch up to an element."""
         yield from self._flush()
-        place = min(self._place, stop)
-        end = self._guess(element, place, stop) if self._decide is None else np.nan
-        batch = self._batch([(self._element, element, place, end, stop)], goes_on=True)
-        yield batch
-        self._place = end if batch.decided is None else batch.decided.reached
-        self._element, self._continued = element, True
+        start = np.minimum(self._place, stop)
+        end = self._guess(element, start, stop)
+        yield self._batch([(self._element, element, start, end, stop, True)], goes_on=True)
+        self._element, self._place, self._continued, self._guessed = element, end, True, True
 
-    def _guess(self, element: int, start: float, stop: int) -> float:
-        """Place near the end of an element on a stretch that has run from a place on: the nearest where it should be.
+    def _guess(self, element: int, start: Floats, stop: int) -> Floats:
+        """(3,) places near the end of an element on a stretch, which has run from places on: the nearest ones.
 
-        If nothing is near there it is looked for on all of the path that may have been passed.
+        They are looked for where they should be, and if nothing is near there on all that may have been passed.
         """
-        path, nc, self.guessed = self.task.path, self._ahead.part(self._element, element + 1), True
+        path, nc = self.task.path, self._ahead.part(self._element, element + 1)
         six = self.task.six(nc.tip, directions(nc, nc.tip, nc.second))
-        gone, begin = float(np.linalg.norm(np.diff(six, axis=0), axis=1).sum()), path.length_at(start)
-        around, place = AROUND * self.task.radius, start
-        for low, high in ((1.0 - _NEAR, 1.0 + _NEAR), (0.0, LONGER)):
-            low, high = (begin + share * self._ratio * gone + side for share, side in ((low, -around), (high, around)))
-            first, last = np.searchsorted(path.length, (low, high)).tolist()
-            first = min(max(first - 1, int(start)), stop - 1)
-            last = max(min(last, stop - 1), first)
-            middle, ends = np.array([(first + last) // 2]), (np.array([first]), np.array([last]))
-            reach = (last - first) // 2 + 1
-            place = max(float(nearest_places(six[-1:], path.points, middle, reach, *ends)[0]), start)
-            if largest_square(six[-1] - path.at(np.array([place]))[0]) <= self.task.radius**2:
-                break
+        gone, begin = float(np.linalg.norm(np.diff(six, axis=0), axis=1).sum()), path.length_at(float(start[0]))
+        around, found = AROUND * self.task.radius, start.copy()
+        for k, (metric, (_, radius)) in enumerate(self.task.runs.items()):
+            for low, high in ((1.0 - _NEAR, 1.0 + _NEAR), (0.0, LONGER)):
+                ends = begin + np.array((low, high)) * self._ratio * gone + np.array((-around, around))
+                window = np.clip(np.searchsorted(path.length, ends) - 1, int(start[k]), stop - 1)
+                first, last = window[:1], window[1:]
+                reach = int(last[0] - first[0]) // 2 + 1
+                found[k:] = nearest_places(six[-1:], path.points, (first + last) // 2, reach, first, last, metric)
+                off = (six[-1:] - path.at(found[k : k + 1]))[:, COLUMNS[metric]]
+                if largest_square(off.T)[0] <= radius**2:
+                    break
         if gone > around:
-            self._ratio = (path.length_at(place) - begin) / gone
-        return min(place, float(stop))
+            self._ratio = (path.length_at(float(found[0])) - begin) / gone
+        return np.clip(found, start, stop)
 
     def _flush(self) -> Iterator[Batch]:
         """Give out what waits."""
@@ -200,14 +191,14 @@ class Batches:
             yield self._batch(self._pending)
             self._pending = []
 
-    def _batch(self, rows: list[tuple[int, int, float, float, int]], *, goes_on: bool = False) -> Batch:
+    def _batch(self, rows: list[_Row], *, goes_on: bool = False) -> Batch:
         """Put some stretches into a batch."""
         lead = int(self._continued and rows[0][0] == self._element)
         begin, last = rows[0][0] - lead, rows[-1][1]
         table = np.array(rows, _STRETCH)
         table["first"] -= begin
         table["last"] -= begin
-        batch = Batch(
+        return Batch(
             nc=self._ahead.part(begin, last + 1),
             offset=begin,
             stretches=table,
@@ -215,15 +206,14 @@ class Batches:
             goes_on=goes_on,
             words=elements_with_words(self._events, begin + lead, last),
         )
-        return batch if self._decide is None else replace(batch, decided=self._decide(batch))
 
     def _stands(self, move_last: int, element_last: int, *, theirs: bool) -> None:
         """Say if between two stops one motion leaves the place where the other stands: CS535, CS536."""
         task, path, original = self.task, self.task.path, self.task.original
         motion = written_motion(self._ahead.part(self._element, element_last + 1), task)
-        place = path.at(np.array([self._place]))
+        place = path.at(self._place[:1])
         if theirs:
-            start, stop = int(self._place), int(original.trail.last[move_last])
+            start, stop = int(self._place[0]), int(original.trail.last[move_last])
             own, bend = np.concatenate((place, path.points[start + 1 : stop + 1])), path.bend[start:stop]
             text, code, other = "feed moves of the CL file are missing", "CS535", motion.six[0]
         else:

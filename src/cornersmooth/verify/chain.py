@@ -175,7 +175,7 @@ class Sections:
     #: (s,): places on the path beside them
     start: Floats
     stop: Floats
-    open: bool = False  #: whether the last section goes on behind its last vertex: that may be anywhere before `stop`
+    guessed: Bools  #: (s,): whether either place is only guessed
 
     def of(self, rows: Ints) -> tuple[Ints, Bools]:
         """Section of each row, or the one before, and whether it is inside."""
@@ -186,7 +186,7 @@ class Sections:
         """The rest of them from a row in section `number` on, counted from that row."""
         first, start = self.first[number:] - row, self.start[number:].copy()
         first[0], start[0] = 0, place
-        return Sections(first, self.last[number:] - row, start, self.stop[number:], self.open)
+        return Sections(first, self.last[number:] - row, start, self.stop[number:], self.guessed[number:])
 
 
 @dataclass(frozen=True)
@@ -222,8 +222,7 @@ def chain(own: Floats, bend: Floats, path: Path, radius: float, sections: Sectio
     place[sections.first] = sections.start
     place[~inside] = sections.stop[number[~inside]]
     np.maximum.accumulate(place, out=place)
-    ends = slice(None, -1 if sections.open else None)
-    place[sections.last[ends]] = sections.stop[ends]
+    place[sections.last] = sections.stop
     away = own - points_at(path.points, place)
     away_square = largest_square(away)
     bad = away_square > radius * radius

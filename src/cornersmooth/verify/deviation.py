@@ -18,7 +18,7 @@ from cornersmooth.verify.findings import AXIS_OFF, Findings, Violation, Where
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.motions import digit_errors, inner_points
 from cornersmooth.verify.nearest import COLUMNS, Metric, largest_square, nearest_places, on_segments
-from cornersmooth.verify.passage import AROUND, LONGER, MOST_BREAKS, Break
+from cornersmooth.verify.passage import AROUND, LONGER, Break
 from cornersmooth.verify.task import ARITHMETIC, Task
 
 #: segments on either side of a place among which a nearer one is looked for
@@ -126,12 +126,9 @@ def _written(match: Match, place: Floats) -> Floats:
 
 def check_breaks(match: Match, found: Findings) -> None:
     """Both motions must be run beside each other within the tolerance: CS521, CS522, CS523, CS525, CS527."""
-    found.parted = bool(match.breaks)
+    found.breaks = match.nc_lines(np.array([one.row for _, one in match.breaks], np.int64)).tolist()
     for metric, one in match.breaks:
         _say(match, found, metric, one)
-    if not match.whole and match.breaks:
-        line = int(match.nc_lines(np.array([match.breaks[-1][1].row]))[0])
-        found.unlooked.append((line, f"what comes after {MOST_BREAKS} places where the motions part"))
 
 
 def _say(match: Match, found: Findings, metric: Metric, one: Break) -> None:

@@ -90,7 +90,7 @@ class Findings:
 
     worst: dict[str, Where] = field(default_factory=_NOTHING.copy)  #: largest values: at least what it started from
     violations: list[Violation] = field(default_factory=list)
-    parted: bool = False  #: whether the motions part anywhere
+    breaks: list[int] = field(default_factory=list)  #: NC lines where the motions part
     feeds: Runs = field(default_factory=Runs)  #: of elements with a wrong feed
     #: (5, k) each: poses of the CL program; how far they are from the nearest written pose: tip and axis point, mm, and
     #: axis, rad; NC lines
@@ -116,6 +116,7 @@ class Findings:
         for name, where in other.worst.items():
             self.take_worst(name, where)
         self.violations += other.violations
+        self.breaks += other.breaks
         self.feeds.follow(other.feeds)
         self.poses += other.poses
         self.unlooked += other.unlooked

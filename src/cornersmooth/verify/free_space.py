@@ -253,11 +253,11 @@ class Around:
         there = start + (place - k) * (end - start)
         return float(min(there, np.nextafter(end, start)) if place < k + 1 else there)
 
-    def goal(self, known: Floats, last: int, stop: float | None) -> float | None:
+    def goal(self, known: Floats, last: int, stop: float) -> float | None:
         """Go along the rows to one after the `last` that the chain does not prove, or to the end; None if that fails.
 
         Of the rows places (k,) by the chain are `known`, else NaN. The last row has to end at place `stop` of the
-        path, anywhere if that is None, at a known place if it is NaN.
+        path, at a known place if it is NaN.
         """
         final, end = len(self.places) - 2, len(self.at) - 1
         self.reached = [self.space.along(0, self.inward(self.start))]
@@ -274,8 +274,6 @@ class Around:
             if goes_on and holds(here, self.inward(float(known[at])), final):
                 return float(known[at])
             at = min(at + 1, end)
-        if stop is None:
-            return self.outward(lowest(self.reached[-1]))
         there = stop <= self.places[-1] and holds(self.reached[-1], self.inward(stop), final)
         return stop if there else None
 

@@ -12,7 +12,7 @@ import numpy as np
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.verify.chain import Path, passed
 from cornersmooth.verify.cl_motion import Original
-from cornersmooth.verify.decision import Batch, Decider, Decision
+from cornersmooth.verify.decision import Batch, Decision, decide
 from cornersmooth.verify.free_space import FreeSpace, holds
 from cornersmooth.verify.passage import AROUND
 from cornersmooth.verify.task import Task
@@ -29,9 +29,8 @@ class Match(Batch, Decision):
 
     @classmethod
     def of(cls, task: Task, batch: Batch) -> Match:
-        """Decide a batch, unless it is decided."""
-        decided = Decider(task).decide(batch) if batch.decided is None else batch.decided
-        return cls(task=task, **vars(batch), **vars(decided))
+        """Decide a batch."""
+        return cls(task=task, **vars(batch), **vars(decide(task, batch)))
 
     @property
     def six(self) -> Floats:
@@ -106,7 +105,7 @@ class Match(Batch, Decision):
     @cached_property
     def low(self) -> Ints:
         """(v,) first segment of the CL path in the stretch a vertex belongs to."""
-        return np.minimum(self.stretches["start"][np.maximum(self.section, 0)].astype(np.int64), self.high)
+        return np.minimum(self.stretches["start"][np.maximum(self.section, 0), 0].astype(np.int64), self.high)
 
     @cached_property
     def high(self) -> Ints:

@@ -4,8 +4,8 @@ That is the Fréchet distance of two polylines, decided. A `chain` of nearest pl
 it does not, what can be reached is worked out exactly (`free_space`), from a few rows before.
 
 The answer has three values. A place where the motions part is a `Break`: it is proved where nothing is near a vertex,
-or all was looked at from where the motion is known to begin; else what lies too far back may lead on, and it is *not
-proved*.
+or all was looked at from where the motion is known to begin; else what lies too far back may lead on, or a guessed
+place may be the wrong one, and it is *not proved*.
 """
 
 from __future__ import annotations
@@ -57,98 +57,60 @@ class Break:
     proved: bool  #: False: NOT VERIFIED, as what was looked at before it was not enough.
 
 
-@dataclass(frozen=True)
 class Passage:
-    """The answer."""
+    """Decides whether a motion can be run beside a path, section by section; all lengths in mm.
 
-    #: (n,): A place on the path, segment plus fraction, for every vertex of the own polyline, ascending: beside each
-    #: other the two motions can be run through all of them. NaN where there is none, from a break on.
-    place: Floats
-    breaks: tuple[Break, ...] = ()
-    #: whether all of the own motion was looked at: not after `MOST_BREAKS`, nor where it never came back to the path
-    whole: bool = True
+    It has vertices (n, 3h), each triple of which has to keep the radius by itself, and bends (n - 1,) of the steps
+    between them. `inner` gives points of bent steps, by numbers of vertices and fractions.
+    """
+
+    def __init__(
+        self, own: Floats, bend: Floats, path: Path, radius: float, sections: Sections, inner: Inner | None = None
+    ) -> None:
+        self.path, self.radius, self._inner = path, radius, inner
+        #: where the motions part; nothing is looked at after `MOST_BREAKS`
+        self.breaks: list[Break] = []
+        # vertices, bends of the steps from them, their places, and their numbers, with fractions of those put between
+        self._own, self._bend = own, bend
+        self._place, self._number = np.full(len(own), np.nan), np.arange(len(own), dtype=np.float64)
+        # sections: the first vertices that are not decided, and the last ones; places where they begin and end
+        self._first, self._last = sections.first.copy(), sections.last.copy()
+        self._begin, self._stop, self._guessed = sections.start.copy(), sections.stop, sections.guessed
+        self._left = 0.0  # last place that was reached before a break
+        section = 0
+        while section < len(self._first) and len(self.breaks) < MOST_BREAKS:
+            section = self._go_on(section)
 
     @property
-    def passed(self) -> bool:
-        """Whether the motions are proved to keep within the radius."""
-        return not self.breaks and self.whole
+    def place(self) -> Floats:
+        """(n,) a place on the path, segment plus fraction, for every vertex, ascending.
 
-
-class Walk:
-    """Goes along a path as the own motion comes in, chunk by chunk; the radius in mm."""
-
-    def __init__(self, path: Path, radius: float) -> None:
-        self.path, self.radius = path, radius
-        # vertices (k, 3h) at hand, those to look back on first; their places, bends of the steps from them, and their
-        # numbers in the chunk, with fractions where they were put between two
-        self._own = np.zeros((0, path.points.shape[1]))
-        self._place = self._bend = self._number = np.zeros(0)
-        # sections at hand: the first vertices that are not decided, the last ones, and the vertices at whose places and
-        # nowhere else the motion begins (-1: forgotten); places where they begin and end
-        self._first = self._last = self._known = np.zeros(0, np.int64)
-        self._begin = self._stop = np.zeros(0)
-        self._open = False
-        self._breaks: list[Break] = []
-        self._count = 0  # of breaks in the chunks before
-        self._left = 0.0  # last place that was reached before a break
-        self._whole = True
-
-    def take(self, own: Floats, bend: Floats, sections: Sections, inner: Inner | None = None) -> Passage:
-        """Go on with vertices (n, 3h), mm, and the bends (n - 1,) of their steps; NaN between sections.
-
-        After an open section the first vertex is the last of those before, and the first section is the rest of that
-        one. Where a section of one vertex has more than one place, the motion stands still. `inner` gives points of
-        bent steps; vertices are counted in `own`.
+        The two motions can be run beside each other through all of them. NaN where there is none, from a break on.
         """
-        if self._count >= MOST_BREAKS:
-            return Passage(np.full(len(own), np.nan), (), False)
-        end = len(self._own)
-        kept = max(end - 1 - LOOK_BACK[-1], int(self._known[-1]), 0) if self._open else end
-        before = slice(kept, end - 1)
-        start = len(self._own[before])
-        self._own, self._bend = np.concatenate((self._own[before], own)), np.concatenate((self._bend[before], bend))
-        last_place, last_known = (self._place[-1], self._known[-1]) if self._open else (np.nan, 0)
-        self._place = np.concatenate((self._place[before], np.full(len(own), np.nan)))
-        self._number = np.arange(len(self._own), dtype=np.float64) - start
-        self._first, self._last, self._known = (
-            rows + start for rows in (sections.first, sections.last, sections.first)
-        )
-        self._begin, self._stop = sections.start.copy(), sections.stop
-        if self._open:
-            self._known[0] = max(last_known - kept, -1)
-            self._begin[0] = self._place[start] = last_place
-        self._open, self._breaks = sections.open, []
-        section = 0
-        while section < len(self._first) and self._whole:
-            section = self._go_on(section, inner)
-        self._count += len(self._breaks)
-        chunk = (self._number >= 0.0) & (self._number == np.floor(self._number))
-        return Passage(self._place[chunk], tuple(self._breaks), self._whole)
+        return self._place[self._number == np.floor(self._number)]
 
     def _meets(self, row: int, place: float) -> bool:
         """Whether a vertex is near a place of the path."""
         off = largest_square(self._own[row] - points_at(self.path.points, np.array([place]))[:, 0])
         return bool(off <= self.radius**2)
 
-    def _go_on(self, section: int, inner: Inner | None) -> int:
+    def _go_on(self, section: int) -> int:
         """Find places for vertices from the first of a section on, or a break; return the section to go on with."""
         row, begin = int(self._first[section]), float(self._begin[section])
-        if np.isnan(begin):  # the motion has not come back to the path yet
-            return self._resume(section, row)
         if np.isnan(self._place[row]) and not self._meets(row, begin):
-            return self._break(section, Break(row, begin, True))
-        bad = self._prove(section, row, begin, inner)
+            return self._break(section, Break(row, begin, not self._guessed[section]))
+        bad = self._prove(section, row, begin)
         while len(bad):
             one = int(np.searchsorted(self._first, bad[0], side="right")) - 1
             gaps = np.flatnonzero(np.diff(bad) > LOOK_BACK[0])
             last = min(int(bad[gaps[0] if len(gaps) else -1]), int(bad[0]) + _SOON, int(self._last[one]))
-            found = self._repair(one, int(bad[0]), last, inner)
+            found = self._repair(one, int(bad[0]), last)
             if isinstance(found, Break):
                 return self._break(one, found)
             bad = bad[bad > found]
         return len(self._first)
 
-    def _prove(self, section: int, row: int, begin: float, inner: Inner | None) -> Ints:
+    def _prove(self, section: int, row: int, begin: float) -> Ints:
         """Find places for vertices from one on by the chain; return those that it does not prove.
 
         Bent steps are divided as long as they are what is in the way.
@@ -158,12 +120,12 @@ class Walk:
         _, inside = sections.of(np.arange(len(found.place)))
         self._place[row:] = np.where(found.bad | ~inside, np.nan, found.place)
         bent = np.flatnonzero(found.bad & ~found.far) + row
-        while len(bent) and inner is not None and self._divide(bent, inner):
+        while len(bent) and self._inner is not None and self._divide(bent, self._inner):
             bent = self._prove_again(row)
         return self._missing(row)[0]
 
     def _sections(self) -> Sections:
-        return Sections(self._first, self._last, self._begin, self._stop, self._open)
+        return Sections(self._first, self._last, self._begin, self._stop, self._guessed)
 
     def _missing(self, row: int) -> tuple[Ints, Ints]:
         """Vertices from one on that have no place, and their sections."""
@@ -185,11 +147,10 @@ class Walk:
         if not len(first):
             return first
         stop = np.where(np.isnan(self._place[last]), self._stop[number], self._place[last])
-        unknown = self._open and bool(last[-1] == self._last[-1] and np.isnan(self._place[last[-1]]))
         size = last - first + 1
         ends = np.cumsum(size)
         at = np.repeat(first - ends + size, size) + np.arange(ends[-1])
-        sections = Sections(ends - size, ends - 1, self._place[first], stop, unknown)
+        sections = Sections(ends - size, ends - 1, self._place[first], stop, self._guessed[number])
         bend = self._bend[np.minimum(at[:-1], len(self._bend) - 1)]
         found = chain(np.ascontiguousarray(self._own[at].T), bend, self.path, self.radius, sections)
         inner = np.ones(len(at), np.bool_)
@@ -210,48 +171,45 @@ class Walk:
         at = np.repeat(steps + 1, PARTS - 1)
         self._own = np.insert(self._own, at, inner(number), axis=0)
         self._number, self._place = np.insert(self._number, at, number), np.insert(self._place, at, np.nan)
-        for rows in (self._first, self._last, self._known):
+        for rows in (self._first, self._last):
             rows += (PARTS - 1) * np.searchsorted(steps, rows)
         bend = self._bend.copy()
         bend[steps] /= PARTS**2
         self._bend = np.insert(bend, at, bend[np.repeat(steps, PARTS - 1)])
         return True
 
-    def _repair(self, section: int, first: int, last: int, inner: Inner | None) -> int | Break:
+    def _repair(self, section: int, first: int, last: int) -> int | Break:
         """Work out exactly how to come past some vertices; return one after them that has a place."""
-        known, end, stop = int(self._known[section]), int(self._last[section]), float(self._stop[section])
-        unfinished = self._open and section == len(self._first) - 1
+        known, end, stop = int(self._first[section]), int(self._last[section]), float(self._stop[section])
+        sure = not self._guessed[section]
         if first == known:
-            return Break(first, float(self._begin[section]), True)
+            return Break(first, float(self._begin[section]), sure)
         found = Break(first, float(self._place[first - 1]), False)
         # whether more is wrong need not be known so well
-        for back in LOOK_BACK[: 2 if self._breaks or self._count else None]:
-            begin = max(first - back, known, 0)
+        for back in LOOK_BACK[: 2 if self.breaks else None]:
+            begin = max(first - back, known)
             until = end if back > _SOON else min(last + _SOON, end)
             rows, steps = slice(begin, until + 1), slice(begin, until)
             own = self._own[rows], self._bend[steps], self._number[rows]
             top = self._within_reach(begin, until, stop)
-            ends = math.nan if until < end else None if unfinished else stop
-            around = Around.of(own, self.path, self.radius, float(self._place[begin]), top, inner)
-            goal = around.goal(self._place[rows], last - begin, ends)
+            around = Around.of(own, self.path, self.radius, float(self._place[begin]), top, self._inner)
+            goal = around.goal(self._place[rows], last - begin, math.nan if until < end else stop)
             if goal is not None:
                 return self._settle(begin, around, goal)
-            if not around.reached[0] and begin not in (known, 0):  # what bends take off leaves nothing of that place
+            if not around.reached[0] and begin > known:  # what bends take off leaves nothing of that place
                 continue
             if around.reached[-1] and until < end:
                 continue
             reached = begin + around.row_reached
             row = max(reached, first)  # the chain has proved what is before that
             proved = begin == known or not self._is_near(reached, known, top)
-            found = Break(row, around.farthest(), proved and row == reached)
-            if proved or begin == 0:
+            found = Break(row, around.farthest(), sure and proved and row == reached)
+            if proved:
                 break
         return found
 
     def _is_near(self, row: int, known: int, top: int) -> bool:
         """Whether a vertex may be near a place up to a vertex of the path, and not before that of an earlier one."""
-        if known < 0:
-            return True
         bottom = min(int(self._place[known]), top - 1)
         start = self.path.points[bottom:top].T
         way = self.path.points[bottom + 1 : top + 1].T - start
@@ -277,8 +235,8 @@ class Walk:
 
     def _break(self, section: int, found: Break) -> int:
         """Take down a break, and find where to go on: the section that it is in, or the next."""
-        self._breaks.append(replace(found, row=int(np.ceil(self._number[found.row]))))
-        self._left, self._whole = found.place, self._count + len(self._breaks) < MOST_BREAKS
+        self.breaks.append(replace(found, row=int(np.ceil(self._number[found.row]))))
+        self._left = found.place
         self._place[found.row :] = np.nan
         return self._resume(section, found.row)
 
@@ -288,7 +246,7 @@ class Walk:
         It gets a place: the nearest to where the path was left.
         """
         path, end, left = self.path, int(self._last[section]), self.path.length_at(self._left)
-        bottom, top = int(np.nan_to_num(self._begin[section])), math.ceil(self._stop[section])
+        bottom, top = int(self._begin[section]), math.ceil(self._stop[section])
         tried = row + np.unique(np.geomspace(1, max(end - row, 1), _TRIED).astype(np.int64)) - 1
         for width, rows in ((AROUND, tried), (AROUND * AROUND, tried[::6])):
             low, high = np.searchsorted(path.length, (left - width * self.radius, left + width * self.radius)).tolist()
@@ -303,7 +261,7 @@ class Walk:
                 free = np.flatnonzero(at <= other)
                 if len(free):
                     place = segments.start + free + np.clip(self._left - segments.start - free, at[free], other[free])
-                    self._first[section] = self._known[section] = k
+                    self._first[section] = k
                     self._begin[section] = self._place[k] = place[np.argmin(np.abs(place - self._left))]
                     return section
         self._place[end] = np.nan

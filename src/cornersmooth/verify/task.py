@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -12,6 +13,7 @@ from cornersmooth.model import Bools, Floats, Keep, Program
 from cornersmooth.nc_reader.elements import Elements
 from cornersmooth.verify.chain import Path
 from cornersmooth.verify.cl_motion import Original, original_motion
+from cornersmooth.verify.nearest import COLUMNS, Metric
 
 #: slack of arithmetic on coordinates that are a million times larger, mm
 ARITHMETIC: Final = 1e-9
@@ -88,6 +90,14 @@ class Task:
     def radius(self) -> float:
         """Distance, mm, within which tip and axis point must be at a common pose."""
         return (APART if self.apart else 1.0) * (self.tolerance + ARITHMETIC)
+
+    @cached_property
+    def runs(self) -> dict[Metric, tuple[Path, float]]:
+        """What is run beside which path, within which radius, mm: both, and, if apart, each on its own as well."""
+        found: dict[Metric, tuple[Path, float]] = {"both": (self.path, self.radius)}
+        for name in ("tip", "axis_point") if self.apart else ():
+            found[name] = self.path.only(COLUMNS[name]), self.tolerance + ARITHMETIC
+        return found
 
     def margin(self, nc: Elements) -> float:
         """Distance that printed digits may account for, mm: never more than a share of the tolerance."""

@@ -29,11 +29,12 @@ from cornersmooth.statements.comparison import KINDS
 from cornersmooth.verify.batches import Batches
 from cornersmooth.verify.cl_motion import half_turns
 from cornersmooth.verify.continuity import measure_continuity
-from cornersmooth.verify.decision import Batch, Decider
+from cornersmooth.verify.decision import Batch
 from cornersmooth.verify.deviation import check_breaks, measure_original, measure_written
 from cornersmooth.verify.feeds import check_feeds
 from cornersmooth.verify.findings import Findings, Where, problems_of
 from cornersmooth.verify.match import Match
+from cornersmooth.verify.passage import MOST_BREAKS
 from cornersmooth.verify.result import Verification
 from cornersmooth.verify.task import Task, length_of
 from cornersmooth.verify.word_places import WordPlaces, place_words
@@ -53,10 +54,6 @@ CHECKS: Final[tuple[Callable[[Match, Findings], None], ...]] = (
 
 #: poses from which on it is worth while to let other processes work
 _LONG: Final = 30_000
-
-
-class _NotProvedError(Exception):
-    """The motions part, and a guess may be why."""
 
 
 class Verifier:
@@ -164,26 +161,17 @@ class Verifier:
         found: Verification = self._work() if self._helper is None else self._helper.result()
         if not found.motions_part or self._axis_tolerance is not None:
             return found
-        alone = self._pass(apart=True)
+        alone = self._work(apart=True)
         better = not alone.motions_part or (found.only_apart and not alone.only_apart)
         return replace(alone, apart=True) if better else found
 
-    def _work(self) -> Verification:
-        """Read and measure the text as far as it goes.
-
-        First with guesses of where long stretches are cut, which can only prove that nothing is wrong.
-        """
-        with contextlib.suppress(_NotProvedError):
-            return self._pass(guess=True)
-        return self._pass()
-
-    def _pass(self, *, guess: bool = False, apart: bool = False) -> Verification:
-        """Read and measure the text; `apart`: with tips and axis points on their own."""
+    def _work(self, *, apart: bool = False) -> Verification:
+        """Read and measure the text as far as it goes; `apart`: with tips and axis points on their own."""
         options, text = self._options, self._text
         if isinstance(text, NcProgram):
             elements = Elements(**{column.name: getattr(text, column.name) for column in fields(Elements)})
             task, read = self._task(rotary=text.rotary, apart=apart), (text, len(text.curves))
-            found = self._found(task, iter([elements]), list(text.events), text.retracts, lambda: read, guess=guess)
+            found = self._found(task, iter([elements]), list(text.events), text.retracts, lambda: read)
             words = "the words of the text: they are looked at where it is read, not afterwards"
             return found.not_verified(words if self._words else "")
         text.begin()
@@ -205,7 +193,7 @@ class Verifier:
             nc = program_of(reader, [])
             return replace(nc, problems=(*nc.problems, *check.problems)), reader.curves
 
-        found = self._found(task, chunks, reader.events, reader.retracts.places, said, guess=guess)
+        found = self._found(task, chunks, reader.events, reader.retracts.places, said)
         unlooked = check.unlooked if self._words else "words beside the motion, which a table of your own may define"
         return replace(found.not_verified(unlooked), trusted=tuple(check.trusted))
 
@@ -222,36 +210,37 @@ class Verifier:
         events: list[Event],
         retracts: Sequence[int],
         said: Callable[[], tuple[NcProgram, int]],
-        *,
-        guess: bool,
     ) -> Verification:
         """Measure all that is read, and put everything together; `said`: of the text and its curves, then."""
-        program, batches = self._program, Batches(task, events, retracts, None if guess else Decider(task).decide)
-        findings = Findings()
+        program, batches, findings = self._program, Batches(task, events, retracts), Findings()
         places = WordPlaces(batches, events)
         poses = np.empty((4, len(program)))
         if self._slower:
             chunks = (part.at_most() for part in chunks)
 
-        def items() -> Iterator[tuple[Batch, dict[str, Where]]]:
+        def items() -> Iterator[tuple[Batch | None, dict[str, Where]]]:
             poses[:3], poses[3] = np.nan, 0.0  # not before other processes are forked, which would keep them
             for batch in batches.of(places.watch(chunks)):
-                yield batch, findings.worst.copy()
+                yield None if len(findings.breaks) >= MOST_BREAKS else batch, findings.worst.copy()
 
-        def work(item: tuple[Batch, dict[str, Where]]) -> Findings:
-            match, found = Match.of(task, item[0]), Findings(item[1])
-            for check in CHECKS:
-                check(match, found)
+        def work(item: tuple[Batch | None, dict[str, Where]]) -> Findings:
+            batch, found = item[0], Findings(item[1])
+            if batch is not None:
+                match = Match.of(task, batch)
+                for check in CHECKS:
+                    check(match, found)
             return found
 
-        for number, found in enumerate(map_in_processes(work, items(), self._processes, busy=True)):
-            findings.parted |= found.parted
-            if guess and findings.parted and (number or batches.guessed):
-                raise _NotProvedError
+        for found in map_in_processes(work, items(), self._processes, busy=True):
+            if len(findings.breaks) >= MOST_BREAKS:
+                continue
             for some in found.poses:
                 poses[:, some[0].astype(np.int64)] = some[1:]
             found.poses = []
             findings.take(found)
+            if len(findings.breaks) >= MOST_BREAKS:
+                text = f"what comes after {MOST_BREAKS} places where the motions part"
+                findings.unlooked.append((findings.breaks[-1], text))
         nc, curves = said()
         findings.unlooked += nc.unlooked
         problems = [problem for problem in nc.problems if self._words or problem.code != CONTROL_WORDS]
