@@ -239,11 +239,8 @@ def test_a_wrong_guess_lets_nothing_pass(used, monkeypatch, processes):
     right = verify(program, text, tolerance=TOLERANCE, processes=processes)
     assert right.passed
 
-    def guess(self, element, start, stop):
-        return np.minimum(start + off, stop)
-
-    monkeypatch.setattr(batches.Batches, "_guess", guess)
     for off in (0.0, 7.5):
+        monkeypatch.setattr(batches.Batches, "_guess", lambda *given, off=off: np.minimum(given[2] + off, given[3]))
         assert verify(program, text, tolerance=TOLERANCE, processes=processes).verdict in ("FAILED", "NOT VERIFIED")
     for number in (1, 30, 39):
         spoilt = text.replace(b"G1 X", b"G1 X9", number + 1).replace(b"G1 X9", b"G1 X", number)
