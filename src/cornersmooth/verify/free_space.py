@@ -10,7 +10,7 @@ Points are columns of arrays (3h, ...): h triples, each of which has to keep the
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Final, TypeAlias
 
 import numpy as np
@@ -73,21 +73,6 @@ class FreeSpace:
     #: mm: how far the motions may leave these segments: it is taken off the radius
     own_bend: Floats
     path_bend: Floats
-
-    def reversed(self) -> FreeSpace:
-        """The same, run backwards."""
-        own, path = self.own[:, ::-1], self.path[:, ::-1]
-        return FreeSpace(own, path, self.radius, self.own_bend[::-1], self.path_bend[::-1])
-
-    def part(self, rows: slice, segments: slice) -> FreeSpace:
-        """Some of its rows, and some of its segments."""
-        return FreeSpace(
-            self.own[:, rows],
-            self.path[:, segments.start : segments.stop + 1],
-            self.radius,
-            self.own_bend[rows.start : rows.stop - 1],
-            self.path_bend[segments],
-        )
 
     def row_radius(self, row: slice, segments: slice) -> Floats:
         """(rows, segments) radius at which rows are free."""
@@ -165,11 +150,11 @@ class FreeSpace:
 
     def between(self, rows: list[Reached], place: float) -> list[Reached]:
         """What of rows, forward from some place, can be reached, and from there the place in the last of them."""
-        first, stop = min(map(min, rows)), max(map(max, rows)) + 1
-        part = self.part(slice(0, len(rows)), slice(first, stop)).reversed()
+        first, stop, last = min(map(min, rows)), max(map(max, rows)) + 1, len(rows) - 1
         # nothing is proved here, and what is free at one point only should not be lost by rounding
-        part = replace(part, radius=part.radius * _WIDER)
-        count = stop - first
+        own, path = self.own[:, last::-1], self.path[:, first : stop + 1][:, ::-1]
+        bends = self.own_bend[:last][::-1], self.path_bend[first:stop][::-1]
+        part, count = FreeSpace(own, path, self.radius * _WIDER, *bends), stop - first
         back = [part.along(0, count - (place - first))]
         back += [reached for _, reached in part.sweep(0, back[0])]
         found = []
