@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -37,20 +38,20 @@ FINI
 
 #: a coolant that no CAM system has: its word in the writer's table, what the reader's list says, blocks of the program
 AIR = {
-    "fanuc": ('XAIR = ["M977"]', {"M977": "coolant XAIR"}, ["M977", "M8", "M977", "M9"]),
-    "siemens": ('XAIR = ["M978"]', {"M978": "coolant XAIR"}, ["M978", "M8", "M978", "M9"]),
+    "fanuc": ('XAIR = ["M977"]', 'M977 = "coolant XAIR"', ["M977", "M8", "M977", "M9"]),
+    "siemens": ('XAIR = ["M978"]', 'M978 = "coolant XAIR"', ["M978", "M8", "M978", "M9"]),
     "haas": (
         'XAIR = ["M983"]',
-        {"M983": "coolant XAIR", "M984": "coolant OFF XAIR"},
+        'M983 = "coolant XAIR"\nM984 = "coolant OFF XAIR"',
         ["M983", "M984", "M8", "M9", "M983", "M984"],
     ),
 }
 
 
 @pytest.fixture
-def _with_air(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def _with_air(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[None]:
     """Tables of both sides with one entry more; HEIDENHAIN has none."""
-    written, listed = Shelf.built_in, word_tables._table
+    written = Shelf.built_in
     caches = (control_tables._built_in, word_tables.word_table, word_tables.means_of, rules.word_list)
 
     def table(self: Shelf, name: str) -> str:
@@ -59,12 +60,12 @@ def _with_air(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         text = text.replace("coolant = {", f"coolant = {{ {entry},") if entry else text
         return text.replace("coolant_off = {", 'coolant_off = { XAIR = ["M984"],')
 
-    def means(control: str) -> dict[str, object]:
-        found = listed(control)
-        return {**found, "means": found["means"] | (AIR[control][1] if control in AIR else {})}
-
+    for control in word_tables.CONTROLS:
+        text = word_tables._LISTS.joinpath(f"{control}.toml").read_text(encoding="utf-8")
+        text = text.replace("[means]", f"[means]\n{AIR[control][1]}") if control in AIR else text
+        (tmp_path / f"{control}.toml").write_text(text, encoding="utf-8")
     monkeypatch.setattr(Shelf, "built_in", table)
-    monkeypatch.setattr(word_tables, "_table", means)
+    monkeypatch.setattr(word_tables, "_LISTS", tmp_path)
     for cached in caches:
         cached.cache_clear()
     yield
@@ -90,7 +91,7 @@ def test_a_new_coolant_of_a_control(control: str) -> None:
     cl = CL.format("COOLNT/XAIR", "COOLNT/XAIR")
     lines, how = _lines(control, cl)
     program = read(cl.encode(), name="air.cls")
-    words = {"M8", "M9", *AIR[control][1]}
+    words = {"M8", "M9", *AIR[control][2]}
     at = [k for k, line in enumerate(lines) if line in words]
     assert [lines[k] for k in at] == AIR[control][2]
     for k in at:

@@ -38,13 +38,9 @@ CONTROLS: Final = tuple(sorted(item.name.removesuffix(".toml") for item in _LIST
 @cache
 def word_table(control: str) -> Mapping[str, Any]:
     """Table of a control, with what it takes over of the control that it is like."""
-    return _table(control)
-
-
-def _table(control: str) -> dict[str, Any]:
     table = tomllib.loads(_LISTS.joinpath(f"{control}.toml").read_text(encoding="utf-8"))
     if "like" in table:
-        base = _table(table.pop("like"))
+        base = word_table(table.pop("like"))
         table = {
             **base,
             **table,

@@ -63,8 +63,9 @@ class WordCheck:
         self._rules = WordRules(self.list, self._positions.rules, lexer, tolerance)
         self.lexer = lexer
         trusted = set(trusted)
-        self._own = [pattern for block in trusted if (pattern := self._pattern(block)) is not None]
-        self._states = WordStates(self.list, self._positions, trusted | {self._text(block) for block in trusted})
+        own = set(map(self._text, trusted))
+        self._own = [re.compile(re.escape(text).replace(_ANY, r"[-+]?[\d.]+")) for text in own if text]
+        self._states = WordStates(self.list, self._positions, trusted | own)
         self._left, self._accepted = trusted, accepted
         self.problems, self._wrong = self._states.problems, self._states.wrong
         #: blocks taken on trust, line and text, and those of them that may bear on the motion
@@ -99,21 +100,13 @@ class WordCheck:
         return "; ".join(told + self._moving)
 
     def _text(self, block: str) -> str:
-        """A block of the user's as the lists have it; empty where it has no words."""
+        """A block of the user's as the lists have it, `_ANY` for what is in braces; empty where it has no words."""
+        block = re.sub(r"\{\w+\}", _ANY, re.sub(r"(^| )(?=\{\w+\})", r"\1G", block))  # alone it is a G word
         try:
             line = self.lexer.line(block.encode("latin-1", "replace"), 0, None)
         except InputError:  # no words: the reader will say so where it meets them
             return ""
         return " ".join(map(word_text, line.words))
-
-    def _pattern(self, block: str) -> re.Pattern[str] | None:
-        """Pattern of a block of the user's, any number for what is in braces; a word of its own is a G word."""
-
-        def number(found: re.Match[str]) -> str:
-            return _ANY if block[: found.start()][-1:] not in ("", " ") else f"G{_ANY}"
-
-        text = self._text(re.sub(r"\{\w+\}", number, block))
-        return re.compile(re.escape(text).replace(_ANY, r"[-+]?[\d.]+")) if text else None
 
     # runs of motion blocks, and lines
 

@@ -39,9 +39,8 @@ _LENGTH: Final = "tool length"
 _PLANES: Final = frozenset(("tilted plane", "swivelled plane"))
 _DYNAMIC: Final = "dynamic work offset"
 
-#: blocks that stop the program, and words of the spindle
+#: blocks that stop the program
 _STOPS: Final = ("M0", "M1", "STOP")
-_SPINDLE: Final = re.compile(r"M[345]")
 
 #: comments that say how a program was made, and the words in them
 _MADE: Final = re.compile(r"CORNERSMOOTH \S+: \w+=", re.IGNORECASE)
@@ -91,9 +90,8 @@ class WordStates:
         self._said: set[str] = set()  # words so far; those that must come again before each of their kind, since then
         self._held: dict[str, _Held] = {}
         self._first: dict[str, str] | None = None  # states at the first motion; "" for those that may come later
-        self._forgotten: dict[str, str] = {}  # states that a word has made the control forget, and that word
-        self._complained: set[tuple[str, int]] = set()
-        self._by_tool: list[Problem] | None = []  # what is wrong unless the program has cycles; None where it has
+        self._others: dict[_Held, str] = {}  # what holds and did not at the first motion, and what is wrong with it
+        self._cycles = False  # whether the program has any, so that some states may differ from tool to tool
         #: where the rotary axes have been sent, as far as that is said, and whether the control has turned them since
         self.angles: dict[str, float] = {}
         self._swivelled = False
@@ -103,12 +101,10 @@ class WordStates:
         self.above = False  # Z has not
         self._over = False  # the tool has been sent over its place since, without tip control
         self._unsaid_at_retract: list[str] | None = None  # what was missing before the first retract
-        # since the last motion:
-        self._changed = True  # words have been said
-        self._arc: tuple[str, int] | None = None  # a word that is for an arc, and its line
-        self._started = False  # the spindle has been started
-        self._stopped: tuple[str, int] | None = None  # the tool change that has stopped it, and its line
-        self._halted: dict[str, str] = {}  # states that a stop has ended, and the stop
+        self._moved = 0  # line of the last motion
+        self._changed = True  # words have been said since
+        #: states that words have ended since, with these and their lines: they must be said again before the next
+        self._ended: dict[str, tuple[str, int]] = {}
 
     # complaints
 
@@ -131,17 +127,13 @@ class WordStates:
     # what holds
 
     @property
-    def _in_force(self) -> list[_Held]:
-        return [held for state, held in self._held.items() if state not in self._forgotten]
-
-    @property
     def _tip_control(self) -> list[str]:
         """Word of tool tip control that holds, if any."""
-        return [held.text for held in self._in_force if held.rule.ends]
+        return [held.text for held in self._held.values() if held.rule.ends]
 
     def _running(self) -> list[str]:
         """Words that are switched off after the last motion of a tool."""
-        on = [held for held in self._in_force if held.rule.tidy]
+        on = [held for held in self._held.values() if held.rule.tidy]
         return [held.text for held in on if not {held.rule.state, held.text} & self._left]
 
     @property
@@ -160,6 +152,7 @@ class WordStates:
         """Take over what a block says, and complain of what is not in its place."""
         self._changed = True
         self._said |= set(words)
+        self._cycles |= any(rule.cycle for _, rule in ruled)
         for word, rule in ruled:
             self._place(line, word, rule)
         for word, rule in ruled:
@@ -174,8 +167,6 @@ class WordStates:
             if not before:
                 self.wrong(line, f"{word} without {shown(rule.after)} before it")
             self._said -= before
-        if rule.cycle:
-            self._by_tool = None
         if rule.rotary == "zero" and (not self.angles or self._positions.away(self.angles)):
             self.unframed(line, f"{word} without the rotary axes at zero before it")
         if rule.high and not self._high:
@@ -190,34 +181,30 @@ class WordStates:
             self._retract = 0
             tell = self.unframed if rule.changes_tool else self.wrong
             tell(line, *[f"{word} under {tip}" for tip in self._tip_control])
-        if rule.changes_tool and self._started:
-            self._started, self._stopped = False, (word, line)
-        if _SPINDLE.fullmatch(word):
-            self._started, self._stopped = word != "M5", None
+        spindle = self._held.get("spindle")
+        if rule.changes_tool and spindle is not None and spindle.rule.tidy and spindle.line > self._moved:
+            self._ended["spindle"] = word, line
 
     def _set(self, line: int, word: str, rule: WordRule, ruled: Ruled) -> None:
         """Take over the state that a word sets, and complain of what a program of our own says around it."""
         if rule.drops in self._held:
-            self._forgotten[rule.drops] = word
+            self._ended[rule.drops] = word, line
         if word in _STOPS:  # ends spindle and coolant on most machines
-            ended = [state for state, held in self._held.items() if held.rule.tidy and held.rule.compared]
-            self._halted = dict.fromkeys(ended, word)
+            on = [state for state, held in self._held.items() if held.rule.tidy and held.rule.compared]
+            self._ended = dict.fromkeys(on, (word, line)) | self._ended
         if rule.state:
             beside = [(other, its) for other, its in ruled if its.needs and its.needs.fullmatch(word)]
             more = [other for other, its in beside if not (its.compared or its.follows)]
             self._held[rule.state] = _Held(" ".join([word, *more]), rule, line)
-            self._forgotten.pop(rule.state, None)
-            self._halted.pop(rule.state, None)
+            self._ended.pop(rule.state, None)
             if not rule.off:
                 unsaid = self._unsaid("used", rule.state)
                 self._lost_since(line, [f"{wanted} must come before {word}" for _, wanted in unsaid])
                 if rule.state in self._approach:  # GOHOME: the same tool comes back as a new one does
                     self._retract = 0
-            if rule.before and self._first is not None and word != self._first.get(rule.state):
-                self._arc = word, line
         if rule.bars is not None:
-            on = [held for held in self._in_force if rule.bars.fullmatch(held.rule.state)]
-            self._lost_since(line, [f"{word} under {held.text}" for held in on if held.rule.tidy or held.rule.ends])
+            barred = [held for held in self._held.values() if rule.bars.fullmatch(held.rule.state)]
+            self._lost_since(line, [f"{word} under {held.text}" for held in barred if held.rule.tidy or held.rule.ends])
         if rule.rotary == "zero" or (rule.rotary and self._high):  # elsewhere they are where the last motion left them
             self._tip_on = rule, dict(self.angles)
         if rule.off and rule.state == _LENGTH and self._first is not None and self._retracts and not self.above:
@@ -248,28 +235,25 @@ class WordStates:
 
         `moves`: along Z, whatever the words are; `drills`: in a cycle of the control, so it does not go there at once.
         """
-        if self._stopped is not None:
-            word, number = self._stopped
-            self.wrong(number, f"{word} stops the spindle that was started before it")
-        ended = [(stop, self._held[state].text) for state, stop in self._halted.items() if state not in self._left]
-        self._lost_since(line, [f"{stop} ends {word}, and the tool moves on without it" for stop, word in ended])
+        for state, (word, number) in self._ended.items():
+            if self._held[state].rule.compared and word not in _STOPS:
+                self.wrong(number, f"{word} stops the spindle that was started before it")
+            elif state not in self._left and word in _STOPS:
+                self._lost_since(line, [f"{word} ends {self._held[state].text}, and the tool moves on without it"])
+            elif state not in self._left:
+                self.unframed(line, f"{state}: it must come after {word}, which deselects it", code=NOT_ESTABLISHED)
         if not drills:
             self._lost_since(line, list(self._approached(words)))
         late = set()
         if self.above and code == 0.0 and not (moves or "Z" in words):
             late = {state for state in self._late & self._held.keys() if self._held[state].off}
-        for state, word in self._forgotten.items():
-            if state not in self._left:
-                self.unframed(line, f"{state}: it must come after {word}, which deselects it", code=NOT_ESTABLISHED)
         first = self._begin(line, late) if self._first is None else self._first
-        self._compare(late, first)
+        self._compare(late, first, arc=code in (2.0, 3.0))
         if self._retract and not late:
             self.wrong(self._retract, GONE_ON)
             self._retract = 0
-        if self._arc is not None and code not in (2.0, 3.0):
-            self.wrong(self._arc[1], f"{self._arc[0]} where no arc follows")
-        self._changed = self._high = self._started = False
-        self._arc, self._stopped, self._halted, self._forgotten = None, None, {}, {}
+        self._moved, self._ended = line, {}
+        self._changed = self._high = False
 
     def _begin(self, line: int, late: Set[str]) -> dict[str, str]:
         """Look at what holds at the first motion, and return it."""
@@ -281,19 +265,18 @@ class WordStates:
                 self.unframed(line, f"{state}: {wanted} must come before the first motion", code=NOT_ESTABLISHED)
         return self._first
 
-    def _compare(self, late: Set[str], first: dict[str, str]) -> None:
+    def _compare(self, late: Set[str], first: dict[str, str], *, arc: bool) -> None:
         """Complain of states that are not what they were at the first motion, where nobody else compares them."""
         for state, held in self._held.items():
             if state not in late and first.get(state) == "":
                 first[state] = held.text
-            known = held.rule.follows or state in late or held.text == first.get(state)
-            if not known and (state, held.line) not in self._complained:
-                self._complained.add((state, held.line))
-                text = f"{state}: {held.text} where {first.get(state, 'nothing')} holds for the whole program"
-                if not held.rule.tool:
-                    self.wrong(held.line, text)
-                elif self._by_tool is not None:
-                    self._by_tool.append(Problem(NOT_LISTED, 0, held.line, text))
+            if state in late or held.text == first.get(state):
+                continue
+            if held.rule.before and held.line > self._moved and not arc:
+                self.wrong(held.line, f"{held.text} where no arc follows")
+            if not held.rule.follows:
+                other = f"{state}: {held.text} where {first.get(state, 'nothing')} holds for the whole program"
+                self._others.setdefault(held, other)
 
     def _approached(self, words: Mapping[str, float]) -> Iterator[str]:
         """What is wrong with a motion of the words of a block, the first after a retract or after other words."""
@@ -318,7 +301,7 @@ class WordStates:
             if unknown and rule.rotary == "zero":
                 yield f"tool tip control comes on before {' and '.join(unknown)} stands at zero"
         if comes_down:
-            on = {held.rule.state: held.text for held in self._in_force if not held.rule.off}
+            on = {held.rule.state: held.text for held in self._held.values() if not held.rule.off}
             for rule in self._list.words:
                 if rule.down and rule.state not in on and any_of(rule.down, on.values()):
                     yield f"the tool comes down from a retract without {shown(rule.pattern)}"
@@ -328,7 +311,7 @@ class WordStates:
 
     def _tilted(self, words: Mapping[str, float]) -> bool | None:
         """Whether X and Y lie in another plane in the part than on the machine; None where that is not known."""
-        on = {held.rule.state: held.text for held in self._in_force if not held.rule.off}
+        on = {held.rule.state: held.text for held in self._held.values() if not held.rule.off}
         plane = [text for state, text in on.items() if state in _PLANES]
         if plane:
             return any(map(float, _DECIMAL.findall(plane[0])))
@@ -345,7 +328,7 @@ class WordStates:
 
     def _wrong_offset(self) -> Iterator[str]:
         """What is wrong with the work offset, one for the whole program."""
-        held = next((held for held in self._in_force if held.rule.state == _OFFSET), None)
+        held = next((held for held in self._held.values() if held.rule.state == _OFFSET), None)
         made_for = self._made.get("OFFSET", "")
         if held is None or _OFFSET in self._left or made_for == "NONE":
             return
@@ -355,11 +338,11 @@ class WordStates:
 
     def end(self, line: int) -> None:
         """Look at what holds where the program ends; `line` is that of its end."""
-        self.problems += self._by_tool or []
-        off = {rule.state for rule in self._list.words if rule.off}
-        for state in sorted(off & self._held.keys()):
-            held = self._held[state]
-            if not held.off:
+        for held, text in self._others.items():
+            if not (held.rule.tool and self._cycles):
+                self.wrong(held.line, text)
+        for state, held in self._held.items():
+            if not held.off and any(rule.off for rule in self._list.words if rule.state == state):
                 text = f"{state}: {held.text} of line {held.line} still holds at the end"
                 self.unframed(line, text, code=NOT_ESTABLISHED)
         if not self._high and self._retracts:
