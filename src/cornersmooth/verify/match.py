@@ -156,7 +156,7 @@ class Match(Batch, Decision):
         """(k,) the same, from the places of the first and the last of some written vertices."""
         there = np.zeros(len(pose), np.bool_)
         start, end = self.place[[first, last]].tolist()
-        bottom = int(start)
+        bottom = min(int(start), self.path.segments - 1)
         top = min(max(math.ceil(end), bottom + 1), self.path.segments)
         bend = self.motion.bend[first:last]
         radius = self.task.radius + float(bend.max(initial=0.0))
