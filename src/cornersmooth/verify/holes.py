@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cornersmooth.model import Bools, Floats, Ints, Move
 from cornersmooth.nc_reader.ahead import Ahead
@@ -36,21 +37,29 @@ class HoleLines:
 
     def exact(self, moves: Ints, elements: Ints) -> Bools:
         """(k,) whether elements end exactly at the poses of moves."""
+        return self.missed(moves, elements)[0]
+
+    def missed(self, moves: Ints, elements: Ints) -> tuple[Bools, Floats]:
+        """(k,) whether elements end exactly at the poses of moves, and by how much, mm, they miss them."""
         own = elements - self.ahead.base
-        return digit_errors(self.ahead.nc, own, self.tip[moves], self.axis[moves], self.axis_length)[0]
+        return digit_errors(self.ahead.nc, own, self.tip[moves], self.axis[moves], self.axis_length)
 
     def heights(self, moves: Ints, elements: Ints) -> Floats:
         """(k,) mm above the poses of holes at the ends of straight elements; NaN beside a hole or with another axis."""
-        nc, own, axis = self.ahead.nc, elements - self.ahead.base, self.axis[moves]
-        away = nc.tip[own] - self.tip[moves]
-        height = np.einsum("ij,ij->i", away, axis)
-        beside = np.linalg.norm(away - height[:, None] * axis, axis=1)
-        turned = np.linalg.norm(directions(nc, nc.tip[own], nc.second[own]) - axis, axis=1)
+        nc, own = self.ahead.nc, elements - self.ahead.base
         # what the printed angles of a tilted plane leave open
         lean = np.where(nc.tip_room[own] > 0.0, nc.second_room[own], 0.0)
-        on = beside <= self.room + lean * np.abs(height)
-        on &= turned * self.axis_length <= 2 * self.room + lean * self.axis_length
-        return np.where(on & self._straight(own), height, np.nan)
+        over = self._above(moves, nc.tip[own], directions(nc, nc.tip[own], nc.second[own]), lean)
+        return np.where(_straight(nc.kind[own]), over, np.nan)
+
+    def _above(self, moves: Ints, tip: Floats, axis: Floats, lean: Floats | float = 0.0) -> Floats:
+        """(k,) mm above the poses of holes at tips (k, 3); NaN beside a hole or with another axis."""
+        away = tip - self.tip[moves]
+        height = np.einsum("ij,ij->i", away, self.axis[moves])
+        beside = np.linalg.norm(away - height[:, None] * self.axis[moves], axis=1)
+        turned = np.linalg.norm(axis - self.axis[moves], axis=1) * self.axis_length
+        on = (beside <= self.room + lean * np.abs(height)) & (turned <= 2 * self.room + lean * self.axis_length)
+        return np.where(on, height, np.nan)
 
     def at(self, move: int, element: int) -> bool:
         """Whether an element ends exactly at the pose of a move, or stands after one that does."""
@@ -99,7 +108,7 @@ class HoleLines:
         """(k,) whether elements lead nowhere: a full circle ends where it begins, and does."""
         nc, own = self.ahead.nc, elements - self.ahead.base
         ways = (values[own] - values[np.maximum(own - 1, 0)] for values in (nc.tip, nc.second))
-        return (own > 0) & self._straight(own) & ~leads_somewhere(nc, *ways)
+        return (own > 0) & _straight(nc.kind[own]) & ~leads_somewhere(nc, *ways)
 
     def block(self, element: int) -> range:
         """Elements of the block of one: rotary words make several lines of it."""
@@ -113,19 +122,11 @@ class HoleLines:
         way = nc.tip[[max(own[0] - 1, 0), *own]]
         chord = np.zeros((len(own) - 1, 1), np.int64)
         _, beside = on_segments(way[1:-1, None], way[[0, -1]], chord, COLUMNS["tip"])
-        return bool(self._straight(own).all() and (beside <= self.tolerance**2).all())
-
-    def _straight(self, own: Ints) -> Bools:
-        """(k,) whether elements at hand are no arcs and no curves."""
-        kind = self.ahead.nc.kind[own]
-        straight: Bools = (kind == Element.RAPID) | (kind == Element.LINE)
-        return straight
+        return bool(_straight(nc.kind[own]).all() and (beside <= self.tolerance**2).all())
 
     def in_line(self, move: int, other: int) -> bool:
         """Whether the pose of another move is in the line of a hole, as far as the digits show."""
-        away, turned = (values[other] - values[move] for values in (self.tip, self.axis))
-        beside = np.linalg.norm(away - (away @ self.axis[move]) * self.axis[move])
-        return bool(beside <= self.room and np.linalg.norm(turned) * self.axis_length <= 2 * self.room)
+        return not np.isnan(self._above(np.array([move]), self.tip[[other]], self.axis[[other]]))[0]
 
     def nc_line(self, element: int) -> int:
         """NC line of an element."""
@@ -136,37 +137,22 @@ class HoleLines:
         nc_line = self.nc_line(element) if element >= 0 else 0
         return Problem(code, int(self.line[min(move, len(self.line) - 1)]), nc_line, text, amount)
 
-    def off(self, move: int, element: int) -> float:
-        """By how much, mm, an element misses the pose of a move."""
-        own = np.array([element - self.ahead.base])
-        return float(digit_errors(self.ahead.nc, own, self.tip[[move]], self.axis[[move]], self.axis_length)[1][0])
-
     def leads(self, first: int, stop: int) -> bool:
         """Whether moves, up to `stop` that excluded, lead anywhere from the pose of the first."""
         tip, axis = (np.linalg.norm(values[first:stop] - values[first], axis=1) for values in (self.tip, self.axis))
         return bool(max(tip.max(), self.axis_length * axis.max()) > self.room)
 
-    def tapped(self, feeds: list[int], cycle: Drilling) -> bool:
-        """Whether the first of the feed moves in a hole is that of its thread."""
-        if not feeds:
-            return False
-        nc, own = self.ahead.nc, feeds[0] - self.ahead.base
-        return bool(nc.per_revolution[own] and nc.carry(own, cycle.feed, True))
-
-    def wrong_feed(self, element: int, cycle: Drilling) -> bool:
-        """Whether the feed of an element is not that of a cycle."""
-        own = element - self.ahead.base
-        return not (math.isnan(cycle.feed) or self.ahead.nc.carry(own, cycle.feed, cycle.per_revolution))
+    def _carries(self, element: int, feed: float, *, per_revolution: bool) -> bool:
+        """Whether an element has a feed."""
+        return bool(self.ahead.nc.carry(element - self.ahead.base, feed, per_revolution))
 
     def fed_above(self, move: int, element: int, cycle: Drilling) -> bool:
         """Whether a feed move ends above a hole, where no cycle feeds."""
         highest = max(cycle.clearance, cycle.level) + self.room
         return self.feeds(element) and self.height(move, element) > highest
 
-    def check(self, move: int, elements: range, cycle: Drilling, *, left: bool = True) -> tuple[list[Problem], bool]:
+    def check(self, move: int, elements: range, cycle: Drilling) -> tuple[list[Problem], bool]:
         """What is wrong with a hole that has some elements, and whether it is left out as it may be.
-
-        Where it is not `left` yet, only what nothing can mend that follows.
 
         CS541 a wrong feed, CS561 a hole is missing, CS562 a wrong depth, CS563 a rapid inside or beside a hole, CS564 a
         feed that is not a hole's.
@@ -178,60 +164,65 @@ class HoleLines:
         def say(code: str, element: int, text: str, amount: float = math.nan) -> None:
             found.append(self.problem(code, move, element, text, amount))
 
-        if math.isnan(cycle.depth) or (cycle.tap and not self.tapped(feeds, cycle)):
+        tapped = bool(feeds) and self._carries(feeds[0], cycle.feed, per_revolution=True)
+        if math.isnan(cycle.depth) or (cycle.tap and not tapped):
             if feeds:
                 say("CS564", feeds[0], "the cycle does not say what is fed here")
-            elif height and (lowest := min(height.values())) < -self.room:
-                element = next(k for k in height if height[k] == lowest)
-                say("CS563", element, f"a rapid goes {-lowest:.4f} mm into the uncut hole", -lowest)
+            elif height and height[lowest := min(height, key=lambda k: height[k])] < -self.room:
+                depth = -height[lowest]
+                say("CS563", lowest, f"a rapid goes {depth:.4f} mm into the uncut hole", depth)
             return found, cycle.tap or not feeds
         if not feeds:
-            if left and cycle.depth > self.room:
+            if cycle.depth > self.room:
                 say("CS561", next(iter(height), -1), "a hole of the CL file is not drilled")
             return found, False
         first, last = next(iter(height)), next(reversed(height))
         deepest = min(feeds, key=lambda k: height[k])
-        off = height[deepest] + cycle.depth
-        if abs(off) > self.room and (left or off < 0):
+        if abs(off := height[deepest] + cycle.depth) > self.room:
             text = f"a hole is {abs(off):.4f} mm too {'shallow' if off > 0 else 'deep'}"
             say("CS562", deepest, text, abs(off))
-        behind = next((k for k in height if k > deepest), None)
-        if cycle.feed_out and behind is not None and not self.feeds(behind) and (left or off <= self.room):
-            say("CS563", behind, "a rapid leaves a hole that the tool is to leave at feed")
+        after = next((k for k in height if k > deepest), deepest)
+        if cycle.feed_out and not self.feeds(after):
+            say("CS563", after, "a rapid leaves a hole that the tool is to leave at feed")
         before = self.height(move, max(first - 1, 0))
-        low = [(last, cycle.level)] if left and move + 1 < len(self.tip) and not self.in_line(move, move + 1) else []
-        if move and self.kind[move - 1] == Move.HOLE and math.isnan(before) and not self.feeds(first):
-            turned = float(np.linalg.norm(self.axis[move] - self.axis[move - 1]))
-            if turned * self.axis_length <= 2 * self.room:
-                step = min(float((self.tip[move - 1] - self.tip[move]) @ self.axis[move]), 0.0)
-                low.append((first, cycle.level + step))
-        for k, level in low:  # what is in the hole is said as such
-            if self.room < (amount := level - height[k]) < cycle.level + self.room:
+        beside = math.isnan(before)
+        low = [(last, cycle.level)] if move + 1 < len(self.tip) and not self.in_line(move, move + 1) else []
+        if beside and not self.feeds(first) and move and self.kind[move - 1] == Move.HOLE:
+            way, turn = (values[move - 1] - values[move] for values in (self.tip, self.axis))
+            if np.linalg.norm(turn) * self.axis_length <= 2 * self.room:
+                low.append((first, cycle.level + min(float(way @ self.axis[move]), 0.0)))
+        for k, level in low:
+            if self.room < (amount := level - height[k]) < cycle.level + self.room:  # in the hole it is said as such
                 text = f"a rapid beside a hole runs {amount:.4f} mm below the height of its cycle (RTRCTO, RAPTO)"
                 say("CS563", k, text, amount)
+        if self.feeds(first) and beside:
+            say("CS563", first, "a feed move enters a hole from the side")
+        if self.feeds(first) and before < -self.room and self.kind[move - 1] == Move.HOLE:
+            say("CS563", first, f"a rapid goes {-before:.4f} mm into the uncut hole", -before)
         free = 0.0 if math.isnan(cycle.clearance) else cycle.clearance  # height down to which rapids may go
         drilled, deep, above = 0.0, False, math.inf
-        for k in height:
+        for k, here in height.items():
             if self.feeds(k):
-                if k == first and math.isnan(before):
-                    say("CS563", k, "a feed move enters a hole from the side")
-                if k == first and before < -self.room and self.kind[move - 1] == Move.HOLE:
-                    say("CS563", k, f"a rapid goes {-before:.4f} mm into the uncut hole", -before)
-                if self.wrong_feed(k, cycle):
+                if not (math.isnan(cycle.feed) or self._carries(k, cycle.feed, per_revolution=cycle.per_revolution)):
                     feed = self.ahead.nc.feed[k - self.ahead.base]
                     say("CS541", k, f"the feed is {feed:g}, the cycle says {cycle.feed:g}")
-                down = above > height[k]
+                down = above > here
                 if down and self.fed_above(move, k, cycle):
                     say("CS564", k, "a feed move ends above the heights of the cycle")
-                cut = deep or (drilled > self.room and self.room < -height[k])
-                if down and cut and -height[k] <= drilled + ARITHMETIC:
+                cut = deep or (drilled > self.room and self.room < -here)
+                if down and cut and -here <= drilled + ARITHMETIC:
                     say("CS562", k, "a hole is drilled again")
-                deep = deep or height[k] <= self.room - cycle.depth
-                drilled, free = max(drilled, -height[k]), min(free, height[k])
-            elif height[k] < free - self.room:
+                deep = deep or here <= self.room - cycle.depth
+                drilled, free = max(drilled, -here), min(free, here)
+            elif here < free - self.room:
                 where = "into the uncut hole" if free <= 0.0 else "below the height where the feed begins (RAPTO)"
-                say("CS563", k, f"a rapid goes {free - height[k]:.4f} mm {where}", free - height[k])
-            above = height[k]
-        if left and height[last] < -self.room:
-            say("CS563", last, "the tool leaves a hole sideways", -height[last])
+                say("CS563", k, f"a rapid goes {free - here:.4f} mm {where}", free - here)
+            above = here
+        if above < -self.room:
+            say("CS563", last, "the tool leaves a hole sideways", -above)
         return found, False
+
+
+def _straight(kind: NDArray[np.uint8]) -> Bools:
+    """(k,) whether elements of some kinds are no arcs and no curves."""
+    return (kind == Element.RAPID) | (kind == Element.LINE)
