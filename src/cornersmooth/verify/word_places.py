@@ -106,18 +106,20 @@ class WordPlaces:
         self._still |= still
         program = original.program
         length = float(path.length[-1]) if len(original.pose) else 0.0
+        # CL path lengths where the moves end; before the first, `_BEFORE`
+        moves = np.append(_BEFORE, path.length[original.trail.last])
         hole, move, after = np.frombuffer(batches.holes, np.int64).reshape(-1, 3).T.copy()
         stop, there, begin = np.frombuffer(batches.stops).reshape(-1, 3).T.copy()
         # what is known best comes last
         self._ends = {element: at for element, (at, _) in found.words.items()}
         # an element that reaches several stops is at the first of them, and where the next begins at the last
-        self._ends |= _by_element(stop[::-1], there[::-1]) | _by_element(hole, self._of_moves(move))
-        self._begins = _by_element(stop + 1, there) | _by_element(hole, self._of_moves(np.maximum(after - 1, 0)))
+        self._ends |= _by_element(stop[::-1], there[::-1]) | _by_element(hole, moves[move + 1])
+        self._begins = _by_element(stop + 1, there) | _by_element(hole, moves[np.maximum(after, 1)])
         self._begins |= _by_element(stop, begin) | {batches.elements: length}
         self._others = {element: others for element, (_, others) in found.words.items() if others}
         self._ended, self._holes = sorted(self._ends), frozenset(hole.tolist())
-        statements = self._statement_lengths()
-        theirs = asked(program, statements, length, means, self._of_holes())
+        statements = moves[np.searchsorted(original.pose, [one.pose for one in program.statements])].tolist()
+        theirs = asked(program, statements, length, means, self._of_holes(moves))
         theirs = [token for token in theirs if token.kind != "auxiliary" or token.value not in clamps]
         here = list(map(self._of, self._events))
         # behind a rapid that leads nowhere they belong with those before it
@@ -132,10 +134,6 @@ class WordPlaces:
             if any(-room <= home - place.at <= place.reach + room for home in homes)
         }
         return wrong, at_home
-
-    def _of_moves(self, moves: Ints) -> Floats:
-        """(k,) where moves of the CL file end."""
-        return self._task.path.length[self._task.original.trail.last[moves]]
 
     def _of(self, event: Event) -> Place:
         """Where a word is: at the end of the element before it; that of a tap at the hole that is fed next.
@@ -154,25 +152,13 @@ class WordPlaces:
         reach = max(self._begins.get(following, -math.inf) - at, 0.0)
         return Place(at, self._rooms.get(before, 0.0), reach, self._others.get(before, ()))
 
-    def _statement_lengths(self) -> list[float]:
-        """CL path length, mm, where every statement of the CL file stands."""
-        original = self._task.original
-        move = np.searchsorted(original.pose, [statement.pose for statement in original.program.statements]) - 1
-        if not len(original.pose):
-            return [_BEFORE] * len(move)
-        return np.where(move >= 0, self._of_moves(np.clip(move, 0, None)), _BEFORE).tolist()
-
-    def _of_holes(self) -> list[Token]:
+    def _of_holes(self, moves: Floats) -> list[Token]:
         """What the cycles of holes ask for: to wait at the bottom, and to tap."""
         original = self._task.original
         asked_for = [("dwell", float(time), move) for move, time in self._batches.dwells]
         asked_for += [("tap", TAP, move) for move in self._batches.taps]
-        line = original.program.line
-        there = self._of_moves(np.array([move for _, _, move in asked_for], np.int64)).tolist()
-        return [
-            Token(kind, value, at, int(line[original.pose[move]]))
-            for (kind, value, move), at in zip(asked_for, there, strict=True)
-        ]
+        line = original.program.line[original.pose]
+        return [Token(kind, value, float(moves[move + 1]), int(line[move])) for kind, value, move in asked_for]
 
 
 def _by_element(elements: Ints | Floats, lengths: Floats) -> dict[int, float]:
