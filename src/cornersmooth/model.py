@@ -29,6 +29,9 @@ Units = Literal["mm", "inch"]
 #: millimetres per unit
 MM_PER_UNIT: dict[Units, float] = {"mm": 1.0, "inch": 25.4}
 
+#: angles nearer to a limit are at the limit, degrees
+_ROUNDING = 1e-9
+
 
 class Move(IntEnum):
     """How a pose is reached (`Program.kind`)."""
@@ -207,6 +210,18 @@ class Program:
     def feed_at(self, pose: Ints) -> Floats:
         """Feeds of the moves into some poses, mm/min; NaN for none, and per revolution."""
         return np.where(self.feed_mode[pose] == FeedMode.PER_MINUTE, self.feed[pose], np.nan)
+
+    def axis_steps(self, moves: Bools, limit: float) -> tuple[Ints, Floats]:
+        """Poses (k,) where those of `moves` (n,) end that turn the tool axis beyond a limit, and the turns; degrees."""
+        axis, stated = self.axis, self.kind == Move.FROM
+        far = moves[1:] & ~stated[1:] & ~stated[:-1]
+        # a first look: the cosine is coarse
+        far &= np.einsum("ij,ij->i", axis[1:], axis[:-1]) < np.cos(np.radians(limit)) + _ROUNDING
+        pose = 1 + np.flatnonzero(far)
+        here, there = axis[pose - 1], axis[pose]
+        turn = np.degrees(2.0 * np.arctan2(np.linalg.norm(there - here, axis=1), np.linalg.norm(there + here, axis=1)))
+        beyond = turn > limit + _ROUNDING
+        return pose[beyond], turn[beyond]
 
     @property
     def mm_per_unit(self) -> float:

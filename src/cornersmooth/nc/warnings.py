@@ -18,7 +18,6 @@ from cornersmooth.nc.first_block import UPRIGHT
 from cornersmooth.nc.form import Form
 from cornersmooth.rotary import rapid_moves
 from cornersmooth.settings import FLIP_ANGLE
-from cornersmooth.smoothing import axis_steps
 from cornersmooth.vectors import dot
 
 #: cosine of the angle from hole to hole beyond which the tool turns between them
@@ -58,7 +57,7 @@ def _arcs(circles: Circles, program: Program, findings: Findings) -> None:
 
 def _flips(program: Program, findings: Findings) -> None:
     """Rapids whose axis turns by nearly half a turn; feed moves that do so are refused before."""
-    poses, _ = axis_steps(program, rapid_moves(program.kind), FLIP_ANGLE)
+    poses, _ = program.axis_steps(rapid_moves(program.kind), FLIP_ANGLE)
     text = (
         f"the tool axis turns by more than {FLIP_ANGLE:g} deg in a rapid, and which way a control turns is not "
         "defined; keep clear of the part there, or insert a pose in between"

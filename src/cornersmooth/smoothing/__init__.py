@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from cornersmooth.errors import Finding, InputError
-from cornersmooth.model import Bools, Floats, Ints, Move, Program, SmoothProgram
+from cornersmooth.model import Bools, Move, Program, SmoothProgram
 from cornersmooth.settings import FLIP_ANGLE, Settings
 from cornersmooth.smoothing.construction import construction_of
-from cornersmooth.vectors import dot, norm
-
-#: angles nearer to a limit are at the limit, degrees
-_ROUNDING = 1e-9
 
 
 def smooth(
@@ -38,21 +33,9 @@ def smooth(
     return replace(smoothed, findings=(*smoothed.findings, *axis_step_findings(program, settings)))
 
 
-def axis_steps(program: Program, moves: Bools, limit: float) -> tuple[Ints, Floats]:
-    """Poses (k,) that `moves` (n,) end in which turn the tool axis by more than a limit, and these turns; degrees."""
-    axis, stated = program.axis, program.kind == Move.FROM
-    far = moves[1:] & ~stated[1:] & ~stated[:-1]
-    far &= dot(axis[1:], axis[:-1]) < math.cos(math.radians(limit)) + _ROUNDING  # a first look: the cosine is coarse
-    pose = 1 + np.flatnonzero(far)
-    here, there = axis[pose - 1], axis[pose]
-    turn = np.degrees(2.0 * np.arctan2(norm(there - here), norm(there + here)))
-    beyond = turn > limit + _ROUNDING
-    return pose[beyond], turn[beyond]
-
-
 def refuse_flips(program: Program) -> None:
     """Refuse a feed move, line or arc, whose axis turns by more than `cornersmooth.settings.FLIP_ANGLE`: CS183."""
-    pose, turn = axis_steps(program, _feed_moves(program), FLIP_ANGLE)
+    pose, turn = program.axis_steps(_feed_moves(program), FLIP_ANGLE)
     if len(pose):
         raise InputError(
             "CS183",
@@ -65,7 +48,7 @@ def refuse_flips(program: Program) -> None:
 
 def axis_step_findings(program: Program, settings: Settings) -> tuple[Finding, ...]:
     """Feed moves whose axis turns by more than `Settings.max_axis_step`: no corner beside them is rounded."""
-    pose, turn = axis_steps(program, _feed_moves(program), settings.max_axis_step)
+    pose, turn = program.axis_steps(_feed_moves(program), settings.max_axis_step)
     if not len(pose):
         return ()
     text = (

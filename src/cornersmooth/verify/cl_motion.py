@@ -24,9 +24,6 @@ CL_SHARE: Final = 1.0 / 128.0
 #: bend of what has none, as where the axis turns over, mm: it is not proved and not divided
 UNBOUND: Final = 1e9
 
-#: cosine of a turn that is surely smaller than `FLIP_ANGLE`
-_HALF_COSINE: Final = -0.5
-
 #: parts of a motion between two poses at most; what bends more is not proved
 _MOST_PARTS: Final = 1 << 13
 
@@ -149,15 +146,9 @@ def half_turns(program: Program) -> list[Problem]:
 
     Between opposite axes there is no great circle, and near them it hangs on the last digits of both.
     """
-    axis, kind = program.axis, program.kind
-    fed = np.isin(kind[1:], (Move.LINEAR, Move.ARC)) & (kind[:-1] != Move.FROM)
-    poses = 1 + np.flatnonzero(fed & (np.einsum("ij,ij->i", axis[1:], axis[:-1]) < _HALF_COSINE))
-    here, before = axis[poses], axis[poses - 1]
-    turn = 2.0 * np.arctan2(np.linalg.norm(here - before, axis=1), np.linalg.norm(here + before, axis=1))
-    problems = []
-    for pose, degrees in zip(poses.tolist(), np.degrees(turn).tolist(), strict=True):
-        if degrees <= FLIP_ANGLE + 1e-9:
-            continue
-        text = f"the tool axis turns by {degrees:.4g} deg in one move, and which way a control turns is not defined"
-        problems.append(Problem("CS526", int(program.line[pose]), 0, text))
-    return problems
+    found = program.axis_steps(np.isin(program.kind, (Move.LINEAR, Move.ARC)), FLIP_ANGLE)
+    text = "the tool axis turns by {:.4g} deg in one move, and which way a control turns is not defined"
+    return [
+        Problem("CS526", int(program.line[pose]), 0, text.format(turn))
+        for pose, turn in zip(*(values.tolist() for values in found), strict=True)
+    ]
