@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_left
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any, Final
 
 import numpy as np
@@ -34,6 +35,8 @@ _MOST_PLACES: Final = 18
 #: bytes of a line, its end included, that is read in runs; bytes that are compared at a time
 _LONGEST: Final = 512
 _PART: Final = 128
+#: lines that are compared at a time: so many fit the cache
+_LINES: Final = 1 << 13
 #: bits of a key that lead to a shape
 _KEY_BITS: Final = 16
 #: stands for a number with a point
@@ -41,7 +44,7 @@ _MARK: Final = b"\x01"
 _NUMBER: Final = re.compile(rb"(?P<sign>[-+]?)(?P<whole>\d*)(?P<point>\.?)(?P<part>\d*)(?P<power>E[-+]?\d+)?")
 
 #: the bytes after the point, for so many decimals; all where there is no point
-_BEHIND = np.array([((1 << (8 * k)) - 1) << (64 - 8 * k) for k in range(9)] + [(1 << 64) - 1], np.uint64)
+_AFTER = np.array([((1 << (8 * k)) - 1) << (64 - 8 * k) for k in range(9)] + [(1 << 64) - 1], np.uint64)
 _TENS = np.array([float(f"1e{k}") for k in range(DIGITS + 1)])
 _EIGHT, _HALF, _REST = np.uint64(8), np.uint64(32), np.uint64(56)
 
@@ -58,11 +61,10 @@ class _Kind:
     Places are counted from the begin of the next of these numbers, or from the end of the line.
     """
 
-    #: columns, those of `constants` at the end; None for lines that are read on their own
-    names: tuple[str, ...] | None = None
-    constants: tuple[float, ...] = ()  #: columns that are the same in all lines
-    #: for each other column: the next number with a point, what is taken of its row in `_pointed`, what is added
-    columns: tuple[tuple[int, tuple[int, ...], tuple[int, ...]], ...] = ()
+    names: tuple[str, ...] | None = None  #: columns; None for lines that are read on their own
+    #: for each column: the next number with a point, what is taken of its row in `_pointed`, what is added to that, and
+    #: to the number
+    columns: tuple[tuple[int, tuple[int, ...], tuple[int, ...], float], ...] = ()
     places: tuple[tuple[int, int], ...] = ()  #: of digits that stand for themselves: the next such number, and where
 
 
@@ -88,22 +90,25 @@ class LinePatterns:
         #: of each shape: where digits stand for themselves, -1 behind those; the digits met first, and their pattern
         self._places, self._usual = np.full((1, _MOST_PLACES), -1), np.zeros((1, 2), np.int64)
         self._others: dict[tuple[int, int], int] = {}  # patterns of a shape with other digits
-        #: kinds by their lines, and those with the same columns by these
-        self._kinds: dict[bytes, int] = {}
+        self._kinds: dict[bytes, int] = {}  # by their lines
         self._most: dict[bytes, Ints] = {}  # decimals of their numbers so far
-        self._groups: dict[tuple[Any, int], int] = {}
         self.kinds = [_Kind()]
-        #: (p, 3): of each pattern its kind, the number of its columns, and where its rows of `fields` begin; the first
-        #: is that of lines that are read on their own
-        self.known = np.zeros((1, 3), np.int64)
-        #: (f, 6): where in the line a number begins, its bytes, its digits, its decimals (-1 without a point), 1 with
-        #: a minus sign, 1 where it is left to `float`
-        self.fields = np.zeros((0, 6), np.int64)
+        #: (p, 2): of each pattern its kind, and where its rows of `fields` begin; the first is that of lines that are
+        #: read on their own
+        self.known = np.zeros((1, 2), np.int64)
+        #: (f, 5): where in the line a number begins, its bytes, its digits (more than are read here if it has an
+        #: exponent), its decimals (-1 without a point), 1 with a minus sign; and (f,) what is added to it
+        self.fields, self.added = np.zeros((0, 5), np.int64), np.zeros(0)
 
     def label(self, text: bytes, start: Ints, size: Ints) -> Ints:
         """(l,) rows of `known`: the pattern of each line of a text; its first byte, and its size with its end."""
+        if len(self._rows) > len(start):  # few of them are met again
+            self._forget()
         raw = np.frombuffer(text, np.uint8)
-        shape = self._shape(text, raw, start, size)
+        marks = raw - np.uint8(ord("0"))
+        marks *= marks > 9  # zero for digits
+        some = [slice(first, first + _LINES) for first in range(0, len(start), _LINES)]
+        shape = np.concatenate([self._shape(text, marks, start[rows], size[rows]) for rows in some])
         self.fresh += [_line(text, start[row]) for row in np.flatnonzero(shape == 0).tolist()]
         digits = _digits(raw, start, self._places, shape)
         label = self._usual[:, 1][shape]
@@ -116,10 +121,8 @@ class LinePatterns:
         label[others] = [self._others[key] for key in keys]
         return label
 
-    def _shape(self, text: bytes, raw: Bytes, start: Ints, size: Ints) -> Ints:
+    def _shape(self, text: bytes, marks: Bytes, start: Ints, size: Ints) -> Ints:
         """(l,) shape of each line."""
-        marks = raw - np.uint8(ord("0"))
-        marks *= marks > 9  # zero for digits
         key, parts = np.zeros(len(start), np.uint64), list(_parts(marks, start, size))
         for rows, columns, words in parts:
             key[rows] += (words ^ (words >> _HALF)) @ _FACTORS[columns]
@@ -129,9 +132,6 @@ class LinePatterns:
         if len(unknown):
             found, first, inverse = np.unique(key[unknown], return_index=True, return_inverse=True)
             new = np.sort(unknown[first[[one not in self._rows for one in found.tolist()]]])
-            if len(new) and len(self._rows) > len(start):  # few of them are met again
-                self._forget()
-                return self._shape(text, raw, start, size)
             if len(new):
                 self._learn(key[new], marks, start[new], size[new], [_line(text, begin) for begin in start[new]])
             shape[unknown] = np.array([self._rows[one] for one in found.tolist()])[inverse]
@@ -166,13 +166,13 @@ class LinePatterns:
         rows_of: dict[bytes, list[int]] = {}
         for row, name in zip(range(len(lines)), kinds.split(b"\n")[:-1], strict=True):
             rows_of.setdefault(name, []).append(row)
-        places, known = np.full((len(lines), _MOST_PLACES), -1), np.zeros((len(lines), 3), np.int64)
-        fields, count = [self.fields], len(self.fields)
+        places, known = np.full((len(lines), _MOST_PLACES), -1), np.zeros((len(lines), 2), np.int64)
+        fields, added, count = [self.fields], [self.added], len(self.fields)
         for name, mine in rows_of.items():
             rows = np.array(mine)
             own = numbers[first[rows][:, None] + np.arange(name.count(_MARK))]
             decimals = own[:, :, 3]
-            own = np.append(own, np.zeros((len(rows), 1, 6), np.int64), axis=1)
+            own = np.append(own, np.zeros((len(rows), 1, 5), np.int64), axis=1)
             own[:, -1, 0] = ends[rows] - start[rows]
             if name not in self._kinds:
                 self._kinds[name] = len(self.kinds)
@@ -183,16 +183,17 @@ class LinePatterns:
                 self.fresh += [lines[mine[row]] for row in set(decimals.argmax(axis=0).tolist())]
                 self._most[name] = np.maximum(self._most[name], decimals.max(axis=0))
             one = self.kinds[self._kinds[name]]
-            group = self._groups.setdefault((one.names, len(one.columns)), len(self._groups))
-            known[rows, 0], known[rows, 1] = self._kinds[name], group
-            known[rows, 2] = count + len(one.columns) * np.arange(len(rows))
+            known[rows, 0], known[rows, 1] = self._kinds[name], count + len(one.columns) * np.arange(len(rows))
             for column, (number, offset) in enumerate(one.places):
                 places[rows, column] = own[:, number, 0] + offset
-            found = [own[:, number] * taken + added for number, taken, added in one.columns]
-            fields += [np.stack(found, axis=1).reshape(-1, 6)] if found else []
-            count += len(one.columns) * len(rows)
+            if one.columns:
+                found = [own[:, number] * taken + more for number, taken, more, _ in one.columns]
+                fields.append(np.stack(found, axis=1).reshape(-1, 5))
+                added.append(np.tile([value for *_, value in one.columns], len(rows)))
+                count += len(added[-1])
         patterns = len(self.known) + np.arange(len(lines))
         self.known, self.fields = np.concatenate((self.known, known)), np.concatenate(fields)
+        self.added = np.concatenate(added)
         return places, _digits(raw, start, places, np.arange(len(lines))), patterns
 
     def _take(self, line: bytes, numbers: Ints) -> _Kind:
@@ -218,30 +219,26 @@ class LinePatterns:
         columns = None if found.comments or found.skipped else self._lexer.motion(found)
         if columns is None:
             return alone
-        own = {name: word for name, word in columns.items() if isinstance(word, Word) and not word.fixed}
-        rest = {
-            name: word.value if isinstance(word, Word) else word for name, word in columns.items() if name not in own
-        }
-        read = []
-        for word in own.values():
+        read: list[tuple[int, tuple[int, ...], tuple[int, ...], float]] = []
+        for word in columns.values():
+            if not isinstance(word, Word) or word.fixed:
+                read.append((0, (0,) * 5, (0, 0, 0, -1, 0), word.value if isinstance(word, Word) else word))
+                continue
             match = _NUMBER.fullmatch(line, word.start, word.stop)
             if match is None or len(match["whole"]) > _MOST_WHOLE:
                 return alone
-            k, power = bisect_left(begins, word.start), match["power"] is not None
-            if begins[k] == word.start:
-                more = word.stop - word.start - int(numbers[k, 1])
-                read.append((k, (1, 1, 1, 1, 1, 1), (0, more, 0, 0, 0, int(power))))
-                if (more > 0) != power:
-                    return alone
+            k, size, power = bisect_left(begins, word.start), word.stop - word.start, match["power"] is not None
+            odd = (_MOST_DIGITS + 1) * power
+            if begins[k] == word.start and (size > numbers[k, 1]) == power:
+                read.append((k, (1,) * 5, (0, size - int(numbers[k, 1]), odd, 0, 0), 0.0))
             elif match["point"]:
                 return alone
             else:
-                size, minus = len(match["whole"]), int(match["sign"] == b"-")
-                number = (word.start - begins[k], word.stop - word.start, size, -1, minus, int(power))
-                read.append((k, (1, 0, 0, 0, 0, 0), number))
-        if {k for k, taken, _ in read if all(taken)} != set(range(len(begins) - 1)):
+                number = (word.start - begins[k], size, len(match["whole"]) + odd, -1, int(match["sign"] == b"-"))
+                read.append((k, (1, 0, 0, 0, 0), number, 0.0))
+        if {k for k, taken, *_ in read if all(taken)} != set(range(len(begins) - 1)):
             return alone
-        return _Kind((*own, *rest), tuple(rest.values()), tuple(read), places)
+        return _Kind(tuple(columns), tuple(read), places)
 
 
 def _digits(raw: Bytes, start: Ints, places: Ints, shape: Ints) -> Ints:
@@ -281,8 +278,7 @@ def _pointed(raw: Bytes) -> tuple[Ints, bytes]:
     begin, end, point, minus = begin[fits], end[fits], point[fits], before[fits] == ord("-")
     signed = raw[begin] < ord(".")
     digits, decimals = end - begin - signed - 1, end - point - 1
-    left = (digits > _MOST_DIGITS) | (decimals > DIGITS)
-    return np.stack((begin, end - begin, digits, decimals, minus, left), axis=1), marked[kept].tobytes()
+    return np.stack((begin, end - begin, digits, decimals, minus), axis=1), marked[kept].tobytes()
 
 
 def _parts(marks: Bytes, start: Ints, size: Ints) -> Iterator[tuple[Any, slice, Words]]:
@@ -314,7 +310,7 @@ class Lines:
     @classmethod
     def of(cls, text: bytes, patterns: LinePatterns) -> Lines:
         """Lines of a chunk, which ends with a line end."""
-        text = b"".join((b"\n" * MARGIN, text, b"\n" * (_PART)))
+        text = b"".join((b"\n" * MARGIN, text, b"\n" * _PART))
         raw = np.frombuffer(text, np.uint8)
         ends = np.flatnonzero(raw == ord("\n"))[MARGIN - 1 : -_PART]
         start, size = ends[:-1] + 1, np.diff(ends)
@@ -331,98 +327,72 @@ class Lines:
 
     def columns(self, chosen: Ints) -> dict[str, Floats]:
         """Numbers of lines that stand in a run, NaN where a line has none."""
-        count, first, last = len(chosen), int(chosen[0]), int(chosen[-1]) + 1
+        count, low, high = len(chosen), int(chosen[0]), int(chosen[-1]) + 1
+        part = slice(low, high) if high - low == count else chosen
+        label, start, own = self.label[part], self.start[part], self.patterns
+        used = np.flatnonzero(np.bincount(label, minlength=len(own.known)))
+        kind, first = own.known[used].T
+        names = {k: own.kinds[k].names or () for k in np.unique(kind).tolist()}
         columns: dict[str, Floats] = {}
-        for rows, names, numbers in self._groups(slice(first, last) if last - first == count else chosen):
-            for name, values in zip(names, numbers, strict=True):
-                if len(values) == count:
-                    columns[name] = values
-                    continue
-                if name not in columns:
-                    columns[name] = np.full(count, np.nan)
+        lines: dict[bytes, tuple[Any, Ints, Ints]] = {}  # with any of some patterns, and which of these
+        for name in dict.fromkeys(chain.from_iterable(names.values())):
+            column = np.full(len(own.kinds), -1)
+            for k, given in names.items():
+                column[k] = given.index(name) if name in given else -1
+            has = column[kind] >= 0
+            if has.tobytes() not in lines:
+                place = np.full(len(own.known), -1)
+                place[used[has]] = np.arange(np.count_nonzero(has))
+                which = place[label]
+                rows: Any = slice(None) if has.all() else np.flatnonzero(which >= 0)
+                lines[has.tobytes()] = rows, start[rows], which[rows]
+            rows, begin, which = lines[has.tobytes()]
+            field = (first + column[kind])[has]
+            values = self._read(begin, which, own.fields[field], own.added[field])
+            if len(values) < count:
+                columns[name] = np.full(count, np.nan)
                 columns[name][rows] = values
+            else:
+                columns[name] = values
         return columns
 
-    def _groups(self, chosen: slice | Ints) -> Iterator[tuple[Any, tuple[str, ...], Sequence[Floats]]]:
-        """Lines of a run by the letters that they have: rows, names of columns, and the numbers for each."""
-        label, starts = self.label[chosen], self.start[chosen]
-        known, kinds, fields = self.patterns.known, self.patterns.kinds, self.patterns.fields
-        used = np.flatnonzero(np.bincount(label, minlength=len(known)))
-        kind, group, first = known[used].T
-        numbers, place = np.unique(group).tolist(), np.zeros(len(known), np.int64)
-        groups = known[:, 1][label] if len(numbers) > 1 else None
-        for number in numbers:
-            mine = group == number
-            one = kinds[kind[mine.argmax()]]
-            place[used[mine]] = np.arange(np.count_nonzero(mine))
-            rows = slice(None) if groups is None else np.flatnonzero(groups == number)
-            own = place[label[rows]]
-            table = fields[first[mine][:, None] + np.arange(len(one.columns))]
-            constants = np.array([kinds[k].constants for k in kind[mine].tolist()])
-            values = self._numbers(starts[rows], own, table)
-            yield rows, one.names or (), [*values, *(column.take(own) for column in constants.T)]
+    def _read(self, start: Ints, label: Ints, fields: Ints, added: Floats) -> Floats:
+        """Numbers of lines, one of each; `label` says which of the rows of `LinePatterns.fields` it has."""
 
-    def _numbers(self, start: Ints, label: Ints, table: Ints) -> list[Floats]:
-        """Numbers of lines with the same letters, one array for each of them; `table` as in `LinePatterns.fields`."""
-
-        def each(values: Any) -> Any:
+        def each(values: NDArray[Any]) -> Any:
             """Value for every line, or the one of all."""
-            return values.take(label) if isinstance(values, np.ndarray) else values
+            return values[0] if (values == values[0]).all() else values.take(label)
 
-        found: list[Floats] = []
-        at = np.empty(len(start), np.int64)
-        for first, end, begin, keep, keep_before, divisor, lead_begin, lead_keep, point, long, lead, left in _columns(
-            table
-        ):
-            if left:
-                spans = zip((start + each(first)).tolist(), (start + each(end)).tolist(), strict=True)
-                found.append(np.array([float(self.text[one:other]) for one, other in spans]))
-                continue
-            np.add(start, each(begin), out=at)
+        first, count, digits, decimals, minus = fields.T
+        pointed, end = decimals >= 0, first + count
+        if (digits > _MOST_DIGITS).any() or (decimals > DIGITS).any():
+            spans = zip((start + each(first)).tolist(), (start + each(end)).tolist(), strict=True)
+            return np.array([float(self.text[one:other] or 0) for one, other in spans]) + each(added)
+        found = np.zeros(len(start))
+        if digits.any():
+            lead = np.maximum(digits - DIGITS, 0)
+            keep, after = LAST_DIGITS[digits - lead], _AFTER[decimals]
+            at = start + each(end - DIGITS)
             word = self.words[at].view(np.uint64)
-            if point:  # close the gap that it leaves
+            if pointed.any():  # close the gap that it leaves
                 closed = word << _EIGHT
-                if long:
+                if (digits + pointed > DIGITS).any():
                     at -= DIGITS
                     before = self.words[at].view(np.uint64)
                     before >>= _REST
                     closed |= before
-                closed &= each(keep_before)
-                word &= each(keep)
+                closed &= each(keep & ~after)
+                word &= each(keep & after)
                 word |= closed
             else:
                 word &= each(keep)
-            value = join_digits(word).view(np.int64)
-            if lead:  # digits before those eight
-                np.add(start, each(lead_begin), out=at)
-                word = self.words[at].view(np.uint64)
-                word &= each(lead_keep)
-                value += 10**DIGITS * join_digits(word).view(np.int64)
-            found.append(np.divide(value, each(divisor)))
-        return found
-
-
-def _columns(table: Ints) -> Iterator[tuple[Any, ...]]:
-    """How to read the numbers of lines with the same letters, of which `table` is as in `LinePatterns.fields`.
-
-    Of each number, one value for every pattern or the one of all: where it begins and ends; eight bytes before its end;
-    those of its last eight digits that are after the point, and before it; what to divide by; where digits before those
-    eight are, and which. Then of any pattern: whether there is a point, more bytes than a word has, digits before the
-    last eight, or one is left to `float`.
-    """
-    first, count, digits, decimals, minus, left = np.ascontiguousarray(table.transpose(2, 0, 1))
-    digits, decimals = np.where(left > 0, 0, digits), np.where(left > 0, -1, decimals)
-    end, size = first + count, digits + (decimals >= 0)
-    divisor = np.where(minus > 0, -1.0, 1.0) * _TENS[np.maximum(decimals, 0)]
-    lead = np.maximum(digits - DIGITS, 0)
-    lead_begin = end - 2 * DIGITS - (decimals >= 0)
-    last, behind = LAST_DIGITS[digits - lead], _BEHIND[decimals]
-    values = (first, end, end - DIGITS, last & behind, last & ~behind, divisor, lead_begin, LAST_DIGITS[lead])
-    flags = (decimals >= 0, size > DIGITS, lead > 0, left > 0)
-    return zip(*map(_alike, values), *(flag.any(axis=0).tolist() for flag in flags), strict=True)
-
-
-def _alike(values: NDArray[Any]) -> list[Any]:
-    """Columns of a table, those that are all the same as one value."""
-    same = (values == values[0]).all(axis=0).tolist()
-    return [values[0, k] if one else values[:, k] for k, one in enumerate(same)]
+            if lead.any():  # digits before those eight
+                np.add(start, each(end - 2 * DIGITS - pointed), out=at)
+                high = self.words[at].view(np.uint64)
+                high &= each(LAST_DIGITS[lead])
+                value = 10**DIGITS * join_digits(high).view(np.int64) + join_digits(word).view(np.int64)
+            else:
+                same = word[0] == word[-1] and (word == word[0]).all()  # as weights and last knots are
+                value = join_digits(word[:1] if same else word).view(np.int64)
+            np.divide(value, each(np.where(minus > 0, -1.0, 1.0) * _TENS[np.maximum(decimals, 0)]), out=found)
+        return found + each(added) if added.any() else found
