@@ -102,7 +102,7 @@ class LinePatterns:
 
     def label(self, text: bytes, start: Ints, size: Ints) -> Ints:
         """(l,) rows of `known`: the pattern of each line of a text; its first byte, and its size with its end."""
-        if len(self._rows) > len(start):  # few of them are met again
+        if len(self.known) > len(start):  # few of them are met again
             self._forget()
         raw = np.frombuffer(text, np.uint8)
         marks = raw - np.uint8(ord("0"))

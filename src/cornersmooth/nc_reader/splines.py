@@ -59,51 +59,49 @@ def _knot_curves(
     table: Table, six: Floats, placed: Bools, curve: Bools, letters: str, problems: list[Problem]
 ) -> Curves:
     """Curves of FANUC's G06.2 (B-63324EN/03 4.17): a knot K and a weight R in every block."""
-    starts = curve & (table.column("G") == NURBS)
     rows = np.flatnonzero(curve)
-    start = np.flatnonzero(starts[rows])
+    later = table.column("G")[rows] != NURBS
+    start = np.flatnonzero(~later)
     if len(start) == 0 or start[0] != 0:
         problems.append(Problem("CS511", 0, int(table.line[rows[0]]), "curve blocks without a G6.2 before them"))
         first = start[0] if len(start) else len(rows)
-        rows, start = rows[first:], start - first
+        rows, later, start = rows[first:], later[first:], start - first
     if not len(start):
         return Curves()
-    size = np.diff(np.append(start, len(rows)))
+    line, head = table.line[rows], rows[start]
+    size = np.diff(start, append=len(rows))
     is_point = placed[rows]
     points = np.add.reduceat(is_point, start, dtype=np.int64)
-    given = table.column("P")[rows[start]]
+    given = table.column("P")[head]
     order = np.where(np.isnan(given), DEFAULT_ORDER, given).astype(np.int64)
-    knot = table.column("K")[rows]
-    weight = table.column("R")[rows][is_point]
-    weight = np.where(np.isnan(weight), 1.0, weight)
+    knot, weight = table.column("K")[rows], table.column("R")[rows][is_point]
+    weight[np.isnan(weight)] = 1.0
 
     def complain(mask: Bools, code: str, text: str) -> None:
-        line = table.line[rows if len(mask) == len(rows) else rows[start]]
-        problems.extend(Problem.at(code, mask, line, text))
+        problems.extend(Problem.at(code, mask, line if len(mask) == len(rows) else line[start], text))
 
-    gap = np.append(False, (np.diff(table.line[rows]) != 1) & ~starts[rows][1:])
-    complain(gap, "CS510", "something else is between the blocks of a curve")
-    complain(np.isnan(knot), "CS512", "a curve block without its knot K")
-    knot = np.nan_to_num(knot)
+    def beside(change: Bools) -> Bools:
+        """Blocks that begin no curve, and differ so from the one before."""
+        return np.append(False, change) & later
+
+    complain(beside(np.diff(line) != 1), "CS510", "something else is between the blocks of a curve")
+    missing = np.isnan(knot)
+    complain(missing, "CS512", "a curve block without its knot K")
+    knot[missing] = 0.0
     single = size - points
     complain(single < order, "CS513", "fewer blocks with only a knot than the order of the curve asks for")
     complain(single > order, "CS513", "more blocks with only a knot than the order of the curve asks for")
     complain((points < order) | (order < 2), "CS514", "fewer control points than the order of the curve")
-    late = is_point[1:] & ~is_point[:-1]
-    late &= ~starts[rows][1:]
-    complain(np.append(False, late), "CS515", "a control point after the blocks with only a knot")
+    complain(beside(is_point[1:] & ~is_point[:-1]), "CS515", "a control point after the blocks with only a knot")
     late = np.zeros(len(rows), np.bool_)
     for letter in sorted({*letters} & table.columns.keys() - {"K"}):
-        named = ~np.isnan(table.columns[letter].take(rows[start]))
-        if not named.all():
-            late |= ~np.isnan(table.columns[letter][rows]) & ~np.repeat(named, size)
+        unnamed = np.isnan(table.columns[letter].take(head))
+        if unnamed.any():
+            late |= ~np.isnan(table.columns[letter][rows]) & np.repeat(unnamed, size)
     complain(late, "CS511", "an axis that the first block of the curve does not name")
-    complain(
-        ~np.isnan(table.column("F")[rows]) & ~starts[rows],
-        "CS511",
-        "a feed inside a curve, which has one for all of it",
-    )
-    falls = np.append(False, (np.diff(knot) < 0) & ~starts[rows][1:])
+    feed = ~np.isnan(table.column("F")[rows]) & later
+    complain(feed, "CS511", "a feed inside a curve, which has one for all of it")
+    falls = beside(np.diff(knot) < 0)
     complain(falls, "CS516", "a knot below the one before it")
     unclamped = _unclamped(knot, start, size, order)
     complain(unclamped, "CS517", "first or last knots that are not all equal")
@@ -118,7 +116,7 @@ def _knot_curves(
     if bad.any():
         order, knot = _replaced(knot, start, order, points, bad)
     return Curves(
-        element=rows[start],
+        element=head,
         end=point_rows[np.cumsum(points) - 1],
         order=order,
         points=points,
@@ -148,6 +146,9 @@ def _unclamped(knot: Floats, start: Ints, size: Ints, order: Ints) -> Bools:
 
 def _crowded(knot: Floats, start: Ints, size: Ints, order: Ints) -> Bools:
     """(q,) whether a knot is equal to the one `order` knots before it in its curve: that does not meet its points."""
+    least = max(int(order.min()), 1)
+    if not (knot[least:] == knot[:-least]).any():  # as nearly always
+        return np.zeros(len(knot), np.bool_)
     before = np.arange(len(knot)) - np.repeat(order, size)
     own = (before >= np.repeat(start, size)) & (np.repeat(order, size) > 0)
     return own & (knot == knot[np.maximum(before, 0)])
@@ -287,14 +288,15 @@ def cut_long(curves: Curves) -> tuple[Curves, Bools]:
         Which of the curves are parts.
     """
     size, first_knot, first_point = curves.points + curves.order, curves.first_knot, curves.first_point
-    plain = np.logical_and.reduceat(curves.weight == 1.0, first_point) & (curves.order == 4)
-    rises = np.append(np.diff(curves.knot) > 0, False)
-    within = np.arange(len(curves.knot)) - np.repeat(first_knot, size)
-    wanted = (within >= 3) & (within < np.repeat(curves.points, size))
-    long = plain & (curves.points > 4) & np.logical_and.reduceat(rises | ~wanted, first_knot)
-    long &= curves.knot[first_knot + size - 1] != 1.0
+    long = (curves.order == 4) & (curves.points > 4) & (curves.knot[first_knot + size - 1] != 1.0)
+    if long.any():
+        rises = np.append(np.diff(curves.knot) > 0, False)
+        within = np.arange(len(curves.knot)) - np.repeat(first_knot, size)
+        wanted = (within >= 3) & (within < np.repeat(curves.points, size))
+        long &= np.logical_and.reduceat(curves.weight == 1.0, first_point)
+        long &= np.logical_and.reduceat(rises | ~wanted, first_knot)
     if not long.any():
-        return curves, np.zeros(len(curves), np.bool_)
+        return curves, long
     number = np.where(long, curves.points - 3, 1)
     owner = np.repeat(np.arange(len(curves)), number)
     k = np.arange(len(owner)) - np.repeat(np.cumsum(number) - number, number)
