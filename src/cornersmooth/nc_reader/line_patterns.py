@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_left
-from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import chain
 from typing import Any, Final
@@ -32,9 +31,8 @@ _MOST_DIGITS: Final = 15
 _MOST_WHOLE: Final = 12
 #: digits of a line that stand for themselves, at most: so many fit an integer
 _MOST_PLACES: Final = 18
-#: bytes of a line, its end included, that is read in runs; bytes that are compared at a time
+#: bytes of a line, its end included, that is read in runs
 _LONGEST: Final = 512
-_PART: Final = 128
 #: lines that are compared at a time: so many fit the cache
 _LINES: Final = 1 << 13
 #: bits of a key that lead to a shape
@@ -48,8 +46,8 @@ _AFTER = np.array([((1 << (8 * k)) - 1) << (64 - 8 * k) for k in range(9)] + [(1
 _TENS = np.array([float(f"1e{k}") for k in range(DIGITS + 1)])
 _EIGHT, _HALF, _REST = np.uint64(8), np.uint64(32), np.uint64(56)
 
-#: keeps the first bytes of a part of a line, for every number of them
-_FIRST = (255 * np.tri(_PART + 1, _PART, -1, np.uint8)).view(np.uint64)
+#: keeps the first bytes of a line, for every number of them
+_FIRST = (255 * np.tri(_LONGEST + 1, _LONGEST, -1, np.uint8)).view(np.uint64)
 #: of the words of a line in its key: odd, with bits at random
 _FACTORS = np.multiply.accumulate(np.full(_LONGEST // DIGITS, 0x9E3779B97F4A7C15, np.uint64))
 
@@ -123,9 +121,11 @@ class LinePatterns:
 
     def _shape(self, text: bytes, marks: Bytes, start: Ints, size: Ints) -> Ints:
         """(l,) shape of each line."""
-        key, parts = np.zeros(len(start), np.uint64), list(_parts(marks, start, size))
-        for rows, columns, words in parts:
-            key[rows] += (words ^ (words >> _HALF)) @ _FACTORS[columns]
+        wide = -(-min(int(size.max()), _LONGEST) // DIGITS)
+        windows = np.ndarray((len(marks) - _LONGEST,), f"V{DIGITS * wide}", buffer=marks.data, strides=(1,))
+        words = windows[start].view(np.uint64).reshape(-1, wide)
+        words &= _FIRST[:, :wide].take(np.minimum(size, _LONGEST), axis=0)
+        key = (words ^ (words >> _HALF)) @ _FACTORS[:wide]
         key[size > _LONGEST] = 0
         shape = self._guess[key >> np.uint64(64 - _KEY_BITS)]
         unknown = np.flatnonzero(self._keys[shape] != key)
@@ -133,22 +133,21 @@ class LinePatterns:
             found, first, inverse = np.unique(key[unknown], return_index=True, return_inverse=True)
             new = np.sort(unknown[first[[one not in self._rows for one in found.tolist()]]])
             if len(new):
-                self._learn(key[new], marks, start[new], size[new], [_line(text, begin) for begin in start[new]])
+                ends = start + size - 1
+                lines = [text[a:b] for a, b in zip(start[new].tolist(), ends[new].tolist(), strict=True)]
+                self._learn(key[new], words[new], lines)
             shape[unknown] = np.array([self._rows[one] for one in found.tolist()])[inverse]
-        for rows, columns, words in parts:
-            other = words != self._bytes[:, columns].take(shape[rows], axis=0)
-            if other.any():  # too long, or two shapes have one key
-                shape[np.arange(len(shape))[rows][other.any(axis=1)]] = 0
+        other = words != self._bytes[:, :wide].take(shape, axis=0)
+        if other.any():  # too long, or two shapes have one key
+            shape[other.any(axis=1)] = 0
         return shape
 
-    def _learn(self, key: Words, marks: Bytes, start: Ints, size: Ints, lines: list[bytes]) -> None:
+    def _learn(self, key: Words, words: Words, lines: list[bytes]) -> None:
         """Take down new shapes, from a line of each."""
         number = len(self._rows) + np.arange(len(key))
         self._rows.update(zip(key.tolist(), number.tolist(), strict=True))
         self._guess[key >> np.uint64(64 - _KEY_BITS)] = number
-        own = np.zeros((len(key), self._bytes.shape[1]), np.uint64)
-        for rows, columns, words in _parts(marks, start, size):
-            own[rows, columns] = words
+        own = np.pad(words, ((0, 0), (0, _LONGEST // DIGITS - words.shape[1])))
         self._keys, self._bytes = np.append(self._keys, key), np.concatenate((self._bytes, own))
         places, digits, patterns = self._add(lines)
         self._places = np.concatenate((self._places, places))
@@ -266,11 +265,8 @@ def _pointed(raw: Bytes) -> tuple[Ints, bytes]:
     heads = (before == ord("\n")) | ((before == ord("N")) & (raw[begin - 2] == ord("\n")))
     heads &= point >= end  # block numbers
     begin = begin - (fits & ((before == ord("+")) | (before == ord("-"))))
-    marked, inside, cut = (
-        np.where(raw == _MARK[0], np.uint8(ord("?")), raw),
-        np.zeros(len(raw) + 1, np.int8),
-        fits | heads,
-    )
+    cut, inside = fits | heads, np.zeros(len(raw) + 1, np.int8)
+    marked = np.where(raw == _MARK[0], np.uint8(ord("?")), raw)
     marked[begin[cut]] = np.where(fits[cut], _MARK[0], ord("0"))
     inside[begin[cut] + 1] += 1
     inside[end[cut]] -= 1
@@ -279,18 +275,6 @@ def _pointed(raw: Bytes) -> tuple[Ints, bytes]:
     signed = raw[begin] < ord(".")
     digits, decimals = end - begin - signed - 1, end - point - 1
     return np.stack((begin, end - begin, digits, decimals, minus), axis=1), marked[kept].tobytes()
-
-
-def _parts(marks: Bytes, start: Ints, size: Ints) -> Iterator[tuple[Any, slice, Words]]:
-    """Bytes of lines, some at a time: rows that have so many, columns of all words of a line, and the words."""
-    longest = int(size.max())
-    wide = -(-min(longest, _PART) // DIGITS)
-    windows = np.ndarray((len(marks) - _PART,), f"V{DIGITS * wide}", buffer=marks.data, strides=(1,))
-    for first in range(0, min(longest, _LONGEST), _PART):
-        rows = np.flatnonzero(size > first) if first else slice(None)
-        words = windows[start[rows] + first].view(np.uint64).reshape(-1, wide)
-        words &= _FIRST[:, :wide].take(np.minimum(size[rows] - first, _PART), axis=0)
-        yield rows, slice(first // DIGITS, first // DIGITS + wide), words
 
 
 def _line(text: bytes, start: int) -> bytes:
@@ -310,9 +294,9 @@ class Lines:
     @classmethod
     def of(cls, text: bytes, patterns: LinePatterns) -> Lines:
         """Lines of a chunk, which ends with a line end."""
-        text = b"".join((b"\n" * MARGIN, text, b"\n" * _PART))
+        text = b"".join((b"\n" * MARGIN, text, b"\n" * _LONGEST))
         raw = np.frombuffer(text, np.uint8)
-        ends = np.flatnonzero(raw == ord("\n"))[MARGIN - 1 : -_PART]
+        ends = np.flatnonzero(raw == ord("\n"))[MARGIN - 1 : -_LONGEST]
         start, size = ends[:-1] + 1, np.diff(ends)
         return cls(text, words_of(raw), start, patterns.label(text, start, size), patterns)
 

@@ -384,7 +384,7 @@ class Reader:
             self.waiting.append((line.number, row))
             if not later:
                 self.flush()
-        elif row:
+        elif row.keys() & {"G", "F"}:
             self.modal = self.modal.but(code=row.get("G", self.modal.code), feed=row.get("F", self.modal.feed))
 
     def change(self, line: Line, **modes: Any) -> None:
