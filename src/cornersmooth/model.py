@@ -23,6 +23,8 @@ from cornersmooth.settings import Settings
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
+#: numbers of rows and poses where millions are held: half the memory
+Numbers = NDArray[np.int32]
 
 Units = Literal["mm", "inch"]
 

@@ -138,11 +138,13 @@ class ArcBlocks(Curves):
 
 def with_arcs(rows: Iterator[Rows], program: Program, circles: Circles) -> Iterator[Rows]:
     """Rows with `Rows.arc`: all rows of a pose that an arc leads to are on it."""
+    if not (circles.blocks > 0).any():
+        yield from rows
+        return
     own = np.full(len(program), -1, np.int64)
     own[program.arcs.pose] = np.where(circles.blocks > 0, np.arange(len(circles.blocks)), -1)
-    some = bool((own >= 0).any())
     for part in rows:
-        yield replace(part, arc=own[part.move]) if some else part
+        yield replace(part, arc=own[part.move])
 
 
 def _deviation(

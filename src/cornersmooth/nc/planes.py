@@ -17,12 +17,11 @@ from itertools import pairwise
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cornersmooth.errors import InputError
 from cornersmooth.geometry.arcs import arc_points, divided
 from cornersmooth.kinematics import Machine, machine_position, solutions, tool_axis
-from cornersmooth.model import Bools, Floats, Ints, Keep, Move, Program
+from cornersmooth.model import Bools, Floats, Ints, Keep, Move, Numbers, Program
 from cornersmooth.nc.cycle_blocks import has_cycles
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
@@ -60,7 +59,7 @@ class Plane:
 class Planes:
     """The tilted planes of a program."""
 
-    of: NDArray[np.int32]  #: (n,) plane of each pose, -1 for none
+    of: Numbers  #: (n,) plane of each pose, -1 for none
     planes: tuple[Plane, ...] = ()
 
     def frames(self, poses: Ints) -> Floats:

@@ -20,7 +20,7 @@ from cornersmooth.geometry.ragged import batches, ranges, search, spread, starts
 from cornersmooth.kinematics import Machine
 from cornersmooth.kinematics.poses import angle_between, continued, pole_distance
 from cornersmooth.methods import DEFAULT_METHOD, METHODS
-from cornersmooth.model import Bools, Floats, Ints, Runs, SmoothProgram
+from cornersmooth.model import Bools, Floats, Ints, Numbers, Runs, SmoothProgram
 from cornersmooth.nc.corner_joints import SHARE, STEPS, Joints
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
@@ -127,7 +127,7 @@ def rotary_curve_rows(smoothed: SmoothProgram, form: Form, findings: Findings) -
 def _way(smoothed: SmoothProgram, form: Form, findings: Findings) -> RotaryWay:
     """The way with two lines for each corner, and all of its lines where these do not show where the axes go."""
     corners, machine = smoothed.corners, machine_of(form)
-    halves, more = corners.smoothed.astype(np.int64), corners.smoothed & _near_pole(smoothed, machine)
+    halves, more = corners.smoothed.astype(np.int32), corners.smoothed & _near_pole(smoothed, machine)
     lined = more
     while True:
         halves[more] = lines_of(smoothed, np.flatnonzero(more))
@@ -159,13 +159,12 @@ class _Work:
     way: RotaryWay
     joints: Joints
     longest: Floats  #: parameters of runs, steps
-    # with millions of corners every array counts
-    corner: NDArray[np.int32]  #: rows of `Corners` that are smoothed
+    corner: Numbers  #: rows of `Corners` that are smoothed
     #: pose, order: (r,); first of each curve, and the curves in path order
-    pose: NDArray[np.int32]
-    order: NDArray[np.int32]
-    row: NDArray[np.int32]  #: rows of the way on curves, but for those where they start
-    first: NDArray[np.int32]  #: (r + 1,) which of these are those of each curve, in path order
+    pose: Numbers
+    order: Numbers
+    row: Numbers  #: rows of the way on curves, but for those where they start
+    first: Numbers  #: (r + 1,) which of these are those of each curve, in path order
 
     @classmethod
     def of(cls, smoothed: SmoothProgram, form: Form, way: RotaryWay) -> _Work:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from cornersmooth.geometry import nurbs
 from cornersmooth.geometry.arcs import arc_lines, arc_points, divided
 from cornersmooth.geometry.ragged import ranges, starts
-from cornersmooth.model import Bools, Floats, Ints, SmoothProgram
+from cornersmooth.model import Bools, Floats, Ints, Numbers, SmoothProgram
 from cornersmooth.slices import joined_rows, some_rows
 from cornersmooth.smoothing.construction import construction_of
 from cornersmooth.smoothing.runs.rows import NO_ROWS, SectionRows, run_lines, section_rows, some_at_once
@@ -76,7 +76,7 @@ def dense_rows(smoothed: SmoothProgram, circles: Ints | None = None, poses: int 
     return (layout.filled(own, layout.rows(own)) for own in layout.batches(poses))
 
 
-def all_dense_rows(smoothed: SmoothProgram, circles: Ints | None = None, *, halves: Ints | None = None) -> Rows:
+def all_dense_rows(smoothed: SmoothProgram, circles: Ints | None = None, *, halves: Numbers | None = None) -> Rows:
     """All rows of `dense_rows` at once, made in the place where they stay.
 
     `halves` (k,) are lines for each half of the transitions in place of `lines_per_half`: straight lines are left whole
@@ -105,8 +105,8 @@ class _Layout:
 
     smoothed: SmoothProgram
     segments: Segments
-    halves: Ints  # (k,) lines for each half of the transitions; none in curves
-    counts: Ints  # (n,) rows
+    halves: Numbers  # (k,) lines for each half of the transitions; none in curves
+    counts: Numbers  # (n,) rows
     runs: SectionRows
     replaced: Bools  # (n,) poses with rows of runs
     curves: bool
@@ -121,12 +121,12 @@ class _Layout:
         curves: bool = False,
         divide: bool,
         circles: Ints | None = None,
-        halves: Ints | None = None,
+        halves: Numbers | None = None,
     ) -> _Layout:
         program, places = smoothed.program, halves is not None
         segments = segments_of(smoothed, dense=divide)
         if halves is None:
-            halves = np.zeros(0, np.int64) if curves else lines_per_half(smoothed)
+            halves = np.zeros(0, np.int32) if curves else lines_per_half(smoothed)
         runs, replaced = _of_runs(smoothed, curves=curves)
         segments.lines[replaced] = 1
         counts = np.where(segments.has_line, segments.lines, 0)
@@ -134,7 +134,7 @@ class _Layout:
         counts[rounded] += 5 if curves else 2 * np.abs(halves[segments.row[rounded]])
         counts[segments.skip] = 0
         if smoothed.runs is not None:
-            counts = np.where(replaced, np.bincount(runs.move, minlength=len(counts)), counts)
+            counts[replaced] = np.bincount(runs.move, minlength=len(counts))[replaced]
         if len(program.arcs):
             lines = arc_lines(program, smoothed.settings)
             counts[program.arcs.pose] = lines if circles is None else np.where(circles > 0, circles, lines)
@@ -161,7 +161,7 @@ class _Layout:
     def filled(self, own: slice, rows: Rows) -> Rows:
         """The rows of some poses, which are filled in place."""
         smoothed, segments, runs = self.smoothed, self.segments, self.runs
-        program, counts = smoothed.program, self.counts[own]
+        program, counts = smoothed.program, self.counts[own].astype(np.int64)
         last = np.cumsum(counts)
         batch = _Batch(np.arange(len(self.counts))[own], last - counts, last, rows)
         sharp = (segments.row[own] < 0) & (batch.last > batch.first)
@@ -199,12 +199,12 @@ def _of_runs(smoothed: SmoothProgram, *, curves: bool) -> tuple[SectionRows, Boo
     return joined_rows(made), replaced
 
 
-def _fill_arcs(smoothed: SmoothProgram, batch: _Batch, counts: Ints) -> None:
+def _fill_arcs(smoothed: SmoothProgram, batch: _Batch, counts: Numbers) -> None:
     pose = smoothed.program.arcs.pose
     inside = np.flatnonzero((pose >= batch.poses[0]) & (pose <= batch.poses[-1]))
     if not len(inside):
         return
-    local, share = divided(counts[pose[inside]])
+    local, share = divided(counts[pose[inside]].astype(np.int64))
     at = np.flatnonzero(np.isin(batch.rows.move, pose[inside]))
     batch.rows.tip[at], batch.rows.other[at] = arc_points(smoothed.program, inside[local], share)
 
@@ -213,7 +213,7 @@ def _fill_curves(smoothed: SmoothProgram, segments: Segments, batch: _Batch) -> 
     corners, rows = smoothed.corners, batch.rows
     here = segments.row[batch.poses] >= 0
     pose, first = batch.poses[here], batch.last[here] - 5
-    row, at = segments.row[pose], first[:, None] + np.arange(5)
+    row, at = segments.row[pose].astype(np.int64), first[:, None] + np.arange(5)
     tip, top = nurbs.control_points(smoothed.program, corners, row, smoothed.settings.axis_length)
     rows.tip[at], rows.other[at], rows.curve[at] = tip, top, np.arange(1, 6)
     assert rows.spline is not None
@@ -232,12 +232,12 @@ def nodes(lines: int) -> Floats:
     return np.concatenate((u, 1.0 - u[-2::-1], [1.0]))
 
 
-def _fill_transitions(smoothed: SmoothProgram, segments: Segments, batch: _Batch, halves: Ints) -> None:
+def _fill_transitions(smoothed: SmoothProgram, segments: Segments, batch: _Batch, halves: Numbers) -> None:
     """Points of the transitions of the batch, first point included; corners of equal count together."""
     construction = construction_of(smoothed.settings.method)
     here = segments.row[batch.poses] >= 0
     poses, last = batch.poses[here], batch.last[here]
-    rows = segments.row[poses]
+    rows = segments.row[poses].astype(np.int64)
     number = halves[rows]
     for lines in np.unique(number):
         chosen = np.flatnonzero(number == lines)

@@ -14,7 +14,7 @@ import numpy as np
 
 from cornersmooth.geometry import nurbs
 from cornersmooth.methods import METHODS
-from cornersmooth.model import Bools, Floats, Ints, Move, SmoothProgram, Status
+from cornersmooth.model import Bools, Floats, Ints, Move, Numbers, SmoothProgram, Status
 from cornersmooth.settings import FLIP_ANGLE, STANDING, Settings
 from cornersmooth.smoothing.construction import construction_of, legs_at
 from cornersmooth.vectors import norm, square
@@ -49,29 +49,29 @@ _MOST_LINES = 20_000
 class Segments:
     """What every pose contributes, arrays over the n poses of the program."""
 
-    row: Ints  # row of `Corners`, -1 where the pose is no smoothed corner
+    row: Numbers  # row of `Corners`, -1 where the pose is no smoothed corner
     skip: Bools  # contributes nothing: repeats another pose, or is stated only
-    start: Ints  # pose the straight line into pose i starts from, -1 for none
+    start: Numbers  # pose the straight line into pose i starts from, -1 for none
     entry: Floats  # fraction of the incoming segment where the straight remainder starts
     exit: Floats  # and where it ends
     axis_entry: Floats
     axis_exit: Floats
     has_line: Bools  # the straight remainder has a length
-    lines: Ints  # lines it is written in
+    lines: Numbers  # lines it is written in
 
 
 def segments_of(smoothed: SmoothProgram, *, dense: bool) -> Segments:
     """Lay out the smoothed motion; straight remainders are divided into several lines only for `dense` output."""
     program, corners = smoothed.program, smoothed.corners
     n = len(program)
-    row = np.full(n, -1, np.int64)
+    row = np.full(n, -1, np.int32)
     rounded = np.flatnonzero(corners.smoothed)
     row[corners.pose[rounded]] = rounded
     skip = program.kind == Move.FROM
     repeated = np.flatnonzero(corners.status == Status.DUPLICATE)
     skip[corners.pose[repeated]] = True
 
-    start = np.full(n, -1, np.int64)
+    start = np.full(n, -1, np.int32)
     start[corners.pose] = corners.before
     last = program.chains[:, 1]
     origin = np.arange(n) - 1  # of a pose behind repeated ones: the first of them
@@ -84,7 +84,7 @@ def segments_of(smoothed: SmoothProgram, *, dense: bool) -> Segments:
     axis_entry, axis_leave = entry, leave
     if corners.axis_trim_in is not corners.trim_in:
         axis_entry, axis_leave = _ends(n, corners.pose, corners.axis_trim_in, corners.axis_trim_out, linear, known)
-    has_line, lines = np.ones(n, np.bool_), np.ones(n, np.int64)
+    has_line, lines = np.ones(n, np.bool_), np.ones(n, np.int32)
     segments = Segments(row, skip, start, entry, leave, axis_entry, axis_leave, has_line, lines)
     for begin in range(0, n, _BATCH):
         poses = begin + np.flatnonzero(linear[begin : begin + _BATCH] & ~skip[begin : begin + _BATCH])
@@ -92,7 +92,9 @@ def segments_of(smoothed: SmoothProgram, *, dense: bool) -> Segments:
     return segments
 
 
-def _ends(n: int, pose: Ints, trim_in: Floats, trim_out: Floats, linear: Bools, known: Ints) -> tuple[Floats, Floats]:
+def _ends(
+    n: int, pose: Ints, trim_in: Floats, trim_out: Floats, linear: Bools, known: Numbers
+) -> tuple[Floats, Floats]:
     """Fractions of the segments into all poses where their straight remainders start and end."""
     entry, leave = np.zeros(n), np.ones(n)
     entry[pose] = trim_out
@@ -171,12 +173,12 @@ def _divide(settings: Settings, segments: Segments, poses: Ints, chord: Floats) 
     lines = np.ceil(turn / turn_limit(settings, np.maximum(np.abs(low), np.abs(high)), allowed) - 1e-9)
     if settings.axis_step is None:
         lines[as_one <= share] = 1
-    segments.lines[pose] = np.clip(lines, 1, _MOST_LINES).astype(np.int64)
+    segments.lines[pose] = np.clip(lines, 1, _MOST_LINES)
 
 
-def lines_per_half(smoothed: SmoothProgram) -> Ints:
+def lines_per_half(smoothed: SmoothProgram) -> Numbers:
     """(k,) lines per half of every transition: n for nodes (j/n)^(2/3), −n for nodes j/n; 0 where not smoothed."""
-    lines = np.zeros(len(smoothed.corners), np.int64)
+    lines = np.zeros(len(smoothed.corners), np.int32)
     rows = np.flatnonzero(smoothed.corners.smoothed)
     for batch in np.array_split(rows, max(1, len(rows) // _BATCH)):
         lines[batch] = lines_of(smoothed, batch)

@@ -52,7 +52,7 @@ def straying_remainders(smoothed: SmoothProgram) -> Ints:
     segments = segments_of(smoothed, dense=False)
 
     def stray(pose: Ints) -> Bools:
-        ends = np.stack((segments.start[pose], pose), axis=1)
+        ends = np.stack((segments.start[pose].astype(np.int64), pose), axis=1)
         return _off_the_motion(smoothed, ends, *inner_points(smoothed, segments, pose, _PARTS))
 
     unlike = (segments.entry != segments.axis_entry) | (segments.exit != segments.axis_exit)
