@@ -128,3 +128,40 @@ def test_a_feed_down_from_the_retract_is_no_matter_of_time(control: str) -> None
     wrong = [*blocks[: first - 1], "G93", blocks[first].replace("F400.", "F348."), *blocks[first + 2 :], ""]
     how = {"control": control, "machine": machine, "tcp": False, "tolerance": 0.04}
     assert "CS542" in {problem.code for problem in verify(program, "\n".join(wrong).encode(), **how).problems}
+
+
+OUT_OF_A_HOLE = """UNITS/MM
+LOADTL/1
+SPINDL/1000,RPM,CLW
+RAPID
+GOTO/10,20,30,0.1325506,0.3175976,0.9389154
+CYCLE/DRILL,FEDTO,5,MMPM,100,RAPTO,3,RTRCTO,25
+GOTO/10,20,5,0.1325506,0.3175976,0.9389154
+CYCLE/OFF
+FEDRAT/500,MMPM
+GOTO/10,20.2,5,0.1325506,0.3175976,0.9389154
+GOTO/10,20.4,5,0.1325506,0.3175976,0.9389154
+GOTO/30,40,5,0.2,0.3175976,0.9268
+FINI
+"""
+
+
+@pytest.mark.parametrize("control", ["fanuc", "siemens", "linuxcnc"])
+@pytest.mark.parametrize("tcp", [False, True])
+def test_a_feed_out_of_a_hole_is_no_matter_of_time_and_is_compared(control: str, tcp: bool) -> None:
+    """The tool comes from the height of the cycle, 25 mm above the pose that the move begins at."""
+    program, machine = read(OUT_OF_A_HOLE.encode(), name="part.cls"), load_machine("table-ac")
+    form = choose_form(control, machine=machine, tcp=tcp)
+    blocks = written(program, form, Settings(tolerance=0.01))[0].splitlines()
+    drilled = next(k for k, block in enumerate(blocks) if block.endswith(" F100."))
+    first = next(k for k in range(drilled + 1, len(blocks)) if re.match(r"G1\b", blocks[k]))
+    assert blocks[first].endswith(" F500.")
+    assert "G93" not in blocks[:first]
+    assert tcp == ("G93" not in blocks[first:])
+    how = {"control": control, "machine": machine, "tcp": tcp, "tolerance": 0.01}
+    assert verify(program, "\n".join(blocks).encode(), **how).passed
+    words = blocks[first].removesuffix(" F500.")
+    for wrong in ([f"{words} F5000.", "F500."], ["G93", f"{words} F2500.", *([] if not tcp else ["G94", "F500."])]):
+        text = "\n".join([*blocks[:first], *wrong, *blocks[first + 1 :]]).encode()
+        found = verify(program, text, **how).problems
+        assert [problem.code for problem in found if problem.nc_line in (first + 1, first + 2)] == ["CS541"]

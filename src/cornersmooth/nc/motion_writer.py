@@ -59,7 +59,7 @@ class MotionWriter:
     _repeated: int = 0
     _return_to: int = _NOWHERE  #: first pose after a tool change, until it is reached
     _next_statement: int = 0
-    _arc_begun: int = -1  #: arc after a FROM whose start has been gone to
+    _begun: int = -1  #: last move after a hole or a FROM that has been begun
     _in_order: tuple[Statement, ...] = field(init=False)
     _holes: HoleWriter = field(init=False)
 
@@ -191,9 +191,10 @@ class MotionWriter:
         if writer is not self.tilting:
             ticks = writer.ticks(rows.tip, rows.other)
         yield from self._go_back(int(move[0]), rows.other[:1])
+        elsewhere = self._begins_elsewhere(int(move[0]))
         if arc is not None and arc[0] >= 0:  # after a tool change, a hole or a FROM the tool is not at its start
             yield from self._go_to(writer.ticks(program.tip[move[:1] - 1], rows.other[:1]), move[:1])
-        elif self._begins_at_stated(int(move[0])):  # an arc in lines wants its start, too
+        elif elsewhere and program.kind[move[0] - 1 : move[0] + 1].tolist() == [Move.FROM, Move.ARC]:  # in lines
             start_of_arc = self.ticks_at(rows, program.tip[move[:1] - 1], np.zeros(1, np.int64))
             yield from self._go_to(start_of_arc, move[:1])
         self._join(ticks, rows.joined)
@@ -215,16 +216,15 @@ class MotionWriter:
             left=rows.left,
         )
         before = len(run)
-        run = self.moving(run)
+        run = self.moving(run.with_programmed_feed(program) if elsewhere else run)
         self._repeated += before - len(run)
         yield from self.emit_above(run)
 
-    def _begins_at_stated(self, move: int) -> bool:
-        """Whether a move is an arc from a stated position, met for the first time."""
-        kind = self.program.kind
-        if move in (0, self._arc_begun) or kind[move] != Move.ARC or kind[move - 1] != Move.FROM:
+    def _begins_elsewhere(self, move: int) -> bool:
+        """Whether rows of a move are the first after a hole or a stated position: the tool is not at its start."""
+        if move in (0, self._begun) or self.program.kind[move - 1] not in (Move.FROM, Move.HOLE):
             return False
-        self._arc_begun = move
+        self._begun = move
         return True
 
     def _go_back(self, move: int, near: Floats) -> Iterator[bytes]:

@@ -21,10 +21,11 @@ from cornersmooth.nc_reader.tool import directions
 from cornersmooth.statements.tool_changes import ToolChanges
 from cornersmooth.verify.along_tool import AlongTool
 from cornersmooth.verify.decision import Batch
+from cornersmooth.verify.feeds import out_of_hole
 from cornersmooth.verify.motions import written_motion
 from cornersmooth.verify.nearest import COLUMNS, largest_square, nearest_places
 from cornersmooth.verify.passage import AROUND, LONGER
-from cornersmooth.verify.stops import BEFORE, Part, Stops, out_of_hole
+from cornersmooth.verify.stops import BEFORE, Part, Stops
 from cornersmooth.verify.task import ARITHMETIC, Task
 
 #: elements in a batch

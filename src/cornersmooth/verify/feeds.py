@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from cornersmooth.model import Bools, FeedMode, Ints
-from cornersmooth.nc_reader.elements import Element, Problem
+from cornersmooth.model import Bools, FeedMode, Floats, Ints
+from cornersmooth.nc_reader.elements import Element, Elements, Problem
+from cornersmooth.nc_reader.tool import directions
+from cornersmooth.verify.cl_motion import Original
 from cornersmooth.verify.findings import Findings, Runs
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.nearest import COLUMNS, on_segments
-from cornersmooth.verify.task import ARITHMETIC
+from cornersmooth.verify.task import ARITHMETIC, Task
 
 #: segments on either side of a vertex that are looked at first (speed only)
 _FEW = 64
@@ -32,19 +34,19 @@ def check_feeds(match: Match, found: Findings) -> None:
     good = still | (nc.kind[element] == Element.RAPID)
     for move in (low, high):
         rows = np.flatnonzero(~good)
-        good[rows] = _fits(match, element[rows], move[rows])
+        good[rows] = _fits(match.original, match.nc, element[rows], move[rows])
     in_a_row = 0
     for k in np.flatnonzero(~good).tolist():
         in_a_row = in_a_row + 1 if k and not good[k - 1] else 0
         if in_a_row < _MOST_SINGLE:
             own = int(element[k])
-            good[k] = _fits(match, own, np.arange(low[k], high[k] + 1)).any() or _joined(
+            good[k] = _fits(match.original, match.nc, own, np.arange(low[k], high[k] + 1)).any() or _joined(
                 match, own, _beside(match, int(start[k])), _beside(match, int(end[k]))
             )
     wrong = np.flatnonzero(~good)
     if len(wrong):
         first = wrong[np.diff(wrong, prepend=-2) > 1]
-        problems = [_problem(match, int(element[k]), int(low[k])) for k in first.tolist()]
+        problems = [_problem(match.original, nc, int(element[k]), int(low[k])) for k in first.tolist()]
         found.feeds = Runs(problems, begins=not good[0], ends=not good[-1])
 
 
@@ -62,24 +64,29 @@ def _touched(match: Match, start: Ints, end: Ints) -> tuple[Ints, Ints]:
     return owner[segment + 1], owner[last + 1]
 
 
-def _fits(match: Match, element: Ints | int, move: Ints) -> Bools:
+def _fits(original: Original, nc: Elements, element: Ints | int, move: Ints) -> Bools:
     """Whether elements carry the feeds of moves, in their unit."""
-    nc, program, pose = match.nc, match.original.program, match.original.pose[move]
+    program, pose = original.program, original.pose[move]
     asked, mode = program.feed[pose], program.feed_mode[pose] == FeedMode.PER_REVOLUTION
     return np.isnan(asked) | nc.carry(element, asked, mode)
 
 
 def _beside(match: Match, vertex: int) -> Ints:
-    """Moves around its own that a vertex may be on: within the tolerance (`Task.radius`) of its tip."""
-    low, here, high = int(match.low[vertex]), int(match.segment[vertex]), int(match.high[vertex])
+    """Moves around its own that a vertex may be on."""
+    low, here, high = (int(segment[vertex]) for segment in (match.low, match.segment, match.high))
+    return _near(match.task, match.six[vertex, :3], low, here, high)
+
+
+def _near(task: Task, tip: Floats, low: int, here: int, high: int) -> Ints:
+    """Moves around that of a segment, from one segment to another, within the tolerance (`Task.radius`) of a tip."""
     size = _FEW
     while True:
         segments = np.arange(max(here - size, low), min(here + size, high) + 1)
-        _, square = on_segments(match.six[vertex, None, None, :3], match.path.points, segments[None], COLUMNS["tip"])
-        off = segments[square[0] > match.task.radius**2]
+        _, square = on_segments(tip[None, None], task.path.points, segments[None], COLUMNS["tip"])
+        off = segments[square[0] > task.radius**2]
         begin, end = off[off < here].max(initial=low - 1) + 1, off[off > here].min(initial=high + 1)
         if segments[0] <= max(begin - 1, low) and min(end, high) <= segments[-1]:
-            owner: Ints = match.original.trail.owner[begin + 1 : end + 1]
+            owner: Ints = task.original.trail.owner[begin + 1 : end + 1]
             return owner
         size *= 4
 
@@ -87,14 +94,32 @@ def _beside(match: Match, vertex: int) -> Ints:
 def _joined(match: Match, element: int, first: Ints, last: Ints) -> bool:
     """Whether a move of the first leads to one of the last along moves whose feed an element carries."""
     moves = np.arange(min(first[0], last[0]), max(first[-1], last[-1]) + 1)
-    good = _fits(match, element, moves)
+    good = _fits(match.original, match.nc, element, moves)
     run = np.cumsum(np.diff(good, prepend=False))
     one, other = (set(run[good & np.isin(moves, part)].tolist()) for part in (first, last))
     return not one.isdisjoint(other)
 
 
-def _problem(match: Match, element: int, move: int) -> Problem:
-    nc, program, pose = match.nc, match.original.program, int(match.original.pose[move])
+def out_of_hole(task: Task, nc: Elements, element: int, move: int) -> float:
+    """Place on the move after a hole that is nearest to the end of an element."""
+    tip, last = nc.tip[element : element + 1], task.original.trail.last
+    six = task.six(tip, directions(nc, tip, nc.second[element : element + 1]))
+    segment = np.arange(int(last[move]), int(last[move + 1]))
+    share, square = on_segments(six[None], task.path.points, segment[None], COLUMNS["both"])
+    nearest = int(np.argmin(square))
+    return float(segment[nearest] + share[0, nearest])
+
+
+def feed_out_of_hole(task: Task, nc: Elements, element: int, move: int) -> Problem | None:
+    """What is wrong with the feed of an element that leads out of the hole of a move, by where it ends."""
+    here = min(int(out_of_hole(task, nc, element, move)), task.path.segments - 1)
+    moves = _near(task, nc.tip[element], here, here, task.path.segments - 1)
+    fits = _fits(task.original, nc, element, moves).any()
+    return None if fits else _problem(task.original, nc, element, int(moves[0]))
+
+
+def _problem(original: Original, nc: Elements, element: int, move: int) -> Problem:
+    program, pose = original.program, int(original.pose[move])
     unit = "rev" if program.feed_mode[pose] == FeedMode.PER_REVOLUTION else "min"
     said = "rev" if nc.per_revolution[element] else "min"
     if np.isnan(nc.feed[element]):

@@ -23,13 +23,13 @@ import numpy as np
 
 from cornersmooth.model import Ints, Move
 from cornersmooth.nc_reader.ahead import Ahead
-from cornersmooth.nc_reader.elements import Elements, Problem
+from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.nc_reader.tool import beyond_digits, directions, moving_rapids
 from cornersmooth.statements.cycles import Drilling, drillings
 from cornersmooth.statements.tool_changes import ToolChanges
 from cornersmooth.verify.along_tool import AlongTool
+from cornersmooth.verify.feeds import feed_out_of_hole
 from cornersmooth.verify.holes import HoleLines
-from cornersmooth.verify.nearest import COLUMNS, on_segments
 from cornersmooth.verify.task import Task
 
 #: elements that are given out together
@@ -257,7 +257,7 @@ class Stops:
             block = lines.block(element)
             out = element - 1 if lines.at(move + 1, element - 1) else block.stop - 1
             if out < element or lines.is_straight(block):  # on the way out nothing else is looked at
-                yield trace if out > element else self._finished(trace, _Trace(k, out, False, trace), element)
+                yield trace if out > element else self._fed_out(trace, element, out)
         elif reaches and self._done(k, element):
             yield self._finished(trace, _Trace(k + 1, element, False, trace), element)
 
@@ -314,6 +314,14 @@ class Stops:
         near = first + int(np.argmin(np.linalg.norm(away, axis=1)))
         text = "a rapid of the CL file is missing, or is written as a feed move"
         return there.with_fault(lines.problem("CS532", move, near, text))
+
+    def _fed_out(self, trace: _Trace, element: int, out: int) -> _Trace:
+        """The trace out of a hole, which an element has left at feed."""
+        there = self._finished(trace, _Trace(trace.stop, out, False, trace), element)
+        own = element - self._ahead.base
+        if out == element and (wrong := feed_out_of_hole(self._task, self._ahead.nc, own, self._move[trace.stop])):
+            return there.with_fault(wrong)
+        return there
 
     def _finished(self, trace: _Trace, there: _Trace, element: int) -> _Trace:
         """The trace out of another before an element, with what is wrong with the hole that it comes from."""
@@ -418,13 +426,3 @@ class Stops:
             self.dwells.append((move, cycle.dwell))
         if cycle.tap:
             self.taps.append(move)
-
-
-def out_of_hole(task: Task, nc: Elements, element: int, move: int) -> float:
-    """Place on the move after a hole that is nearest to the end of an element."""
-    tip, last = nc.tip[element : element + 1], task.original.trail.last
-    six = task.six(tip, directions(nc, tip, nc.second[element : element + 1]))
-    segment = np.arange(int(last[move]), int(last[move + 1]))
-    share, square = on_segments(six[None], task.path.points, segment[None], COLUMNS["both"])
-    nearest = int(np.argmin(square))
-    return float(segment[nearest] + share[0, nearest])
