@@ -167,11 +167,9 @@ class WordCheck:
         elif self._positions.rules:
             retract = any(rule.retract and rule in self.list.blocks for _, rule in ruled)
             self.problems += self._positions.take(line, text, retract=retract)
-        rules = [rule for _, rule in ruled]
         codes = [word.value for word in line.words if word.name == "G" and word.value in (0.0, 1.0, 2.0, 3.0)]
         self._code = codes[-1] if codes else self._code
-        apart = any(rule.alone for rule in rules) or (len(ruled) == 1 and len(line.words) > 1)
-        self._move(number, {word.name: word.value for word in line.words}, rules, apart=apart)
+        self._move(number, {word.name: word.value for word in line.words}, [rule for _, rule in ruled])
         return line
 
     def _on_trust(self, line: Line, words: Sequence[str], ruled: Ruled, before: int) -> Line:
@@ -194,14 +192,12 @@ class WordCheck:
         kept = [word for word, out in zip(line.words, left, strict=True) if not out or (tool and word.name == "T")]
         return replace(line, words=tuple(kept))
 
-    def _move(
-        self, line: int, given: Mapping[str, float], rules: Sequence[WordRule] = (), *, apart: bool = False
-    ) -> None:
-        """Look at where the words of a block send the axes; `apart`: they are not those of a motion of the tool."""
+    def _move(self, line: int, given: Mapping[str, float], rules: Sequence[WordRule] = ()) -> None:
+        """Look at where the words of a block send the axes; those beside a word that is alone do not move the tool."""
         self._states.turn(line, given)
         moves, drills = any(rule.moves for rule in rules), any(rule.cycle for rule in rules)
-        if moves or (not apart and LINEAR & given.keys()):
-            self._states.motion(line, given, 1.0 if moves else self._code, moves=moves, drills=drills)
+        if moves or (LINEAR & given.keys() and not any(rule.alone for rule in rules)):
+            self._states.motion(line, given, 1.0 if moves else self._code, drills=drills)
 
     def _follow(self, line: int, text: str, ruled: Ruled) -> None:
         """Look at what a block and that before want of each other."""

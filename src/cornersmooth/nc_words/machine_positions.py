@@ -70,7 +70,7 @@ class MachinePositions:
         if home or change:
             says = "position of the machine, as its file has it"
             self.rules = tuple(
-                WordRule(re.compile(pattern), says, retract=retract)
+                WordRule(re.compile(pattern), says, alone=True, retract=retract)
                 for block in _BLOCKS
                 for retract, pattern in ((True, f"(?=.* Z[-+.\\d]){block}"), (False, block))
             )

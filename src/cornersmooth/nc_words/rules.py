@@ -119,7 +119,7 @@ def word_list(control: str) -> WordList:
         header=re.compile(table["header"]) if "header" in table else None,
         orders=re.compile(table["orders"], re.IGNORECASE) if "orders" in table else None,
         words=tuple(words.values()),
-        blocks=tuple(map(_rule, table["block"])),
+        blocks=tuple(_rule({"alone": True, **entry}) for entry in table["block"]),
     )
 
 

@@ -228,12 +228,10 @@ class WordStates:
         if self.above and ROTARY & words.keys() and not LINEAR & words.keys():
             self._lost_since(line, [f"the rotary axes turn under {word}" for word in self._tip_control])
 
-    def motion(
-        self, line: int, words: Mapping[str, float], code: float, *, moves: bool = False, drills: bool = False
-    ) -> None:
+    def motion(self, line: int, words: Mapping[str, float], code: float, *, drills: bool) -> None:
         """Look at what holds where the tool moves by the words of a block, and by the G word of group 01 in force.
 
-        `moves`: along Z, whatever the words are; `drills`: in a cycle of the control, so it does not go there at once.
+        `drills`: in a cycle of the control, so it does not go there at once.
         """
         for state, (word, number) in self._ended.items():
             if self._held[state].rule.compared and word not in _STOPS:
@@ -245,7 +243,7 @@ class WordStates:
         if not drills:
             self._lost_since(line, list(self._approached(words)))
         late = set()
-        if self.above and code == 0.0 and not (moves or "Z" in words):
+        if self.above and code == 0.0 and "Z" not in words:
             late = {state for state in self._late & self._held.keys() if self._held[state].off}
         first = self._begin(line, late) if self._first is None else self._first
         self._compare(late, first, arc=code in (2.0, 3.0))
