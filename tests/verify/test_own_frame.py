@@ -215,6 +215,19 @@ def test_late_tip_control_and_an_end_in_incremental_words_are_found(control: str
         assert all(any(end in problem for problem in found) for end in said), found
 
 
+@pytest.mark.parametrize("control", sorted(_HIGH))
+def test_a_first_retract_that_is_lost_is_found_without_a_tool_change(control: str) -> None:
+    cl = _ONE_TOOL.replace("LOADTL/1\n", "").encode()
+    form, stream = choose_form(control, machine=load_machine(MACHINES[control])), io.BytesIO()
+    postprocess(cl, stream, Settings(tolerance=0.05), form=form)
+    lines, how = stream.getvalue().decode().splitlines(), {"control": control, "machine": form.machine}
+    up = next(k for k, line in enumerate(lines) if re.search("G28 Z|G53 G0 Z|SUPA|M91", line))
+    for text, said in ((lines, False), ([*lines[:up], *lines[up + 1 :]], True)):
+        found = verify(read(cl), "\n".join(text).encode(), tolerance=0.05, **how).problems
+        assert said == ("the first motion without a retract before it" in [problem.text for problem in found])
+        assert said or not found
+
+
 @pytest.mark.parametrize("control", [*MACHINES])
 def test_what_a_stop_ends_and_nothing_says_again_is_found(control: str) -> None:
     cl = _ONE_TOOL.replace("GOTO/20,0,1", "OPSTOP\nGOTO/20,0,1").replace("RPM,CLW", "RPM,CLW\nCOOLNT/ON")

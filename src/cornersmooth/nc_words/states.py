@@ -257,6 +257,8 @@ class WordStates:
         """Look at what holds at the first motion, and return it."""
         self._retract = 0
         self._lost_since(line, [*(self._unsaid_at_retract or ()), *self._wrong_offset()])
+        if self._retracts and not self._high:
+            self._lost_since(line, ["the first motion without a retract before it"])
         self._first = {state: "" if state in late else held.text for state, held in self._held.items()}
         for state, wanted in self._unsaid("motion"):
             if state not in self._left:
