@@ -377,7 +377,7 @@ class Stops:
         alive = sorted(alive, key=lambda one: -one.stop)
         ends = [here for trace in alive for here in self._on(trace, element) if here.stop == last]
         ends = [self._finished(here, _Trace(last + 1, element, True, here), element) for here in ends]
-        if not ends or min(one.cost for one in ends)[0] > best.cost[0]:
+        if not ends:
             for t in range(best.stop + 1, last + 1):
                 best = self._without(best, t, element)
             ends.append(self._finished(best, _Trace(last + 1, element, True, best), element))
