@@ -165,3 +165,17 @@ def test_a_feed_out_of_a_hole_is_no_matter_of_time_and_is_compared(control: str,
         text = "\n".join([*blocks[:first], *wrong, *blocks[first + 1 :]]).encode()
         found = verify(program, text, **how).problems
         assert [problem.code for problem in found if problem.nc_line in (first + 1, first + 2)] == ["CS541"]
+
+
+@pytest.mark.parametrize("wrong", [" F7000.", " F70.", ""])
+def test_feed_to_the_first_pose_is_compared(wrong: str) -> None:
+    cl = "UNITS/MM\nLOADTL/1\nSPINDL/900,RPM,CLW\nFEDRAT/700,MMPM\nGOTO/5,5,9\nGOTO/5,5,0\nGOTO/25,5,0\nFINI\n"
+    program = read(cl.encode(), name="part.cls")
+    text, _ = written(program, choose_form("fanuc"), Settings(tolerance=0.01))
+    assert verify(program, text.encode(), tolerance=0.01).problems == ()
+    block = next(line for line in text.splitlines() if line.endswith(" F700."))
+    assert " Z9." in block
+    spoilt = text.replace(" F700.", wrong, 1).replace("\nG1 ", "\nF700.\nG1 ", 2).replace("F700.\n", "", 1)
+    found = verify(program, spoilt.encode(), tolerance=0.01).problems
+    line = spoilt.splitlines().index(block.removesuffix(" F700.") + wrong) + 1
+    assert (("CS541" if wrong else "CS542"), line) in [(problem.code, problem.nc_line) for problem in found]

@@ -21,7 +21,7 @@ from cornersmooth.nc_reader.tool import directions
 from cornersmooth.statements.tool_changes import ToolChanges
 from cornersmooth.verify.along_tool import AlongTool
 from cornersmooth.verify.decision import Batch
-from cornersmooth.verify.feeds import out_of_hole
+from cornersmooth.verify.feeds import feed_at, out_of_hole
 from cornersmooth.verify.motions import written_motion
 from cornersmooth.verify.nearest import COLUMNS, largest_square, nearest_places
 from cornersmooth.verify.passage import AROUND, LONGER
@@ -115,10 +115,11 @@ class Batches:
         task, nc, at = self.task, self._ahead.nc, element - self._ahead.base
         original, path, last_vertex = task.original, task.path, task.original.trail.last
         kind = int(original.program.kind[original.pose[move]])
-        if move == 0 and kind == Move.RAPID and nc.kind[at] != Element.RAPID:
+        if move == 0 and nc.kind[at] != Element.RAPID:
             text = "the first rapid is written as a feed move"
             line = int(original.program.line[original.pose[move]])
-            self.problems.append(Problem("CS532", line, int(nc.line[at]), text))
+            rapid = Problem("CS532", line, int(nc.line[at]), text)
+            self.problems += [rapid] if kind == Move.RAPID else feed_at(task, nc, at, move, 0.0)
         # out of a hole the way begins anywhere
         place = out_of_hole(task, nc, at, move) if kind == Move.HOLE else float(last_vertex[move])
         self._move, self._element, self._place = move, element, np.full(3, place)

@@ -110,12 +110,15 @@ def out_of_hole(task: Task, nc: Elements, element: int, move: int) -> float:
     return float(segment[nearest] + share[0, nearest])
 
 
-def feed_out_of_hole(task: Task, nc: Elements, element: int, move: int) -> Problem | None:
-    """What is wrong with the feed of an element that leads out of the hole of a move, by where it ends."""
-    here = min(int(out_of_hole(task, nc, element, move)), task.path.segments - 1)
-    moves = _near(task, nc.tip[element], here, here, task.path.segments - 1)
-    fits = _fits(task.original, nc, element, moves).any()
-    return None if fits else _problem(task.original, nc, element, int(moves[0]))
+def feed_at(task: Task, nc: Elements, element: int, move: int, place: float) -> list[Problem]:
+    """What is wrong with the feed of an element of which only the end is compared: it leads to a place of a move."""
+    last, moves = task.path.segments - 1, np.array([move])
+    if last >= 0:
+        here = min(int(place), last)
+        moves = np.append(moves, _near(task, nc.tip[element], here, here, last))
+    if _fits(task.original, nc, element, moves).any():
+        return []
+    return [_problem(task.original, nc, element, move)]
 
 
 def _problem(original: Original, nc: Elements, element: int, move: int) -> Problem:

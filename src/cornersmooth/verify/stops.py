@@ -28,7 +28,7 @@ from cornersmooth.nc_reader.tool import beyond_digits, directions, moving_rapids
 from cornersmooth.statements.cycles import Drilling, drillings
 from cornersmooth.statements.tool_changes import ToolChanges
 from cornersmooth.verify.along_tool import AlongTool
-from cornersmooth.verify.feeds import feed_out_of_hole
+from cornersmooth.verify.feeds import feed_at, out_of_hole
 from cornersmooth.verify.holes import HoleLines
 from cornersmooth.verify.task import Task
 
@@ -318,9 +318,10 @@ class Stops:
     def _fed_out(self, trace: _Trace, element: int, out: int) -> _Trace:
         """The trace out of a hole, which an element has left at feed."""
         there = self._finished(trace, _Trace(trace.stop, out, False, trace), element)
-        own = element - self._ahead.base
-        if out == element and (wrong := feed_out_of_hole(self._task, self._ahead.nc, own, self._move[trace.stop])):
-            return there.with_fault(wrong)
+        if out == element:
+            nc, own, move = self._ahead.nc, element - self._ahead.base, self._move[trace.stop]
+            for wrong in feed_at(self._task, nc, own, move + 1, out_of_hole(self._task, nc, own, move)):
+                there = there.with_fault(wrong)
         return there
 
     def _finished(self, trace: _Trace, there: _Trace, element: int) -> _Trace:
