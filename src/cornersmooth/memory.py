@@ -13,7 +13,7 @@ _LARGE = 4 << 20
 _TRIMMED = 64 << 20
 
 #: parameters of mallopt (malloc.h)
-_M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3
+_M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD, _M_ARENA_MAX = -1, -3, -8
 
 
 def return_large_arrays() -> None:
@@ -25,6 +25,7 @@ def return_large_arrays() -> None:
     if sys.platform == "linux" and (mallopt := getattr(ctypes.CDLL(None), "mallopt", None)) is not None:
         mallopt(_M_MMAP_THRESHOLD, _LARGE)
         mallopt(_M_TRIM_THRESHOLD, _TRIMMED)
+        mallopt(_M_ARENA_MAX, 1)  # what one thread frees another takes
 
 
 def return_free_memory() -> None:

@@ -40,7 +40,7 @@ from cornersmooth.vectors import norm, unit
 _NEAR_POLE, _NEAR_POLE_DEGREES = 5.0, 1.0
 
 #: control points of a corner, and those that are worked on at a time
-_CONTROLS, _TOGETHER = 5, 40_960
+_CONTROLS, _TOGETHER = 5, 20_480
 
 
 @dataclass(frozen=True)
