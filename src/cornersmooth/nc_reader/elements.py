@@ -48,9 +48,13 @@ class _Shapes:
 
     def part(self, first: int, stop: int) -> Self:
         """Those that are elements from `first` to `stop`, the latter excluded."""
-        a, b = np.searchsorted(self.element, (first, stop)).tolist()
-        chosen = self.only(np.arange(a, b)) if a < b else type(self)()
-        return replace(chosen, element=chosen.element - first)
+        rows = slice(*np.searchsorted(self.element, (first, stop)).tolist())
+        chosen = {name: values[self._place(name, rows)] for name, values in _stored(self).items()}
+        return replace(self, **chosen | {"element": chosen["element"] - first})
+
+    def _place(self, name: str, rows: slice) -> slice:
+        """Where a field has what belongs to some rows."""
+        return rows
 
     @classmethod
     def joined(cls, parts: Sequence[Self], start: Sequence[int] | None = None) -> Self:
@@ -101,6 +105,14 @@ class Curves(_Shapes):
         place, at = _slices(self.points, chosen), _slices(self.points + self.order, chosen)
         rows = {"point": place, "weight": place, "knot": at}
         return replace(self, **{name: values[rows.get(name, chosen)] for name, values in _stored(self).items()})
+
+    def _place(self, name: str, rows: slice) -> slice:
+        """Where a field has what belongs to some of the curves."""
+        if name not in ("point", "weight", "knot"):
+            return rows
+        size = self.points + self.order if name == "knot" else self.points
+        first = int(size[: rows.start].sum())
+        return slice(first, first + int(size[rows].sum()))
 
 
 def _slices(size: Ints, chosen: Ints) -> Ints:
