@@ -1,9 +1,11 @@
 """Lines of one digit pattern: the same letters, with numbers of the same shape after them, in the same places.
 
-What posts write is regular: few patterns make up a text, and a line's pattern is known from the line with zeros for
-its digits, and from those digits that always stand for themselves, as that of G1 does. Each pattern is taken apart
-once. Its numbers are read where they must stand, eight digits at a time: without the point they fit one machine word,
-or two, and the value is that integer over a power of ten: exactly what `float` gives. Longer ones are left to `float`.
+What posts write is regular: few patterns make up most texts. A line's pattern is known from its shape, which is the
+line with zeros for its digits, and from those digits that always stand for themselves, as that of G1 does. In lines
+of new patterns all numbers with a point are found at once. What stands between these is the kind of a line, and one
+line of each kind is taken apart by the control's grammar. Numbers are read where they must stand, eight digits at a
+time: without the point they fit one machine word, or two, and the value is that integer over a power of ten: exactly
+what `float` gives. Longer ones are left to `float`.
 """
 
 from __future__ import annotations
@@ -69,8 +71,7 @@ class _Kind:
 class LinePatterns:
     """The patterns of a text met so far.
 
-    The shape of a line is the line without its digits. A key, made of all its bytes, says which shape it may be, and
-    then their bytes are compared.
+    A key, made of all bytes of a line but its digits, says which shape it may be. Then their bytes are compared.
     """
 
     def __init__(self, lexer: Lexer) -> None:
