@@ -14,7 +14,7 @@ from cornersmooth.nc_reader.line_patterns import LinePatterns, Lines
 from cornersmooth.nc_reader.words import Line, Table
 
 #: bytes read at a time
-CHUNK = 1 << 21
+CHUNK = 1 << 20
 
 
 class Readable(Protocol):
