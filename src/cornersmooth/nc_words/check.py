@@ -120,8 +120,9 @@ class WordCheck:
         rows = [len(table)]
         if self._states.attentive:
             linear = ~np.all([np.isnan(table.column(name)) for name in sorted(LINEAR)], axis=0)
-            first, down = int(np.argmax(linear)), ~np.isnan(table.column("Z"))
-            rows = sorted({0, first, first + int(np.argmax(down[first:])), len(table)})
+            first = int(np.argmax(linear))
+            down = int(np.argmax(~np.isnan(table.column("Z")[first:]))) if self._states.above else 0
+            rows = sorted({0, first, first + down, len(table)})
         for row in rows:
             self._states.angles |= table.last_before(row, ROTARY)
             self._code = table.last_before(row + 1, "G").get("G", self._code)
