@@ -14,10 +14,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.geometry.ragged import batches, search, spread, starts
-from cornersmooth.model import Floats, Ints, Program, Runs
+from cornersmooth.model import Floats, Ints, Numbers, Program, Runs
 from cornersmooth.settings import STANDING, Settings
 from cornersmooth.slices import some_runs
 from cornersmooth.smoothing.runs.polylines import Pieces, Polylines
@@ -95,15 +96,15 @@ def largest_curvature(lines: Polylines, splines: Splines, control: Floats) -> Fl
 class SectionRows:
     """Rows of runs in path order, m of them: control points of sections, or ends of lines."""
 
-    move: Ints  # pose in whose segment the section or line ends
-    number: Ints  # 1 for the first control point of a section; 0 for lines
+    move: Numbers  # pose in whose segment the section or line ends
+    number: NDArray[np.int8]  # 1 for the first control point of a section; 0 for lines
     points: Floats  # tip and axis point, (m, 6), mm; tip and unit axis for lines
     knot: Floats  # that goes with each control point, from 0
     last_knot: Floats  # of the section in its last row, else 0
 
 
 #: where there are no runs
-NO_ROWS = SectionRows(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 6)), np.zeros(0), np.zeros(0))
+NO_ROWS = SectionRows(np.zeros(0, np.int32), np.zeros(0, np.int8), np.zeros((0, 6)), np.zeros(0), np.zeros(0))
 
 
 @dataclass(frozen=True)
@@ -128,7 +129,8 @@ def run_lines(runs: Runs, program: Program, settings: Settings) -> SectionRows:
     tip[at], axis[at] = ends[:, :3], unit(ends[:, 3:] - ends[:, :3])
     place[at] = 1.0
     nothing = np.zeros(len(tip))
-    return SectionRows(found.pose, np.zeros(len(tip), np.int64), np.hstack((tip, axis)), place, nothing)
+    number = np.zeros(len(tip), np.int8)
+    return SectionRows(found.pose.astype(np.int32), number, np.hstack((tip, axis)), place, nothing)
 
 
 def line_places(runs: Runs, lines: Polylines, program: Program, settings: Settings) -> LinePlaces:
@@ -182,8 +184,8 @@ def section_rows(runs: Runs, program: Program) -> SectionRows:
     owner, number, knot, points = clamped(splines, runs.control, run, begin, end)
     last = np.append(number[1:] == 1, True)
     return SectionRows(
-        move=moves_at(runs, run, end)[owner],
-        number=number,
+        move=moves_at(runs, run, end).astype(np.int32)[owner],
+        number=number.astype(np.int8),
         points=points,
         knot=knot / STEPS_PER_UNIT,
         last_knot=np.where(last, (end - begin)[owner], 0.0) / STEPS_PER_UNIT,
