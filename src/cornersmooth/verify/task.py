@@ -75,7 +75,9 @@ class Task:
         def exact(place: Floats) -> Floats:
             return side_by_side(*original.pose_at(place), axis_length, own_axis)
 
-        path = Path.of(side_by_side(tip, axis, axis_length, own_axis), original.trail.bend, exact)
+        six = side_by_side(tip, axis, axis_length, own_axis)
+        del tip, axis  # before as much is needed for path lengths
+        path = Path.of(six, original.trail.bend, exact)
         return cls(original, path, _exact_poses(original), tolerance, axis_length, axis_tolerance, apart, sagitta)
 
     def six(self, tip: Floats, axis: Floats) -> Floats:
@@ -112,8 +114,10 @@ def length_of(tolerance: float, axis_tolerance: float) -> float:
 
 def side_by_side(tip: Floats, axis: Floats, axis_length: float, own_axis: bool) -> Floats:
     """(..., 6) tips and axis points, mm."""
-    axis_point = axis_length * axis if own_axis else tip + axis_length * axis
-    return np.concatenate((tip, axis_point), axis=-1)
+    six = np.concatenate((tip, axis_length * axis), axis=-1)
+    if not own_axis:
+        six[..., 3:] += tip
+    return six
 
 
 def _exact_poses(original: Original) -> Bools:
