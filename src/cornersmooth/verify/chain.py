@@ -260,13 +260,12 @@ def _places(own: Floats, gone: Floats, path: Path, radius: float, where: tuple[S
         slack = _SLACK * (high - low) + _RADII * radius
         place[rows], square = Window.of(path, low - slack, high + slack).nearest(own[:, rows], expected, radius)
         close = square <= radius * radius
-        count = len(close)
-        if size > _BLOCKS[0] and not close.all():
-            count, size = int(np.argmin(close)), max(size // 4, _BLOCKS[0])
+        known, count = row + np.flatnonzero(close)[-1:], len(close)
+        if size > _BLOCKS[0] and not close[-1]:
+            count, size = int(known[0]) + 1 - row if len(known) else 0, max(size // 4, _BLOCKS[0])
         else:
             size = min(2 * size, _BLOCKS[2])
         near[row : row + count] = close[:count]
-        known = row + np.flatnonzero(close[:count])[-1:]
         row += count
         if len(known):
             section, last = int(number[known[0]]), int(known[0])

@@ -52,8 +52,8 @@ class Batch:
         return int(self.stretches["first"][0])
 
 
-def decide(task: Task, batch: Batch) -> Decision:
-    """Run the motions beside each other."""
+def decide(task: Task, batch: Batch, most: int) -> Decision:
+    """Run the motions beside each other; nothing is looked at after `most` places where they part."""
     rows, lead = batch.stretches, int(batch.continued)
     part = batch.nc.part(lead, len(batch.nc))
     motion = written_motion(part, task)
@@ -66,7 +66,7 @@ def decide(task: Task, batch: Batch) -> Decision:
         def inner(number: Floats, columns: slice = columns) -> Floats:
             return inner_points(part, motion, task, number)[:, columns]
 
-        found = Passage(motion.six[:, columns], motion.bend, path, radius, sections, inner)
+        found = Passage(motion.six[:, columns], motion.bend, path, radius, sections, inner, most)
         place = place if k else found.place
         breaks += [(metric, one) for one in found.breaks]
     return Decision(motion=motion, place=place, breaks=tuple(breaks))

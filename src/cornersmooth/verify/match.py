@@ -14,7 +14,7 @@ from cornersmooth.verify.chain import Path, passed
 from cornersmooth.verify.cl_motion import Original
 from cornersmooth.verify.decision import Batch, Decision, decide
 from cornersmooth.verify.free_space import FreeSpace, holds
-from cornersmooth.verify.passage import AROUND
+from cornersmooth.verify.passage import AROUND, MOST_BREAKS
 from cornersmooth.verify.task import Task
 
 #: vertices on either side of one from whose places it is worked out first where it may be (speed only)
@@ -28,9 +28,9 @@ class Match(Batch, Decision):
     task: Task
 
     @classmethod
-    def of(cls, task: Task, batch: Batch) -> Match:
+    def of(cls, task: Task, batch: Batch, most: int = MOST_BREAKS) -> Match:
         """Decide a batch."""
-        return cls(task=task, **vars(batch), **vars(decide(task, batch)))
+        return cls(task=task, **vars(batch), **vars(decide(task, batch, most)))
 
     @property
     def six(self) -> Floats:

@@ -44,8 +44,9 @@ _TRIED: Final = 48
 #: segments around a break among which it is looked for where to go on, at most (as above)
 _WIDEST: Final = 1 << 16
 
-#: breaks after which nothing more is looked at
+#: breaks after which nothing more is looked at: in all, and in a part of a motion after its first
 MOST_BREAKS: Final = 100
+MORE_BREAKS: Final = 5
 
 
 @dataclass(frozen=True)
@@ -65,11 +66,17 @@ class Passage:
     """
 
     def __init__(
-        self, own: Floats, bend: Floats, path: Path, radius: float, sections: Sections, inner: Inner | None = None
+        self,
+        own: Floats,
+        bend: Floats,
+        path: Path,
+        radius: float,
+        sections: Sections,
+        inner: Inner | None = None,
+        most: int = MOST_BREAKS,
     ) -> None:
         self.path, self.radius, self._inner = path, radius, inner
-        #: where the motions part; nothing is looked at after `MOST_BREAKS`
-        self.breaks: list[Break] = []
+        self.breaks: list[Break] = []  #: where the motions part; nothing is looked at after `most`
         # vertices, bends of the steps from them, their places, and their numbers, with fractions of those put between
         self._own, self._bend = own, bend
         self._place, self._number = np.full(len(own), np.nan), np.arange(len(own), dtype=np.float64)
@@ -78,7 +85,7 @@ class Passage:
         self._begin, self._stop, self._guessed = sections.start.copy(), sections.stop, sections.guessed
         self._left = 0.0  # last place that was reached before a break
         section = 0
-        while section < len(self._first) and len(self.breaks) < MOST_BREAKS:
+        while section < len(self._first) and len(self.breaks) < most:
             section = self._go_on(section)
 
     @property
@@ -119,7 +126,8 @@ class Passage:
         found = chain(np.ascontiguousarray(self._own[row:].T), self._bend[row:], self.path, self.radius, sections)
         _, inside = sections.of(np.arange(len(found.place)))
         self._place[row:] = np.where(found.bad | ~inside, np.nan, found.place)
-        bent = np.flatnonzero(found.bad & ~found.far) + row
+        # whether more is wrong need not be known so well
+        bent = np.flatnonzero(found.bad & ~found.far & (not self.breaks)) + row
         while len(bent) and self._inner is not None and self._divide(bent, self._inner):
             bent = self._prove_again(row)
         return self._missing(row)[0]
@@ -185,7 +193,6 @@ class Passage:
         if first == known:
             return Break(first, float(self._begin[section]), sure)
         found = Break(first, float(self._place[first - 1]), False)
-        # whether more is wrong need not be known so well
         for back in LOOK_BACK[: 2 if self.breaks else None]:
             begin = max(first - back, known)
             until = end if back > _SOON else min(last + _SOON, end)

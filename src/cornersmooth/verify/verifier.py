@@ -34,7 +34,7 @@ from cornersmooth.verify.deviation import check_breaks, measure_original, measur
 from cornersmooth.verify.feeds import check_feeds
 from cornersmooth.verify.findings import Findings, Where, problems_of
 from cornersmooth.verify.match import Match
-from cornersmooth.verify.passage import MOST_BREAKS
+from cornersmooth.verify.passage import MORE_BREAKS, MOST_BREAKS
 from cornersmooth.verify.result import Verification
 from cornersmooth.verify.task import Task, length_of
 from cornersmooth.verify.word_places import WordPlaces, place_words
@@ -218,28 +218,29 @@ class Verifier:
         if self._slower:
             chunks = (part.at_most() for part in chunks)
 
-        def items() -> Iterator[tuple[Batch | None, dict[str, Where]]]:
+        def items() -> Iterator[tuple[Batch | None, dict[str, Where], int]]:
             poses[:3], poses[3] = np.nan, 0.0  # not before other processes are forked, which would keep them
-            for batch in batches.of(places.watch(chunks)):
-                yield None if len(findings.breaks) >= MOST_BREAKS else batch, findings.worst.copy()
+            for number, batch in enumerate(batches.of(places.watch(chunks))):
+                wanted = batch if len(findings.breaks) < MOST_BREAKS else None
+                yield wanted, findings.worst.copy(), MORE_BREAKS if number else MOST_BREAKS
 
-        def work(item: tuple[Batch | None, dict[str, Where]]) -> Findings:
+        def work(item: tuple[Batch | None, dict[str, Where], int]) -> Findings:
             batch, found = item[0], Findings(item[1])
             if batch is not None:
-                match = Match.of(task, batch)
+                match = Match.of(task, batch, item[2])
                 for check in CHECKS:
                     check(match, found)
             return found
 
-        for found in map_in_processes(work, items(), self._processes, busy=True):
+        for number, found in enumerate(map_in_processes(work, items(), self._processes, busy=True)):
             if len(findings.breaks) >= MOST_BREAKS:
                 continue
             for some in found.poses:
                 poses[:, some[0].astype(np.int64)] = some[1:]
             found.poses = []
             findings.take(found)
-            if len(findings.breaks) >= MOST_BREAKS:
-                text = f"what comes after {MOST_BREAKS} places where the motions part"
+            if len(findings.breaks) >= MOST_BREAKS or (number and len(found.breaks) >= MORE_BREAKS):
+                text = f"what comes after {len(findings.breaks)} places where the motions part"
                 findings.unlooked.append((findings.breaks[-1], text))
         nc, curves = said()
         findings.unlooked += nc.unlooked
