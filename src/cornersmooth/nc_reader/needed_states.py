@@ -76,17 +76,18 @@ def axis_problems(
     for column, axis in enumerate(machine.axes):
         name, values = axis.name, table.column(axis.name)
         given, told = ~np.isnan(values), ~np.isnan(table.column(f"{BY_WORD} {axis.name}"))
-        wrong: dict[str, Bools] = {}
         if axis.modulo:
-            wrong[f"a word of {name} that is not from 0 to 360 degrees"] = (values < 0.0) | (values >= 360.0)
+            text = f"a word of {name} that is not from 0 to 360 degrees"
+            yield from first_wrong(CONTROL_WORDS, (values < 0.0) | (values >= 360.0), table.line, text)
         if way == BY_WORD and axis.modulo:
-            wrong[f"{name} without {BY_WORD}(), which sends it the shorter way"] = given & ~told
+            text = f"{name} without {BY_WORD}(), which sends it the shorter way"
+            yield from first_wrong(CONTROL_WORDS, given & ~told, table.line, text)
         elif way == BY_WORD:
-            wrong[f"{name} with {BY_WORD}(), which is for modulo axes"] = told
+            text = f"{name} with {BY_WORD}(), which is for modulo axes"
+            yield from first_wrong(CONTROL_WORDS, told, table.line, text)
         elif way and axis.modulo and not memory.shorter_way:
-            wrong[f"{name} without {way} in force, which sends it the shorter way"] = given
-        for text, rows in wrong.items():
-            yield from first_wrong(CONTROL_WORDS, rows, table.line, text)
+            text = f"{name} without {way} in force, which sends it the shorter way"
+            yield from first_wrong(CONTROL_WORDS, given, table.line, text)
         if axis.limits is not None:
             angles, line = (run.second[:, column], run.line) if len(run.curves) else (values, table.line)
             beyond = (angles < axis.low - step / 2) | (angles > axis.high + step / 2)

@@ -6,12 +6,16 @@ from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from typing import Final
 
+from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.nc_reader.lexer import Lexer
 from cornersmooth.nc_reader.words import Line
 from cornersmooth.nc_words.rules import UNLISTED, WordList, WordRule, any_of, shown
 
 #: words of a block, or the block as a whole, with their rules
 Ruled = list[tuple[str, WordRule]]
+
+#: code of words that are not on the list or not in their place
+NOT_LISTED: Final = "CS571"
 
 #: blocks, and words, whose rules are remembered
 _REMEMBERED: Final = 4096
@@ -59,35 +63,39 @@ class WordRules:
         fitting = [rule for rule in self._words if rule.pattern.fullmatch(word)]
         return [] if fitting and fitting[0].never else fitting
 
-    def problems(self, line: Line, words: Sequence[str], ruled: Ruled) -> Iterator[str]:
+    def problems(self, line: Line, words: Sequence[str], ruled: Ruled) -> Iterator[Problem]:
         """What is wrong with a block by itself: words off the list, twice, without others or beside others."""
+
+        def wrong(text: str) -> Problem:
+            return Problem(NOT_LISTED, 0, line.number, text)
+
         for word, rule in ruled:
             if rule is UNLISTED and self._fitting(word):
-                yield f"{word} is beside nothing that it belongs to"
+                yield wrong(f"{word} is beside nothing that it belongs to")
             elif rule is UNLISTED:
-                yield f"{word} is not on the list of words for this control"
+                yield wrong(f"{word} is not on the list of words for this control")
         for spelt in filter(self._lexer.without_point, line.words):
-            yield f"{spelt.text} without a decimal point: the control may count it in its least increment"
+            yield wrong(f"{spelt.text} without a decimal point: the control may count it in its least increment")
         names = [word.name for word in line.words if word.name not in "GM"]
         names += [word for word in words if word[0] in "GM"]
         for name in sorted({name for name in names if names.count(name) > 1}):
-            yield f"{name} is twice in one block"
+            yield wrong(f"{name} is twice in one block")
         if sum(word.name == "M" for word in line.words) > 1:
-            yield "two M words in one block"
+            yield wrong("two M words in one block")
         if sum(word in _MOTION for word in words) > 1:
-            yield "two motions in one block"
+            yield wrong("two motions in one block")
         states = [rule.state for _, rule in ruled if rule.state]
         if len(set(states)) < len(states):
-            yield "two words of one group in one block"
+            yield wrong("two words of one group in one block")
         for k, (word, rule) in enumerate(ruled):
             others = [*words[:k], *words[k + 1 :]]
             if rule.must is not None and not any_of(rule.must, others):
-                yield f"{word} without {shown(rule.must)}"
+                yield wrong(f"{word} without {shown(rule.must)}")
             if rule.alone:
                 own = [bool(theirs.needs and theirs.needs.fullmatch(word)) for _, theirs in ruled]
                 for (other, _), belongs in zip(ruled, own, strict=True):
                     if other != word and (not belongs or sum(own) > 1):
-                        yield f"{other} in the block of {word}"
+                        yield wrong(f"{other} in the block of {word}")
             share = rule.pattern.fullmatch(word) if rule.share is not None else None
             if share and float(share[1]) > (rule.share or 0.0) * self._tolerance * (1 + 1e-9) + 1e-5:
-                yield f"{word} is more than {rule.share:g} of the tolerance"
+                yield wrong(f"{word} is more than {rule.share:g} of the tolerance")

@@ -12,7 +12,7 @@ import numpy as np
 from cornersmooth.errors import InputError
 from cornersmooth.nc_reader.lexer import Lexer
 from cornersmooth.nc_reader.words import Line, Table
-from cornersmooth.nc_words.blocks import Ruled, WordRules
+from cornersmooth.nc_words.blocks import NOT_LISTED, Ruled, WordRules
 from cornersmooth.nc_words.machine_positions import MachinePositions
 from cornersmooth.nc_words.rules import UNLISTED, WordList, WordRule, shown, word_list, word_text
 from cornersmooth.nc_words.states import LINEAR, ROTARY, WordStates
@@ -138,7 +138,9 @@ class WordCheck:
             for weight in weights or ():
                 off &= np.abs(column - weight) > _WEIGHT_ROOM
             for row in np.flatnonzero(off)[:_MOST_WEIGHTS].tolist():
-                self._wrong(int(table.line[row]), f"a weight of {column[row]:g}, which no curve of this program has")
+                self._wrong(
+                    NOT_LISTED, int(table.line[row]), f"a weight of {column[row]:g}, which no curve of this program has"
+                )
 
     def _block(self, line: Line) -> Line:
         """Look at a line on its own; of one that is taken on trust only what is understood goes on to the reader."""
@@ -146,20 +148,20 @@ class WordCheck:
         for comment in line.comments:
             self._states.comment(comment)
             if self.list.orders is not None and self.list.orders.match(comment):
-                self._wrong(number, f"a comment that the control obeys: {comment[:40]}")
+                self._wrong(NOT_LISTED, number, f"a comment that the control obeys: {comment[:40]}")
             if _CONTROL_CHARACTERS.search(comment):
-                self._wrong(number, "a comment with a character that ends a block or is none")
+                self._wrong(NOT_LISTED, number, "a comment with a character that ends a block or is none")
         words = [word_text(word) for word in line.words] or ["%"] * line.tape
         text = " ".join(words)
         own = bool(words) and any(pattern.fullmatch(text) for pattern in self._own)
         if line.skipped and not own:
-            self._wrong(number, "block skip: what the control does depends on a switch")
+            self._wrong(NOT_LISTED, number, "block skip: what the control does depends on a switch")
         if not words:
             return line
         before, ruled = len(self.problems), self._rules.of(words)
         if not self._frames(number, text):
             self._follow(number, text, ruled)
-            self._wrong(number, *self._rules.problems(line, words, ruled))
+            self.problems += self._rules.problems(line, words, ruled)
             self._states.take(number, words, ruled)
         self._line = number
         if own:
@@ -205,10 +207,10 @@ class WordCheck:
         number, before, theirs = self._before
         for _, rule in theirs:
             if rule.then is not None and not rule.then.fullmatch(text):
-                self._wrong(number, f"{shown(rule.pattern)} without {shown(rule.then)} after it")
+                self._wrong(NOT_LISTED, number, f"{shown(rule.pattern)} without {shown(rule.then)} after it")
         for word, rule in ruled:
             if rule.behind is not None and not rule.behind.fullmatch(before):
-                self._wrong(line, f"{word} does not follow what it belongs to")
+                self._wrong(NOT_LISTED, line, f"{word} does not follow what it belongs to")
         self._before = line, text, ruled
 
     # how the program begins and ends
@@ -220,7 +222,7 @@ class WordCheck:
         if wanted := self._wanted:
             place = next((k for k, pattern in enumerate(wanted) if pattern.fullmatch(text)), None)
             if place != 0:
-                self._states.unframed(number, f"the program must begin with {shown(wanted[0])}")
+                self._states.unframed(NOT_LISTED, number, f"the program must begin with {shown(wanted[0])}")
             self._wanted = () if place is None else wanted[place + 1 :]
             if place is not None:
                 self._opening = self._opening or text
@@ -229,7 +231,7 @@ class WordCheck:
             self._tail.append((number, text))
             return True
         for line, ending in self._tail:
-            self._states.unframed(line, f"{ending} ends the program, and more follows")
+            self._states.unframed(NOT_LISTED, line, f"{ending} ends the program, and more follows")
         self._tail = []
         return False
 
@@ -238,9 +240,9 @@ class WordCheck:
         first = self._tail[0][0] if self._tail else self._line
         ends, texts = self.list.end, [text for _, text in self._tail]
         if len(texts) != len(ends) or not all(map(re.Pattern.fullmatch, ends, texts)):
-            self._states.unframed(first, f"the program must end with {', '.join(map(shown, ends))}, once")
+            self._states.unframed(NOT_LISTED, first, f"the program must end with {', '.join(map(shown, ends))}, once")
         elif self._opening.partition(" ")[2] != texts[-1].partition(" ")[2]:
-            self._states.unframed(self._tail[-1][0], f"{texts[-1]} ends what {self._opening} began")
+            self._states.unframed(NOT_LISTED, self._tail[-1][0], f"{texts[-1]} ends what {self._opening} began")
         self._states.end(first)
 
 

@@ -19,15 +19,14 @@ import numpy as np
 
 from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.nc_reader.rotary import tool_vectors
-from cornersmooth.nc_words.blocks import Ruled
+from cornersmooth.nc_words.blocks import NOT_LISTED, Ruled
 from cornersmooth.nc_words.machine_positions import SAME, MachinePositions
 from cornersmooth.nc_words.rules import WordList, WordRule, any_of, shown
 
 #: a retract with the same tool, which only GOHOME of the CL file asks for
 GONE_ON: Final = "a retract that another motion of the same tool follows"
 
-#: codes of words that are not on the list or not in their place, and of states that the program never establishes
-NOT_LISTED: Final = "CS571"
+#: code of states that the program never establishes
 NOT_ESTABLISHED: Final = "CS572"
 
 #: name of the blocks around the motion, among what is left to the user
@@ -90,7 +89,9 @@ class WordStates:
         self._said: set[str] = set()  # words so far; those that must come again before each of their kind, since then
         self._held: dict[str, _Held] = {}
         self._first: dict[str, str] | None = None  # states at the first motion; "" for those that may come later
-        self._others: dict[_Held, str] = {}  # what holds and did not at the first motion, and what is wrong with it
+        self._others: dict[
+            _Held, tuple[str, str]
+        ] = {}  # what holds and did not at the first motion, and what is wrong with it
         self._cycles = False  # whether the program has any, so that some states may differ from tool to tool
         #: where the rotary axes have been sent, as far as that is said, and whether the control has turned them since
         self.angles: dict[str, float] = {}
@@ -108,21 +109,21 @@ class WordStates:
 
     # complaints
 
-    def wrong(self, line: int, *texts: str, code: str = NOT_LISTED) -> None:
+    def wrong(self, code: str, line: int, *texts: str) -> None:
         """Complain of words or states."""
         self.problems += [Problem(code, 0, line, text) for text in texts]
 
-    def unframed(self, line: int, *texts: str, code: str = NOT_LISTED) -> None:
+    def unframed(self, code: str, line: int, *texts: str) -> None:
         """Complain of the blocks around the motion; where they are the user's own, they are taken on trust."""
         if FRAME in self._left:
             self.trusted += [(line, text) for text in texts]
             self.unsure += [(line, text) for text in texts]
         else:
-            self.wrong(line, *texts, code=code)
+            self.wrong(code, line, *texts)
 
     def _lost_since(self, line: int, texts: Iterable[str]) -> None:
         """Complain of what a program of our own has."""
-        self.unframed(line, *(texts if self._made else ()))
+        self.unframed(NOT_LISTED, line, *(texts if self._made else ()))
 
     # what holds
 
@@ -165,12 +166,12 @@ class WordStates:
         if rule.after is not None:
             before = {said for said in self._said if rule.after.fullmatch(said)}
             if not before:
-                self.wrong(line, f"{word} without {shown(rule.after)} before it")
+                self.wrong(NOT_LISTED, line, f"{word} without {shown(rule.after)} before it")
             self._said -= before
         if rule.rotary == "zero" and (not self.angles or self._positions.away(self.angles)):
-            self.unframed(line, f"{word} without the rotary axes at zero before it")
+            self.unframed(NOT_LISTED, line, f"{word} without the rotary axes at zero before it")
         if rule.high and not self._high:
-            self.unframed(line, f"{word} without a retract before it")
+            self.unframed(NOT_LISTED, line, f"{word} without a retract before it")
         if rule.turns:
             self.angles, self._swivelled = {}, True
         if rule.retract:
@@ -180,7 +181,8 @@ class WordStates:
         if rule.changes_tool or rule.outside:
             self._retract = 0
             tell = self.unframed if rule.changes_tool else self.wrong
-            tell(line, *[f"{word} under {tip}" for tip in self._tip_control])
+            for tip in self._tip_control:
+                tell(NOT_LISTED, line, f"{word} under {tip}")
         spindle = self._held.get("spindle")
         if rule.changes_tool and spindle is not None and spindle.rule.tidy and spindle.line > self._moved:
             self._ended["spindle"] = word, line
@@ -235,11 +237,11 @@ class WordStates:
         """
         for state, (word, number) in self._ended.items():
             if self._held[state].rule.compared and word not in _STOPS:
-                self.wrong(number, f"{word} stops the spindle that was started before it")
+                self.wrong(NOT_LISTED, number, f"{word} stops the spindle that was started before it")
             elif state not in self._left and word in _STOPS:
                 self._lost_since(line, [f"{word} ends {self._held[state].text}, and the tool moves on without it"])
             elif state not in self._left:
-                self.unframed(line, f"{state}: it must come after {word}, which deselects it", code=NOT_ESTABLISHED)
+                self.unframed(NOT_ESTABLISHED, line, f"{state}: it must come after {word}, which deselects it")
         if not drills:
             self._lost_since(line, list(self._approached(words)))
         late = set()
@@ -248,7 +250,7 @@ class WordStates:
         first = self._begin(line, late) if self._first is None else self._first
         self._compare(late, first, arc=code in (2.0, 3.0))
         if self._retract and not late:
-            self.wrong(self._retract, GONE_ON)
+            self.wrong(NOT_LISTED, self._retract, GONE_ON)
             self._retract = 0
         self._moved, self._ended = line, {}
         self._changed = self._high = False
@@ -262,7 +264,7 @@ class WordStates:
         self._first = {state: "" if state in late else held.text for state, held in self._held.items()}
         for state, wanted in self._unsaid("motion"):
             if state not in self._left:
-                self.unframed(line, f"{state}: {wanted} must come before the first motion", code=NOT_ESTABLISHED)
+                self.unframed(NOT_ESTABLISHED, line, f"{state}: {wanted} must come before the first motion")
         return self._first
 
     def _compare(self, late: Set[str], first: dict[str, str], *, arc: bool) -> None:
@@ -273,10 +275,9 @@ class WordStates:
             if state in late or held.text == first.get(state):
                 continue
             if held.rule.before and held.line > self._moved and not arc:
-                self.wrong(held.line, f"{held.text} where no arc follows")
+                self.wrong(NOT_LISTED, held.line, f"{held.text} where no arc follows")
             if not held.rule.follows:
-                other = f"{state}: {held.text} where {first.get(state, 'nothing')} holds for the whole program"
-                self._others.setdefault(held, other)
+                self._others.setdefault(held, (state, first.get(state, "nothing")))
 
     def _approached(self, words: Mapping[str, float]) -> Iterator[str]:
         """What is wrong with a motion of the words of a block, the first after a retract or after other words."""
@@ -338,15 +339,16 @@ class WordStates:
 
     def end(self, line: int) -> None:
         """Look at what holds where the program ends; `line` is that of its end."""
-        for held, text in self._others.items():
+        for held, (state, other) in self._others.items():
             if not (held.rule.tool and self._cycles):
-                self.wrong(held.line, text)
+                text = f"{state}: {held.text} where {other} holds for the whole program"
+                self.wrong(NOT_LISTED, held.line, text)
         for state, held in self._held.items():
             if not held.off and any(rule.off for rule in self._list.words if rule.state == state):
                 text = f"{state}: {held.text} of line {held.line} still holds at the end"
-                self.unframed(line, text, code=NOT_ESTABLISHED)
+                self.unframed(NOT_ESTABLISHED, line, text)
         if not self._high and self._retracts:
-            self.unframed(line, "the tool is not retracted at the end", code=NOT_ESTABLISHED)
+            self.unframed(NOT_ESTABLISHED, line, "the tool is not retracted at the end")
         if self._first is None:
             return
         self._lost_since(line, [f"{word} still holds at the end" for word in self._running()])

@@ -143,7 +143,7 @@ def _say(match: Match, found: Findings, metric: Metric, one: Break) -> None:
         k = int(np.argmax(distance > limit)) if off[name] > limit else int(distance.argmax())  # there it begins
         where = _lines(match, float(place[k]), int(row[k]))
         if name == "both":
-            gap = Gap.of(task, points_at(match.six, step).T - match.path.at(place))
+            gap = Gap.of(task, _written(match, step) - match.path.at(place))
             around.note(match, found, gap, row)
             farthest = int(distance[: len(around.rows)].argmax())
             turned = float(gap.angle[farthest])
@@ -213,7 +213,8 @@ class _Around:
         """(k,) distances of vertices of both motions, mm, and places on both: written vertices first."""
         columns, path = COLUMNS[metric], match.path.points
         at, off = _nearest(match.six[self.rows], path, self.segments, columns)
-        step, other = _nearest(path[self.vertices], match.six, self.steps, columns)
+        step, _ = _nearest(path[self.vertices], match.six, self.steps, columns)
+        other = np.sqrt(largest_square((_written(match, step) - path[self.vertices])[:, columns].T))
         return np.append(off, other), np.append(at, self.vertices), np.append(self.rows, step)
 
     def note(self, match: Match, found: Findings, gap: Gap, row: Ints) -> None:

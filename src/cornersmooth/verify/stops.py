@@ -299,7 +299,8 @@ class Stops:
                 text = "motion that the CL file does not have"
                 yield there.with_fault(lines.problem("CS534", self._move[first], element, text))
             elif t == first and not self._hole[t] and (not feeds or t == 0):
-                amount, text = float(lines.missed(moves[:1], elements[:1])[1][0]), "a rapid does not end at its pose"
+                amount = float(lines.missed(moves[:1], elements[:1])[1][0])
+                text = "a rapid does not end at its pose"
                 yield there.with_fault(lines.problem("CS531", self._move[t], element, text, amount))
             here = self._without(here, t, element)
 
