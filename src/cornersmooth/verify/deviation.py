@@ -7,6 +7,7 @@ keeps within them. Of tips and of axis points alone the nearest places are looke
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -18,7 +19,7 @@ from cornersmooth.verify.findings import AXIS_OFF, Findings, Violation, Where
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.motions import digit_errors, inner_points
 from cornersmooth.verify.nearest import COLUMNS, Metric, largest_square, nearest_places, on_segments
-from cornersmooth.verify.passage import AROUND, LONGER, Break
+from cornersmooth.verify.passage import AROUND, LONGER, LOOK_BACK, Break
 from cornersmooth.verify.task import ARITHMETIC, Task
 
 #: segments on either side of a place among which a nearer one is looked for
@@ -95,21 +96,25 @@ def nearest(match: Match, reached: Reached, rows: Ints, metric: Metric) -> Float
         low, high = first[middle], last[middle] - 1
     point, columns = own[vertex], COLUMNS[metric]
     best = nearest_places(point, other, middle, _REACH, low, high, metric)
-    first_place, last_place = low.astype(np.float64), high + 1.0
 
     def square(place: Floats) -> Floats:
-        away = ((match.path.at(place) if reached.mine else _written(match, place)) - point)[:, columns]
-        return np.einsum("ij,ij->i", away, away)
+        away = (match.path.at(place) if reached.mine else _written(match, place)) - point
+        return largest_square(away[:, columns].T)
 
+    return np.sqrt(_least(square, best, low.astype(np.float64), (high + 1).astype(np.float64)))
+
+
+def _least(square: Callable[[Floats], Floats], best: Floats, first: Floats, last: Floats) -> Floats:
+    """(k,) the least squares near places, from the first to the last ones: of a bent motion, by parabolas."""
     least = square(best)
     for width in _WIDTHS:
-        centre = np.clip(best, first_place + width, last_place - width)  # a bent step may go on in the next one
+        centre = np.clip(best, first + width, last - width)  # a bent step may go on in the next one
         before, here, after = (square(centre + side) for side in (-width, 0.0, width))
         bend = before - 2.0 * here + after
         shift = np.divide(width * (before - after), 2.0 * bend, out=np.zeros_like(bend), where=bend > 0.0)
-        best = np.clip(centre + np.clip(shift, -1.0, 1.0), first_place, last_place)
+        best = np.clip(centre + np.clip(shift, -1.0, 1.0), first, last)
         least = np.minimum.reduce((least, before, here, after))
-    return np.sqrt(np.minimum(least, square(best)))
+    return np.minimum(least, square(best))
 
 
 def _written(match: Match, place: Floats) -> Floats:
@@ -186,7 +191,7 @@ class _Around:
     def of(cls, match: Match, one: Break) -> _Around:
         """Find it."""
         path, row = match.path, max(one.row, 0)
-        end = int(np.flatnonzero(match.section == match.section[row])[-1])
+        first, end = np.flatnonzero(match.section == match.section[row])[[0, -1]].tolist()
         whole = min(int(match.motion.last[match.motion.owner[row]]), end)  # what is off at its end begins before it
         again = whole + 1 + np.flatnonzero(match.on[whole + 1 : end + 1])
         resumed = int(again[0]) if len(again) else end + 1
@@ -205,7 +210,7 @@ class _Around:
         low, high = np.searchsorted(path.length, (here - near, path.length_at(stop) + near)).tolist()
         low = min(max(low - 1, int(match.low[row])), int(match.high[row]))
         high = max(min(high, int(match.high[row]) + 1, low + _MOST_SEGMENTS), low + 1)
-        before = max(row - 1, 0)
+        before = max(row - LOOK_BACK[1], first)  # what is passed late may be near what has been run before
         steps = np.arange(before, max(min(resumed, end, last + 1), before + 1))
         return cls(np.arange(row, last + 1), np.arange(low, high), vertices[:_MOST_SEGMENTS], steps)
 
@@ -213,8 +218,15 @@ class _Around:
         """(k,) distances of vertices of both motions, mm, and places on both: written vertices first."""
         columns, path = COLUMNS[metric], match.path.points
         at, off = _nearest(match.six[self.rows], path, self.segments, columns)
-        step, _ = _nearest(path[self.vertices], match.six, self.steps, columns)
-        other = np.sqrt(largest_square((_written(match, step) - path[self.vertices])[:, columns].T))
+        step, other = _nearest(path[self.vertices], match.six, self.steps, columns)
+        if (off_path := other > match.tolerance).any():  # they are off the chords, but perhaps not the bent steps
+            vertices = self.vertices[off_path]
+            first, last = (np.full(len(vertices), float(at)) for at in (self.steps[0], self.steps[-1] + 1))
+
+            def square(place: Floats) -> Floats:
+                return largest_square((_written(match, place) - path[vertices])[:, columns].T)
+
+            other[off_path] = np.sqrt(_least(square, step[off_path], first, last))
         return np.append(off, other), np.append(at, self.vertices), np.append(self.rows, step)
 
     def note(self, match: Match, found: Findings, gap: Gap, row: Ints) -> None:
