@@ -84,7 +84,7 @@ def map_in_processes(
 
     Items are taken as they are needed, a fixed number ahead; none before the processes have been forked, which would
     keep copies of them. Nothing leaves this process where there is to be only one or the system cannot fork safely.
-    `busy`: to take an item is more than to work on it, so this process keeps up with one other and no more.
+    `busy`: to take an item is work, too, so there is one other process, and this one works on items while that does.
 
     Raises MemoryError where a process has been ended from outside, which is what a system short of memory does.
     """
@@ -94,9 +94,10 @@ def map_in_processes(
     waiting: deque[Callable[[], Result]] = deque()
 
     def start(turn: int, item: Item) -> Callable[[], Result]:
-        if crew:
-            crew[turn % len(crew)].start(item)
-            return crew[turn % len(crew)].result
+        member = crew[turn % len(crew)] if crew else None
+        if member is not None and not (busy and member.works):
+            member.start(item)
+            return member.result
         found = work(item)
         return lambda: found
 
@@ -124,6 +125,11 @@ class _Member:
         theirs.close()
         self.found = deque[Any]()
         self.working = False
+
+    @property
+    def works(self) -> bool:
+        """Whether it has not found yet what it was given."""
+        return self.working and not self.connection.poll()
 
     def start(self, item: Any) -> None:
         """Send an item, after what was found for the one before has been taken in."""

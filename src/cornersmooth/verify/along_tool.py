@@ -10,7 +10,7 @@ the two the tool is nowhere near the part: it stays where the cut is left.
 from __future__ import annotations
 
 import math
-from bisect import bisect_left
+from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from typing import Final
 
@@ -95,8 +95,10 @@ class AlongTool:
         """Whether an element goes on at feed with a cut that its tool has left, or it or the next one in rapid."""
         if element != self._left:
             return False
-        first = bisect_left(self._events, element, key=lambda event: event.element)
-        if any(event.letter == "T" for event in self._events[first:] if event.element == element):
+        first, last = (
+            side(self._events, element, key=lambda event: event.element) for side in (bisect_left, bisect_right)
+        )
+        if any(event.letter == "T" for event in self._events[first:last]):
             return False
         found = not self._is(Element.RAPID, element) or self._is_where_left(element)
         if not found and self._ahead.has(element + 1):

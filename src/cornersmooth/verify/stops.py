@@ -203,7 +203,10 @@ class Stops:
         if stands:  # a rapid for the digits of a stop alone
             put(alive)
         for trace in alive:
-            put(self._takes(trace, element) if stands else self._from(trace, element))
+            if not stands:
+                put(self._from(trace, element))
+            elif trace.inside or self._moved_on(trace.stop, element):
+                put(self._takes(trace, element))
         if found:
             return list(found.values())
         if self._along.stays(element):
@@ -212,6 +215,10 @@ class Stops:
         for trace in alive:
             put(self._with_fault(trace, element))
         return sorted(found.values(), key=lambda one: one.cost)[:_AFTER_FAULT]
+
+    def _moved_on(self, stop: int, element: int) -> bool:
+        """Whether no move between a stop and the next leads away from where the tool is before an element."""
+        return stop < 0 or not self._leads(stop) or self.lines.at(self._move[stop + 1] - 1, element - 1)
 
     def _check_return(self, element: int) -> None:
         """Complain of an element that goes on with a cut, but if the CL file has a pose where that was left."""
