@@ -36,12 +36,11 @@ _STRETCH: Final = np.dtype(
     [("first", "i8"), ("last", "i8"), ("start", "f8", 3), ("end", "f8", 3), ("stop", "i8"), ("guessed", "?")]
 )
 
-#: share of the way, on either side, within which a place is guessed at first (speed only)
-_NEAR: Final = 0.05
-
-
 #: a row of it
 _Row: TypeAlias = tuple[int, int, Floats, Floats, int, bool]
+
+#: share of the way, on either side, within which a place is guessed at first (speed only)
+_NEAR: Final = 0.05
 
 
 class Batches:

@@ -205,7 +205,7 @@ class Stops:
         for trace in alive:
             if not stands:
                 put(self._from(trace, element))
-            elif trace.inside or self._moved_on(trace.stop, element):
+            elif trace.inside or self._moved_on(trace.stop, element, -1):
                 put(self._takes(trace, element))
         if found:
             return list(found.values())
@@ -216,9 +216,11 @@ class Stops:
             put(self._with_fault(trace, element))
         return sorted(found.values(), key=lambda one: one.cost)[:_AFTER_FAULT]
 
-    def _moved_on(self, stop: int, element: int) -> bool:
-        """Whether no move between a stop and the next leads away from where the tool is before an element."""
-        return stop < 0 or not self._leads(stop) or self.lines.at(self._move[stop + 1] - 1, element - 1)
+    def _moved_on(self, stop: int, element: int, begin: int) -> bool:
+        """Whether no move between a stop and the next leads anywhere, or elements after one have run up to the last."""
+        if stop < 0 or not self._leads(stop):
+            return True
+        return element - 1 > begin and self.lines.at(self._move[stop + 1] - 1, element - 1)
 
     def _check_return(self, element: int) -> None:
         """Complain of an element that goes on with a cut, but if the CL file has a pose where that was left."""
@@ -277,7 +279,7 @@ class Stops:
             passes = self._done(k, element)
         else:
             begin = trace.begin - (k >= 0 and self._hole[k])  # out of a hole the first feed move may be the last, too
-            passes = k < 0 or not self._leads(k) or (element - 1 > begin and lines.at(self._move[t] - 1, element - 1))
+            passes = self._moved_on(k, element, begin)
         if passes and self._hole[t] and (self._over(t, element) or self._may_be_left_out(t)):
             there = self._finished(trace, _Trace(t, element, True, trace), element)
             return None if there.problems else there
