@@ -10,6 +10,7 @@ import pytest
 
 import cornersmooth as cs
 from cornersmooth.filter import Filtered, filter_program, verify_programs
+from cornersmooth.filter.runs import ProgramReader
 from cornersmooth.filter.state import VOCABULARIES
 from cornersmooth.verdict import Verdict
 from filter.programs import ISO, PROGRAMS, WORDS, X, Y, Z, cuts
@@ -176,12 +177,21 @@ def test_paths_of_klartext_that_are_not_known_lose_the_place() -> None:
     assert "".join(lines[12:]).encode() in found.data
 
 
-def test_what_is_jumped_to_is_left() -> None:
+@pytest.mark.parametrize("jump", ["IF [#1 EQ 1] GOTO 12", "M99 P12", "M 099 P12", "N900 if[#1 eq 1]goto12"])
+def test_what_is_jumped_to_is_left(jump: str) -> None:
     lines = [f"N{k} {line}\n" for k, line in enumerate(RUN.splitlines(), start=1)]
-    text = ISO.format(on="G43.4 H1", start="A20. C30.", cuts="".join(lines)).replace("M30", "IF [#1 EQ 1] GOTO 12\nM30")
+    text = ISO.format(on="G43.4 H1", start="A20. C30.", cuts="".join(lines)).replace("M30", f"{jump}\nM30")
     found = filtered("fanuc", "table-ac", text)
     assert found.smoothed == 11
     assert "".join(lines[11:]).encode() in found.data
+
+
+def test_a_jump_back_into_a_piece_that_was_read_before_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("cornersmooth.filter.runs.CHUNK", 200)
+    lines = [f"N{k} {line}\n" for k, line in enumerate(RUN.splitlines(), start=1)]
+    text = ISO.format(on="G43.4 H1", start="A20. C30.", cuts="".join(lines)).replace("M30", "IF [#1 EQ 1] GOTO 5\nM30")
+    reading = ProgramReader("fanuc", cs.load_machine("table-ac")).read(text.encode())
+    assert 0 < max(run.stop for run in reading.runs) <= text[: text.index("N5 ")].count("\n")
 
 
 def test_corners_that_the_program_rounds_itself_stay() -> None:

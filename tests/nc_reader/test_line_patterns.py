@@ -158,3 +158,14 @@ def test_long_lines_are_read_as_they_are():
     blanks = (0, 100, *range(500, 507), 600)
     data = b"\n".join(b"X1.5 Y2.5" + b" " * k for k in blanks) + b"\n(" + b"A" * 300 + b")\nX3.5 Y1.5\n"
     assert same_alone(data, dialect_of("fanuc")) == sum(k + 10 <= line_patterns._LONGEST for k in blanks) + 1
+
+
+def test_lines_keep_their_patterns_where_others_are_forgotten() -> None:
+    patterns = LinePatterns(dialect_of("fanuc").lexer)
+    first = Lines.of(b"".join(b"X%d.5 Y-%d. F%s.\n" % (k, k, b"1" * (k % 9 + 1)) for k in range(40)), patterns)
+    Lines.of(b"Z1.5\n", patterns)  # fewer lines than patterns: all are forgotten
+    Lines.of(b"G1 X1.25 I0.5\nY7. Z2.\n", patterns)
+    assert first.bulk().all()
+    columns = first.columns(np.arange(40))
+    assert columns["X"].tolist() == [k + 0.5 for k in range(40)]
+    assert columns["F"].tolist() == [float("1" * (k % 9 + 1)) for k in range(40)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from bisect import bisect_right
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Final
@@ -34,16 +34,16 @@ _TITLE: Final = re.compile(r"(?i)(%.*|[O:]\s*(\d+|<[^>]*>|[A-Z][^#\[(]*))")
 _WEAK_FEED: Final = re.compile(rb"(?i)F[ \t]*\d+(?![\d.])")
 _MARK: Final = b"\xef\xbb\xbf"
 
-#: words beside an end that shape the corner there: it belongs to the blocks on both sides; and what is in each of them
+#: words beside an end that shape the corner there: it belongs to the blocks on both sides
 _CORNER_WORDS: Final = re.compile(rb"(?i),\s*[RC]\s*[\d.]|\b(?:RNDM?|CHF|CHR|FRCM?)\b")
-_CORNER_SIGNS: Final = (b",", b"RND", b"CHF", b"CHR", b"FRC")
 
-#: what sends a control to other lines of the program, and what is in each such line; numbers of lines beside it, and
-#: a jump to a line that the program works out
-_JUMPS: Final = re.compile(rb"(?i)(?:GOTO[BFCS]?|M9[6-9]|M198|G6[56]|THEN|REPEATB?|CALL|UNTIL)[^\n]*")
-_JUMP_SIGNS: Final = (b"GOTO", b"M9", b"M198", b"G6", b"THEN", b"REPEAT", b"CALL", b"UNTIL")
+#: what sends a control to other lines of the program; numbers of lines beside it, and a jump to a line that the
+#: program works out
+_JUMPS: Final = re.compile(
+    rb"(?i)(?:GOTO[BFCS]?|M[ \t]*0*(?:9[6-9]|198)(?!\d)|G[ \t]*0*6[56]|THEN|REPEATB?|CALL|UNTIL)[^\n]*"
+)
 _TARGET: Final = re.compile(rb"(?i)(?:GOTO[BFCS]?|REPEATB?|LBL|(?<![A-Z])[NPQ])\s*(\d{1,9})")
-_COMPUTED: Final = re.compile(rb"(?i)GOTO[BFCS]?\s*[^\d\s]|M9[6-9][^\n]*P\s*[#\[]")
+_COMPUTED: Final = re.compile(rb"(?i)GOTO[BFCS]?\s*[^\d\s]|M[ \t]*0*9[6-9][^\n]*P\s*[#\[]")
 
 
 @dataclass(frozen=True)
@@ -144,23 +144,14 @@ class ProgramReader:
     def read(self, data: bytes, stops: Iterable[int] = ()) -> Reading:
         """Read a program, whatever it is; remember the state before some lines."""
         start = np.flatnonzero(np.frombuffer(data, np.uint8) == ord("\n")) + 1
-        start = np.unique(np.concatenate(([0], start, [len(data)]))).astype(np.int64)
-        found, asked, patterns = Reading(data, start, self._first.copy()), sorted(set(stops)), LinePatterns(self.lexer)
-        targets, corners = _targets(found), _near(_lines_with(_CORNER_WORDS, _CORNER_SIGNS, found), len(found.why))
-        first, started = _begin(found), False
-        while first < len(found.why):
-            stop = min(max(int(np.searchsorted(start, start[first] + CHUNK)), first + 1), len(found.why))
-            while stop < len(found.why) and found.lines(stop - 1, stop).rstrip().endswith(b"~"):
-                stop += 1
-            chunk = found.lines(first, stop).removeprefix(_MARK if first == 0 else b"")
-            chunk = chunk if chunk.endswith(b"\n") else chunk + b"\n"
-            text = self.lexer.unfolded(chunk)
-            lines = Lines.of(text, patterns)
-            bulk = lines.bulk().copy()
-            bulk[[number - first for number in targets if first <= number < stop]] = False
-            if b"~" in chunk:
-                bulk[[k for k in range(stop - first) if b"~" in found.lines(first + k, first + k + 1)]] = False
-            ends = np.concatenate(([0], np.flatnonzero(np.frombuffer(text, np.uint8) == ord("\n")) + 1)).tolist()
+        start = np.concatenate(([0], start, [] if data.endswith(b"\n") else [len(data)])).astype(np.int64)
+        found, asked, started = Reading(data, start, self._first.copy()), sorted(set(stops)), False
+        chunks = list(self._chunks(found))
+        others = [(first + k, lines.line(k)) for first, lines, bulk in chunks for k in np.flatnonzero(~bulk).tolist()]
+        targets = _targets(found, [line for _, line in others])
+        corners = _near([number for number, line in others if _CORNER_WORDS.search(line)], len(found.why))
+        for first, lines, bulk in chunks:
+            bulk[[number - first for number in targets if first <= number < first + len(bulk)]] = False
             columns = lines.columns(np.flatnonzero(bulk)) if bulk.any() else {}
             before = np.concatenate(([0], np.cumsum(bulk)))
             for a, b in pairwise(np.flatnonzero(np.diff(bulk, prepend=~bulk[0], append=~bulk[-1])).tolist()):
@@ -169,14 +160,30 @@ class ProgramReader:
                     self._take_rows(found, first + a, {key: one[own] for key, one in columns.items()}, corners, asked)
                     continue
                 for k in range(a, b):
-                    line, number = text[ends[k] : ends[k + 1]], first + k
+                    line, number = lines.line(k), first + k
                     block = self.lexer.comment.sub("", line.decode("latin-1")).strip()
                     if block and (started or not _TITLE.fullmatch(block)):
                         started = True
                         self._take_line(found, number, line, known=number not in targets)
                     found.at |= {stop: found.state.copy() for stop in _within(asked, number, number + 1)}
-            first = stop
         return found
+
+    def _chunks(self, found: Reading) -> Iterator[tuple[int, Lines, Bools]]:
+        """Lines from a number on, and which of them are plain motion blocks: these have no words of other kinds."""
+        patterns, first = LinePatterns(self.lexer), _begin(found)
+        while first < len(found.why):
+            stop = int(np.searchsorted(found.start, found.start[first] + CHUNK))
+            stop = min(max(stop, first + 1), len(found.why))
+            while stop < len(found.why) and found.lines(stop - 1, stop).rstrip().endswith(b"~"):
+                stop += 1
+            chunk = found.lines(first, stop).removeprefix(_MARK if first == 0 else b"")
+            chunk = chunk if chunk.endswith(b"\n") else chunk + b"\n"
+            lines = Lines.of(self.lexer.unfolded(chunk), patterns)
+            bulk = lines.bulk().copy()
+            if b"~" in chunk:
+                bulk[[k for k in range(stop - first) if b"~" in found.lines(first + k, first + k + 1)]] = False
+            yield first, lines, bulk
+            first = stop
 
     def _take_line(self, found: Reading, number: int, text: bytes, *, known: bool) -> None:
         if not known:  # who jumps here may come from anywhere
@@ -272,29 +279,17 @@ def _filled(values: Floats, before: float) -> tuple[Floats, Ints]:
     return np.where(last < 0, before, values[last]), last
 
 
-def _lines_with(pattern: re.Pattern[bytes], signs: Sequence[bytes], found: Reading) -> Ints:
-    """Lines in which something occurs, as in `_matches`."""
-    at = np.array([match.end() - 1 for match in _matches(pattern, signs, found.data)], np.int64)
-    return np.unique(np.searchsorted(found.start, at, side="right") - 1)
-
-
-def _matches(pattern: re.Pattern[bytes], signs: Sequence[bytes], data: bytes) -> Iterable[re.Match[bytes]]:
-    """Where something occurs that has one of some signs in it, capital or not: fast where none is."""
-    capitals = data.upper()
-    return pattern.finditer(data) if any(sign in capitals for sign in signs) else ()
-
-
-def _near(lines: Ints, count: int) -> Bools:
+def _near(lines: Sequence[int], count: int) -> Bools:
     """(count,) whether a line, or the one before or after it, is one of some."""
-    near = np.zeros(count + 2, np.bool_)
+    near, at = np.zeros(count + 2, np.bool_), np.array(lines, np.int64)
     for step in (0, 1, 2):
-        near[lines + step] = True
+        near[at + step] = True
     return near[1:-1]
 
 
-def _targets(found: Reading) -> set[int]:
-    """Lines to which the program may jump: those of all numbers that stand beside jumps."""
-    jumps = [match[0] for match in _matches(_JUMPS, _JUMP_SIGNS, found.data)]
+def _targets(found: Reading, others: Sequence[bytes]) -> set[int]:
+    """Lines to which the program may jump: those of all numbers that stand beside jumps in some lines."""
+    jumps = [match[0] for match in map(_JUMPS.search, others) if match]
     if not jumps:
         return set()
     numbers = {int(word) for jump in jumps for word in _TARGET.findall(jump)}
@@ -303,7 +298,8 @@ def _targets(found: Reading) -> set[int]:
     else:
         some = b"|".join(b"0*%d" % number for number in sorted(numbers)) or rb"(?!)"
         pattern = re.compile(rb"(?im)^[ \t/]*N[ \t]*(?:%b)(?!\d)" % some)
-    return set(_lines_with(pattern, (b"N",), found).tolist())
+    at = [match.start() for match in pattern.finditer(found.data)]
+    return set((np.searchsorted(found.start, np.array(at, np.int64), side="right") - 1).tolist())
 
 
 def _begin(found: Reading) -> int:

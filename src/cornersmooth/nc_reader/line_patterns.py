@@ -68,6 +68,20 @@ class _Kind:
     places: tuple[tuple[int, int], ...] = ()  #: of digits that stand for themselves: the next such number, and where
 
 
+@dataclass(frozen=True)
+class Patterns:
+    """Some patterns; what is learnt or forgotten later does not change them."""
+
+    kinds: list[_Kind]  #: those met later stand behind
+    #: (p, 2): of each pattern its kind, and where its rows of `fields` begin; the first is that of lines that are
+    #: read on their own
+    known: Ints
+    #: (f, 5): where in the line a number begins, its bytes, its digits (more than are read here if it has an
+    #: exponent), its decimals (-1 without a point), 1 with a minus sign; and (f,) what is added to it
+    fields: Ints
+    added: Floats
+
+
 class LinePatterns:
     """The patterns of a text met so far.
 
@@ -91,17 +105,11 @@ class LinePatterns:
         self._others: dict[tuple[int, int], int] = {}  # patterns of a shape with other digits
         self._kinds: dict[bytes, int] = {}  # by their lines
         self._most: dict[bytes, Ints] = {}  # decimals of their numbers so far
-        self.kinds = [_Kind()]
-        #: (p, 2): of each pattern its kind, and where its rows of `fields` begin; the first is that of lines that are
-        #: read on their own
-        self.known = np.zeros((1, 2), np.int64)
-        #: (f, 5): where in the line a number begins, its bytes, its digits (more than are read here if it has an
-        #: exponent), its decimals (-1 without a point), 1 with a minus sign; and (f,) what is added to it
-        self.fields, self.added = np.zeros((0, 5), np.int64), np.zeros(0)
+        self.patterns = Patterns([_Kind()], np.zeros((1, 2), np.int64), np.zeros((0, 5), np.int64), np.zeros(0))
 
     def label(self, text: bytes, start: Ints, size: Ints) -> Ints:
-        """(l,) rows of `known`: the pattern of each line of a text; its first byte, and its size with its end."""
-        if len(self.known) > len(start):  # few of them are met again
+        """(l,) rows of `Patterns.known` for lines of a text; `start`: first byte of each, `size`: with its end."""
+        if len(self.patterns.known) > len(start):  # few of them are met again
             self._forget()
         raw = np.frombuffer(text, np.uint8)
         marks = raw - np.uint8(ord("0"))
@@ -167,7 +175,8 @@ class LinePatterns:
         for row, name in zip(range(len(lines)), kinds.split(b"\n")[:-1], strict=True):
             rows_of.setdefault(name, []).append(row)
         places, known = np.full((len(lines), _MOST_PLACES), -1), np.zeros((len(lines), 2), np.int64)
-        fields, added, count = [self.fields], [self.added], len(self.fields)
+        before = self.patterns
+        kinds_of, fields, added, count = before.kinds, [before.fields], [before.added], len(before.fields)
         for name, mine in rows_of.items():
             rows = np.array(mine)
             own = numbers[first[rows][:, None] + np.arange(name.count(_MARK))]
@@ -175,14 +184,14 @@ class LinePatterns:
             own = np.append(own, np.zeros((len(rows), 1, 5), np.int64), axis=1)
             own[:, -1, 0] = ends[rows] - start[rows]
             if name not in self._kinds:
-                self._kinds[name] = len(self.kinds)
-                self.kinds.append(self._take(lines[mine[0]], own[0]))
+                self._kinds[name] = len(kinds_of)
+                kinds_of.append(self._take(lines[mine[0]], own[0]))
                 self._most[name] = np.full(decimals.shape[1], -1)
                 self.fresh.append(lines[mine[0]])
             if (decimals > self._most[name]).any():
                 self.fresh += [lines[mine[row]] for row in set(decimals.argmax(axis=0).tolist())]
                 self._most[name] = np.maximum(self._most[name], decimals.max(axis=0))
-            one = self.kinds[self._kinds[name]]
+            one = kinds_of[self._kinds[name]]
             known[rows, 0], known[rows, 1] = self._kinds[name], count + len(one.columns) * np.arange(len(rows))
             for column, (number, offset) in enumerate(one.places):
                 places[rows, column] = own[:, number, 0] + offset
@@ -191,9 +200,9 @@ class LinePatterns:
                 fields.append(np.stack(found, axis=1).reshape(-1, 5))
                 added.append(np.tile([value for *_, value in one.columns], len(rows)))
                 count += len(added[-1])
-        patterns = len(self.known) + np.arange(len(lines))
-        self.known, self.fields = np.concatenate((self.known, known)), np.concatenate(fields)
-        self.added = np.concatenate(added)
+        patterns = len(before.known) + np.arange(len(lines))
+        known = np.concatenate((before.known, known))
+        self.patterns = Patterns(kinds_of, known, np.concatenate(fields), np.concatenate(added))
         return places, _digits(raw, start, places, np.arange(len(lines))), patterns
 
     def _take(self, line: bytes, numbers: Ints) -> _Kind:
@@ -255,7 +264,7 @@ def _digits(raw: Bytes, start: Ints, places: Ints, shape: Ints) -> Ints:
 
 
 def _pointed(raw: Bytes) -> tuple[Ints, bytes]:
-    """Numbers of a text with a point, but for G words: rows of `LinePatterns.fields`; and the text with their marks."""
+    """Numbers of a text with a point, but for G words: rows of `Patterns.fields`; and the text with their marks."""
     is_point = raw == ord(".")
     edges = np.flatnonzero(np.diff(is_point | (raw - np.uint8(ord("0")) <= 9), prepend=False, append=False))
     begin, end, point = edges[::2], edges[1::2], np.append(np.flatnonzero(is_point), [len(raw)] * 2)
@@ -289,8 +298,8 @@ class Lines:
     text: bytes  #: between line ends, so that words beyond its own can be fetched
     words: NDArray[np.void]  #: what stands from every place of it on
     start: Ints  #: (l,): first byte of every line
-    label: Ints  #: (l,): row of `LinePatterns.known`
-    patterns: LinePatterns
+    label: Ints  #: (l,): row of `Patterns.known`
+    patterns: Patterns
 
     @classmethod
     def of(cls, text: bytes, patterns: LinePatterns) -> Lines:
@@ -299,7 +308,8 @@ class Lines:
         raw = np.frombuffer(text, np.uint8)
         ends = np.flatnonzero(raw == ord("\n"))[MARGIN - 1 : -_LONGEST]
         start, size = ends[:-1] + 1, np.diff(ends)
-        return cls(text, words_of(raw), start, patterns.label(text, start, size), patterns)
+        label = patterns.label(text, start, size)
+        return cls(text, words_of(raw), start, label, patterns.patterns)
 
     def line(self, row: int) -> bytes:
         """One of them, without its end."""
@@ -342,7 +352,7 @@ class Lines:
         return columns
 
     def _read(self, start: Ints, label: Ints, fields: Ints, added: Floats) -> Floats:
-        """Numbers of lines, one of each; `label` says which of the rows of `LinePatterns.fields` it has."""
+        """Numbers of lines, one of each; `label` says which of the rows of `Patterns.fields` it has."""
 
         def each(values: NDArray[Any]) -> Any:
             """Value for every line, or the one of all."""
