@@ -1,5 +1,7 @@
 """Prints every position that LinuxCNC's interpreter makes of a program: kind, line, X Y Z in mm, A B C in degrees.
 
+Arcs, dwells and tools too, with the numbers that the interpreter gives, and offsets in units of the program.
+
 Runs under Debian's Python, which has LinuxCNC's modules: ``python3 linuxcnc_canon.py FILE``. Exit code 1 and the
 interpreter's words for an error.
 """
@@ -20,6 +22,7 @@ class Canon:
         self.parameter_file = parameters
         self.line = 0
         self.scale = MM_PER_INCH
+        self.plane = 17
 
     def next_line(self, state):
         self.line = state.sequence_number
@@ -33,6 +36,34 @@ class Canon:
 
     def straight_traverse(self, *numbers):
         self._show("rapid", numbers)
+
+    def _say(self, kind, *numbers):
+        print(kind, self.line, *map(repr, numbers))
+
+    def arc_feed(self, first, second, *rest):
+        """The end as X Y Z, then the numbers that the interpreter gives."""
+        along = rest[3]
+        ends = {17: (first, second, along), 18: (second, along, first), 19: (along, first, second)}
+        self._say("arc", *(value * self.scale for value in ends[self.plane]), *rest)
+
+    def dwell(self, seconds):
+        self._say("dwell", seconds)
+
+    def change_tool(self, pocket):
+        self._say("tool", pocket)
+
+    def set_g5x_offset(self, *numbers):
+        self._say("g5x", *numbers)
+
+    def set_g92_offset(self, *numbers):
+        self._say("g92", *numbers)
+
+    def tool_offset(self, *numbers):
+        self._say("length", *numbers)
+
+    def set_plane(self, plane):
+        self.plane = {1: 17, 2: 19, 3: 18}[plane]
+        self._say("plane", plane)
 
     def get_tool(self, pocket):
         return (-1,) + (0.0,) * 12 + (0,)

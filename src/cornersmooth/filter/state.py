@@ -54,10 +54,10 @@ _SETS: Final[Mapping[str, tuple[str, Any]]] = {
     "G90": ("absolute", True),
     "G91": ("absolute", False),
     "G40": ("compensated", False),
-    **dict.fromkeys(("G41", "G42", "G41.1", "G42.1"), ("compensated", True)),
-    "M136": ("feed_mode", PER_REVOLUTION),
-    "M137": ("feed_mode", PER_MINUTE),
 }
+
+#: feed modes by the M words of Klartext
+_KLARTEXT_FEEDS: Final = {"M136": PER_REVOLUTION, "M137": PER_MINUTE}
 
 #: words of Siemens under which the tool axis runs as its words say
 _EVEN: Final = {VECTOR: ("ORIVECT", "ORIPLANE", "ORIWKS"), ANGLES: ("ORIAXES", "ORIMKS")}
@@ -69,7 +69,13 @@ _UNKNOWN: Final[Mapping[str, Any]] = {
     **dict.fromkeys(("offset", "rounding"), ""),
 }
 
-_ASSIGNMENT: Final = re.compile(r"\s*(#|Q[LRS]?\d+\s*=|[A-Z_]\w*(\[[^]]*\])?\s*=(?!=)|DEF\s|FN ?[0-8] ?:)")
+#: a value for a variable, which is no axis and no word of its own
+_ASSIGNMENT: Final = re.compile(r"(#|Q[LRS]?\d+\s*=|(R\d*|[A-Z_]{2,}\w*)(\[[^]]*\])?\s*=(?!=)|DEF\s|FN ?[0-8] ?:)")
+#: what a value is made of, and a word that stands beside it
+_IN_VALUE: Final = re.compile(r"\[[^][]*\]|\([^()]*\)|\"[^\"]*\"|<[^>]*>|[RQ][LRS]?\d+|[A-Z_]{2,}\w*")
+_WORD_BESIDE: Final = re.compile(r"[A-Z]\s*[-+.\d#\[=]")
+#: words of a path of Klartext that change what holds for the blocks after it
+_TELLING: Final = re.compile(r"\bR[LR]\b|\bM(2|30|8\d|9\d|1[0-3]\d|14[45])\b")
 #: a word whose number is worked out by the control
 _WORKED_OUT: Final = re.compile(
     r"([A-Z]+\d*)\s*=?\s*[-+]?(?:#(?:<[^>]*>|\d+|\[[^]]*\])|\[[^]]*\]|Q[LRS]?\d+|"
@@ -93,6 +99,18 @@ class Vocabulary:
     ends: Mapping[str, str]
     offsets: str
     change_keeps_tip: bool
+    rounding: str
+    compensation: str
+
+    @property
+    def klartext(self) -> bool:
+        """Whether blocks say in words what they are."""
+        return "M128" in self.tip
+
+    @property
+    def siemens(self) -> bool:
+        """Whether words are those of SINUMERIK."""
+        return "TRAORI" in self.tip
 
     def does(self, word: str) -> Does:
         """Say what a word such as ``G43.4`` does; words of group 01, of units, distances and feeds are not here."""
@@ -110,8 +128,16 @@ def _vocabularies() -> dict[str, Vocabulary]:
         if "tip" in table:
             patterns = {does: table[does] for does in Does if does in table}
             patterns = {does: one if isinstance(one, str) else "|".join(one) for does, one in patterns.items()}
-            rest = table.get("ends", {}), table["offsets"], table.get("change_keeps_tip", False)
-            found[name] = Vocabulary(name, patterns, table["tip"], *rest)
+            found[name] = Vocabulary(
+                name,
+                patterns,
+                table["tip"],
+                table.get("ends", {}),
+                table["offsets"],
+                table.get("change_keeps_tip", False),
+                table.get("rounding", ""),
+                table["compensation"],
+            )
     return found
 
 
@@ -210,7 +236,7 @@ class State:
         first = line.words[0]
         if first.name == "block":
             self._take_block(first.text.upper())
-        elif first.name == "O" or (first.name == "L" and first.text != "L"):  # a call of Siemens
+        elif first.name == "O" or (self.vocabulary.siemens and any(word.name == "L" for word in line.words)):  # calls
             self.lose_all()
         else:
             return self._take_words(line.words)
@@ -230,10 +256,10 @@ class State:
                 done |= {does} if does is not Does.ALL else {Does.LENGTH} if word.name in "DH" else set()
             else:
                 given[word.name] = word.value
-        if self.rounding.startswith("G64") and {"P", "Q"} & names and "G" in names:
-            own = (word for word in words if word.name in "PQ" or word.text[1:] in ("64", "64.0"))
-            self.rounding = " ".join(word.text for word in own)
-        if "L" in names or "LN" in names:  # Klartext says anew in each block what it is
+        if self.vocabulary.rounding and any(re.fullmatch(self.vocabulary.rounding, _code(word)) for word in words):
+            own = (word for word in words if word.name in "PQ" or re.fullmatch(self.vocabulary.rounding, _code(word)))
+            self.rounding = " ".join(word.text.replace(" ", "") for word in own)
+        if self.vocabulary.klartext and {"L", "LN"} & names:  # it says anew in each block what it is
             self.motion = 0.0 if "RAPID" in names else 1.0
         return self._move(given, done, names)
 
@@ -271,12 +297,12 @@ class State:
 
     def _code(self, word: Word, names: set[str]) -> set[Does]:
         """Take a G or M word; return what it does beside changing the state."""
-        name, words = f"{word.name}{word.value:g}", self.vocabulary
-        if word.name == "G" and "M128" in words.tip:  # a block of DIN/ISO among those of Klartext
+        name, words = _code(word), self.vocabulary
+        if word.name == "G" and words.klartext:  # a block of DIN/ISO among those of Klartext
             return {Does.ALL}
         if name in _SETS:
             setattr(self, *_SETS[name])
-        elif name in _UNITS and (name not in ("G70", "G71") or "TRAORI" in words.tip):
+        elif name in _UNITS and (name not in ("G70", "G71") or words.siemens):
             if self.unit != _UNITS[name]:
                 self.feed = math.nan
                 self.lose_place("XYZ")
@@ -287,8 +313,10 @@ class State:
         elif word.name == "G" and re.fullmatch(words.offsets, name):
             same, self.offset = name == self.offset and name != "G154" and "." not in name, name
             return set() if same else {Does.OFFSET}
-        elif re.fullmatch(r"G6(0|1|4)(\.\d)?", name):
-            self.rounding = word.text.replace(" ", "")
+        elif re.fullmatch(words.compensation, name):
+            self.compensated = True
+        elif name in _KLARTEXT_FEEDS and words.klartext:
+            self.feed_mode = _KLARTEXT_FEEDS[name]
         else:
             return self._do(f"{name} R" if name == "G10" and "R" in names else name)
         return set()
@@ -296,7 +324,7 @@ class State:
     def _do(self, name: str, *, alone: bool = False) -> set[Does]:
         """Do what a word says, by the vocabulary; `alone` where the block has no other."""
         words = self.vocabulary
-        if alone and name in ("ROT", "SCALE", "MIRROR", "TRANS") and "TRAORI" in words.tip:
+        if alone and name in ("ROT", "SCALE", "MIRROR", "TRANS") and words.siemens:
             name = "ROT0"
         if name.startswith("ORI"):
             self.even = name in _EVEN[VECTOR if "I" in self.axes else ANGLES]
@@ -337,26 +365,42 @@ class State:
         """Take a line that is not made of words alone: variables, jumps, what nobody knows."""
         plain = lexer.comment.sub(" ", text.upper().decode("latin-1")).strip()
         plain = re.sub(r"^/?\d?\s*(N?\d+\s+|N\d+)?\s*", "", plain)
-        if _ASSIGNMENT.match(plain) and not plain.startswith("$") and "FRAME" not in plain:
+        if _ASSIGNMENT.match(plain) and "FRAME" not in plain and not _word_beside(plain):
             self.lose_place()
             return ""
-        if re.match(r"LN? ", plain) and not re.search(r"M12[89]", plain):  # a path of Klartext
-            self.lose_place()
-            self.feed = math.nan
-            return "words that are not known"
         lost = [match[1] for match in _WORKED_OUT.finditer(plain)]
         rest = _WORKED_OUT.sub(" ", plain)
         try:
             line = lexer.line(rest.encode("latin-1"), 0, None) if lost else None
         except InputError:
             line = None
+        if line is None and self.vocabulary.klartext and re.match(r"LN? ", plain) and not _TELLING.search(plain):
+            self.lose_place()
+            self.feed = math.nan
+            return "words that are not known"
         if line is None or {"G", "M"} & set(lost) or (line.words and line.words[0].name == "block"):
             self.lose_all()
             return ""
-        before = self.motion
+        before = self.copy()
         self._take_line(line)
-        self.motion = self.motion if line.words else before
+        if line.skipped or re.match(r"\s*/", text.decode("latin-1")):
+            self.or_not(before)
+        elif not line.words:
+            self.motion = before.motion
         self.lose_place(self.axes if set(lost) - {*"XYZABCFSQRP"} - set(self.axes) else lost)
         if "F" in lost:
             self.feed = math.nan
         return "words that the control works out" if self.motion in (1.0, 2.0, 3.0) else ""
+
+
+def _code(word: Word) -> str:
+    """Give a word as vocabularies have it."""
+    return f"{word.name}{word.value:g}"
+
+
+def _word_beside(plain: str) -> bool:
+    """Whether beside a value for a variable there are words of a block."""
+    before, count = plain.partition("=")[2], 1
+    while count:
+        before, count = _IN_VALUE.subn("", before)
+    return _WORD_BESIDE.search(before) is not None
