@@ -98,6 +98,12 @@ def test_what_is_no_cut_any_more_stays(control: str, blocks: str) -> None:
     assert three_axes(text, control) == text.encode()
 
 
+@pytest.mark.parametrize("block", ["/G1 X#5 F100.", "/2 G1 X#5 F100."])
+def test_rapids_behind_a_skipped_cut_stay(block: str) -> None:
+    text = f"G90 G94 G17\nG54\nG0 X0. Y0. Z15. F200.\n{block}\nX0. Y0. Z15.\n{RUN}M2\n"
+    assert three_axes(text, "fanuc") == text.encode()
+
+
 @pytest.mark.parametrize(
     ("control", "blocks"),
     [
