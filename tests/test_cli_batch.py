@@ -7,6 +7,7 @@ import errno
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import time
@@ -119,10 +120,12 @@ def test_without_marks_what_is_made_is_compared(tree: Path, tmp_path: Path, monk
     out = tmp_path / "nc"
     lines(tree, "-d", out)
     (out / "one.nc").write_bytes(b"edited by hand")
+    for marks in out.rglob(".cornersmooth"):
+        shutil.rmtree(marks)
     before = files_in(out)
     said = lines(tree, "-d", out, code=BAD_OUTPUT)
     assert said[-1] == "3 files: 2 PASSED (2 to check), 1 error"
-    assert files_in(out) == before
+    assert {name: text for name, text in files_in(out).items() if ".cornersmooth" not in name} == before
 
 
 def test_existing_outputs_may_be_skipped(tree: Path, tmp_path: Path) -> None:

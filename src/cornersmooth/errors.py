@@ -59,8 +59,17 @@ def install_hint(extra: str) -> str:
     checkout = Path(__file__).resolve().parents[2]
     if (checkout / "pyproject.toml").is_file() and (checkout / "src" / "cornersmooth").is_dir():
         here = "." if checkout == Path.cwd() else str(checkout)
-        return f"install it with: pip install -e {shlex.quote(f'{here}[{extra}]')}"
-    return f"install it with: pip install 'cornersmooth[{extra}]'"
+        return f"install it with: {command_text(['pip', 'install', '-e', f'{here}[{extra}]'])}"
+    return f"install it with: {command_text(['pip', 'install', f'cornersmooth[{extra}]'])}"
+
+
+def command_text(words: list[str]) -> str:
+    """Give a command line as the shell of this system reads it."""
+    if os.name != "nt":
+        return shlex.join(words)
+    from subprocess import list2cmdline
+
+    return list2cmdline(words)
 
 
 def internal_error(failure: Exception, source: str = "") -> str:

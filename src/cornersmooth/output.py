@@ -2,12 +2,14 @@
 
 A regular file is written beside its place and moved there when it is whole and on the disk; an error, an interruption,
 a full disk or a closed pipe leave the old file or none. What is moved is what was written: it is read once more and
-compared by its hash, so that nobody's change in between goes unnoticed.
+compared by its hash, so that nobody's change in between goes unnoticed. It is closed before it is moved or removed:
+Windows refuses both for a file that is open.
 """
 
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import errno
 import filecmp
 import functools
@@ -19,6 +21,7 @@ import platform
 import secrets
 import shutil
 import stat
+import sys
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -38,8 +41,19 @@ _HASH: Final = "sha256"
 #: extended attribute that holds the mark of a file
 _MARK = "user.cornersmooth"
 
-#: names of the files that are being written in this process, for whoever ends it from a signal handler
-_unfinished: set[str] = set()
+#: folder beside the outputs with a file of marks for each, where the file system has no extended attributes
+_MARKS = ".cornersmooth"
+
+#: what a file system says that has no extended attributes
+_NO_ATTRIBUTES = (errno.ENOTSUP, errno.EPERM)
+
+#: OpenProcess and WaitForSingleObject (winnt.h, winerror.h): a right, the error for a number that is no process's, and
+#: the answer for a process that has not ended
+_SYNCHRONIZE, _NO_SUCH_PROCESS, _WAIT_TIMEOUT = 0x100000, 87, 258
+
+#: names of the files that are being written in this process, for whoever ends it from a signal handler; the number
+#: under which each is open, -1 for not
+_unfinished: dict[str, int] = {}
 
 
 class ClosedPipe(Exception):  # noqa: N818 - no error of ours: whoever read the output has seen enough
@@ -154,7 +168,10 @@ def open_output(target: Target, *, hold: bool = False, replace: bool = True) -> 
         # a stream, a device or a pipe cannot be replaced, only written to
         with contextlib.nullcontext(cast(BinaryIO, target)) if path is None else open(path, "wb") as device:
             if hold:
-                with _temporary(tempfile.gettempdir(), "cornersmooth", mode=0o600) as (file, temporary):
+                with (
+                    temporary_name(tempfile.gettempdir(), "cornersmooth") as temporary,
+                    _opened(temporary, mode=0o600) as file,
+                ):
                     output = Output(HashedStream(file), temporary)
                     yield output
                     output.stream.flush()
@@ -174,23 +191,64 @@ def open_output(target: Target, *, hold: bool = False, replace: bool = True) -> 
 
 
 def read_mark(path: str) -> dict[str, str] | None:
-    """Mark that was set when the file was written; empty without one or after a change, None where none are kept."""
-    if not hasattr(os, "getxattr"):
-        return None
+    """Mark that was set when the file was written; empty without one or after a change, None where nothing is known.
+
+    A mark beside the file, which is written after it, may be lost with the run: without it nothing is known.
+    """
     try:
-        mark = json.loads(os.getxattr(path, _MARK))
+        mark, beside = _stored_mark(path)
         with open(path, "rb") as file:
             changed = hashlib.file_digest(file, _HASH).hexdigest() != mark.pop("text")
     except OSError as failure:
-        return None if failure.errno in (errno.ENOTSUP, errno.EPERM) else {}
+        return None if isinstance(failure, FileNotFoundError) or failure.errno in _NO_ATTRIBUTES else {}
     except (ValueError, KeyError, AttributeError):
         return {}
-    return {} if changed else mark
+    if not changed:
+        return mark
+    return None if beside else {}
+
+
+def _stored_mark(path: str) -> tuple[dict[str, str], bool]:
+    """Mark of a file with its hash, and whether it is kept in a file beside."""
+    if sys.platform == "linux" and hasattr(os, "getxattr"):
+        try:
+            return json.loads(os.getxattr(path, _MARK)), False
+        except OSError as failure:
+            if failure.errno not in _NO_ATTRIBUTES:
+                raise
+    with open(_mark_beside(path), "rb") as file:
+        return json.loads(file.read()), True
+
+
+def _mark_beside(path: str) -> str:
+    folder, name = os.path.split(os.path.realpath(path))
+    return os.path.join(folder, _MARKS, f"{name}.json")
+
+
+def _set_attribute(path: str, mark: bytes) -> bool:
+    """Keep a mark with a file; return whether the file system can."""
+    if sys.platform == "linux" and hasattr(os, "setxattr"):
+        with contextlib.suppress(OSError):
+            os.setxattr(path, _MARK, mark)
+            return True
+    return False
+
+
+def _write_beside(path: str, mark: bytes) -> None:
+    """Keep a mark in a file beside; without it the next run only makes the program again."""
+    beside = _mark_beside(path)
+    with contextlib.suppress(OSError):
+        os.makedirs(os.path.dirname(beside), exist_ok=True)
+        with open(beside, "wb") as file:
+            file.write(mark)
 
 
 def remove_unfinished() -> None:
     """Remove what is being written in this process, which is about to end; for signal handlers."""
-    _remove(list(_unfinished))
+    for number in [*_unfinished.values()]:
+        with contextlib.suppress(OSError):
+            os.close(number)
+    _remove([*_unfinished])
 
 
 def remove_leftovers(path: str, process: int | None = None) -> None:
@@ -225,24 +283,26 @@ def reason(failure: OSError) -> str:
 @contextlib.contextmanager
 def _moving(target: str, told: str, *, replace: bool) -> Iterator[Output]:
     """Write beside the target, and move there at the end."""
-    folder, name = os.path.split(target)
-    with _temporary(folder, name) as (file, temporary):
-        output = Output(HashedStream(file), temporary)
-        yield output
-        output.stream.flush()
-        if os.path.exists(target):
-            os.fchmod(file.fileno(), stat.S_IMODE(os.stat(target).st_mode))
-        os.fsync(file.fileno())
+    with temporary_name(*os.path.split(target)) as temporary:
+        with _opened(temporary) as file:
+            output = Output(HashedStream(file), temporary)
+            yield output
+            output.stream.flush()
+            os.fsync(file.fileno())
         output.stream.check(temporary)
-        if output.mark and hasattr(os, "setxattr"):
-            with contextlib.suppress(OSError):
-                os.setxattr(temporary, _MARK, json.dumps({"text": output.stream.digest, **output.mark}).encode())
+        if os.name == "posix" and os.path.exists(target):
+            os.chmod(temporary, stat.S_IMODE(os.stat(target).st_mode))
+        mark = json.dumps({"text": output.stream.digest, **output.mark}).encode() if output.mark else b""
+        marked = not mark or _set_attribute(temporary, mark)
         if output.failed:
             os.replace(temporary, target + FAILED)
-        elif replace:
+            return
+        if replace:
             os.replace(temporary, target)
         else:
             _move_to_free_place(temporary, target, told)
+        if not marked:
+            _write_beside(target, mark)
 
 
 def _move_to_free_place(temporary: str, target: str, told: str) -> None:
@@ -266,13 +326,14 @@ def _move_to_free_place(temporary: str, target: str, told: str) -> None:
 
 
 @contextlib.contextmanager
-def _temporary(folder: str, name: str, mode: int = 0o666) -> Iterator[tuple[BinaryIO, str]]:
-    """Yield a new file and its name; what is left of it is removed."""
-    with (
-        temporary_name(folder, name) as path,
-        open(path, "xb", opener=lambda name, flags: os.open(name, flags, mode)) as file,
-    ):
-        yield file, path
+def _opened(path: str, mode: int = 0o666) -> Iterator[BinaryIO]:
+    """Yield a new file of a name that `temporary_name` has given."""
+    with open(path, "xb", opener=lambda name, flags: os.open(name, flags, mode)) as file:
+        _unfinished[path] = file.fileno()
+        try:
+            yield file
+        finally:
+            _unfinished[path] = -1
 
 
 @contextlib.contextmanager
@@ -280,12 +341,12 @@ def temporary_name(folder: str, name: str) -> Iterator[str]:
     """Yield a name for a file that exists no longer than the block, whatever ends that."""
     _remove_abandoned(folder, name)
     path = os.path.join(folder, f".{name}.{os.getpid()}-{secrets.token_hex(4)}-{_machine()}.part")
-    _unfinished.add(path)  # before it exists: a signal at any moment finds a name to remove
+    _unfinished[path] = -1  # before it exists: a signal at any moment finds a name to remove
     try:
         yield path
     finally:
         _remove([path])
-        _unfinished.discard(path)
+        _unfinished.pop(path, None)
 
 
 def _remove_abandoned(folder: str, name: str) -> None:
@@ -298,8 +359,16 @@ def _remove_abandoned(folder: str, name: str) -> None:
 
 def _is_running(process: int) -> bool:
     """Whether a process of this number runs on this computer, as far as that can be told."""
-    if os.name == "nt":  # there, signal 0 is Ctrl-C
-        return True
+    if sys.platform == "win32":  # there, signal 0 is Ctrl-C
+        kernel = ctypes.WinDLL("kernel32", use_last_error=True)
+        kernel.OpenProcess.restype = ctypes.c_void_p
+        found = ctypes.c_void_p(kernel.OpenProcess(_SYNCHRONIZE, False, process))
+        if not found:
+            return ctypes.get_last_error() != _NO_SUCH_PROCESS
+        try:
+            return int(kernel.WaitForSingleObject(found, 0)) == _WAIT_TIMEOUT
+        finally:
+            kernel.CloseHandle(found)
     try:
         os.kill(process, 0)
     except ProcessLookupError:

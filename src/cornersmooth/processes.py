@@ -26,8 +26,11 @@ MOST_PROCESSES: Final = 4
 #: items taken ahead of what has been given out, whatever the number of processes: what comes out never depends on it
 _AHEAD: Final = 5
 
-#: only used where the system can fork
+#: elsewhere the system's own: a process of a batch begins anew there
 _CONTEXT: Final = get_context("fork" if sys.platform == "linux" else None)
+
+#: after so many seconds a wait looks for signals: Windows ends it for Ctrl-C only
+_LOOK: Final = 0.5
 
 #: what is said of a process that has gone without a word, which is what a system short of memory does
 _ENDED: Final = "a process that helped was ended"
@@ -35,13 +38,14 @@ _ENDED: Final = "a process that helped was ended"
 
 def useful_processes() -> int:
     """Processes that this computer has room for."""
-    allowed = len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
+    linux = sys.platform == "linux" and hasattr(os, "sched_getaffinity")
+    allowed = len(os.sched_getaffinity(0)) if linux else os.cpu_count() or 1
     return max(1, min(MOST_PROCESSES, allowed))
 
 
 def can_fork() -> bool:
     """Whether the system can fork a process with numpy in it safely."""
-    return sys.platform == "linux"
+    return sys.platform == "linux" and hasattr(os, "fork")
 
 
 class Helper:
@@ -74,7 +78,9 @@ class Helper:
 def first_ready(helpers: Iterable[Helper]) -> list[Helper]:
     """Wait until one or more have ended their work."""
     by_connection = {helper.connection: helper for helper in helpers}
-    return [by_connection[ready] for ready in wait([*by_connection])]  # type: ignore[index]
+    while not (ready := wait([*by_connection], _LOOK)):
+        pass
+    return [by_connection[one] for one in ready]  # type: ignore[index]
 
 
 def map_in_processes(

@@ -17,8 +17,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import NoReturn
 
-#: signals that end a run: Ctrl-C, the polite end, the end of the terminal
-SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+#: signals that end a run: Ctrl-C, the polite end, the end of the terminal, Ctrl-Break of Windows
+_NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
+SIGNALS = tuple(getattr(signal, name) for name in _NAMES if hasattr(signal, name))
 
 #: shows the cursor again and begins a new line, where a bar was being drawn
 _TIDY_TERMINAL = b"\r\x1b[2K\x1b[?25h"
@@ -84,6 +85,8 @@ def main() -> NoReturn:
 
     if sys.stderr is None:  # closed by the caller; what is said to it must not end up in the NC text
         sys.stderr = open(os.devnull, "w")  # noqa: SIM115
+    if sys.stdout is not None:  # a name outside the console's code page is shown escaped, as on standard error
+        sys.stdout.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
     sys.exit(group.flushed(group.run(None, ending)))
 
 

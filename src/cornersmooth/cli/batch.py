@@ -27,6 +27,9 @@ from cornersmooth.processes import Helper, first_ready
 from cornersmooth.report.record import report_json
 from cornersmooth.verdict import Verdict
 
+#: exit code of a process that SIGKILL has ended
+_KILLED = -9
+
 #: parameter of prctl (sys/prctl.h): the signal that a process gets when its parent ends
 _PR_SET_PDEATHSIG = 1
 
@@ -108,9 +111,9 @@ def _run_with_parent(job: Job) -> Outcome:
     signal.signal(signal.SIGTERM, leave)
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
-    parent = parent_process()
-    if parent is not None and os.getppid() != parent.pid:  # it has ended meanwhile
-        leave()
+        parent = parent_process()
+        if parent is not None and os.getppid() != parent.pid:  # it has ended meanwhile
+            leave()
     try:
         return run_job(job)
     finally:
@@ -126,7 +129,7 @@ def _outcome(job: Job, helper: Helper) -> Outcome:
         code = helper.end()
         _remove_unfinished_of(job, helper)
         how = f"exit code {code}" if code >= 0 else f"signal {-code}"
-        how += ", as a system short of memory does" * (code == -signal.SIGKILL)
+        how += ", as a system short of memory does" * (code == _KILLED)
         what = f"the process working on it was ended ({how}); run it again"
         return Outcome(job, 3, message("error", what, place=job.source))
     return outcome

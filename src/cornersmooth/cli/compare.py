@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import os
-import shlex
 from collections.abc import Iterator
 from typing import Any
 
@@ -16,6 +15,7 @@ from cornersmooth.cli.files import check_inputs, check_path, told_of, write_repo
 from cornersmooth.cli.options import Options
 from cornersmooth.cli.show import progress_bar, say
 from cornersmooth.comparing import Row, Table, candidates, compare_programs
+from cornersmooth.errors import command_text
 from cornersmooth.feedrate import BlockLimits
 from cornersmooth.report.verdict import limits_text
 
@@ -122,7 +122,7 @@ def _command(given: Options, row: Row, machine: Any, command: str, suffix: str) 
     if "--machine" in options:
         options[options.index("--machine") + 1] = called
     target = os.path.splitext(os.path.basename(given.source))[0] + (".smooth" if command == "filter" else "") + suffix
-    return shlex.join(["cornersmooth", command, given.source, *typed, *options, "-o", target])
+    return command_text(["cornersmooth", command, given.source, *typed, *options, "-o", target])
 
 
 def _csv(table: Table, commands: list[str]) -> str:

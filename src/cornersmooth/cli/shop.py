@@ -1,6 +1,7 @@
 """Shop settings: defaults of a project and of a user, from ``cornersmooth.toml`` and the environment.
 
-A project's file stands in the folder of the input or above it, a user's in ``~/.config/cornersmooth``::
+A project's file is in the folder of the input or above it, a user's in ``~/.config/cornersmooth`` (Windows:
+``%APPDATA%\\cornersmooth``)::
 
     [smooth]
     tolerance = 0.01        # options by their long names
@@ -24,7 +25,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import shlex
 import stat
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
@@ -35,7 +35,7 @@ import click
 
 from cornersmooth.cli.options import FLAGS
 from cornersmooth.cli.show import warn
-from cornersmooth.errors import SettingsError
+from cornersmooth.errors import SettingsError, command_text
 from cornersmooth.output import reason
 
 FILE = "cornersmooth.toml"
@@ -93,7 +93,7 @@ def parse_args(
     command: click.Command, ctx: click.Context, args: list[str], parse: Callable[[click.Context, list[str]], list[str]]
 ) -> list[str]:
     """Read the shop settings that go with the input, then the options."""
-    ctx.meta[_TYPED] = shlex.join(["cornersmooth", str(command.name), *args])
+    ctx.meta[_TYPED] = command_text(["cornersmooth", str(command.name), *args])
     if not settable(command):
         return parse(ctx, args)
     if ctx.resilient_parsing:  # a shell wants to complete what is not whole yet
@@ -166,9 +166,14 @@ def find_files(first: str) -> tuple[ShopFile, ...]:
     here = Path(os.path.abspath(first))
     folders = [here, *here.parents] if os.path.isdir(here) else list(here.parents)
     project = next((folder / FILE for folder in folders if os.path.isfile(folder / FILE)), None)
-    config = os.environ.get("XDG_CONFIG_HOME") or os.path.expanduser("~/.config")
-    user = Path(config) / "cornersmooth" / FILE
+    user = _config_folder(os.name) / "cornersmooth" / FILE
     return tuple(_read(path) for path in (project, user) if path is not None and os.path.isfile(path))
+
+
+def _config_folder(system: str) -> Path:
+    """Folder of a user's settings on the system of that name, ``nt`` for Windows."""
+    variable, usual = ("APPDATA", "~/AppData/Roaming") if system == "nt" else ("XDG_CONFIG_HOME", "~/.config")
+    return Path(os.environ.get(variable) or os.path.expanduser(usual))
 
 
 def _defaults(command: click.Command, shop: Shop, control: str | None) -> dict[str, Any]:

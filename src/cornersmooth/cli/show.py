@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import sys
 import textwrap
@@ -29,6 +30,9 @@ _STYLES: Final = {"error": "bold red", "warning": "bold yellow", "note": "bold",
 #: findings and sharp corners shown without -v
 _FINDINGS_SHOWN = 10
 _SHARP_SHOWN = 10
+
+#: what JSON has escapes for
+_OUTSIDE_ASCII: Final = re.compile(r"[^\x00-\x7f]+")
 
 #: room for the labels of the summary
 _LABEL = 14
@@ -200,8 +204,10 @@ def say_json(contents: Mapping[str, Any]) -> None:
     """Print one JSON object to standard output."""
     from cornersmooth.report import report_json
 
-    text = report_json(contents)
-    print(text.encode("utf-8", "backslashreplace").decode(), end="")  # names need not be UTF-8  # noqa: T201
+    text = report_json(contents).encode("utf-8", "backslashreplace").decode()  # names need not be UTF-8
+    if (sys.stdout.encoding or "").lower().replace("-", "") != "utf8":  # the code page of a console
+        text = _OUTSIDE_ASCII.sub(lambda one: json.dumps(one[0])[1:-1], text)
+    print(text, end="")  # noqa: T201
 
 
 def say_line(text: str, indent: int = 2) -> None:
