@@ -1,4 +1,4 @@
-"""The four verdicts and their order."""
+"""The verdicts and their order."""
 
 from __future__ import annotations
 

@@ -137,3 +137,67 @@ def test_options_of_cl_files_are_refused(tmp_path: Path) -> None:
     told = run("time", part, "--control", "fanuc")
     assert told.returncode == USAGE
     assert b"--limits" in told.stderr
+
+
+PLAIN = "G21 G90 G94 G17\nG0 X0. Y0. Z5.\nG1 Z-1. F200.\n{}G0 Z5.\nM30\n"
+CUTS = "X10. Y0.\nX20. Y5.\nX30. Y0.\n"
+THREE_AXES = Path(__file__).parents[2] / "samples" / "machines" / "three-axis.toml"
+
+
+@pytest.mark.parametrize("more", [(), ("--no-verify",)])
+def test_nothing_smoothed_is_a_verdict_of_its_own(more: tuple[str, ...], tmp_path: Path) -> None:
+    (tmp_path / "part.nc").write_text(PLAIN.format("G2 X10. R9.\nG95\n" + CUTS))
+    on = ("part.nc", "--machine", THREE_AXES, "-e", 0.01, "-o", "new.nc", *more)
+    made = run("filter", *on, cwd=tmp_path)
+    assert made.returncode == DONE
+    assert made.stderr.decode().startswith("NOT SMOOTHED  new.nc")
+    assert (tmp_path / "new.nc").read_bytes() == (tmp_path / "part.nc").read_bytes()
+    report = json.loads(run("filter", *on, "--force", "--json", cwd=tmp_path).stdout)
+    assert report["verdict"] == "NOT SMOOTHED"
+    assert report["verdict_text"].startswith("NOT SMOOTHED: 0 of 5 cuts smoothed")
+    if more:
+        return
+    strict = run("filter", *on, "--force", "--strict", cwd=tmp_path)
+    assert strict.returncode == 1
+    assert (tmp_path / "new.nc.failed").exists()
+    same = run("verify", "part.nc", "new.nc.failed", "--machine", THREE_AXES, cwd=tmp_path)
+    assert same.returncode == DONE
+    assert same.stdout.startswith(b"PASSED")
+
+
+def test_a_batch_counts_what_became_of_its_programs(tmp_path: Path) -> None:
+    (tmp_path / "arc.nc").write_text(PLAIN.format("G2 X10. R9.\n"))
+    (tmp_path / "cuts.nc").write_text(PLAIN.format(CUTS))
+    (tmp_path / "part.cls").write_text("PARTNO A\nUNITS/MM\nGOTO/0,0,0\nGOTO/1,0,0\nFINI\n")
+    made = run("filter", "arc.nc", "cuts.nc", "part.cls", "--machine", THREE_AXES, "-d", "out", cwd=tmp_path)
+    assert made.returncode == BAD_INPUT
+    assert made.stderr.decode().splitlines()[-1] == "3 programs: 1 NOT SMOOTHED, 1 PASSED, 1 error"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "PARTNO A\nUNITS/MM\nFEDRAT/500,MMPM\nGOTO/0,0,0\nGOTO/1,0,0\nFINI\n",
+        "TOOL PATH/A,TOOL,B\nGOTO/0,0,0,0,0,1\n",
+        "$$ a comment\nGOTO / 0.0, 0.0, 0.0\n",
+        "x,y,z,i,j,k\n0,0,0,0,0,1\n1,0,0,0,0,1\n",
+        "# points\n0.0 0.0 0.0\n1.0 0.0 0.5\n",
+        "0;0;0\n1;0;0.5\n",
+    ],
+)
+def test_a_cl_file_is_no_program_to_filter(text: str, tmp_path: Path) -> None:
+    (tmp_path / "part.txt").write_text(text)
+    refused = run("filter", "part.txt", "-o", "new.nc", cwd=tmp_path)
+    assert refused.returncode == BAD_INPUT
+    assert b"this is a CL file, not an NC program" in refused.stderr
+    assert b"cornersmooth smooth" in refused.stderr
+    assert not (tmp_path / "new.nc").exists()
+
+
+def test_jumps_of_programs_are_no_statements_of_cl_files(tmp_path: Path) -> None:
+    """GOTO of FANUC's macros, and RAPID as the name of a subprogram."""
+    (tmp_path / "part.nc").write_text(PLAIN.format(CUTS + "GOTO 5\nN5 G0 Z5.\n") + "RAPID\n")
+    made = run("filter", "part.nc", "--machine", THREE_AXES, "-o", "new.nc", cwd=tmp_path)
+    assert made.returncode == DONE
+    assert made.stderr.startswith(b"PASSED")
+    assert b"an NC program" in run("info", "part.nc", cwd=tmp_path).stdout

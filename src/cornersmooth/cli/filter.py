@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Any
@@ -73,25 +74,33 @@ def run_filter(given: Options) -> int:
             make_folder(os.path.dirname(job.target) or ".")
         for path in (job.target, *job.reports):
             check_path(path, [job.source], force=given.force)
-    worst = 0
+    worst, words = 0, Counter[str]()
     for job in jobs:
         try:
-            worst = max(worst, _filter(job, form, settings, given))
+            verdict = _filter(job, form, settings, given)
+            worst, words = max(worst, int(_bad(verdict, given))), words + Counter((verdict,))
         except CornersmoothError as error:
             if len(jobs) == 1:
                 raise
             error.file = error.file or job.source
             print_message(str(error))
-            worst = max(worst, error.exit_code)
+            worst, words = max(worst, error.exit_code), words + Counter(("error",))
+    if len(jobs) > 1 and not given.quiet:
+        print_line(f"{len(jobs)} programs: " + ", ".join(f"{count} {word}" for word, count in words.items()))
     return worst
+
+
+def _bad(verdict: Verdict, given: Options) -> bool:
+    """Whether a program is put aside."""
+    return verdict is Verdict.FAILED or (given.strict and verdict is not Verdict.PASSED)
 
 
 def _pages(reports: Iterable[str]) -> bool:
     return any(suffix_of(path) == ".html" for path in reports)
 
 
-def _filter(job: Input, form: Form, settings: Settings, given: Options) -> int:
-    """Filter one program; return the exit code."""
+def _filter(job: Input, form: Form, settings: Settings, given: Options) -> Verdict:
+    """Filter one program; return the verdict."""
     data, name = read_input(job.source)
     axes = given.load_limits()
     with told_of(name):
@@ -105,7 +114,7 @@ def _filter(job: Input, form: Form, settings: Settings, given: Options) -> int:
             paths=_pages(job.reports),
             processes=useful_processes(),
         )
-    bad = found.verdict is Verdict.FAILED or (given.strict and found.verdict is not Verdict.PASSED)
+    bad = _bad(found.verdict, given)
     with open_output(target_of(job.target), hold=bad, replace=given.force) as output:
         output.failed = bad
         output.stream.write(found.data)
@@ -138,7 +147,7 @@ def _filter(job: Input, form: Form, settings: Settings, given: Options) -> int:
         _show(name, contents, found, given)
     elif loosened(settings.tolerance):
         print_line(f"{name}: {contents['verdict_text']}")
-    return int(bad)
+    return found.verdict
 
 
 def verify_with_program(source: str, old: bytes, given: Options) -> int:
@@ -254,13 +263,13 @@ def _show(name: str, contents: Mapping[str, Any], found: Filtered, given: Option
 def _judgement(found: Filtered, tolerance: float) -> Judgement:
     """Give the verdict, and what it rests on."""
     what, unverified = f"{found.smoothed} of {found.cuts} cuts smoothed in {found.runs} runs", ""
-    if found.checked is None:
+    if not found.runs:
+        what = f"{what}; the program is the same byte for byte"
+    elif found.checked is None:
         unverified = "it was not asked for"
         what = f"{what}; {unverified}"
     elif found.checked.wrong:
         what = f"{_problems(found.checked.wrong)}; {what}"
-    elif not found.runs:
-        what = f"{what}; the program is the same byte for byte"
     else:
         what = f"{what} {_measured(found.checked, tolerance)}"
     return Judgement(found.verdict, 0, 0, unverified, what)

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.comparing import MOST_POSES, Candidate, Row, Table, law_of_lines, rows_of
-from cornersmooth.errors import CornersmoothError, SettingsError
+from cornersmooth.errors import CornersmoothError, InputError, SettingsError
 from cornersmooth.filter.checking import Checked, Place, check, pair, places
 from cornersmooth.filter.motion import Job
 from cornersmooth.filter.runs import Left, ProgramReader, Reading
@@ -23,6 +23,8 @@ from cornersmooth.memory import return_free_memory
 from cornersmooth.nc import choose_form, fit_settings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc_reader import NcProgram
+from cornersmooth.nc_reader.recognition import is_cl_file
+from cornersmooth.provenance import HEAD
 from cornersmooth.saving import Timing
 from cornersmooth.settings import Settings
 from cornersmooth.verdict import Verdict
@@ -50,10 +52,13 @@ class Filtered:
     seconds: tuple[float, float] | None = None  #: planned time before and after; see `planned_times`
     #: what the control does in the runs before and after, where that was asked for
     motions: tuple[NcProgram, NcProgram] | None = None
+    compared: bool = False  #: whether two programs were compared alone, and nothing was to be smoothed
 
     @property
     def verdict(self) -> Verdict:
         """How the program turned out."""
+        if not self.runs and not self.compared:
+            return Verdict.NOT_SMOOTHED
         if self.checked is None:
             return Verdict.NOT_VERIFIED
         return Verdict.of(problems=len(self.checked.wrong))
@@ -101,7 +106,8 @@ def filter_program(
     SettingsError
         The form cannot hold what the settings ask for, or `axes` does not say how fast its axes may go.
     InputError
-        `axes` does not reach a pose, or CS264: on LinuxCNC a program with arcs has no time.
+        `axes` does not reach a pose; CS594: a CL file, or a table of points; CS264: on LinuxCNC a program with arcs
+        has no time.
     """
     settings = Settings() if settings is None else settings
     job, old = read_program(data, form, settings, tip_from_start=tip_from_start, inch=inch, processes=processes)
@@ -143,13 +149,16 @@ def verify_programs(
     where, wrong = places(before, job.reader.read(new))
     after = job.reader.read(new, [place.stop for place in where])
     checked = Checked(tuple(wrong)) if wrong else check(job, before, after, where)
-    return _result(job, before, after, where, {}, checked, None if wrong else axes, paths=paths and not wrong)
+    found = _result(job, before, after, where, {}, checked, None if wrong else axes, paths=paths and not wrong)
+    return replace(found, compared=True)
 
 
 def read_program(
     data: bytes, form: Form, settings: Settings, *, tip_from_start: bool = False, inch: bool = False, processes: int = 1
 ) -> tuple[Job, Reading]:
     """Read a program, and see how it is to be written; parameters and errors as of `filter_program`."""
+    if is_cl_file(data[:HEAD]):
+        raise InputError("CS594", "this is a CL file, not an NC program", "make a program of it: 'cornersmooth smooth'")
     tcp = form.orientation != "machine"
     reader = ProgramReader(form.table.dialect, form.machine, tcp=tcp, tip_from_start=tip_from_start, inch=inch)
     old = reader.read(data)

@@ -18,13 +18,21 @@ _COMMENT: Final = re.compile(r"\([^)]*\)|;.*")
 
 
 #: what begins a line of a CL file or of a table, and a block of an NC program
-_OTHER: Final = re.compile(rb"(?im)^\s*(GOTO|FEDRAT|LOADTL|PARTNO|TOOL PATH|RAPID|MULTAX|FINI)\b")
+_OTHER: Final = re.compile(
+    rb"(?im)^\s*(GOTO\s*/|(FEDRAT|LOADTL|PARTNO|TOOL PATH|MULTAX|FINI)\b)"
+    rb"|\A(\s*[#\"X][^\n]*\n)*\s*[-+]?\d*\.?\d+(\s*[,;\t ]\s*[-+]?\d*\.?\d+(E[-+]?\d+)?){2,}\s*$"
+)
 _BLOCK: Final = re.compile(rb"(?im)^[ \t/]*(N\d+[ \t]*)?(G\d{1,3}(\.\d)?(?![\d/,=])|L [XYZ][+-]|\d+ BEGIN PGM).*")
 
 
 def first_block(head: bytes) -> re.Match[bytes] | None:
     """Motion in the beginning of an NC program; None where that is of a CL file or a table of points."""
-    return None if _OTHER.search(head) else _BLOCK.search(head)
+    return None if is_cl_file(head) else _BLOCK.search(head)
+
+
+def is_cl_file(head: bytes) -> bool:
+    """Whether a file begins as a CL file, or as a table of points."""
+    return _OTHER.search(head) is not None
 
 
 def recognise_control(head: bytes) -> str:
