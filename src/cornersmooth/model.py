@@ -142,6 +142,8 @@ class Program:
     units: Units = "mm"  #: Units of the file, and of the NC text made from it
     source: Source = field(default_factory=Source)
     findings: tuple[Finding, ...] = ()  #: What the reader noticed
+    #: (n,), mm: By how much smoothing has moved poses that are almost doubled, at most; None where it has moved none.
+    moved: Floats | None = None
 
     def __post_init__(self) -> None:
         n = len(self.tip)

@@ -72,6 +72,8 @@ class Settings:
     axis_point_resolution: float = _setting(0.0, 0.0, 10.0, "mm")
     #: mm: Poses closer than this, in tip and axis point, are one pose.
     duplicate_distance: float = _setting(1e-6, 0.0, 0.01, "mm")
+    #: mm: By how much poses that are almost doubled are moved at most: taken off ε, as digits are. Smoothing finds it.
+    pose_shift: float = _setting(0.0, 0.0, 10.0, "mm")
     #: mm: A straight remainder shorter than this between two transitions is not written as a line of its own.
     shortest_line: float = _setting(1e-3, 0.0, 1.0, "mm")
 
@@ -172,11 +174,11 @@ class Settings:
 
     @property
     def _tip_rounding(self) -> float:
-        return math.sqrt(3) / 2 * self.tip_resolution
+        return math.sqrt(3) / 2 * self.tip_resolution + self.pose_shift
 
     @property
     def _axis_point_rounding(self) -> float:
-        return math.sqrt(3) / 2 * (self.tip_resolution + self.axis_point_resolution)
+        return math.sqrt(3) / 2 * (self.tip_resolution + self.axis_point_resolution) + self.pose_shift
 
     @property
     def chord(self) -> float:

@@ -121,9 +121,10 @@ def show_verdict(contents: Mapping[str, Any], saving: Saving | None = None) -> N
     from cornersmooth.report.verdict import method_text, sharp_line, time_text
 
     summary = contents["summary"]
+    corners = summary["corners"] - summary["not_smoothed"].get("duplicate", 0)
     lines = [
         _error_text(contents),
-        f"{summary['smoothed']:,} of {summary['corners']:,} corners rounded, {sharp_line(contents)}",
+        f"{summary['smoothed']:,} of {corners:,} corners rounded, {sharp_line(contents)}",
         *(time_text(saving, contents["times"]["limits"]).split("; ") if saving is not None else ()),
         f"method {method_text(summary)}",
     ]

@@ -11,7 +11,8 @@ import numpy as np
 from cornersmooth.errors import Finding
 from cornersmooth.model import SmoothProgram, Status
 from cornersmooth.report.corners import corner_table
-from cornersmooth.smoothing.sharp import STRAIGHT_ON, other_corners, sharp_rows
+from cornersmooth.smoothing.construction import STRAIGHT_ON
+from cornersmooth.smoothing.sharp import other_corners, sharp_rows
 from cornersmooth.verdict import Verdict
 
 if TYPE_CHECKING:

@@ -11,6 +11,7 @@ from cornersmooth.errors import Finding, InputError
 from cornersmooth.model import Bools, Move, Program, SmoothProgram
 from cornersmooth.settings import FLIP_ANGLE, Settings
 from cornersmooth.smoothing.construction import construction_of
+from cornersmooth.smoothing.doubled import one_corner_each
 
 
 def smooth(
@@ -26,6 +27,7 @@ def smooth(
     """
     settings = (Settings() if settings is None else settings).with_method()
     refuse_flips(program)
+    program, settings = one_corner_each(program, settings)
     smoothed = construction_of(settings.method).smooth(program, settings, progress, processes)
     if settings.axis_tolerance is not None:
         turned = settings.axis_scale * 2.0 * np.sin(smoothed.corners.orientation_error / 2.0)

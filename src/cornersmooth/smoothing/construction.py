@@ -33,6 +33,9 @@ BATCH = 16384
 #: batches worked on side by side
 THREADS = 2
 
+#: degrees below which the path goes straight on: numbers are rounded in CL files
+STRAIGHT_ON = 1.0
+
 #: what `Corners.extra` may have: largest curvature of the curve of a run beside each of its corners, 1/mm
 RUN_CURVATURE = "run_curvature"
 
@@ -45,11 +48,16 @@ class Legs(NamedTuple):
     turn_in: Floats  # H times the change of the axis vector, mm: ``tip + turn`` is the axis-point segment
     turn_out: Floats
     axis: Floats  # unit axis at the corner
+    shift: Floats  # (g,) by how much the segments are off the motion of the CL file, mm (`smoothing.doubled`)
+
+    def spare(self, settings: Settings) -> Floats:
+        """(g,) what is left of the tolerances here, as other corners were moved by more, mm."""
+        return settings.curve_share * (settings.pose_shift - self.shift)
 
 
 def legs_at(program: Program, axis_length: float, pose: Ints, before: Ints, after: Ints) -> Legs:
     """Segments at the corners `pose` with their neighbours `before` and `after`, (g,) each."""
-    tip, axis = program.tip, program.axis
+    tip, axis, moved = program.tip, program.axis, program.moved
     corner, direction = tip[pose], axis[pose]
     return Legs(
         corner - tip[before],
@@ -57,6 +65,7 @@ def legs_at(program: Program, axis_length: float, pose: Ints, before: Ints, afte
         axis_length * (direction - axis[before]),
         axis_length * (axis[after] - direction),
         direction,
+        np.zeros(len(pose)) if moved is None else np.maximum(moved[pose], np.maximum(moved[before], moved[after])),
     )
 
 
@@ -177,6 +186,8 @@ def place_corners(
         if len(rows):
             legs = legs_at(program, settings.axis_length, pose[rows], before[rows], after[rows])
             part = construction.place(legs, settings)
+            rounded = part.status == Status.SMOOTHED
+            part.tip_error, part.axis_error = (e + rounded * legs.shift for e in (part.tip_error, part.axis_error))
             for name in ("status", "limited_by", *_MEASURES):
                 getattr(found, name)[rows] = getattr(part, name)
             for name, values in part.extra.items():

@@ -88,7 +88,9 @@ def _solve(
     point = np.hstack((program.tip[pose], program.tip[pose] + settings.axis_length * program.axis[pose]))
     # what turning the axis inside a line is worth at the axis point is left free
     turning = TURNING * settings.tolerance * (settings.axis_length / settings.axis_scale)
-    tolerances = settings.tip_tolerance, settings.axis_point_tolerance - turning
+    shift = 0.0 if program.moved is None else float(program.moved[pose].max())
+    spare = settings.curve_share * (settings.pose_shift - shift)
+    tolerances = settings.tip_tolerance + spare, settings.axis_point_tolerance + spare - turning
     back = _backwards(point, count)
     lines = Polylines.through(point[_turned(count, back)], count, STEP * min(tolerances))
     curves = solve_runs(lines, tolerances, settings.axis_length, progress, processes=processes)
@@ -99,7 +101,7 @@ def _solve(
         return np.where(back[owner], whole[owner] - s[own], s[own])
 
     knot, control = ahead(splines.knot, splines.count), curves.control[_turned(splines.count + 2, back)]
-    bounds = curves.tip_bound, curves.axis_bound
+    bounds = curves.tip_bound + shift, curves.axis_bound + shift
     runs = Runs(pose, count, ahead(lines.s, count), lines.step, knot, splines.count, control, *bounds)
     run, place = spread(count)
     inner = (place > 0) & (place < count[run] - 1)

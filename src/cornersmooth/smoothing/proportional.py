@@ -12,6 +12,7 @@ from cornersmooth.geometry import nurbs
 from cornersmooth.model import Floats, Ints, LimitedBy, SmoothProgram, Status
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.construction import (
+    STRAIGHT_ON,
     Construction,
     Legs,
     Placed,
@@ -38,15 +39,15 @@ EXACT = 1e-10
 _TILT_PAPER, _TILT_ANY = 1.5, 0.5
 
 
-def keep(length: Floats, rows: Ints, measure: Callable[[Floats, Ints], Floats], tolerance: float) -> Floats:
-    """Lengths of the given rows, shortened until the measured deviation keeps the tolerance."""
+def keep(length: Floats, rows: Ints, measure: Callable[[Floats, Ints], Floats], tolerance: Floats) -> Floats:
+    """Lengths of the given rows, shortened until the measured deviation keeps the tolerances (of all rows)."""
     length = length.copy()
     pending = rows
     while len(pending):
         deviation = measure(length[pending], pending)
-        over = deviation > tolerance * (1.0 + EXACT)
+        over = deviation > tolerance[pending] * (1.0 + EXACT)
         pending = pending[over]
-        length[pending] *= tolerance / deviation[over] * (1.0 - EXACT)
+        length[pending] *= tolerance[pending] / deviation[over] * (1.0 - EXACT)
     return length[rows]
 
 
@@ -70,16 +71,18 @@ class Wanted:
         self.per_tip, per_axis, self.per_turn = (self.factor * norm(bend) for bend in bends)
         #: lengths that the tolerances allow, mm
         self.by_tolerance = np.minimum(
-            divide(settings.tip_tolerance, self.per_tip), divide(settings.axis_point_tolerance, per_axis)
+            divide(settings.tip_tolerance + legs.spare(settings), self.per_tip),
+            divide(settings.axis_point_tolerance + legs.spare(settings), per_axis),
         )
         self.half_cosine = half_cosine(legs, settings.axis_length)
 
         self.room = np.minimum(self.length_in, self.length_out) / 2.0
         flat_tip = self.per_tip * self.room <= settings.tip_resolution / 2.0
         flat_axis = per_axis * self.room <= max(settings.tip_resolution, settings.axis_point_resolution) / 2.0
-        #: as far as the geometry of the corner decides it
-        self.status = np.where(flat_tip & flat_axis, Status.STRAIGHT, Status.SMOOTHED).astype(np.uint8)
         cosine = (dot(legs.tip_in, legs.tip_out) + dot(axis_in, axis_out)) / (2.0 * self.length_in * self.length_out)
+        #: as far as the geometry of the corner decides it
+        flat = np.where(cosine >= np.cos(np.radians(STRAIGHT_ON)), Status.STRAIGHT, Status.TOO_SHORT)
+        self.status = np.where(flat_tip & flat_axis, flat, Status.SMOOTHED).astype(np.uint8)
         refuse_turns(self.status, cosine, self.half_cosine, settings)
 
     def middle(self, length: Floats, rows: Ints | slice = slice(None)) -> Floats:
@@ -149,17 +152,17 @@ class Proportional(Construction):
 
         # The construction runs on chords of the sphere, the tolerance is about b = tip + H·axis at constant H.
         # The bound |b′−b| ≤ |A′−A| + H|O′−O| proves most corners; the others are shortened until they keep it.
-        axis_length = settings.axis_length
+        axis_length, allowed = settings.axis_length, settings.axis_point_tolerance + legs.spare(settings)
         shortest_lever = axis_length * asked.half_cosine - length * per_turn  # below |B−A| of both motions
         bound = length * (per_tip + divide(axis_length * per_turn, np.maximum(shortest_lever, 0.0)))
-        doubtful = (status == Status.SMOOTHED) & (bound > settings.axis_point_tolerance * (1.0 + EXACT))
+        doubtful = (status == Status.SMOOTHED) & (bound > allowed * (1.0 + EXACT))
         peaks = _largest_in_the_middle(asked, length, length * per_turn)
         probed = np.flatnonzero(doubtful & ~peaks)
         for rows, measure, share in (
             (np.flatnonzero(doubtful & peaks), asked.middle, 1.0),
             (probed, asked.probe, 1.0 - BETWEEN_PROBES),
         ):
-            shortened = keep(length, rows, measure, share * settings.axis_point_tolerance)
+            shortened = keep(length, rows, measure, share * allowed)
             limited_by[rows[shortened < length[rows]]] = LimitedBy.TOLERANCE
             length[rows] = shortened
         status[(status == Status.SMOOTHED) & (length <= 4.0 * settings.tip_resolution)] = Status.TOO_SHORT

@@ -190,7 +190,7 @@ def lines_of(smoothed: SmoothProgram, rows: Ints) -> Ints:
     program, corners, settings = smoothed.program, smoothed.corners, smoothed.settings
     after = corners.after[rows]
     legs = legs_at(program, settings.axis_length, corners.pose[rows], corners.before[rows], after)
-    tip_in, tip_out, turn_in, turn_out, _ = legs
+    tip_in, tip_out, turn_in, turn_out, *_ = legs
     bends = (
         tip_out * corners.trim_out[rows][:, None] - tip_in * corners.trim_in[rows][:, None],
         (tip_out + turn_out) * corners.axis_trim_out[rows][:, None]

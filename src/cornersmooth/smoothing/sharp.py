@@ -12,12 +12,9 @@ from numpy.typing import NDArray
 
 from cornersmooth.geometry.arcs import arc_tangents
 from cornersmooth.model import Floats, Ints, Move, Program, SmoothProgram, Status, Trait
-from cornersmooth.smoothing.construction import BATCH, legs_at
+from cornersmooth.smoothing.construction import BATCH, STRAIGHT_ON, legs_at
 from cornersmooth.smoothing.proportional import Wanted
 from cornersmooth.vectors import angle_between
-
-#: degrees below which the path goes straight on: numbers of arcs are rounded in CL files
-STRAIGHT_ON = 1.0
 
 
 def sharp_rows(smoothed: SmoothProgram) -> Ints:
