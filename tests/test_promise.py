@@ -154,7 +154,6 @@ def test_long_segments_with_steep_turns(form: Form, axis_length: float) -> None:
 
 FOUR_OR_LESS = (
     "catia_5x6args_prepaflans_pointage.aptsource",
-    "catia_demo3.aptsource",
     "creo11_3x_inch_multiop.ncl",
     "nx_clsf_drill_pattern.cls",
     "nx_clsf_facemill_sideaxis.cls",

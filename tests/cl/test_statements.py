@@ -235,6 +235,7 @@ def test_rapid_modes() -> None:
     result = program("RAPID/ON\nGOTO/0,0,0\nGOTO/1,0,0\nRAPID/OFF\nGOTO/2,0,0\nRAPID/FEDTO,LENGTH,2.\nGOTO/3,0,0\n")
     assert result.kind.tolist() == [1, 1, 2, 2]
     assert codes(result) == {"CS140": 1}
+    assert words(result) == [(3, 6, "RAPID")]  # what is not understood stays, and the verdict names it
 
 
 def test_feed_between_rapid_and_goto_keeps_the_rapid() -> None:
@@ -257,6 +258,7 @@ def test_feed_between_rapid_and_goto_keeps_the_rapid() -> None:
         (".01,IPR", "INCHES", 0.254, FeedMode.PER_REVOLUTION),
         (".01,PERREV", "INCHES", 0.254, FeedMode.PER_REVOLUTION),
         ("1.,FPM", "MM", 304.8, FeedMode.PER_MINUTE),
+        ("150,MMPF", "INCHES", 150.0, FeedMode.PER_MINUTE),
     ],
 )
 def test_feed_units(feed: str, units: str, value: float, mode: FeedMode) -> None:
@@ -271,11 +273,15 @@ def test_feed_without_a_unit_keeps_the_mode() -> None:
     assert result.feed_mode.tolist() == [1, 1, 0]
 
 
-def test_feed_options_stay_statements() -> None:
-    result = program("FEDRAT/INVERS,AUTO\nFEDRAT/MMPM,5\nGOTO/0,0,0\nFEDRAT/LOCK,ON\nGOTO/1,0,0\n")
-    assert [word for _, _, word in words(result)] == ["FEDRAT", "FEDRAT"]
-    assert result.feed.tolist() == [5, 5]
-    assert [(f.code, f.count) for f in result.findings if f.code == "CS136"] == [("CS136", 1), ("CS136", 1)]
+@pytest.mark.parametrize(
+    "feed",
+    ["INVERS,AUTO", "LOCK,ON", "50,FOO", "INVERS,10", "LENGTH,50", "300,100,MMPM", ".05,MMPT", "MMPM", "1,IPM,MMPM"],
+)
+def test_a_feed_that_is_not_understood_is_an_error(feed: str) -> None:
+    for lenient in (False, True):
+        with pytest.raises(InputError, match=r"x.cls:2: error\[CS136\]: FEDRAT/") as caught:
+            program(f"FEDRAT/MMPM,5\nFEDRAT/{feed}\nGOTO/0,0,0\nGOTO/1,0,0\n", lenient=lenient)
+        assert caught.value.exit_code == 3
 
 
 # --- units -------------------------------------------------------------------------------------------------------

@@ -9,9 +9,12 @@ from typing import Final
 
 from cornersmooth.cl.arcs import RULES, ArcRule
 from cornersmooth.cl.dialects import NAMES as DIALECTS
+from cornersmooth.cl.grammar import joined
+from cornersmooth.cl.messages import error
 from cornersmooth.cl.source import clean, load
 from cornersmooth.errors import SettingsError
-from cornersmooth.model import MM_PER_UNIT, Program, Units
+from cornersmooth.model import MM_PER_UNIT, Program, Statement, Units
+from cornersmooth.statements.asked import statements_not_understood, turns
 
 __all__ = ["DIALECTS", "FORMATS", "read"]
 
@@ -110,4 +113,21 @@ def read(
 
         program = program if operation is None else one_operation(program, operation)
         program = with_tool(program, tool_number, spindle)
+    _refuse(program, name, lenient)
     return program
+
+
+def _refuse(program: Program, name: str, lenient: bool) -> None:
+    """Refuse what must not be missing from a program in silence: a spindle that is not understood, and turning."""
+    for statement in statements_not_understood(program):
+        if turns(statement) and not lenient:
+            raise error("CS179", name, statement.line, text=statement.text)
+        if statement.word == "SPINDL":
+            raise error("CS115", name, statement.line, **_spindle_wanted(statement))
+
+
+def _spindle_wanted(statement: Statement) -> dict[str, str]:
+    want = "give revolutions per minute with RPM and CLW or CCLW"
+    if {"SFM", "SMM"} & set(statement.args):
+        want += "; a cutting speed needs CUTTER with the diameter before it, and is not written for a lathe"
+    return {"word": "SPINDL", "text": joined(statement.args), "want": want}

@@ -179,7 +179,7 @@ def _obey(state: ReaderState, record: Record) -> None:
         return
     if any(isinstance(value, float) and not math.isfinite(value) for value in record.args):
         raise state.fail("CS196", record, word=word)
-    if word not in KNOWN_WORDS and word != "$$" and not word.startswith(PLAIN_PREFIXES):
+    if word not in KNOWN_WORDS and not word.startswith(PLAIN_PREFIXES):
         _unknown(state, record, word)
     state.keep(record)
 

@@ -38,7 +38,8 @@ DIALECTS: Final[tuple[Dialect, ...]] = (
     Dialect("makino", rb"^PPRINT/APTCL-SPEC, *MAKINO", decimals=7),
     Dialect(
         "creo",
-        rb"^\$\$\* +Pro/CLfile|^\$\$-> *(FEATNO|MFGNO|CSYS|CUTTER|END) */",
+        # with words of GPOST, the comments are REMARK
+        rb"^(\$\$|REMARK *)(\* *Pro/CLfile|-> *(FEATNO|MFGNO|CSYS|CUTTER|END) */)|^[ \t]*(PPWORD|CAMERA)[ \t]*/",
         short_axis="up",
         multax_off="up",
         decimals=10,

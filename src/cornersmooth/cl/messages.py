@@ -35,6 +35,8 @@ ERRORS: Final[dict[str, tuple[str, str]]] = {
     "CS116": ("{word} changes to {new} after positions in {old}", "say --units, or split the file"),
     "CS117": ("{word} changes the coordinates of what follows", "export the path in one coordinate system"),
     "CS118": ("{word} after FINI", "split the file at FINI, or remove what follows it"),
+    "CS136": ("FEDRAT/{text} is not understood: {why}", "give one feed, with MMPM, MMPR, IPM or IPR"),
+    "CS179": ("{text} is for a lathe, and turning is not written", "take the milling alone, with --operation"),
     "CS119": ("{word} needs a positive feed, not {value:g}", "correct the feed"),
     # arcs and curves
     "CS120": ("{word} with {count} number{s}", "give {want}"),
@@ -113,11 +115,10 @@ FINDINGS: Final[dict[str, tuple[Severity, str]]] = {
     "CS133": ("warning", "the file says {stated}, read as {units} as asked for"),
     "CS134": ("warning", "GOTO numbers separated by blanks instead of commas"),
     "CS135": ("warning", "FEDRAT between RAPID and its GOTO: the move stays rapid"),
-    "CS136": ("warning", "FEDRAT/{text} is not understood: the feed stays as it was; correct the word"),
     "CS137": ("warning", "axis vectors after MULTAX/OFF are ignored: the axis is locked"),
     "CS138": ("note", "poses under CUTCOM are passed exactly: the control offsets the path"),
     "CS139": ("warning", "tool axis is {length:.6g} long, not 1: normalised"),
-    "CS140": ("warning", "RAPID/{text}: the move is made at feed"),
+    "CS140": ("warning", "RAPID/{text} is not understood: the move is {how}"),
     "CS141": ("note", "arcs shorter than the printed digits can tell are read as lines"),
     "CS142": ("warning", "arc turns the other way than its neighbours: read {how}, corners there are kept"),
     "CS143": (

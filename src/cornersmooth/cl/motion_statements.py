@@ -203,7 +203,7 @@ def finish_curve(state: ReaderState) -> None:
 def _at_feed(state: ReaderState, record: Record) -> None:
     """Say that a rapid curve is read as a feed motion."""
     if state.rapid:
-        state.note("CS140", record.line, text=record.word)
+        state.note("CS140", record.line, text=record.word, how="made at feed")
         state.rapid = False
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Final
 
 from cornersmooth.cl.bulk import FARTHEST
@@ -16,6 +17,7 @@ from cornersmooth.model import FeedMode, Keep, Units
 #: unit words of FEDRAT: millimetres per unit of the value (None: the unit of the file) and what it is per
 FEED_UNITS: Final[dict[str, tuple[float | None, FeedMode]]] = {
     "MMPM": (1.0, FeedMode.PER_MINUTE),
+    "MMPF": (1.0, FeedMode.PER_MINUTE),  # FwxPostProcessing
     "IPM": (25.4, FeedMode.PER_MINUTE),
     "FPM": (12 * 25.4, FeedMode.PER_MINUTE),
     "PERMIN": (None, FeedMode.PER_MINUTE),
@@ -24,6 +26,9 @@ FEED_UNITS: Final[dict[str, tuple[float | None, FeedMode]]] = {
     "FPR": (12 * 25.4, FeedMode.PER_REVOLUTION),
     "PERREV": (None, FeedMode.PER_REVOLUTION),
 }
+
+#: feeds per tooth; no CL file says how many teeth a tool has
+_PER_TOOTH: Final = frozenset({"MMPT", "IPT", "FPT", "PERTOOTH"})
 
 UNIT_NAMES: Final[dict[str, Units]] = {
     **dict.fromkeys(("MM", "MILLIMETER", "MILLIMETERS", "MILLIMETRE", "MILLIMETRES", "METRIC"), "mm"),
@@ -52,12 +57,15 @@ def _rapid(state: ReaderState, record: Record) -> None:
         state.rapid_on = option == "ON"
         state.rapid = False
         state.set_kind()
-    elif option in ("", "MODIFY"):
+    elif record.args in ((), ("",), ("MODIFY",)):
         state.rapid = True
         if state.hole:
             state.note("CS144", record.line, what="RAPID inside CYCLE")
     else:  # FEDTO,LENGTH,n: the last part is at feed; all of it at feed is slow but safe
-        state.note("CS140", record.line, text=joined(record.args))
+        state.rapid = option == "MODIFY"
+        how = "made axis by axis or not, as the control has it" if state.rapid else "made at feed"
+        state.note("CS140", record.line, text=joined(record.args), how=how)
+        state.keep(record)
 
 
 def _feed(state: ReaderState, record: Record) -> None:
@@ -65,9 +73,8 @@ def _feed(state: ReaderState, record: Record) -> None:
     words = record.words
     units = [word for word in words if word in FEED_UNITS]
     if len(values) != 1 or len(units) != len(words) or len(units) > 1:
-        state.note("CS136", record.line, text=joined(record.args))
-        state.keep(record)
-        return
+        why = "the teeth of the tool are not known" if _PER_TOOTH & set(words) else "it is no single feed with its unit"
+        raise state.fail("CS136", record, why=why)
     if not (math.isfinite(values[0]) and values[0] > 0):
         if not state.lenient:
             raise state.fail("CS119", record, value=values[0])
@@ -189,12 +196,17 @@ def _comment(state: ReaderState, record: Record) -> None:
     if text.startswith("*CATIA0"):
         state.matrix = []
     elif text.startswith("->") and text[2:].lstrip().upper().startswith("CSYS"):
-        _same_system(state, record, "$$-> CSYS", text.partition("/")[2].replace(",", " ").split())
+        _same_system(state, record, "CSYS", text.partition("/")[2].replace(",", " ").split())
     elif state.matrix is not None and len(row := text.split()) == 4:
         state.matrix += row
         if len(state.matrix) == 12:
             _same_system(state, record, "$$*CATIA0", state.matrix)
             state.matrix = None
+
+
+def _camera(state: ReaderState, record: Record) -> None:
+    """CAMERA/ and 12 numbers: what $$-> CSYS is where Creo writes words of GPOST."""
+    _same_system(state, record, "CSYS", [str(value) for value in state.numbers(record)])
 
 
 def _same_system(state: ReaderState, record: Record, word: str, given: list[str]) -> None:
@@ -221,11 +233,20 @@ def _cycle(state: ReaderState, record: Record) -> None:
 
 
 def _frame(state: ReaderState, record: Record) -> None:
-    values = record.values
-    # off, or by nothing: its numbers are zero, or the matrix of no turn
-    nothing = record.option in _ENDS or (bool(values) and not any(values)) or values == _NO_TURN
-    if record.word == "TRNTYP" or not nothing:
+    if record.word == "TRNTYP" or not _changes_nothing(record):
         _other_system(state, record, record.word)
+
+
+def _changes_nothing(record: Record) -> bool:
+    """Whether a change of coordinates is off, or by nothing: its numbers are zero, or the matrix of no turn."""
+    values = record.values
+    return record.option in _ENDS or (bool(values) and not any(values)) or values == _NO_TURN
+
+
+def _turn(state: ReaderState, record: Record) -> None:
+    """TRANS, ORIGIN, ROTABL and the like: what changes nothing is a remark."""
+    _frame(state, record)
+    state.keep(replace(record, word="$$", args=(record.text,)) if _changes_nothing(record) else record)
 
 
 def _other_system(state: ReaderState, record: Record, word: str) -> None:
@@ -259,8 +280,12 @@ def _fini(state: ReaderState, record: Record) -> None:
 
 Handler = Callable[[ReaderState, Record], None]
 
-#: of statements that become a part of the motion
-FED: Final[dict[str, Handler]] = {"RAPID": _rapid, "FEDRAT": _feed}
+#: of statements that become a part of the motion, or are kept by what they do
+FED: Final[dict[str, Handler]] = {
+    "RAPID": _rapid,
+    "FEDRAT": _feed,
+    **{word: _turn for word, code in REFUSED_WORDS.items() if code == TURNS},
+}
 
 #: of statements that the program keeps, too
 KEPT: Final[dict[str, Handler]] = {
@@ -281,8 +306,9 @@ KEPT: Final[dict[str, Handler]] = {
     "FINI": _fini,
     "SYS": _msys,
     "$$": _comment,
+    "REMARK": _comment,
+    "CAMERA": _camera,
     "CLEARP": _clearance,
     "CLRSRF": _clearance,
     **dict.fromkeys(("FIXTUR", "FIXTURE", "WCS"), _offset),
-    **{word: _frame for word, code in REFUSED_WORDS.items() if code == TURNS},
 }

@@ -2,12 +2,11 @@
 
 What a machinist reads becomes a comment without its CL word (PPRINT, REMARK, TPRINT and the like); what describes the
 file or the tool becomes a comment as it stands; PAINT only tells the CAM screen what to draw and is left out. Whatever
-is not understood becomes a comment and a counted warning, never an NC word by guess.
+is not understood becomes a comment and a counted warning, never an NC word by guess; `statements.asked` decides that.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -30,6 +29,7 @@ from cornersmooth.nc.statement_args import (
     words_of,
 )
 from cornersmooth.nc.tools import TOOL_WORDS, ahead_of_tools, loaded_tool
+from cornersmooth.statements.asked import statements_not_understood
 from cornersmooth.text import format_number
 
 #: words of SPINDL whose number is no speed
@@ -38,19 +38,11 @@ _LIMITS = ("RANGE", "MAXRPM")
 #: words whose text is for the machinist: comments without the word
 _TEXT_WORDS = frozenset("$$ PPRINT REMARK TPRINT LETTER DISPLY".split())
 
-#: words that describe the file or the tool: comments, nothing to warn of
-_DESCRIBING = frozenset(
-    "PARTNO TLDATA MSYS CSYS CUTTER INTOL OUTTOL TOLER MULTAX UNITS UNIT MACHIN TLAXIS TRNTYP SYN PPFUN ISN TOOLNO "
-    "CSI_SET_FLUTE_LENGTH CSI_SET_EXTENSION_LENGTH CLEARP CLRSRF MCS MCSYS".split()
-) | {"TOOL PATH"}
-
 #: words that say nothing beside what the NC text shows anyway
 _SILENT = frozenset({"END-OF-PATH", "FINI", "REWIND"})
 
 #: words of SPINDL about gears and limits of the speed
 _GEARS = frozenset(("RANGE", "MAXRPM", "HIGH", "LOW", "MEDIUM"))
-
-_NC_WORDS = re.compile(r"\s*(?:[A-Z][+-]?(?:\d+\.?\d*|\.\d+)\s*)+[$%]?\s*", re.IGNORECASE)
 
 
 @dataclass
@@ -75,6 +67,7 @@ class StatementWriter:
     words: Words = field(init=False)
     toolno_loads: bool = field(init=False)
     _ahead_of_tools: frozenset[int] = field(init=False)
+    _unknown: frozenset[int] = field(init=False)  #: statements that are not understood, by identity
 
     def __post_init__(self) -> None:
         self.words = self.form.table.words
@@ -82,6 +75,7 @@ class StatementWriter:
         said = {statement.word for statement in self.program.statements}
         self.toolno_loads = not TOOL_WORDS & said
         self._ahead_of_tools = ahead_of_tools(self.program)
+        self._unknown = frozenset(map(id, statements_not_understood(self.program)))
 
     def blocks(self, statement: Statement) -> list[str]:
         """NC blocks of one statement, without line ends."""
@@ -96,7 +90,7 @@ class StatementWriter:
             return self.comment(spoken_text(statement))
         elif word in _SILENT:
             return []
-        elif word not in _DESCRIBING:
+        elif id(statement) in self._unknown:
             self._not_understood(statement)
         return self.comment(statement.text or word)
 
@@ -230,9 +224,9 @@ class StatementWriter:
         return blocks or self.comment(statement.text)
 
     def cutter(self, statement: Statement) -> list[str]:
-        """CUTTER/d,r,e,... and TLDATA/MILL,d,...: the diameter is kept; CUTTER/d alone is the nose of a lathe tool."""
+        """CUTTER/d,r,e,... and TLDATA/MILL,d,...: the diameter is kept."""
         numbers = numbers_of(statement)
-        mill = {"MILL", "DRILL"} & set(words_of(statement)) if statement.word == "TLDATA" else len(numbers) > 2
+        mill = statement.word == "CUTTER" or {"MILL", "DRILL"} & set(words_of(statement))
         self._diameter = numbers[0] * self.program.mm_per_unit if mill and numbers else 0.0
         return self.comment(statement.text)
 
@@ -359,8 +353,8 @@ class StatementWriter:
     def insert(self, statement: Statement) -> list[str]:
         """INSERT: text for the NC file; as a comment, since its meaning is not known."""
         text = spoken_text(statement)
-        if _NC_WORDS.fullmatch(text):
-            what = "INSERT with NC words is written as a comment; put them in by hand where the machine needs them"
+        if id(statement) in self._unknown:
+            what = "INSERT is written as a comment; put them in by hand where the machine needs them"
             self.findings.add("CS320", "warning", statement.line, what)
         return self.comment(text)
 
@@ -388,10 +382,6 @@ class StatementWriter:
         text = "PAINT is left out: it only says what the CAM screen shows"
         self.findings.add("CS317", "note", statement.line, text)
         return []
-
-    def mode(self, statement: Statement) -> list[str] | None:
-        """SET/MODE,ABSOL: positions are absolute, as ours always are."""
-        return self.comment(statement.text) if words_of(statement) == ["MODE", "ABSOL"] else None
 
     def start(self, statement: Statement) -> list[str]:
         """FROM: a position that is stated; the tool is not sent there."""
@@ -439,6 +429,5 @@ _HANDLERS: dict[str, Handler] = {
     "INSERT": StatementWriter.insert,
     "AUXFUN": StatementWriter.auxiliary,
     "PAINT": StatementWriter.paint,
-    "SET": StatementWriter.mode,
     "FROM": StatementWriter.start,
 }

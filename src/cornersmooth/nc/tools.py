@@ -39,6 +39,8 @@ def loaded_tool(statement: Statement) -> tuple[int, int] | None:
     number = whole_number(numbers[:1])
     if number is None:
         return None
+    if len(numbers) == 4 and not numbers[1]:  # LOADTL/tool,0,length,register of Autodesk's ISO 4343 post
+        registers.append(numbers[3])
     offset = whole_number(registers[:1])
     return number, number if offset is None else offset
 

@@ -42,6 +42,12 @@ def add_warnings(form: Form, smoothed: SmoothProgram, circles: Circles, findings
             f"50 % longer, and once it left the tolerance there; use --method {DEFAULT_METHOD}"
         )
         findings.add("CS394", "warning", 0, text)
+    if form.curve == "g6.2" and form.orientation == "point":
+        text = (
+            "axis points U V W in G6.2 need the option of dual NURBS interpolation (a second curve for the tool axis); "
+            "see that the control has it, else it stops with an alarm, or name the machine for rotary words"
+        )
+        findings.add("CS395", "warning", 0, text)
     for extra in form.extras:
         if extra.warning:
             findings.add("CS339", "warning", 0, f"{extra.name} was asked for: {extra.warning}")

@@ -97,14 +97,7 @@ def compare(
         return apart(place, nearest) > 2 * room + ours.room  # a pose is a rounding off, and its place as far from it
 
     end = max((token.place for token in asked_for if token.kind == "end"), default=math.inf)
-    # what shifts the path counts wherever it is said
-    shifted = {token.kind for token in found if token.kind == "compensation" and token.value != "OFF"}
-    sayable = {*shifted, *means.values()}
-
-    def counts(token: Token) -> bool:
-        names = token.kind, (token.kind, ""), (token.kind, token.value)
-        return token.kind not in _WORDED or not sayable.isdisjoint(names)
-
+    counts = _counting(found, means)
     asked_for = [token for token in asked_for if counts(token) and token.kind not in own]
     found = [token for token in found if counts(token) and token.kind not in own & _LOOSE]
     changes = [token.line for token in found if token.kind == "tool"]
@@ -128,6 +121,33 @@ def compare(
             before = (other.line for other in reversed(found) if other.place <= wanted.place + room)
             problems.append(Problem(code, wanted.line, next(before, 0) if token is None else token.line, text))
     return problems
+
+
+def _counting(found: list[Token], means: Means) -> Callable[[Token], bool]:
+    """Whether a token is compared: the control has a word for it."""
+    # what shifts the path counts wherever it is said
+    shifted = {token.kind for token in found if token.kind == "compensation" and token.value != "OFF"}
+    sayable = {*shifted, *means.values()}
+
+    def counts(token: Token) -> bool:
+        names = token.kind, (token.kind, ""), (token.kind, token.value)
+        return token.kind not in _WORDED or not sayable.isdisjoint(names)
+
+    return counts
+
+
+def without_word(asked_for: list[Token], found: list[Token], means: Means, own: Set[str]) -> str:
+    """Say what the CL file asks for and the control has no word for; empty for nothing.
+
+    A tool has its own length without a word, and what is off needs none.
+    """
+    counts = _counting(found, means)
+    lost, tool = [], -1.0
+    for token in asked_for:
+        tool = float(token.value) if token.kind == "tool" else tool
+        if not counts(token) and token.kind not in own and token.value not in ("OFF", tool, _AT_START.get(token.kind)):
+            lost.append(f"{_NAMES[token.kind][1].format(token.value)} in CL line {token.line}")
+    return f"the control has no word for: {', '.join(dict.fromkeys(lost))}" if lost else ""
 
 
 def _unlike(theirs: list[Token], ours: list[Token], habits: Set[int], away: _Away) -> Iterator[_Pair]:

@@ -25,6 +25,7 @@ from cornersmooth.nc_words.machine_positions import MachinePositions
 from cornersmooth.nc_words.states import GONE_ON
 from cornersmooth.processes import Helper, can_fork, map_in_processes
 from cornersmooth.settings import BOUNDS
+from cornersmooth.statements.asked import not_understood_text
 from cornersmooth.statements.comparison import KINDS
 from cornersmooth.verify.batches import Batches
 from cornersmooth.verify.cl_motion import half_turns
@@ -248,12 +249,13 @@ class Verifier:
         if nc.units != program.units:
             text = f"the program is in {nc.units}, the CL file in {program.units}"
             problems.append(Problem("CS505", 0, 1, text))
+        unsaid = ""
         problems += batches.problems + findings.feeds.problems + problems_of(findings.violations)
         problems += half_turns(program)
         if not self._skip_cycles:
             problems += batches.left_out
         if self._words and batches.elements:  # without any motion nothing has a place
-            of_statements, at_home = places.problems(findings, nc.means, self._own_kinds, self._clamps)
+            of_statements, at_home, unsaid = places.problems(findings, nc.means, self._own_kinds, self._clamps)
             problems = [one for one in problems if one.text != GONE_ON or one.nc_line not in at_home] + of_statements
         if nc.coarse:  # a pose missed within the tolerance where digits are too few for it is not verified
             limit = task.tolerance
@@ -271,7 +273,7 @@ class Verifier:
             curves=curves,
             left_out=len(batches.left_out) if self._skip_cycles else 0,
             rewinds=tuple(batches.rewinds),
-        )
+        ).not_verified(not_understood_text(program), unsaid)
 
     @property
     def _own_kinds(self) -> frozenset[str]:

@@ -19,7 +19,7 @@ from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem
 from cornersmooth.nc_reader.tool import leads_somewhere
 from cornersmooth.nc_reader.word_tables import Means
 from cornersmooth.statements.asked import asked
-from cornersmooth.statements.comparison import compare
+from cornersmooth.statements.comparison import compare, without_word
 from cornersmooth.statements.tokens import TAP, Place, Token, said
 from cornersmooth.verify.batches import Batches, elements_with_words
 from cornersmooth.verify.findings import Findings
@@ -94,8 +94,8 @@ class WordPlaces:
         means: Means,
         own: frozenset[str],
         clamps: Set[float],
-    ) -> tuple[list[Problem], set[int]]:
-        """What words say wrongly, and the NC lines of those where the CL file has GOHOME.
+    ) -> tuple[list[Problem], set[int], str]:
+        """What words say wrongly, the NC lines of those where the CL file has GOHOME, and what no word can say.
 
         Of all batches it is known what was `found`, of the control what its words mean (see `NcProgram`). The user says
         some kinds of statements in words of his `own`. M words that clamp a rotary axis or let it turn stand where the
@@ -124,7 +124,8 @@ class WordPlaces:
         here = list(map(self._of, self._events))
         # behind a rapid that leads nowhere they belong with those before it
         of = [replace(one, element=one.element - 1) if one.element - 1 in still else one for one in self._events]
-        wrong = compare(theirs, said(of, here, means), self.margin, means, path.way_apart, own)
+        ours = said(of, here, means)
+        wrong = compare(theirs, ours, self.margin, means, path.way_apart, own)
         said_there = zip(statements, program.statements, strict=True)
         homes = [at for at, statement in said_there if statement.word == "GOHOME"]
         at_home = {
@@ -133,7 +134,7 @@ class WordPlaces:
             for room in [self.margin + place.room]
             if any(-room <= home - place.at <= place.reach + room for home in homes)
         }
-        return wrong, at_home
+        return wrong, at_home, without_word(theirs, ours, means, own)
 
     def _of(self, event: Event) -> Place:
         """Where a word is: at the end of the element before it; that of a tap at the hole that is fed next.
