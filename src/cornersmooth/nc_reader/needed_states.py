@@ -62,7 +62,11 @@ def control_problems(table: Table, state: Reader, code: float, approach: Set[int
         line = table.line[rows]
         need = " or ".join(word or "no tool tip control" for word in wanted)
         text = f"{_KINDS[kind]} under {state.tip_control or 'no tool tip control'}, where {need} must be in force"
-        yield from first_wrong(CONTROL_WORDS, ~np.isin(line, list(approach)), line, text)
+        wrong = list(first_wrong(CONTROL_WORDS, ~np.isin(line, list(approach)), line, text))
+        if state.tip_control in dialect.unsure.get(kind, ()):
+            state.unlooked += [(problem.nc_line, problem.text) for problem in wrong]
+        else:
+            yield from wrong
 
 
 def axis_problems(

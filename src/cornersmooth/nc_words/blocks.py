@@ -33,11 +33,20 @@ class WordRules:
         Blocks beyond the list: positions of the machine that its file has.
     tolerance : float
         ε in units of the text.
+    axis_tolerance : float
+        That of the tool axis, degrees.
     """
 
-    def __init__(self, listed: WordList, positions: Sequence[WordRule], lexer: Lexer, tolerance: float) -> None:
+    def __init__(
+        self,
+        listed: WordList,
+        positions: Sequence[WordRule],
+        lexer: Lexer,
+        tolerance: float,
+        axis_tolerance: float = 0.0,
+    ) -> None:
         self._words, self._blocks = listed.words, (*listed.blocks, *positions)
-        self._lexer, self._tolerance = lexer, tolerance
+        self._lexer, self._rooms = lexer, {"length": tolerance, "angle": axis_tolerance}
         # most blocks beside the motion are alike; those of cycles are not, but most of their words are
         self._find = lru_cache(_REMEMBERED)(self._look_up)
         self._fitting = lru_cache(_REMEMBERED)(self._rules_for)
@@ -96,6 +105,8 @@ class WordRules:
                 for (other, _), belongs in zip(ruled, own, strict=True):
                     if other != word and (not belongs or sum(own) > 1):
                         yield wrong(f"{other} in the block of {word}")
-            share = rule.pattern.fullmatch(word) if rule.share is not None else None
-            if share and float(share[1]) > (rule.share or 0.0) * self._tolerance * (1 + 1e-9) + 1e-5:
-                yield wrong(f"{word} is more than {rule.share:g} of the tolerance")
+            shared = rule.pattern.fullmatch(word) if rule.share is not None else None
+            for name, number in shared.groupdict().items() if shared else ():
+                room = (rule.share or 0.0) * self._rooms[name] * (1 + 1e-9) + 1e-5
+                if number is not None and float(number) > room:
+                    yield wrong(f"{word} is more than {rule.share:g} of the tolerance")

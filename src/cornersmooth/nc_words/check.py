@@ -40,7 +40,7 @@ _MOST_WEIGHTS: Final = 100
 
 
 class WordCheck:
-    """Looks at all blocks of a program in order; ε in units of the program.
+    """Looks at all blocks of a program in order; ε in units of the program, that of the tool axis in degrees.
 
     Trusted blocks belong where they are because the user says so, any number where they have braces; so do names of
     states that the program leaves to him, and `FRAME` where the blocks around the motion are his. Words in these that
@@ -56,11 +56,12 @@ class WordCheck:
         accepted: Set[str] = frozenset(),
         weights: Iterable[float] | None = None,
         positions: MachinePositions | None = None,
+        axis_tolerance: float = 0.0,
     ) -> None:
         self._positions = MachinePositions(None, 1.0) if positions is None else positions
         listed = word_list(control)
         self.list: WordList = replace(listed, words=(*self._positions.switch, *listed.words))
-        self._rules = WordRules(self.list, self._positions.rules, lexer, tolerance)
+        self._rules = WordRules(self.list, self._positions.rules, lexer, tolerance, axis_tolerance)
         self.lexer = lexer
         trusted = set(trusted)
         own = set(map(self._text, trusted))

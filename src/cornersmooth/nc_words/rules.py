@@ -42,7 +42,9 @@ class WordRule:
     needs: re.Pattern[str] | None = None
     must: re.Pattern[str] | None = None
     alone: bool = False  #: no other words may stand beside it
-    share: float | None = None  #: what the number in brackets may be of the tolerance
+    #: what the numbers in its groups may be of the tolerance: ``length`` of ε, ``angle`` of that of the tool axis
+    share: float | None = None
+    numbers: str = ""  #: what is done with its numbers, where they have no share and are not `compared`
     never: bool = False  #: the control has no such word
 
     # blocks before and after

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 from collections.abc import Callable, Iterator, Sequence, Set
 from dataclasses import fields, replace
@@ -186,7 +187,9 @@ class Verifier:
         machine = self._machine if options.dialect.retracts else None
         scale, switches = self._program.mm_per_unit, options.dialect.switches
         positions = MachinePositions(machine, scale, switches=switches, tcp=options.tcp)
-        check = WordCheck(options.control, options.dialect.lexer, options.tolerance / scale, *self._own, positions)
+        own_axis, (tip, length) = self._axis_tolerance, (options.tolerance, options.axis_length)
+        turn = math.degrees(tip / length) if own_axis is None else own_axis
+        check = WordCheck(options.control, options.dialect.lexer, tip / scale, *self._own, positions, turn)
         lines = reader.lines(text)
         chunks = reader.chunks(check.watch(lines) if self._words else lines)
 

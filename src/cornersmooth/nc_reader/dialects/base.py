@@ -36,13 +36,15 @@ class Memory:
     height: float | None = None  #: at which a run of modal cycles began (G98), in units of the program
     cycle: HoleCycle | None = None  #: that a block defines for others to call
     centre: dict[str, float] = field(default_factory=dict)  #: of circles to come
-    orientation: str = ""  #: how the tool axis is interpolated
+    #: how the tool axis is interpolated, and in which coordinates
+    orientation: str = ""
+    axis_frame: str = ""
 
 
 #: how the values of a table `[grammar]` are read, where not as they are
 _READ: Mapping[str, Callable[[Any], Any]] = {
     "tip_control": lambda table: {float(code): name for code, name in table.items()},
-    "controls": lambda table: {kind: tuple(names) for kind, names in table.items()},
+    **dict.fromkeys(("controls", "unsure"), lambda table: {kind: tuple(names) for kind, names in table.items()}),
     "silent": lambda codes: frozenset(map(float, codes)),
 }
 
@@ -65,6 +67,8 @@ class Dialect:
     inch_feed = 1.0
     #: what must be in force for words of a kind: ``"vector"``, ``"point"``, ``"angles"``, ``"machine"``
     controls: Mapping[str, tuple[str, ...]] = {}
+    #: what is not known to be in force for them: machine data or parameters decide
+    unsure: Mapping[str, tuple[str, ...]] = {}
     #: whether texts can send the tool up, so that rotary axes turn there
     retracts: bool = True
     #: what sends a modulo axis the shorter way: `BY_WORD`, a word that is in force, or empty for a parameter

@@ -36,11 +36,14 @@ _POLYNOMIALS: Final = {"X": "X", "Y": "Y", "Z": "Z", "XH": "U", "YH": "V", "ZH":
 _NUMBER_ONLY: Final = re.compile(NUMBER)
 
 #: words and calls that change nothing measured here
-_SILENT_CALLS = frozenset(("CYCLE832", "ORIWKS", "ORIMKS", "FFWON", "FFWOF", "SOFT", "BRISK", "STOPRE", "MSG", "CFTCP"))
+_SILENT_CALLS = frozenset(("CYCLE832", "FFWON", "FFWOF", "SOFT", "BRISK", "STOPRE", "MSG", "CFTCP"))
 _SILENT_CODES = frozenset((9.0, 53.0, *map(float, range(54, 60)), 60.0, 64.0, 90.0, *map(float, range(500, 600))))
 _SILENT_CODES |= frozenset(map(float, (153, 601, 602, 641, 642, 643, 644, 645)))
+_AXIS_FRAMES = ("ORIWKS", "ORIMKS")
 _ORIENTATIONS = ("ORIVECT", "ORIPLANE", "ORICURVE", "ORIAXES")
 _CODES = (0.0, 1.0, 2.0, 3.0)
+#: units of lengths, not of feeds
+_LENGTHS_ALONE = (70.0, 71.0)
 
 #: hole cycles, and how many arguments they may have
 _CYCLES: Final = {"CYCLE81": (4,), "CYCLE82": (6,), "CYCLE83": (12,), "CYCLE84": (12,), "CYCLE85": (8,)}
@@ -102,7 +105,7 @@ class Siemens(Dialect):
                 state.event(line, "M", 19.0, text)
             elif name in ("X", "Y", "Z", "F", *self.rotary) or name.removeprefix(f"{BY_WORD} ") in self.rotary:
                 motion[name] = value
-            elif name in ("TRAORI", "TRAFOOF", *_ORIENTATIONS):
+            elif name in ("TRAORI", "TRAFOOF", *_AXIS_FRAMES, *_ORIENTATIONS):
                 self._transform(name, state)
             elif name == "SPLINEPATH":
                 state.memory.spline_axes = frozenset(re.split("[(), ]+", text)[2:])
@@ -177,9 +180,19 @@ class Siemens(Dialect):
         on = state.tip_control.startswith("TRAORI")
         if name in _ORIENTATIONS:
             state.memory.orientation = name
+        elif name in _AXIS_FRAMES:
+            state.memory.axis_frame = name
         else:
             on = name == "TRAORI"
-        state.tip_control = f"TRAORI {state.memory.orientation}".rstrip() if on else ""
+        words = ("TRAORI", state.memory.axis_frame, state.memory.orientation) if on else ()
+        state.tip_control = " ".join(filter(None, words))
+
+    def mode(self, code: float, line: Line, state: Reader) -> None:
+        """Take a G word outside group 01 that changes what holds from block to block."""
+        if code in _LENGTHS_ALONE:
+            what = f"feeds under G{code:g}, whose units the machine's basic system says: G{code:g}0 says them"
+            state.unlooked.append((line.number, what))
+        super().mode(code, line, state)
 
 
 class _SiemensLexer(Lexer):
