@@ -44,8 +44,6 @@ def roles(entry: dict[str, Any], kind: str) -> str:
             said.append(text.format(shown(entry[key])))
     if "share" in entry:
         said.append(f"at most {entry['share']:g} ε")
-    if "numbers" in entry:
-        said.append(f"its numbers: {entry['numbers']}")
     if entry.get("needs") and entry.get("follows"):
         said.append("may change from line to line")
     if entry.get("before"):
