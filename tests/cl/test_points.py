@@ -466,3 +466,50 @@ def test_a_quaternion_is_no_axis(names: str):
 def test_a_quaternion_without_a_header(order: list[int]):
     flips = np.array([[1.0, 0, 0, 0.0099], [0.9995, 0.03, 0, 0.0099], [0.6, 0.8, 0, 0.0099], [0.8, 0.6, 0, 0.0099]])
     assert "the columns 4 to 7 are a quaternion" in message(rows(TIPS, flips[:, order]))
+
+
+@pytest.mark.parametrize("names", ["nx,ny,nz,tx,ty,tz", "tx,ty,tz,i,j,k", "u,v,w,nx,ny,nz", "xb,yb,zb,i,j,k"])
+def test_two_triples_that_may_be_the_axis_are_an_error_that_names_them(names: str):
+    cells = names.split(",")
+    first, second = ",".join(cells[:3]), ",".join(cells[3:])
+    said = message(f"x,y,z,{names}\n" + "0,0,0,0,1,0,0,0,1\n14,3,0,0,1,0,0,0,1\n")
+    assert said.startswith("path.csv:1: error: cannot make out the columns of the header: ")
+    assert first in said
+    assert second in said
+    assert "may each be the tool axis" in said
+
+
+def parted(text: str) -> list[tuple[int, int]]:
+    """Line and count of findings of rows after a gap or another pass."""
+    return [(one.line, one.count) for one in read(text, units="mm").findings if one.code == "CS200"]
+
+
+def test_a_feed_move_over_a_gap_is_to_be_checked():
+    one, two = "0,0,0,0,0,1\n9,0,0,0,0,1\n", "9,5,0,0,0,1\n0,5,0,0,0,1\n"
+    head = "x,y,z,i,j,k\n"
+    assert parted(head + one + two) == []
+    for gap in ("\n", "# pass 2\n", "\n\n", "// next\n"):
+        assert parted(head + one + gap + two) == [(4 + gap.count("\n"), 1)]
+    assert parted(head + one + "\n" + two + "\n" + one) == [(5, 2)]
+    assert parted("\n\n" + head + "\n" + one + two + "\n") == []
+    every = head + (one + two).replace("\n", "\n\n")
+    assert parted(every) == []
+    rapid = "type,x,y,z,i,j,k\n" + (one + "\n" + two).replace("9,5", "R9,5").replace("\n0", "\nfeed,0")
+    rapid = rapid.replace("\n9", "\nfeed,9").replace("R", "rapid,").replace("i,j,k\n0", "i,j,k\nfeed,0")
+    assert parted(rapid) == []
+
+
+def test_a_column_of_passes_is_to_be_checked_where_it_changes():
+    text = "pass,x,y,z,i,j,k\n1,0,0,0,0,0,1\n1,9,0,0,0,0,1\n2,9,5,0,0,0,1\n2,0,5,0,0,0,1\n"
+    assert parted(text) == [(4, 1)]
+    assert parted(text.replace("\n2,", "\n1,")) == []
+
+
+def test_a_path_that_is_a_part_of_a_millimetre_may_be_in_metres():
+    text = "x,y,z,i,j,k\n0,0,0.04,0,0,1\n0.014,0.003,0,0,0,1\n0.041,0.003,0,0,0,1\n"
+    found = [one for one in read(text).findings if one.code == "CS209"]
+    assert [(one.severity, one.text.partition(";")[0]) for one in found] == [
+        ("warning", "the whole path is 0.041 mm long: are the numbers metres?")
+    ]
+    assert "CS209" not in codes(read(text.replace("0.041", "4.1")))
+    assert "CS209" not in codes(read(text.replace("x,y,z", "x [mm],y [mm],z [mm]")))

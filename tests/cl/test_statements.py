@@ -733,3 +733,37 @@ def test_points_go_to_their_own_reader() -> None:
 def test_import_is_light() -> None:
     code = "import sys, cornersmooth.cl; sys.exit('scipy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+# --- Creo, however its head is spelt --------------------------------------------------------------------------------
+
+CREO = (
+    "{head}UNITS / MM\nLOADTL / 1\nMULTAX / ON\nSPINDL / RPM, 3000.0, CLW\nRAPID\nGOTO / 0.0, 0.0, 30.0,  $\n"
+    "0.6, 0.0, 0.8\nFEDRAT / 300.0, MMPM\nGOTO / 0.0, 0.0, 0.0,  $\n0.6, 0.0, 0.8\nGOTO / 20.0, 5.0, 0.0\n{more}FINI\n"
+)
+CAMERA = "    CAMERA/ 1.0, 0.0, 0.0,$\n {:.1f},  $\n  0.0, 1.0, 0.0,$\n 0.0,  $\n 0.0, 0.0, 1.0, 0.0\n"
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        "$$*         Pro/CLfile  Version 11.0 - 11.0.1.0\n",
+        "$$-> FEATNO / 12\n",
+        "REMARK *          PRO/CLFILE  VERSION 9.0 - 9.0.3.0\n",
+        "REMARK -> MFGNO / A1\n",
+        "REMARK -> FEATNO / 12\n",
+        "PPWORD/CSYSOP,3192\n",
+        CAMERA.format(0.0),
+    ],
+)
+def test_three_numbers_of_creo_are_upright_without_an_option(head: str) -> None:
+    result = program(CREO.format(head=head, more=""))
+    assert result.source.dialect == "creo"
+    assert result.axis.tolist() == [[0.6, 0, 0.8], [0.6, 0, 0.8], [0, 0, 1]]
+
+
+def test_camera_is_the_coordinate_system_of_creo() -> None:
+    same = CREO.format(head=CAMERA.format(5.0), more=CAMERA.format(5.0))
+    assert len(program(same)) == 3
+    with pytest.raises(InputError, match=r"error\[CS117\]: CSYS changes the coordinates"):
+        program(CREO.format(head=CAMERA.format(5.0), more=CAMERA.format(6.0)))

@@ -43,3 +43,19 @@ def test_the_command_says_so_even_if_quiet(tmp_path: Path, capsys) -> None:
     capsys.readouterr()
     assert run(["verify", str(part), str(text), "--control", str(own), "-q"]) == 1
     assert capsys.readouterr().err.startswith(f"{text}: NOT VERIFIED, 3 to check: M50, NC line ")
+
+
+def test_a_program_without_any_feed_is_not_passed(tmp_path: Path, capsys) -> None:
+    part, text = tmp_path / "part.cls", tmp_path / "part.nc"
+    part.write_text("LOADTL/1\nSPINDL/RPM,900,CLW\nRAPID\nGOTO/0,0,9,0,0,1\nGOTO/0,0,0\nGOTO/10,0,0\nFINI\n")
+    for control in ("fanuc", "siemens", "heidenhain"):
+        assert run(["smooth", str(part), "-o", str(text), "--control", control, "-q", "--force"]) == 0
+        assert "NOT VERIFIED" in capsys.readouterr().err
+        assert run(["verify", str(part), str(text)]) == 1
+        assert "no F before the first feed move" in capsys.readouterr().out
+    assert run(["smooth", str(part), "-o", str(text), "-q", "--force", "--feed", "500"]) == 0
+    assert run(["verify", str(part), str(text), "-q"]) == 0
+    with_feed = part.read_text().replace("RAPID", "FEDRAT/500,MMPM\nRAPID")
+    part.write_text(with_feed)
+    assert run(["smooth", str(part), "-o", str(text), "-q", "--force"]) == 0
+    assert run(["verify", str(part), str(text), "-q"]) == 0

@@ -148,6 +148,14 @@ FINDINGS: Final[dict[str, tuple[Severity, str]]] = {
     "CS174": ("warning", "tool axis is {length:.6g} long, not 1: normalised"),
     "CS175": ("warning", "feed {feed:g} is not positive: the feed before it is kept"),
     "CS177": ("note", "no column says which moves are rapid: the first pose is reached in rapid, all others at feed"),
+    "CS200": (
+        "warning",
+        "{what} before this line, and the tool feeds straight on; see that it may, or give a column type with rapid",
+    ),
+    "CS209": (
+        "warning",
+        "the whole path is {size:.3g} {units} long: are the numbers metres?; --units inch, or multiply them by 1000",
+    ),
     "CS176": ("note", "the file states no units: mm assumed"),
 }
 

@@ -22,6 +22,9 @@ from cornersmooth.model import MM_PER_UNIT, Bools, Floats, Ints, Move, Program, 
 #: largest spread of |B−A| over its mean in a file of second points
 DISTANCE_SPREAD: Final = 1e-2
 
+#: mm: a path that is shorter in every direction may be in metres
+SMALLEST: Final = 1.0
+
 #: without a header, second points stand farther from the tip than this, in units of the file, or from the origin
 LEAST_DISTANCE: Final = 1.5
 
@@ -79,7 +82,10 @@ def read_points(data: bytes, *, name: str, units: Units | None = None, lenient: 
     axis, axis_findings = _axis(rows, scale, lenient)
     kind, rapid_findings = _kind(rows)
     feed, feed_findings = _feed(rows, kind, lenient)
-    findings += [*axis_findings, *feed_findings, *rapid_findings]
+    findings += [*axis_findings, *feed_findings, *rapid_findings, *_parted(rows, kind)]
+    size = float(np.ptp(rows.take(columns.tip), axis=0).max()) * scale
+    if 0.0 < size < SMALLEST and not columns.units:
+        findings.append(finding("CS209", 0, size=size / scale, units=units))
     if columns.unused:
         findings.append(finding("CS173", text.header_line, len(columns.unused), names=", ".join(columns.unused)))
     return Program.from_poses(
@@ -158,6 +164,21 @@ def _kind(rows: _Rows) -> tuple[NDArray[np.uint8], list[Finding]]:
         return kind, [finding("CS177", 0)]
     kind[rows.values[:, rows.columns.rapid] == table.RAPID] = Move.RAPID
     return kind, []
+
+
+def _parted(rows: _Rows, kind: NDArray[np.uint8]) -> list[Finding]:
+    """Findings of feed moves over a blank line, a comment or from one pass to the next, which may lead across a part.
+
+    A gap after every row is how the file is spelt.
+    """
+    fed = kind[1:] != Move.RAPID
+    gap = np.diff(rows.line)
+    found = [("a blank line or a comment is", gap > gap.min(initial=rows.line[-1]))]
+    if rows.columns.passes is not None:
+        number = rows.values[:, rows.columns.passes]
+        found.append(("the number of the pass changes", (number[1:] != number[:-1]) & ~np.isnan(number[1:])))
+    at = [(what, 1 + np.flatnonzero(parted & fed)) for what, parted in found]
+    return [finding("CS200", int(rows.line[row[0]]), len(row), what=what) for what, row in at if len(row)]
 
 
 def _distances(rows: _Rows, distance: Floats) -> list[Finding]:

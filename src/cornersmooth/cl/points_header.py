@@ -37,6 +37,13 @@ _RAPIDS: dict[str, Rapid] = {
         ("type", "movetype", "motiontype", "movement", "motion", "move", "mode", "kind", "feedtype"), "word"
     ),
 }
+#: columns that number passes
+_PASSES = frozenset(
+    """
+    pass passno passid passnumber passindex path pathid pathno strip layer curve contour cut cutno track stroke block
+    section operation op toolpath polyline segment seg group
+    """.split()
+)
 _COUNTERS = ("n", "no", "nr", "num", "number", "id", "idx", "index", "line", "row", "point", "pose", "t", "time")
 
 #: units a header may state after a name, as in ``x [mm]``
@@ -57,6 +64,7 @@ class Columns:
     rapid: int | None = None  #: says which moves are rapid, as `rapid_as` has it
     rapid_as: Rapid = "word"
     rapid_name: str = ""  #: of that column, for messages
+    passes: int | None = None  #: numbers the passes
     unused: tuple[str, ...] = ()  #: names of columns that are not read; counters and times are not counted among them
     units: Units | None = None  #: what the header says about units
 
@@ -91,8 +99,16 @@ def from_header(text: str, file: str, line: int) -> Columns:
     if tip is None:
         raise error("CS156", file, line, why=f"no x, y and z in {text.strip()[:60]!r}")
     left = [name if column not in tip else "" for column, name in enumerate(plain)]
-    named = ((_find(spellings, left), meaning) for meaning, spellings in _SECOND.items())
-    second, meaning = next((found for found in named if found[0]), (None, "none"))
+    named = [
+        (found, meaning)
+        for meaning, spellings in _SECOND.items()
+        for spelling in spellings
+        if (found := _find((spelling,), left))
+    ]
+    if len({found for found, _ in named}) > 1:  # a surface normal is no tool axis
+        which = " and ".join(",".join(names[c].strip() for c in found) for found, _ in named)
+        raise error("CS156", file, line, why=f"{which} may each be the tool axis")
+    second, meaning = named[0] if named else (None, "none")
     feed = next((left.index(name) for name in _FEEDS if name in left), None)
     rapid = next((left.index(name) for name in _RAPIDS if name in left), None)
     used = {*tip, *(second or ()), feed, rapid}
@@ -106,7 +122,8 @@ def from_header(text: str, file: str, line: int) -> Columns:
     units = _units(names, (*tip, *(second if second and meaning == "points" else ())), feed, file, line)
     says: Rapid = "word" if rapid is None else _RAPIDS[left[rapid]]
     name = "" if rapid is None else names[rapid].strip()
-    return Columns(len(names), tip, second, meaning, feed, rapid, says, name, unused, units)
+    passes = next((c for c in rest if left[c] in _PASSES), None)
+    return Columns(len(names), tip, second, meaning, feed, rapid, says, name, passes, unused, units)
 
 
 def is_header(text: str) -> bool:

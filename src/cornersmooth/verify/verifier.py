@@ -15,7 +15,7 @@ import numpy as np
 from cornersmooth.copied_signature import taking_what
 from cornersmooth.errors import SettingsError
 from cornersmooth.model import Program
-from cornersmooth.nc_reader.elements import Elements, Event, NcProgram, Problem
+from cornersmooth.nc_reader.elements import Element, Elements, Event, NcProgram, Problem
 from cornersmooth.nc_reader.needed_states import CONTROL_WORDS
 from cornersmooth.nc_reader.reader import Reader
 from cornersmooth.nc_reader.reading import DIGITS_SAMPLE, ReadingOptions, program_of
@@ -53,6 +53,9 @@ CHECKS: Final[tuple[Callable[[Match, Findings], None], ...]] = (
     measure_continuity,
     place_words,
 )
+
+#: what is said of a text without feeds, which both files may agree on
+NO_FEED: Final = "no F before the first feed move, and most controls stop there with an alarm (smooth --feed gives one)"
 
 #: poses from which on it is worth while to let other processes work
 _LONG: Final = 30_000
@@ -221,6 +224,7 @@ class Verifier:
         poses = np.empty((4, len(program)))
         if self._slower:
             chunks = (part.at_most() for part in chunks)
+        chunks = _watch_feeds(chunks, findings)
 
         def items() -> Iterator[tuple[Batch | None, dict[str, Where], int]]:
             poses[:3], poses[3] = np.nan, 0.0  # not before other processes are forked, which would keep them
@@ -289,6 +293,15 @@ def verify(*args: Any, **how: Any) -> Verification:
     """Measure an NC text, that is whole, against the CL program it was made from; all as `Verifier`."""
     with Verifier(*args, **how) as verifier:
         return verifier.result()
+
+
+def _watch_feeds(chunks: Iterator[Elements], findings: Findings) -> Iterator[Elements]:
+    """Give out the elements of a text; note the first feed move that no F has come before."""
+    for nc in chunks:
+        without = (nc.kind != Element.RAPID) & np.isnan(nc.feed) & np.isnan(nc.other_feed)
+        if without.any() and NO_FEED not in [text for _, text in findings.unlooked]:
+            findings.unlooked.append((int(nc.line[without.argmax()]), NO_FEED))
+        yield nc
 
 
 def _check_bounds(**values: float) -> None:
