@@ -221,8 +221,11 @@ def test_what_bears_on_the_metal_is_counted_with_the_verdict(tmp_path, capsys):
     # no tool, no spindle, no feed, a first motion at feed; not that its numbers have blanks between them
     assert {one["code"] for one in told if one["to_check"]} == {"CS311", "CS333", "CS334", "CS335"}
     assert "CS134" in {one["code"] for one in told}
-    assert line.startswith("PASSED, 4 to check  ")
-    assert first_lines(capsys, "smooth", source, "-o", tmp_path / "bare.nc", "--force", "--strict")[0] == 0
+    assert line.startswith("NOT VERIFIED, 4 to check  ")  # no F: the control stops
+    strict = ("smooth", source, "-o", tmp_path / "bare.nc", "--force", "--strict")
+    assert first_lines(capsys, *strict)[0] == 1
+    code, line = first_lines(capsys, *strict, "--feed", "500")
+    assert (code, line.partition("  ")[0]) == (0, "PASSED, 3 to check")
 
 
 def test_an_own_tool_change_of_known_words_passes(part, tmp_path, capsys):
