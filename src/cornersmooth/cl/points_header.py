@@ -99,7 +99,7 @@ def from_header(text: str, file: str, line: int) -> Columns:
     if tip is None:
         raise error("CS156", file, line, why=f"no x, y and z in {text.strip()[:60]!r}")
     left = [name if column not in tip else "" for column, name in enumerate(plain)]
-    named = [
+    named: list[tuple[Triple, Meaning]] = [
         (found, meaning)
         for meaning, spellings in _SECOND.items()
         for spelling in spellings
@@ -108,7 +108,8 @@ def from_header(text: str, file: str, line: int) -> Columns:
     if len({found for found, _ in named}) > 1:  # a surface normal is no tool axis
         which = " and ".join(",".join(names[c].strip() for c in found) for found, _ in named)
         raise error("CS156", file, line, why=f"{which} may each be the tool axis")
-    second, meaning = named[0] if named else (None, "none")
+    second: Triple | None = named[0][0] if named else None
+    meaning: Meaning = named[0][1] if named else "none"
     feed = next((left.index(name) for name in _FEEDS if name in left), None)
     rapid = next((left.index(name) for name in _RAPIDS if name in left), None)
     used = {*tip, *(second or ()), feed, rapid}
