@@ -223,7 +223,7 @@ def postprocess(
         told = stage_of(progress, "smoothing")
         smoothed = smooth(program, settings, form=form, progress=told, processes=processes)
     return_free_memory()  # before processes share what there is
-    frame = frame or Frame()
+    frame = (frame or Frame()).with_offset_of(program, form)
     provenance = replace(
         _provenance(source, program, smoothed.settings, form),
         planned_feeds=plan_feeds is not None,

@@ -119,10 +119,12 @@ def read(
 
 def _refuse(program: Program, name: str, lenient: bool) -> None:
     """Refuse what must not be missing from a program in silence: a spindle that is not understood, and turning."""
-    for statement in statements_not_understood(program):
-        if turns(statement) and not lenient:
-            raise error("CS179", name, statement.line, text=statement.text)
-        if statement.word == "SPINDL":
+    unknown = statements_not_understood(program)
+    turning = next((statement for statement in unknown if turns(statement)), None)
+    if turning is not None and not lenient:
+        raise error("CS179", name, turning.line, text=turning.text)
+    for statement in unknown:
+        if statement.word == "SPINDL" and turning is None:
             raise error("CS115", name, statement.line, **_spindle_wanted(statement))
 
 

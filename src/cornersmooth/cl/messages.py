@@ -127,7 +127,7 @@ FINDINGS: Final[dict[str, tuple[Severity, str]]] = {
     ),
     "CS144": ("warning", "{what}: ignored"),
     "CS145": ("note", "NURBS curves are read as lines within {tolerance:g} mm"),
-    "CS146": ("note", "{word} changes: positions and axes are read into the first {word}"),
+    "CS146": ("note", "{word} changes: positions and axes are read into {into}"),
     "CS147": ("warning", "the tool axis turns along an arc, and how it turns is not defined"),
     "CS148": ("warning", "FEDRAT without a unit is read in the unit of the file"),
     "CS149": ("note", "GOHOME without coordinates is kept as a statement"),

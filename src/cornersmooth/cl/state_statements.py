@@ -7,12 +7,16 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
 
+import numpy as np
+
 from cornersmooth.cl.bulk import FARTHEST
+from cornersmooth.cl.cycles import plain_cycle
 from cornersmooth.cl.grammar import Record, joined, number
 from cornersmooth.cl.poses import IDENTITY, UNIT_TOLERANCE, UP, System, Vector, system_of
 from cornersmooth.cl.reader_state import ReaderState
 from cornersmooth.cl.words import MOTION_WORDS, REFUSED_WORDS, TURNS
-from cornersmooth.model import FeedMode, Keep, Units
+from cornersmooth.model import FeedMode, Keep, Statement, Units
+from cornersmooth.statements.work_offsets import number_of
 
 #: unit words of FEDRAT: millimetres per unit of the value (None: the unit of the file) and what it is per
 FEED_UNITS: Final[dict[str, tuple[float | None, FeedMode]]] = {
@@ -34,6 +38,9 @@ UNIT_NAMES: Final[dict[str, Units]] = {
     **dict.fromkeys(("MM", "MILLIMETER", "MILLIMETERS", "MILLIMETRE", "MILLIMETRES", "METRIC"), "mm"),
     **dict.fromkeys(("IN", "INCH", "INCHES"), "inch"),
 }
+
+#: MCS of a section that is not turned
+_MCS_OF_THE_OFFSET: Final = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
 
 #: by how much axes of a coordinate system may be off those of the part
 _TURNED: Final = 1e-6
@@ -79,6 +86,7 @@ def _feed(state: ReaderState, record: Record) -> None:
         if not state.lenient:
             raise state.fail("CS119", record, value=values[0])
         state.note("CS144", record.line, what=f"feed of {values[0]:g}")
+        state.keep(record)
         return
     if state.rapid:
         state.note("CS135", record.line)
@@ -139,7 +147,7 @@ def _msys(state: ReaderState, record: Record) -> None:
         _frame(state, record)
     else:
         _enter(state, system.seen_from(state.first_system[1]))
-        state.note("CS146", record.line, word=record.word)
+        state.note("CS146", record.line, word=record.word, into=f"the first {record.word}")
 
 
 def _enter(state: ReaderState, system: System) -> None:
@@ -179,9 +187,40 @@ def _offset(state: ReaderState, record: Record) -> None:
 
 
 def _mcs(state: ReaderState, record: Record) -> None:
-    """MCS/ of CAMplete, MCSYS/NUM,n,POINT,...,VECTOR,...,VECTOR,... of MfgSuite: positions are in this system."""
+    """MCS/X,Y and Z axes, origin of CAMplete: a section is in this system, seen from that of the work offset."""
     values = record.values
-    axes = values[:6] if record.word == "MCS" else values[4:10]
+    if state.dialect.name != "hsm":
+        _mcsys(state, record)
+        return
+    plain = len(values) == len(record.args) == 12 and max(map(abs, values)) <= FARTHEST
+    system = system_of([*values[9:], *values[:6]]) if plain else None
+    if system is None or np.abs(system.axes[:, 2] - values[6:9]).max() > UNIT_TOLERANCE:
+        _frame(state, record)
+        return
+    state.set_axis(UP)  # GOTO of three numbers means Z of the section
+    if values == _MCS_OF_THE_OFFSET:
+        _enter(state, IDENTITY)
+    else:
+        _enter(state, system)
+        state.note("CS146", record.line, word="MCS", into="the work offset")
+
+
+def _zero(state: ReaderState, record: Record) -> None:
+    """ZERO/n of CAMplete: the work offset, one for the whole program, where that of no ZERO is the first."""
+    number = number_of(Statement(state.n, record.line, record.word, record.args))
+    before = state.offsets.get("ZERO", (1.0,) if state.n else record.args)
+    if state.dialect.name != "hsm" or number is None:
+        _turn(state, record)
+        return
+    if record.args != before:
+        _other_system(state, record, f"ZERO/{number}")
+    state.offsets["ZERO"] = record.args
+    state.keep(record)
+
+
+def _mcsys(state: ReaderState, record: Record) -> None:
+    """MCSYS/NUM,n,POINT,...,VECTOR,...,VECTOR,... of MfgSuite: positions are in this system."""
+    axes = record.values[:6] if record.word == "MCS" else record.values[4:10]
     turned = len(axes) == 6 and max(abs(a - b) for a, b in zip(axes, (1, 0, 0, 0, 1, 0), strict=True)) > _TURNED
     moved = state.n and (state.first_system is None or state.first_system[0] != record.args)
     if turned or moved:
@@ -230,6 +269,7 @@ def _cutcom(state: ReaderState, record: Record) -> None:
 def _cycle(state: ReaderState, record: Record) -> None:
     state.hole = record.option not in _ENDS
     state.set_kind()
+    state.keep(replace(record, args=plain_cycle(record.args, state.dialect.name)))
 
 
 def _frame(state: ReaderState, record: Record) -> None:
@@ -254,6 +294,7 @@ def _other_system(state: ReaderState, record: Record, word: str) -> None:
     if not state.lenient:
         raise state.fail("CS117", record, word=word)
     state.note("CS143", record.line, word=word)
+    state.keep(replace(record, word="?"))  # the verdict names it
 
 
 def _set(state: ReaderState, record: Record) -> None:
@@ -285,6 +326,8 @@ FED: Final[dict[str, Handler]] = {
     "RAPID": _rapid,
     "FEDRAT": _feed,
     **{word: _turn for word, code in REFUSED_WORDS.items() if code == TURNS},
+    "ZERO": _zero,
+    "CYCLE": _cycle,
 }
 
 #: of statements that the program keeps, too
@@ -297,9 +340,8 @@ KEPT: Final[dict[str, Handler]] = {
     "CSYS": _csys,
     "MSYS": _msys,
     "MCS": _mcs,
-    "MCSYS": _mcs,
+    "MCSYS": _mcsys,
     "CUTCOM": _cutcom,
-    "CYCLE": _cycle,
     "SET": _set,
     "TRNTYP": _trntyp,
     "SYN": _syn,

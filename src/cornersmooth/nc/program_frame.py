@@ -6,7 +6,7 @@ import math
 import re
 import unicodedata
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -18,6 +18,7 @@ from cornersmooth.nc.control_tables import control_names, load_control
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.tools import tool_loads
 from cornersmooth.settings import Settings
+from cornersmooth.statements.work_offsets import spellings, work_offset_of
 from cornersmooth.tables import filled as filled_in
 from cornersmooth.text import format_number
 
@@ -152,6 +153,23 @@ class Frame:
             if found is not None:
                 what = f"the header loads a tool, {line!r}, and the program takes the length of tool 1"
                 raise SettingsError("CS249", what, "leave it out of the header, and give --tool-number")
+
+    def with_offset_of(self, program: Program, form: Form) -> Frame:
+        """Return the same with the work offset that a program asks for.
+
+        CS216: the control has no such work offset. CS248: another is given.
+        """
+        number = work_offset_of(program)
+        if number is None or self.work_offset == "":
+            return self
+        if self.work_offset is not None:
+            raise SettingsError("CS248", "the input names its work offset itself", "leave out --work-offset")
+        pattern = form.table.program.work_offset_pattern
+        name = next((name for name in spellings(number) if re.fullmatch(pattern, name)), None)
+        if name is None:
+            hint = "leave it out: --work-offset none"
+            raise SettingsError("CS216", f"{form.control} takes no work offset number {number}", hint)
+        return replace(self, work_offset=name)
 
     def named_offset(self, table: Control) -> str:
         """Work offset for the head of a text; empty for that of the table that the control's is like."""

@@ -100,6 +100,11 @@ class WordCheck:
             told.append(f"{more} more blocks of your own")
         return "; ".join(told + self._moving)
 
+    @property
+    def work_offset(self) -> str:
+        """The work offset that holds at the end, as it is written; empty for none."""
+        return self._states.work_offset
+
     def _text(self, block: str) -> str:
         """A block of the user's as the lists have it, `_ANY` for what is in braces; empty where it has no words."""
         block = re.sub(r"\{\w+\}", _ANY, re.sub(r"(^| )(?=\{\w+\})", r"\1G", block))  # alone it is a G word

@@ -132,6 +132,11 @@ class WordStates:
         """Word of tool tip control that holds, if any."""
         return [held.text for held in self._held.values() if held.rule.ends]
 
+    @property
+    def work_offset(self) -> str:
+        """The work offset that holds, as it is written; empty for none."""
+        return self._held[_OFFSET].text if _OFFSET in self._held else ""
+
     def _running(self) -> list[str]:
         """Words that are switched off after the last motion of a tool."""
         on = [held for held in self._held.values() if held.rule.tidy]

@@ -13,6 +13,7 @@ import numpy as np
 from cornersmooth.model import Ints, Move, Program, Statement
 from cornersmooth.nc_reader.word_tables import Means
 from cornersmooth.statements.tokens import PAUSES, SPEED_DECIMALS, Token, of_m
+from cornersmooth.statements.work_offsets import work_offset_of
 
 #: cutting speeds in mm per minute
 _MM_PER_MINUTE = {"SMM": 1000.0, "SFM": 304.8}
@@ -84,6 +85,7 @@ class Asking:
             "CUTTER": self.cutter,
             "TLDATA": self.cutter,
             "AUXFUN": self.auxiliary,
+            "ZERO": lambda words, numbers, statement: work_offset_of(program) is not None,  # compared with the words
             "INSERT": lambda words, numbers, statement: _NOTE.match(" ".join(words)) is not None,
             "MODE": lambda words, numbers, statement: words in (["MILL"], ["ABSOL"]) and not numbers,
             "SET": lambda words, numbers, statement: words == ["MODE", "ABSOL"] and not numbers,

@@ -28,6 +28,7 @@ from cornersmooth.processes import Helper, can_fork, map_in_processes
 from cornersmooth.settings import BOUNDS
 from cornersmooth.statements.asked import not_understood_text
 from cornersmooth.statements.comparison import KINDS
+from cornersmooth.statements.work_offsets import spellings, work_offset_of
 from cornersmooth.verify.batches import Batches
 from cornersmooth.verify.cl_motion import half_turns
 from cornersmooth.verify.continuity import measure_continuity
@@ -198,11 +199,20 @@ class Verifier:
 
         def said() -> tuple[NcProgram, int]:
             nc = program_of(reader, [])
-            return replace(nc, problems=(*nc.problems, *check.problems)), reader.curves
+            problems = (*nc.problems, *check.problems, *self._wrong_offset(check.work_offset))
+            return replace(nc, problems=problems), reader.curves
 
         found = self._found(task, chunks, reader.events, reader.retracts.places, said)
         unlooked = check.unlooked if self._words else "words beside the motion, which a table of your own may define"
         return replace(found.not_verified(unlooked), trusted=tuple(check.trusted))
+
+    def _wrong_offset(self, found: str) -> list[Problem]:
+        """What is wrong with the work offset of the text, where the CL file names one."""
+        number = work_offset_of(self._program) if self._words and "work offset" not in self._trusted else None
+        if number is None or found in spellings(number):
+            return []
+        text = f"work offset {found or 'none'} where the CL file asks for number {number}, {spellings(number)[0]}"
+        return [Problem("CS559", 0, 0, text)]
 
     def _task(self, *, rotary: bool, apart: bool) -> Task:
         options = self._options

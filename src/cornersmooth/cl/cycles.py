@@ -1,0 +1,49 @@
+"""CYCLE in the words that all of the program reads: spellings of one CAM system that mean one thing only."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from cornersmooth.cl.grammar import Argument
+
+#: millimetres per inch: threads per inch as a pitch
+_INCH = 25.4
+
+
+def plain_cycle(args: Sequence[Argument], dialect: str) -> tuple[Argument, ...]:
+    """Arguments of a cycle without spellings that mean one thing only; all others stay as they are.
+
+    ``RIGID`` with ``PITCH`` is a tap (Autodesk's CAMplete post), ``TPI`` its pitch in threads per inch (PTC Creo);
+    ``FLOAT`` says what holds the tap (NX). ``CSKDIA`` beside a depth is the diameter that comes of it (PTC Creo).
+    ``ORIENT,0`` of the CAMplete post has no meaning: "unknown orientation". ``OPTION,CAM,n`` is a remark (NX).
+    """
+    own = list(args)
+    kind = own[0] if own else ""
+    if kind == "RIGID" and _number_behind(own, "PITCH") is not None:
+        own[0] = "TAP"
+        own[own.index("PITCH")] = "PERREV"
+    if kind == "TAP":
+        threads = _number_behind(own, "TPI")
+        if threads is not None and threads > 0.0:
+            at = own.index("TPI")
+            own[at : at + 2] = ["MMPR", _INCH / threads]
+        _drop(own, "FLOAT", 1)
+    if kind == "CSINK" and "DEPTH" in own and _number_behind(own, "CSKDIA") is not None:
+        _drop(own, "CSKDIA", 2)
+    if kind == "BORE" and dialect == "hsm" and _number_behind(own, "ORIENT") == 0.0:
+        _drop(own, "ORIENT", 2)
+    if "OPTION" in own and own[own.index("OPTION") + 1 :][:1] == ["CAM"] and _number_behind(own, "CAM") is not None:
+        _drop(own, "OPTION", 3)
+    return tuple(own)
+
+
+def _number_behind(args: Sequence[Argument], word: str) -> float | None:
+    """Return the number right behind a word."""
+    after = args[args.index(word) + 1 :][:1] if word in args else ()
+    return next((value for value in after if isinstance(value, float)), None)
+
+
+def _drop(args: list[Argument], word: str, count: int) -> None:
+    if word in args:
+        at = args.index(word)
+        del args[at : at + count]

@@ -1,0 +1,165 @@
+"""Autodesk's CAMplete APT: work offset, turned planes, taps; and spellings of cycles that mean one thing."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+import pytest
+
+from cornersmooth import postprocess, read, verify
+from cornersmooth.errors import InputError, SettingsError
+from cornersmooth.nc import Frame, choose_form
+from cornersmooth.settings import Settings
+from cornersmooth.verdict import Verdict
+
+SECTION = """PPRINT/'NEW SECTION'
+CSI_TOOL_PATH/Op{tool}
+
+UNITS/MM
+MULTAX/{multax}
+
+MCS/{axes}
+
+CUTTER/8., 4., 0., 0., 0., 0., 40.
+CSI_SET_FLUTE_LENGTH/22.
+LOADTL/{tool}, 0, 40., {tool}
+SPINDL/RPM,900,CLW
+COOLNT/FLOOD
+{zero}CSI_PATH_TOLERANCE/0.01
+"""
+UPRIGHT = "1., 0., 0., $\n0., 1., 0., $\n0., 0., 1., $\n0., 0., 0."
+TURNED = "1., 0., 0., $\n0., 0.8, 0.6, $\n0., -0.6, 0.8, $\n0., -20., -5."
+CUT = "RAPID\nGOTO/0., 0., 40.\nFEDRAT/800., MMPM\nGOTO/0., 0., 0.\nGOTO/14., 3., 0.\nGOTO/27., 0., 0.\n"
+TAP = "RAPID\nGOTO/5., 6., 40.\nCYCLE/RIGID, DEPTH, 12., PITCH, 1.25, CLEAR, 30., RETURN, 30., RAPTO, 5.\n"
+TAP += "GOTO/5., 6., 0.\nCYCLE/OFF\n"
+
+
+def part(*sections: str) -> bytes:
+    return ("MACHIN/UMC\nMODE/MILL\nPARTNO/'4711'\n" + "".join(sections) + "END\nFINI\n").encode()
+
+
+def section(tool: int, motion: str, *, axes: str = UPRIGHT, zero: str = "", multax: str = "OFF") -> str:
+    return SECTION.format(tool=tool, axes=axes, zero=zero, multax=multax) + motion
+
+
+def written(data: bytes, control: str = "fanuc", frame: Frame | None = None) -> tuple[Verdict, str]:
+    stream = io.BytesIO()
+    result = postprocess(data, stream, Settings(tolerance=0.02), form=choose_form(control), frame=frame)
+    return result.verdict, stream.getvalue().decode()
+
+
+def test_a_section_in_a_turned_plane_is_read_into_the_system_of_the_work_offset() -> None:
+    # origin + 40 times its Z axis; whichever section comes first
+    for sections in ((section(3, CUT), section(4, CUT, axes=TURNED)), (section(4, CUT, axes=TURNED), section(3, CUT))):
+        program = read(part(*sections))
+        turned = slice(4, 8) if "LOADTL/3" in sections[0] else slice(0, 4)
+        assert program.tip[turned] == pytest.approx(
+            np.array([[0, -44, 27], [0, -20, -5], [14, -17.6, -3.2], [27, -20, -5]])
+        )
+        assert program.axis[turned] == pytest.approx(np.array([[0, -0.6, 0.8]] * 4))
+        assert program.axis[[*range(4)] if turned.start else [*range(4, 8)]].tolist() == [[0, 0, 1]] * 4
+
+
+def test_a_multi_axis_section_has_its_axes_turned_too() -> None:
+    motion = "GOTO/0., 0., 40., 0., 0., 1.\nGOTO/0., 0., 0., 0.6, 0., 0.8\n"
+    program = read(part(section(4, motion, axes=TURNED, multax="ON")))
+    assert program.axis == pytest.approx(np.array([[0, -0.6, 0.8], [0.6, -0.48, 0.64]]))
+
+
+def test_a_matrix_that_is_no_turn_is_refused() -> None:
+    for wrong in (TURNED.replace("-0.6, 0.8", "0.6, 0.8"), TURNED.replace("0., 0.8, 0.6", "0., 0.8, 0.7")):
+        with pytest.raises(InputError, match=r"error\[CS117\]: MCS changes"):
+            read(part(section(3, CUT), section(4, CUT, axes=wrong)))
+
+
+@pytest.mark.parametrize(
+    ("number", "control", "block"),
+    [
+        (1, "fanuc", "G54"),
+        (2, "fanuc", "G55"),
+        (6, "fanuc", "G59"),
+        (9, "fanuc", "G54.1 P3"),
+        (3, "siemens", "G56"),
+        (5, "siemens", "G505"),
+        (2, "heidenhain", "DATUM SETTING Q339=+2"),
+    ],
+)
+def test_zero_is_the_work_offset(number: int, control: str, block: str) -> None:
+    data = part(section(3, CUT, zero=f"ZERO/{number}\n"), section(4, CUT, zero=f"ZERO/{number}\n"))
+    verdict, text = written(data, control)
+    assert verdict is Verdict.PASSED
+    assert any(line.endswith(block) for line in text.splitlines())
+    other = {"G54": "G55", "G505": "G506", "DATUM SETTING Q339=+2": "DATUM SETTING Q339=+3"}.get(block, "G54")
+    wrong = verify(read(data), text.replace(block, other).encode(), tolerance=0.02, control=control)
+    assert wrong.verdict is Verdict.FAILED
+    assert any(
+        "where the CL file asks for number" in one.text and one.code in ("CS559", "CS571") for one in wrong.problems
+    )
+
+
+def test_another_work_offset_within_the_path_is_refused() -> None:
+    first, second = section(3, CUT, zero="ZERO/1\n"), section(4, CUT, zero="ZERO/2\n")
+    with pytest.raises(InputError, match=r"error\[CS117\]: ZERO/2 changes"):
+        read(part(first, second))
+    with pytest.raises(InputError, match=r"error\[CS117\]: ZERO/2 changes"):
+        read(part(section(3, CUT), second))
+    assert written(part(section(3, CUT), first.replace("LOADTL/3", "LOADTL/4")))[0] is Verdict.PASSED
+
+
+def test_the_option_and_the_file_do_not_both_name_the_work_offset() -> None:
+    data = part(section(3, CUT, zero="ZERO/2\n"))
+    with pytest.raises(SettingsError, match="CS248"):
+        written(data, frame=Frame(work_offset="G54"))
+    with pytest.raises(SettingsError, match="CS216"):
+        written(data, "generic")
+    verdict, text = written(data, frame=Frame(work_offset=""))
+    assert (verdict, "G55" in text) == (Verdict.PASSED, False)
+
+
+def test_zero_of_apt_still_changes_the_coordinates() -> None:
+    with pytest.raises(InputError, match=r"error\[CS117\]: ZERO changes"):
+        read(b"UNITS/MM\nZERO/1\nGOTO/0,0,0\n")
+
+
+def test_a_part_in_two_planes_with_offset_taps_and_two_tools_gets_through() -> None:
+    for control in ("fanuc", "siemens", "heidenhain"):
+        sections = (section(3, CUT, zero="ZERO/2\n"), section(5, TAP, zero="ZERO/2\n"))
+        turned = section(4, CUT, axes=TURNED, zero="ZERO/2\n")
+        assert written(part(*sections, turned), control)[0] is Verdict.PASSED
+
+
+@pytest.mark.parametrize(
+    ("dialect", "cycle", "same"),
+    [
+        ("hsm", "RIGID,DEPTH,12,PITCH,1.25,CLEAR,30,RAPTO,5", "TAP,DEPTH,12,MMPR,1.25,CLEAR,30,RAPTO,5"),
+        (
+            "hsm",
+            "BORE,FEDTO,12,MMPM,150,CLEAR,30,RETURN,30,RAPTO,5,ORIENT,0",
+            "BORE,FEDTO,12,MMPM,150,RETURN,30,RAPTO,5",
+        ),
+        ("creo", "TAP,DEPTH,15,TPI,20,CLEAR,2", "TAP,DEPTH,15,MMPR,1.27,CLEAR,2"),
+        ("creo", "CSINK,DEPTH,4,MMPM,120,CLEAR,2,CSKDIA,8", "CSINK,DEPTH,4,MMPM,120,CLEAR,2"),
+        ("nx", "TAP,FLOAT,RAPTO,5,FEDTO,-12,MMPR,1.25", "TAP,RAPTO,5,FEDTO,-12,MMPR,1.25"),
+        ("nx", "DRILL,RAPTO,3,FEDTO,-12,OPTION,CAM,2,MMPM,180", "DRILL,RAPTO,3,FEDTO,-12,MMPM,180"),
+    ],
+)
+def test_spellings_that_mean_one_thing(dialect: str, cycle: str, same: str) -> None:
+    text = "UNITS/MM\nLOADTL/1\nSPINDL/RPM,900,CLW\nRAPID\nGOTO/5,6,40\nCYCLE/{}\nGOTO/5,6,0\nCYCLE/OFF\nFINI\n"
+    found = []
+    for one in (cycle, same):
+        stream = io.BytesIO()
+        reading = {"dialect": dialect}
+        result = postprocess(text.format(one).encode(), stream, Settings(tolerance=0.02), reading=reading)
+        assert result.verdict is Verdict.PASSED
+        found.append([line for line in stream.getvalue().decode().splitlines() if not line.startswith("(")])
+    assert found[0] == found[1]
+
+
+@pytest.mark.parametrize(
+    "cycle", ["BORE,NODRAG", "BORE,BACK", "BORE,ORIENT,30", "DRILL,OPTION,3", "DRILL,CSINK,9,TLANGL,90"]
+)
+def test_what_means_more_is_not_drilled(cycle: str) -> None:
+    text = f"UNITS/MM\nLOADTL/1\nSPINDL/RPM,900,CLW\nRAPID\nGOTO/5,6,40\nCYCLE/{cycle},RAPTO,3,FEDTO,-12,MMPM,80\n"
+    with pytest.raises(InputError, match=r"6: error\[CS342\]"):
+        postprocess((text + "GOTO/5,6,0\nCYCLE/OFF\nFINI\n").encode(), io.BytesIO(), reading={"dialect": "nx"})
