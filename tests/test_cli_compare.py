@@ -34,8 +34,8 @@ def test_every_row_is_a_program_and_the_best_is_marked_with_its_command(part: Pa
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
     rows = found["rows"]
-    # g1: vectors and rotary words, two methods, three densities; bspline: both words and methods; poly: vectors
-    assert len(rows) == 2 * 2 * 3 + 2 * 2 + 2
+    # g1: vectors and rotary words, two methods, three densities; bspline, poly: vectors and both methods
+    assert len(rows) == 2 * 2 * 3 + 2 + 2
     assert {row["verdict"] for row in rows} == {"PASSED"}
     assert all(row["tip"] <= 0.02 and row["axis_point"] <= 0.02 for row in rows)
     assert all(row["seconds"] + row["saved"] == pytest.approx(found["unsmoothed_seconds"]) for row in rows)

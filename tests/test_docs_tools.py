@@ -209,7 +209,7 @@ def test_batch_runs_times_a_batch(tmp_path: Path, capsys: pytest.CaptureFixture[
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("nc.sweep", ("--only", "fanuc-g6.2-nutated", "--seeds", "1", "--chains", "1")),
+        ("nc.sweep", ("--only", "mitsubishi-g1-nutated", "--seeds", "1", "--chains", "1")),
         ("verify.sweep", ("--only", "fanuc-g1", "--seeds", "0", "1")),
         ("verify.hole_programs", ("0", "2")),
         ("nc.run_chains", ("0", "1", "--chains", "1")),

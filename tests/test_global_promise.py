@@ -127,6 +127,7 @@ def test_forms_without_long_curves_are_refused(tmp_path: Path) -> None:
         ("fanuc", "g6.2", ["--no-tcp"], "cannot run without tool tip control"),
         ("siemens", "bspline", ["--no-tcp"], "cannot run without tool tip control"),
         ("siemens", "poly", [], "has no rotary words"),
+        ("heidenhain", "spl", [], "has no rotary words"),
         ("mitsubishi", "g6.2", [], "has no rotary words"),
     ):
         options = ["--control", control, "-f", form, "--machine", "table-ac", *tcp]

@@ -96,16 +96,3 @@ def test_another_file_and_another_machine_are_named(part: Path, tmp_path: Path) 
     assert found.returncode == USAGE
     assert "the program is for the machine our-mill; name its file with --machine" in one_line(found.stderr)
     assert run("verify", part, out, "--machine", mill).returncode == DONE
-
-
-def test_weights_of_curves_in_rotary_words_are_named_where_all_are_one(part: Path, tmp_path: Path) -> None:
-    """Knots that are put in change the weights of a curve only where they differ."""
-    options = ("--control", "siemens", "--machine", "table-ac", "-f", "bspline")
-    other = run("smooth", part, "--weights", "0.8,1", "--machine", "table-ac", "-f", "g6.2").stdout
-    assert b" WEIGHTS=any" in other
-    text = run("smooth", part, *options).stdout.decode("ascii")
-    assert "WEIGHTS" not in text
-    assert " PW=1" in text
-    changed = tmp_path / "changed.mpf"
-    changed.write_text(text.replace(" PW=1", " PW=1.01", 1))
-    assert b"a weight of 1.01, which no curve of this program has" in run("verify", part, changed).stderr

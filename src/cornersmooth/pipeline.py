@@ -332,8 +332,6 @@ def _provenance(
     source: Program | bytes | str | os.PathLike[str], program: Program, settings: Settings, form: Form
 ) -> Provenance:
     """What the text says of how it was made."""
-    # on more knots, as angles of rotary axes need them, the same curves have other weights, but where all are 1
-    any_weights = form.rotary and set(settings.weights) != {1.0}
     return Provenance(
         version=__version__,
         tolerance=settings.tolerance,
@@ -347,7 +345,7 @@ def _provenance(
         source=program.source.name,
         operation=program.source.operation,
         sha256="" if isinstance(source, Program) else sha256_of(source),
-        weights=None if any_weights else (1.0, *settings.weights),
+        weights=(1.0, *settings.weights),
     )
 
 

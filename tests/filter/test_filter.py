@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import cornersmooth as cs
+from cornersmooth.errors import SettingsError
 from cornersmooth.filter import Filtered, filter_program, verify_programs
 from cornersmooth.filter.runs import ProgramReader
 from cornersmooth.filter.state import VOCABULARIES
@@ -75,12 +76,11 @@ def test_smooths_what_smooth_has_written(path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "form"), [("siemens words", "bspline"), ("heidenhain words", "spl"), ("fanuc words", "g6.2")]
 )
-def test_writes_curves_of_the_control(name: str, form: str) -> None:
-    control, machine, text = PROGRAMS[name]
-    found = filtered(control, machine, text, form=form)
-    assert found.verdict is Verdict.PASSED
-    assert found.smoothed == 24
-    assert {"bspline": b"BSPLINE", "spl": b"SPL", "g6.2": b"G6.2"}[form] in found.data
+def test_curves_of_the_control_are_refused(name: str, form: str) -> None:
+    control, _, text = PROGRAMS[name]
+    with pytest.raises(SettingsError, match="use -f g1") as refused:
+        filtered(control, "", text, form=form)
+    assert refused.value.code == "CS241"
 
 
 def test_modes_are_put_back() -> None:

@@ -67,16 +67,18 @@ RUNNABLE = [case for case in ALL if case.runs]
 
 
 def _chosen() -> list[Case]:
-    """What no machine is needed for, and each control and form with one machine or two, all machines in turn."""
-    turn = {"linuxcnc": ("xyzac-trt", "xyzbc-trt"), "haas": ("table-bc", "nutated-bc")}
-    chosen = []
-    asked = dict.fromkeys((case.control, case.form, case.tcp) for case in RUNNABLE if case.machine)
-    for at, (control, form, tcp) in enumerate(asked):
-        machines = turn.get(control, (MACHINES[at % len(MACHINES)],))
-        machines = machines if tcp else machines[:1]
-        if (control, form, tcp) == ("fanuc", "g6.2", True):
-            machines = ("table-ac", "head-table-bc", "nutated-bc")
-        chosen += [Case(control, form, machine, tcp) for machine in machines]
+    """What no machine is needed for, and each control with one machine or two, all machines among them."""
+    machines = {  # with tool tip control, and one without
+        "fanuc": ("table-ac", "table-bc"),
+        "generic": ("xyzbc-trt", "head-table-bc"),
+        "haas": ("table-bc", "nutated-bc", "table-bc"),
+        "heidenhain": ("table-bc", ""),
+        "linuxcnc": ("xyzac-trt", "xyzbc-trt", "xyzac-trt"),
+        "mitsubishi": ("head-ac", "nutated-bc"),
+        "siemens": ("table-ac", "table-bc"),
+    }
+    chosen = [Case(control, "g1", name) for control, names in machines.items() for name in names[:-1]]
+    chosen += [Case(control, "g1", names[-1], tcp=False) for control, names in machines.items() if names[-1]]
     return [case for case in RUNNABLE if not case.machine] + chosen
 
 

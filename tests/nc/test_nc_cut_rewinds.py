@@ -300,52 +300,12 @@ def three_cuts(above: str = "GOTO/-10,0,70,0.5,0,0.8660254") -> bytes:
 
 
 @pytest.mark.parametrize(
-    ("control", "form", "name", "method"),
-    [
-        ("fanuc", "g6.2", "table-ac", "proportional"),
-        ("siemens", "bspline", "nutated-bc", "proportional"),
-        ("heidenhain", "spl", "table-ac", "proportional"),
-        ("heidenhain", "spl", "table-ac", "global"),
-    ],
+    ("control", "name", "tcp"),
+    [("fanuc", "table-ac", True), ("siemens", "nutated-bc", True), ("fanuc", "nutated-bc", False)],
 )
-def test_a_cut_is_left_between_curves(control: str, form: str, name: str, method: str) -> None:
-    chosen = choose_form(control, form, machine=short(name), rewind=AWAY)
-    program, stream = read(three_cuts()), io.BytesIO()
-    settings = fit_settings(Settings(tolerance=EPS, method=method), chosen, "mm")
-    written = write(smooth(program, settings), stream, form=chosen)
-    # no curve but the one that the place is on, if it is on one, becomes lines
-    lost = {one.code: one.count for one in written.findings}.get("CS378", 0)
-    assert lost <= 1
-    lines = bare(stream.getvalue().decode().splitlines())
-    curves = [k for k, line in enumerate(lines) if re.search("G6.2|BSPLINE|SPL |PL=", line)]
-    assert curves
-    checked = verify(program, stream.getvalue(), tolerance=EPS, control=control, machine=short(name))
-    assert checked.problems == ()
-    assert len(checked.rewinds) == 1
-    out, back = checked.rewinds[0]
-    assert any(k < out - 1 for k in curves)
-    assert any(k > back for k in curves)
-    if control != "fanuc":
-        return
-    wrong = mutants(stream.getvalue().decode().splitlines(), control, (out - 1, back - 1))
-    for what in ("no retract", "back too deep", "a part of the cut is missing"):
-        text = ("\n".join(wrong[what]) + "\n").encode()
-        assert not verify(program, text, tolerance=EPS, control=control, machine=short(name)).passed, what
-
-
-@pytest.mark.parametrize(
-    ("control", "form", "name", "tcp"),
-    [
-        ("fanuc", "g6.2", "table-ac", True),
-        ("siemens", "bspline", "nutated-bc", True),
-        ("fanuc", "g1", "nutated-bc", False),
-    ],
-)
-def test_a_rapid_said_twice_may_turn_axes_that_hold_the_tool_alike(
-    control: str, form: str, name: str, tcp: bool
-) -> None:
+def test_a_rapid_said_twice_may_turn_axes_that_hold_the_tool_alike(control: str, name: str, tcp: bool) -> None:
     """The same cut follows: nothing but their ends tells the two rapids from one that the CL file lacks."""
-    chosen = choose_form(control, form, machine=short(name), rewind=AWAY, tcp=tcp)
+    chosen = choose_form(control, machine=short(name), rewind=AWAY, tcp=tcp)
     program, stream = read(three_cuts("")), io.BytesIO()
     write(smooth(program, fit_settings(Settings(tolerance=EPS), chosen, "mm")), stream, form=chosen)
     how = {"tolerance": EPS, "control": control, "machine": short(name), "tcp": tcp}

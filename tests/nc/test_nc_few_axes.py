@@ -248,7 +248,7 @@ def test_what_a_machine_without_axes_cannot_do_is_named() -> None:
         choose_form("fanuc", machine=THREE, rewind=20.0)
     with pytest.raises(SettingsError, match="no blocks without words of the tool axis\nhint: use -f g1"):
         choose_form("generic", "g6.2", machine=THREE)
-    with pytest.raises(SettingsError, match="one rotary axis\nhint: use -f g1"):
+    with pytest.raises(SettingsError, match="has no rotary words\nhint: use -f g1"):
         choose_form("fanuc", "g6.2", machine=FOUR["table A"])
 
 

@@ -151,12 +151,13 @@ def test_block_numbers_start_again_behind_the_last(control: str) -> None:
 # ------------------------------------------------------------------------------------------------ long blocks
 
 
-def test_a_spline_of_five_axes_goes_on_in_the_next_line() -> None:
-    lines = lines_of(Case("heidenhain", "spl", "table-ac").choose(), CL.replace("20,20,0\n", "20,20,0,0,0.6,0.8\n"))
+def test_a_spline_goes_on_in_the_next_line() -> None:
+    control = parse_control('like = "heidenhain"\n[layout]\nlongest_block = 100\n')
+    lines = lines_of(choose_form(control, "spl"), CL)
     parts = [line for line in lines if "SPL" in line]
     assert parts
     assert all(line.endswith(" ~") for line in parts)
-    assert max(map(len, lines)) <= 200
+    assert max(map(len, lines)) <= 100
     assert not any(line.endswith(" ~") for line in lines if "SPL" not in line)
 
 

@@ -30,7 +30,6 @@ TEXTS = list(
             *(("upright" if case in UPRIGHT else "corner", case) for case in CHOSEN),
             ("corner", Case("fanuc", "g1", "table-ac", tcp=False)),
             ("corner", Case("siemens", "g1", "head-ac")),
-            ("corner", Case("heidenhain", "spl", "table-bc")),
             *(("inch", case) for case in (Case("siemens", "bspline"), Case("heidenhain", "g1"))),
             ("inch", Case("linuxcnc", "g1", "xyzac-trt")),
         ]

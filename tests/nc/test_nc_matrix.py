@@ -15,7 +15,7 @@ import pytest
 from cornersmooth import Program, nc
 from cornersmooth.cl import read
 from cornersmooth.errors import SettingsError
-from cornersmooth.nc import fit_settings, load_control, write
+from cornersmooth.nc import control_names, fit_settings, load_control, write
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from nc.cases import ALL, RUNNABLE, Case
@@ -78,6 +78,11 @@ def test_what_cannot_run_is_refused_with_a_hint_that_runs(case: Case) -> None:
     assert other.runs, refusal.value
 
 
+CURVES = [
+    (control, name) for control in control_names() for name, form in load_control(control).forms.items() if form.curve
+]
+
+
 def test_the_matrix_holds_what_the_controls_cannot_run() -> None:
     """What the manuals refuse is refused here; what they have is not."""
     runs = {str(case) for case in RUNNABLE}
@@ -85,16 +90,13 @@ def test_the_matrix_holds_what_the_controls_cannot_run() -> None:
         "haas-g1",  # no tool vectors
         "linuxcnc-g1",
         "fanuc-g6.2-table-ac-axes",  # PS1006: G6.2 under G93
-        "mitsubishi-g6.2-table-ac",  # three basic axes
         "siemens-bspline-table-ac-axes",
-        "siemens-poly-table-ac",
+        *(f"{control}-{form}-table-ac" for control, form in CURVES),  # curves in rotary words
         "heidenhain-g1-table-ac-axes",  # no inverse time
-        "heidenhain-spl-table-ac-axes",
         *(f"{case.control}-{case.form}-axes" for case in ALL),  # machine positions without a machine
     }
     assert set(load_control("linuxcnc").forms) == {"g1"}  # G5.2, G6.2 run in a plane only
     assert {
-        "siemens-bspline-table-ac",
         "siemens-g1-table-ac-axes",
         "haas-g1-table-ac-axes",
         "linuxcnc-g1-xyzac-trt-axes",

@@ -110,18 +110,13 @@ UPRIGHT = "UNITS/MM\nLOADTL/{}\nRAPID\nGOTO/0,0,60\nFEDRAT/MMPM,300\nGOTO/0,0,0\
 
 
 @pytest.mark.parametrize(
-    ("form", "axes", "method"),
-    [
-        ("g1", "axis = []", "proportional"),
-        ("g1", 'like = "head-ac"', "proportional"),
-        ("g6.2", 'like = "head-ac"', "proportional"),
-        ("g6.2", 'like = "head-ac"', "global"),
-    ],
+    ("axes", "method"),
+    [("axis = []", "proportional"), ('like = "head-ac"', "proportional"), ('like = "head-ac"', "global")],
 )
-def test_travel_counts_with_the_length_of_the_tool_at_hand(form: str, axes: str, method: str) -> None:
+def test_travel_counts_with_the_length_of_the_tool_at_hand(axes: str, method: str) -> None:
     """The nose is at 60 + 120 mm with tool 1, at 60 + 81.5 mm with tool 7."""
     lengths = "tool_length = 0\n[tool_lengths]\n1 = 120\n7 = 81.5\n[travel]\nZ = [-500, 150]\n"
-    chosen = choose_form("fanuc", form, machine=parse_machine(f"{axes}\n{lengths}"))
+    chosen = choose_form("fanuc", machine=parse_machine(f"{axes}\n{lengths}"))
     assert lines_of(chosen, UPRIGHT.format(7), method=method)
     with pytest.raises(InputError, match=r"Z of machine would have to go to 180\.000 mm"):
         lines_of(chosen, UPRIGHT.format(1), method=method)

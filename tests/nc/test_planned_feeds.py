@@ -29,7 +29,7 @@ CASES = (
     ("siemens", "bspline", "", True),
     ("siemens", "poly", "", True),
     ("heidenhain", "g1", "", True),
-    ("heidenhain", "spl", "table-ac", True),
+    ("heidenhain", "g1", "table-ac", True),
     ("linuxcnc", "g1", "xyzac-trt", True),
     ("haas", "g1", "table-ac", True),
 )

@@ -32,7 +32,7 @@ FINI
 REPORTS = {
     "smooth": "smooth {0} -o o.nc --limits table-ac --report r.json",
     "quiet": "smooth {0} -o o.nc -q --report r.json",
-    "curves": "smooth {0} -o o.nc --control siemens -f bspline --machine table-ac --report r.json",
+    "curves": "smooth {0} -o o.nc --control siemens -f bspline --report r.json",
     "global": "smooth {0} -o o.nc --control siemens --method global --report r.json",
     "zhang": "smooth {0} -o o.nc --method zhang2016 --report r.json",
     "not verified": "smooth {0} -o o.nc --no-verify --report r.json",
@@ -102,7 +102,7 @@ def test_a_report_names_files_hashes_control_machine_times_and_command(part: Pat
     assert contents["settings"]["tolerance_mm"] == 0.01
     assert made("quiet", part, "--force")["times"] is None
     curves = made("curves", part, "--force")
-    assert [curves["program"][key] for key in ("control", "form", "machine")] == ["siemens", "bspline", "table-ac"]
+    assert [curves["program"][key] for key in ("control", "form", "machine")] == ["siemens", "bspline", None]
 
 
 def test_verify_takes_the_form_from_the_head_and_says_what_failed(part: Path) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cornersmooth.kinematics import Machine, load_machine, machine_names, tip_position, tool_axis
-from cornersmooth.rotary.chord_bounds import axis_bend, axis_curve_bend, lever_bend, ruled_bend, tip_bend
+from cornersmooth.rotary.chord_bounds import axis_bend, ruled_bend, tip_bend
 from kinematics.random_machines import random_machine
 
 STEPS = 200
@@ -59,26 +59,6 @@ def test_ruled_motion_bends_no_more():
     ratio = bend_of(along / np.linalg.norm(along, axis=2, keepdims=True)) / ruled_bend(start, end)
     assert ratio.max() <= 1 + 1e-4
     assert ratio.max() > 0.9
-
-
-@pytest.mark.parametrize("machine", MACHINES[:8], ids=IDS[:8])
-@pytest.mark.parametrize("rational", [False, True])
-def test_rational_cubics_of_angles_and_levers_bend_no_more(machine: Machine, rational: bool):
-    rng = np.random.default_rng(4)
-    size = 10.0 ** rng.uniform(-3, 0, (500, 1, 1))
-    words = (rng.uniform(-3, 3, (500, 1, 2)) + rng.normal(size=(500, 4, 2)) * size).swapaxes(0, 1)
-    lever = (rng.normal(size=(500, 1, 3)) + rng.normal(size=(500, 4, 3)) * size).swapaxes(0, 1)
-    weight = (rng.uniform(0.4, 2.0, (500, 4)) if rational else np.ones((500, 4))).T
-    t = np.linspace(0, 1, STEPS + 1)
-    basis = np.stack(((1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3), axis=1)
-    sums = (basis @ weight)[:, :, None]
-    along, place = (np.tensordot(basis, part * weight[:, :, None], 1) / sums for part in (words, lever))
-    axis = tool_axis(machine, np.degrees(along).reshape(-1, 2)).reshape(STEPS + 1, -1, 3)
-    ratio = bend_of(axis) / axis_curve_bend(machine, words * weight[:, :, None], weight)
-    assert 0.3 < ratio.max() <= 1 + 1e-4
-    direction = place / np.linalg.norm(place, axis=2, keepdims=True)
-    ratio = bend_of(direction) / lever_bend(lever * weight[:, :, None], weight)
-    assert 0.3 < ratio.max() <= 1 + 1e-4
 
 
 def test_a_jump_has_no_bound():

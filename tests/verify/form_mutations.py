@@ -318,11 +318,9 @@ def of_splines(text: Text, rng: np.random.Generator):
     lines = text.lines
     # the control's own rule: no more than a micrometre beside the end of the block before
     # with a machine each corner is many splines, and the text long
-    count = 2 if text.case.machine else 6
-    for i in rng.choice([i for i in text.curved if i - 1 in text.straight], count, replace=False).tolist():
+    for i in rng.choice([i for i in text.curved if i - 1 in text.straight], 6, replace=False).tolist():
         line, here = lines[i], (i + 1, i + 3)
-        folded = line.endswith("~")
-        rest = lines[i + 2 if folded else i + 1 :]
+        rest = lines[i + 1 :]
         slope = {match[1][2]: match for match in re.finditer(rf"(K1[XYZ])({NUMBER})", line)}
         match = slope[str(rng.choice(list("XYZ")))]
         yield Mutant("gap of 2 micrometres", text.changed(i, match, float(match[2]) + 0.002), here)
@@ -342,13 +340,9 @@ def of_splines(text: Text, rng: np.random.Generator):
         yield Mutant("spline lost", [*lines[:i], *rest], here)
         yield Mutant("line with coefficients", text.with_line(i, line.replace(" SPL ", " L ")), (i + 1, i + 1))
         yield Mutant("spline without its word", text.with_line(i, line.replace(" SPL ", " ")), (i + 1, i + 1))
-        last = i + folded
-        yield Mutant("spline at rapid", text.with_line(last, lines[last] + " FMAX"), (i + 1, i + 2))
-        yield Mutant("feed on a spline", text.with_line(last, lines[last] + " F77"), (i - 1, i + 14))
+        yield Mutant("spline at rapid", text.with_line(i, line + " FMAX"), (i + 1, i + 2))
+        yield Mutant("feed on a spline", text.with_line(i, line + " F77"), (i - 1, i + 14))
         yield Mutant("coefficient without a number", text.with_line(i, line.replace(long[0], long[1])), here)
-        if folded:
-            yield Mutant("fold lost", text.with_line(i, line.removesuffix(" ~")), here)
-            continue
         yield Mutant("spline twice", [*lines[:i], line, *lines[i:]], here)
         at = line.index(" K1Y")
         yield Mutant("folded", [*lines[:i], line[:at] + " ~", line[at + 1 :], *rest], None)

@@ -41,7 +41,6 @@ ALONE = (
     "coefficient without",
     "spline without",
     "spline at rapid",
-    "fold lost",
 )
 
 #: what is named: its line, and what is said

@@ -307,9 +307,7 @@ def _settings(rng: np.random.Generator, seed: int, form: Form) -> Settings:
 
 def _other_methods(rng: np.random.Generator, form: Form, options: dict[str, object]) -> None:
     """Methods that some forms do not hold, and long lines; by a generator of its own, so that programs stay."""
-    runs = not form.curves or (form.curve in ("bspline", "g6.2") and not form.rotary)
-    if form.curves and form.rotary and options.get("method") == "zhang2016":
-        del options["method"]
+    runs = not form.curves or form.curve in ("bspline", "g6.2")
     if rng.random() < 0.25 and runs:
         options.pop("weights", None)
         options["method"] = "global"

@@ -82,7 +82,7 @@ GOTO/-58.3760,-5.7811,-1.3692,-0.6131925,0.0049931,0.7899178
 
 #: a dwell near the pole, where the first axis stays what it was: the pose is not quite where the CL file has it
 DWELL_AT_THE_POLE = Alarm(
-    Case("heidenhain", "spl", "head-ac"),
+    Case("heidenhain", "g1", "head-ac"),
     0.15,
     10.0,
     """GOTO/0.8411,-0.3935,0.2380,0.0000000,0.0000000,1.0000000
@@ -191,7 +191,7 @@ GOTO/-0.3263,0.4129,0.3420,-0.3200766,0.4127683,0.8527446
 
 #: a pose that must be passed, found several blocks from where it is since the axis tells little
 EXACT_AT_THE_POLE = Alarm(
-    Case("heidenhain", "spl", "table-ac"),
+    Case("heidenhain", "g1", "table-ac"),
     0.15,
     10.0,
     """GOTO/0.0030,0.0024,-0.0000,0.0002552,0.0008903,0.9999996
@@ -203,7 +203,7 @@ GOTO/0.0228,-0.0085,0.0001,0.1479951,0.0243007,-0.9886895
 
 #: a turn that begins with a tiny move, at which the walk stays
 PURE_TURN = Alarm(
-    Case("generic", "g6.2", "nutated-bc"),
+    Case("generic", "g1", "nutated-bc"),
     0.04,
     10.0,
     """GOTO/0.0000,0.0000,0.0000,-0.0024753,-0.0002965,0.9999969
@@ -219,7 +219,7 @@ GOTO/1.8534,-1.0989,1.0331,-0.5004361,-0.0168184,0.8656101
 
 #: compensation ends with the program, near the pole
 LAST_TIDIED = Alarm(
-    Case("fanuc", "g6.2", "xyzbc-trt"),
+    Case("fanuc", "g1", "xyzbc-trt"),
     0.15,
     50.0,
     """GOTO/0.7261,0.6440,-0.0003,0.0108990,-0.0259442,0.9996040
@@ -230,7 +230,7 @@ GOTO/0.7261,0.6440,-0.0003,-0.0004832,-0.0006688,0.9999997
 
 #: the last pose is a margin from where the walk ends, and a rounding more from the end
 END_TWO_DIGITS_BACK = Alarm(
-    Case("generic", "g6.2", "head-ac"),
+    Case("generic", "g1", "head-ac"),
     0.15,
     50.0,
     """GOTO/-0.1857,0.1952,-0.0008,-0.2044695,-0.9785411,0.0254853
@@ -305,7 +305,7 @@ GOTO/0.5286,-0.1038,0.0990,0.4304417,0.4441343,0.7857892
 
 #: the vertex that is farthest off keeps its place when those about it are assigned anew
 AS_FAR_AS_BEFORE = Alarm(
-    Case("heidenhain", "spl", "head-table-bc"),
+    Case("heidenhain", "g1", "head-table-bc"),
     0.15,
     50.0,
     """GOTO/0.0000,0.0000,0.0000,0.0000000,0.0000000,1.0000000

@@ -7,7 +7,6 @@ from functools import partial
 
 import pytest
 
-from cornersmooth.errors import InputError
 from cornersmooth.model import Program
 from cornersmooth.nc import fit_settings, write
 from cornersmooth.settings import Settings
@@ -76,16 +75,3 @@ def test_every_mutant_that_matters_is_found(case: Case) -> None:
     print(f"\n{case}: {score}")
     assert score.missed == []
     assert sum(score.judged.values()) == len(chosen) >= 15
-
-
-def test_a_fold_that_is_lost_is_found() -> None:
-    (case,) = (case for case in CASES if str(case) == "heidenhain-spl-table-ac")
-    program = program_of(case)
-    lines = text_of(case, program)
-    folds = [mutant for mutant in mutants(case, lines) if mutant.kind == "fold lost"]
-    assert folds
-    for mutant in folds:
-        assert mutant.where is not None
-        with pytest.raises(InputError) as refused:
-            named_in(case, program, mutant.lines)
-        assert refused.value.line in range(mutant.where[0], mutant.where[1] + 1)

@@ -38,8 +38,9 @@ def run_compare(given: Options) -> int:
     data, name, is_program = given.read()
     with told_of(name), progress_bar(given.quiet) as progress:
         step = None if progress is None else lambda done, total: progress("programs", done, total)
-        if is_program:  # it has one kind of words
-            tried = [one for one in candidates(control, settings, machine) if one.form.rotary == (machine is not None)]
+        if is_program:  # it has one kind of words, and lines
+            rotary, tried = machine is not None, candidates(control, settings, machine)
+            tried = [one for one in tried if one.form.rotary == rotary and not one.form.curves]
             table = compare_filtered(data, tried, axes, **how_read(given), progress=step)
         else:
             program = read(data, name=name, **given.reading()).with_feed(given.feed)

@@ -27,7 +27,6 @@ class Job:
 
     reader: ProgramReader
     form: Form  #: of the new blocks
-    own: Form  #: lines in the words that the program has
     spelling: Spelling
     settings: Settings
     processes: int = 1
@@ -52,7 +51,7 @@ def motion_of_runs(job: Job, reading: Reading, runs: Sequence[Run]) -> NcProgram
             pairs = zip(in_places(job, run), feeds, strict=True)
             text = b"".join(block + b" " + (feed[0] if feed else b"") + b"\n" for block, feed in pairs)
         stretches.append(Stretch(run, text, run.first + 1))
-    return motion(job, stretches, job.own)
+    return motion(job, stretches, job.form)
 
 
 def motion(job: Job, stretches: Sequence[Stretch], form: Form) -> NcProgram:
@@ -99,7 +98,7 @@ def program_of(nc: NcProgram, marks: bool = False) -> Program:
 
 def in_places(job: Job, run: Run) -> list[bytes]:
     """Blocks that go to the places of a run, without line ends."""
-    return [_block(job, run, place, job.own, rapid=False) for place in run.place]
+    return [_block(job, run, place, job.form, rapid=False) for place in run.place]
 
 
 def _head(form: Form, *, inch: bool) -> bytes:

@@ -20,7 +20,7 @@ from cornersmooth.filter.times import by_own_law, no_runs, planned_times, time_a
 from cornersmooth.filter.writing import smoothed
 from cornersmooth.kinematics import Machine
 from cornersmooth.memory import return_free_memory
-from cornersmooth.nc import choose_form, fit_settings
+from cornersmooth.nc import fit_settings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc_reader import NcProgram
 from cornersmooth.nc_reader.recognition import is_cl_file
@@ -159,6 +159,10 @@ def read_program(
     """Read a program, and see how it is to be written; parameters and errors as of `filter_program`."""
     if is_cl_file(data[:HEAD]):
         raise InputError("CS594", "this is a CL file, not an NC program", "make a program of it: 'cornersmooth smooth'")
+    if form.curves:  # CS241
+        line = next(name for name, one in form.table.forms.items() if not one.curve)
+        what = f"{form.control} form {form.name} has curves, and a program is smoothed in lines"
+        raise SettingsError("CS241", what, f"use -f {line}")
     tcp = form.orientation != "machine"
     reader = ProgramReader(form.table.dialect, form.machine, tcp=tcp, tip_from_start=tip_from_start, inch=inch)
     old = reader.read(data)
@@ -166,7 +170,7 @@ def read_program(
     spelling = Spelling.of(islice(cuts, SAMPLE), len(reader.axes))
     if old.runs:
         spelling = _fine(spelling, form, settings, inch=old.runs[0].state.unit != 1.0)
-    return Job(reader, form, _own_form(form), spelling, settings, processes), old
+    return Job(reader, form, spelling, settings, processes), old
 
 
 def _fine(spelling: Spelling, form: Form, settings: Settings, *, inch: bool) -> Spelling:
@@ -177,16 +181,6 @@ def _fine(spelling: Spelling, form: Form, settings: Settings, *, inch: bool) -> 
         spelling = spelling.with_digits(form.table.digits, inch=inch)
         fit_settings(settings, spelling.form(form, rounding=False), "inch" if inch else "mm")
     return spelling
-
-
-def _own_form(form: Form) -> Form:
-    """Lines of the control with the words that the program has; CS241: it has not the words of the form."""
-    line = next(name for name, one in form.table.forms.items() if not one.curve)
-    own = choose_form(form.table, line, machine=form.machine, tcp=form.orientation != "machine")
-    if own.orientation != form.orientation:
-        what = f"{form.control} form {form.name} has other words for the tool axis than the program"
-        raise SettingsError("CS241", what, f"use -f {line}, or name your machine with --machine")
-    return own
 
 
 def _spliced(old: Reading, texts: dict[int, bytes]) -> tuple[bytes, list[Place]]:

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.errors import CornersmoothError
-from cornersmooth.filter.motion import Job, in_places, motion_of_runs, program_of
+from cornersmooth.filter.motion import Job, motion_of_runs, program_of
 from cornersmooth.filter.runs import Reading, Run
 from cornersmooth.filter.spelling import numbered, numbers_of
 from cornersmooth.filter.state import INVERSE_TIME
@@ -128,7 +128,7 @@ def _split(job: Job, form: Form, text: bytes, runs: Sequence[Run]) -> Iterator[l
             head.append(mode)
         if rounding and run.state.rounding and not any(map(_ROUNDING.match, kept[:said])):
             head.append(rounding)
-        feed_before = feed if mode == _MINUTE and not form.curves else b""
+        feed_before = feed if mode == _MINUTE else b""
         for line in kept:
             if b"F" in line and (match := _FEED.search(line)):
                 feed = match[0]
@@ -136,14 +136,13 @@ def _split(job: Job, form: Form, text: bytes, runs: Sequence[Run]) -> Iterator[l
                 mode = line
             elif _ROUNDING.match(line):
                 rounding = line
-        stays = form.curves or (same(begin, run.start, run) and same(angles, run.place[-1], run))
+        stays = same(begin, run.start, run) and same(angles, run.place[-1], run)
         if not stays or not kept:
             yield None
             continue
         if feed_before and b"F" not in kept[said]:
             kept[said] += (b" " if look.spaces else b"") + feed_before
-        tail = in_places(job, run)[-1:] if form.curves else []
-        tail += [own] if mode != own else []
+        tail = [own] if mode != own else []
         if mode == _INVERSE and own == _MINUTE:
             tail.append(f"{look.feed}{run.feed:.10g}".encode())
         if rounding and run.state.rounding:

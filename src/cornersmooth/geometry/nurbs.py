@@ -130,19 +130,3 @@ def derivatives(points: Floats, weights: Floats, u: Floats) -> tuple[Floats, Flo
     p1 = ((n1 * w) @ points - d1 * p0) / d0
     p2 = ((n2 * w) @ points - 2.0 * d1 * p1 - d2 * p0) / d0
     return p0, p1, p2
-
-
-def leg_derivatives(weights: Floats, ratio: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """First and second derivative by u, at u = 0, of the share of the leg that curves have passed, and of the weight.
-
-    From weights (g, 5) and ratios (g,): four (g,).
-    """
-    share = np.stack((np.zeros_like(ratio), weights[:, 1] * (1.0 - ratio), weights[:, 2]), axis=1)
-    (slope, bend), (weight_slope, weight_bend) = (
-        (
-            6.0 * (points[:, 1] - points[:, 0]),
-            12.0 * (points[:, 2] - points[:, 1]) - 24.0 * (points[:, 1] - points[:, 0]),
-        )
-        for points in (share, weights[:, :3])
-    )
-    return slope, bend - 2.0 * weight_slope * slope, weight_slope, weight_bend

@@ -29,7 +29,6 @@ from cornersmooth.nc.operation import Operation
 from cornersmooth.nc.own_words import own_words
 from cornersmooth.nc.planes import Planes, check_travel_in_planes, check_travel_without_axes, plan_planes
 from cornersmooth.nc.program_frame import POINT_APPROACH, Frame, Stream
-from cornersmooth.nc.rotary_curve_rows import rotary_curve_rows
 from cornersmooth.nc.rotary_rows import rotary_rows
 from cornersmooth.nc.rotary_words import rotary_way, within_reach
 from cornersmooth.nc.statement_writer import StatementWriter
@@ -59,7 +58,7 @@ __all__ = [
 #: poses from which on it saves time to compute in a thread what is written next
 _MANY = 4096
 
-#: curve styles without weights; BSPLINE takes none above 3, which the knots of rotary words may ask for
+#: curve styles without weights
 _POLYNOMIAL = ("poly", "spl")
 
 #: curve styles of controls that may turn the tool in their own way on a line between two axis points
@@ -83,8 +82,7 @@ def fit_settings(settings: Settings, form: Form, units: Units) -> Settings:
         The form cannot hold what the settings ask for.
     """
     tolerance = settings.tolerance
-    polynomial = form.curve in _POLYNOMIAL or (form.curve == "bspline" and form.rotary)
-    if polynomial and settings.weights != (1.0, 1.0):
+    if form.curve in _POLYNOMIAL and settings.weights != (1.0, 1.0):
         raise SettingsError(
             "CS217",
             f"{form.control} form {form.name} holds curves with weights 1 only",
@@ -209,8 +207,6 @@ def write(
 def _rows(smoothed: SmoothProgram, form: Form, circles: Circles, planes: Planes, findings: Findings) -> Iterator[Rows]:
     if form.machine is not None and not form.rotary:
         check_travel_without_axes(form.machine, smoothed.program)
-    if form.curves and form.rotary:
-        return rotary_curve_rows(smoothed, form, findings)
     if form.curves:
         return curve_rows(smoothed, divide=form.curve in _TURNING)
     long = smoothed.settings.lines == "long"
@@ -220,7 +216,7 @@ def _rows(smoothed: SmoothProgram, form: Form, circles: Circles, planes: Planes,
         whole = coarse_rows(smoothed, circles.blocks) if long else all_dense_rows(smoothed, circles.blocks)
         if form.rotary:
             inside, way = planes.of >= 0 if planes.planes else None, rotary_way(whole, smoothed, form, findings)
-            rows = (part for part, _ in rotary_rows(way, smoothed, form, findings, long=long, in_planes=inside))
+            rows = rotary_rows(way, smoothed, form, findings, long=long, in_planes=inside)
         else:
             rows = long_rows(whole, smoothed, form)
     return with_arcs(rows, smoothed.program, circles)

@@ -30,7 +30,7 @@ _BRACES: dict[str, Table] = {
     "dwell": {"milliseconds": 1, "seconds": "1."},
     "compensation_left": {"register": 1},
     "compensation_right": {"register": 1},
-    "on": {"offset": 1, "rotary": "A,C", "first": "0.", "second": "0.", "third": "0."},
+    "on": {"offset": 1, "first": "0.", "second": "0.", "third": "0."},
     "with_z": {"offset": 1},
     "within_on": {"kinematics_on": ""},
     "within_off": {"kinematics_off": ""},
@@ -167,6 +167,8 @@ def _form(name: str, entry: Any, motion: Table) -> FormTable:
     _SHELF.check_keys(_SHELF.table(entry, where), _FORM_KEYS, f"{where}.")
     mode = partial(_mode, motion=motion)
     modes = {key: mode(entry[key], f"{where}.{key}") for key in orientations if key in entry}
+    if entry.get("curve") and {"angles", "machine"} & modes.keys():
+        raise _SHELF.wrong(f"{where} has curves in rotary words", "write lines: leave out curve, or angles and machine")
     for orientation, found in modes.items():
         wanted = {"vector": 3, "point": 3}.get(orientation, 0)
         if len(found.words) != wanted:

@@ -10,7 +10,7 @@ import numpy as np
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.kinematics import Machine
-from cornersmooth.model import Floats, Move, Program
+from cornersmooth.model import Move, Program
 from cornersmooth.nc.control import Control, Extra, FormTable, Mode, Orientation
 from cornersmooth.nc.control_tables import load_control
 from cornersmooth.nc.form import ROTARY_SHARE, Form
@@ -76,7 +76,7 @@ def choose_form(
     orientation, mode = _mode(table, chosen, machine, tcp)
     asked = tuple(_extra(table, name, extra) for extra in dict.fromkeys(extras))
     if machine is not None and machine.names:
-        _check_axes(table, chosen, mode, machine)
+        _check_axes(table, mode, machine)
     plane = _plane(table, chosen, machine) if planes else None
     found = Form(table, name, chosen.curve, orientation, mode, machine, asked, chosen.upright, rewind, plane)
     _check_rewind(found)
@@ -107,27 +107,12 @@ def _without_rotary_axes(table: Control, form: FormTable) -> Mode:
     return mode
 
 
-def _use_lines(table: Control, otherwise: str) -> str:
-    """Hint at the first form of a control that has lines; at something else where it has none."""
-    lines = next((name for name, other in table.forms.items() if not other.curve), "")
-    return f"use -f {lines}" if lines else otherwise
-
-
-def _check_axes(table: Control, form: FormTable, mode: Mode, machine: Machine) -> None:
-    """Refuse curves with one rotary axis or with modulo axes, and modulo axes that do not go the shorter way."""
-    here, axes, hint = (
-        f"{table.name} form {form.name}",
-        " and ".join(machine.modulo),
-        "leave out modulo in the machine file",
-    )
-    if axes and form.curve:
-        text = f"{here} has curves of the words of {axes}, which a modulo axis cannot follow"
-        raise SettingsError("CS215", text, _use_lines(table, hint))
+def _check_axes(table: Control, mode: Mode, machine: Machine) -> None:
+    """Refuse modulo axes that the control does not turn the shorter way."""
+    axes = " and ".join(machine.modulo)
     if axes and not mode.motion.shortest:
-        raise SettingsError("CS215", f"{table.name} has no words by which {axes} goes the shorter way", hint)
-    if form.curve and len(machine.names) < 2:
-        what = f"{here} has no curves for a machine with one rotary axis"
-        raise SettingsError("CS215", what, _use_lines(table, "leave out --machine"))
+        what = f"{table.name} has no words by which {axes} goes the shorter way"
+        raise SettingsError("CS215", what, "leave out modulo in the machine file")
 
 
 def _check_rewind(form: Form) -> None:
@@ -168,7 +153,7 @@ def _extra(table: Control, form: str, name: str) -> Extra:
 
 
 def check_program(form: Form, program: Program, settings: Settings) -> None:
-    """Refuse a program whose tool is not along Z, or turns on an arc, where the form has no words for that (CS219)."""
+    """Refuse a program whose tool is not along Z where the form has no words for its axis (CS219)."""
     if form.orientation == "fixed":
         tilt = norm(program.axis - (0.0, 0.0, 1.0))
         tilt[program.kind == Move.FROM] = 0.0
@@ -178,15 +163,12 @@ def check_program(form: Form, program: Program, settings: Settings) -> None:
         if form.machine is not None:
             text = f"the tool is not parallel to Z, and {form.machine.name} has no rotary axis"
             hint = "turn the part for an operation of its own, or use a machine that reaches it"
-        _refuse_tilt(form, program, settings, tilt, text, hint)
+        tilted = np.flatnonzero(settings.axis_scale * tilt > ROTARY_SHARE * settings.tolerance)
+        if len(tilted):  # by more than a rounding error at the axis point
+            what, line = text.format(f"{form.control} form {form.name}"), int(program.line[tilted[0]])
+            raise SettingsError("CS219", what, hint, file=program.source.name, line=line)
     if form.orientation == "machine" and form.machine is not None and form.machine.swings_the_tool:
         _check_lengths(form.machine, program)
-    if form.rotary and form.curves and len(program.arcs):
-        turn = np.zeros(len(program))
-        pose = program.arcs.pose
-        turn[pose] = norm(program.axis[pose] - program.axis[pose - 1])
-        text = "the tool turns on an arc, which {} cannot follow within the tolerance"
-        _refuse_tilt(form, program, settings, turn, text, f"use -f {next(iter(form.table.forms))}")
 
 
 def _check_lengths(machine: Machine, program: Program) -> None:
@@ -207,14 +189,6 @@ def _check_lengths(machine: Machine, program: Program) -> None:
         raise SettingsError("CS219", what, hint, file=program.source.name, line=line)
 
 
-def _refuse_tilt(form: Form, program: Program, settings: Settings, tilt: Floats, text: str, hint: str) -> None:
-    """Refuse the first pose whose tilt (n,), rad, is worth more than a rounding error at the axis point."""
-    tilted = np.flatnonzero(settings.axis_scale * tilt > ROTARY_SHARE * settings.tolerance)
-    if len(tilted):
-        what = text.format(f"{form.control} form {form.name}")
-        raise SettingsError("CS219", what, hint, file=program.source.name, line=int(program.line[tilted[0]]))
-
-
 def _refusal(
     table: Control, form: FormTable, wanted: tuple[Orientation, ...], machine: Machine | None
 ) -> SettingsError:
@@ -227,7 +201,9 @@ def _refusal(
             what += ": its curves are refused at inverse time feed (G93)"
         if instead and machine is None:
             instead += " and name your machine with --machine"
-        return SettingsError("CS215", what, instead or "leave out --no-tcp")
+        lines = next((name for name, other in table.forms.items() if not other.curve), form.name)
+        hint = "leave out --no-tcp" if lines == form.name else f"use -f {lines} and leave out --no-tcp"
+        return SettingsError("CS215", what, instead or hint)
     if "angles" in wanted:
         return SettingsError("CS215", f"{here} has no rotary words", instead or "leave out --machine")
     return SettingsError(

@@ -241,8 +241,7 @@ class Operation:
 
     def _tip_control_on(self) -> list[str]:
         self._tip_control = self._functions = True
-        rotary = ",".join(self.form.other_words if self.form.rotary else ())
-        on = [block.format(offset=self.offset, rotary=rotary, **self.plane) for block in self.mode.on]
+        on = [block.format(offset=self.offset, **self.plane) for block in self.mode.on]
         within = [*self._expand(self.mode.within_on), *self._extras("on", outside=False)]
         if self.mode.on[-1:] == (self.mode.motion.with_z,) and not within:  # functions within want it before them
             self._with_z = on.pop()

@@ -53,14 +53,12 @@ def rotary_rows(
     *,
     long: bool = False,
     in_planes: Bools | None = None,
-    continued: bool = False,
-) -> Iterator[tuple[Rows, Ints]]:
+) -> Iterator[Rows]:
     """Rows of lines with the words of the form's machine in `Rows.other`, and the row of the way that each is.
 
-    Some thousand come at a time, with the points (row -1) that lines need. Of `long` lines only those are left that ε
-    asks for. Poses (n,) `in_planes`, whose rotary axes the control turns, are not compared with the travel. The first
-    row of a way that is `continued` is where the one before has ended. Raises InputError where the machine cannot
-    follow the path.
+    Some thousand come at a time, with the points that lines need. Of `long` lines only those are left that ε asks for.
+    Poses (n,) `in_planes`, whose rotary axes the control turns, are not compared with the travel. Raises InputError
+    where the machine cannot follow the path.
     """
     if not len(way.move):
         return
@@ -79,7 +77,7 @@ def rotary_rows(
             way.tip[here],
             way.axis[here],
             way.angles[here],
-            tolerance=way.tolerance[here],
+            tolerance=way.tolerance,
             rapid=way.free[here],
             tip_tolerance=TIP_SHARE * settings.tolerance if form.orientation == "machine" else None,
             max_step=max_step,
@@ -100,13 +98,13 @@ def rotary_rows(
             kept = fewest_lines(found, limits)
             filled = some_rows(filled, kept)
             blend = corner_blends(found, kept, way.free[here][filled.pose], limits, settings, form)
-        own = slice(1 if begin or continued else 0, None)
+        own = slice(1 if begin else 0, None)
         filled, rate = _timed(filled, chunk, own, smoothed, form, limits, findings)
         pose, inserted = filled.pose[own], filled.inserted[own]
         tip, angles = filled.tip[own], filled.angles[own]
         seen = slice(None) if in_planes is None else ~in_planes[move[pose]]
         travel.check(tip[seen], angles[seen], move[pose[seen]])
-        part = Rows(
+        yield Rows(
             tip=tip,
             other=angles,
             move=move[pose],
@@ -116,7 +114,6 @@ def rotary_rows(
             blend=None if blend is None else blend[own],
             left=left[pose] & ~inserted if way.left.any() else None,
         )
-        yield part, np.where(inserted, -1, begin + pose)
 
 
 def largest_turn(settings: Settings) -> float:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.geometry.ragged import starts
@@ -33,13 +32,11 @@ class RotaryWay:
     axis: Floats
     move: Ints  #: (n,)
     angles: Floats  #: (n, 2), degrees; in the order of the machine's axes
-    branch: NDArray[np.int8]  #: (n,) as in `cornersmooth.rotary.RotaryPath`
     #: free, left: (n,); whether nothing is looked at on the way to the row, as it cuts nothing; whether the tool comes
     #: back there into a cut that it has left
     free: Bools
     left: Bools
-    place: Floats  #: (n,) as in `Rows`; (0,) where there are no curves
-    tolerance: Floats  #: (n,), degrees by which the axis may be off on the way to the row
+    tolerance: float  #: degrees by which the axis may be off on the way to a row
 
 
 def rotary_way(rows: Rows, smoothed: SmoothProgram, form: Form, findings: Findings) -> RotaryWay:
@@ -49,11 +46,10 @@ def rotary_way(rows: Rows, smoothed: SmoothProgram, form: Form, findings: Findin
     """
     program, settings, machine = smoothed.program, smoothed.settings, machine_of(form).with_longest_tool()
     tip, axis, move = rows.tip, rows.other, rows.move
-    place = np.zeros(0) if rows.place is None else rows.place
+    tolerance = form.rotary_tolerance(settings.tolerance, settings.axis_scale)
     if not len(move):
         none = np.zeros(0, np.bool_)
-        return RotaryWay(tip, axis, move, np.zeros((0, 2)), np.zeros(0, np.int8), none, none, place, place)
-    tolerance = form.rotary_tolerance(settings.tolerance, settings.axis_scale)
+        return RotaryWay(tip, axis, move, np.zeros((0, 2)), none, none, tolerance)
     rapid, file = rapid_moves(program.kind)[move], program.source.name
     _check_reach(machine, program, axis, move, tolerance)
     how: dict[str, Any] = {"tolerance": tolerance, "rapid": rapid, "line": program.line[move], "file": file}
@@ -62,7 +58,7 @@ def rotary_way(rows: Rows, smoothed: SmoothProgram, form: Form, findings: Findin
     if form.rewind:
         path, source, left = rewound_angles(machine, tip, axis, **how)
         if left.any():
-            tip, axis, move, place = tip[source], axis[source], move[source], place[source] if len(place) else place
+            tip, axis, move = tip[source], axis[source], move[source]
             rapid = rapid[source] | left
             _note_rewinds(machine, path.angles, left, program.line[move], findings)
     else:
@@ -70,9 +66,7 @@ def rotary_way(rows: Rows, smoothed: SmoothProgram, form: Form, findings: Findin
     findings.add_all(path.findings)
     from_zero(form, program, axis, path.angles, move, rapid)
     return_free_memory()  # rows are written while all of this is held
-    return RotaryWay(
-        tip, axis, move, path.angles, path.branch, rapid, left, place, np.broadcast_to(tolerance, len(move))
-    )
+    return RotaryWay(tip, axis, move, path.angles, rapid, left, tolerance)
 
 
 def machine_of(form: Form) -> Machine:

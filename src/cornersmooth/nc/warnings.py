@@ -45,7 +45,7 @@ def add_warnings(form: Form, smoothed: SmoothProgram, circles: Circles, findings
     if form.curve == "g6.2" and form.orientation == "point":
         text = (
             "axis points U V W in G6.2 need the option of dual NURBS interpolation (a second curve for the tool axis); "
-            "see that the control has it, else it stops with an alarm, or name the machine for rotary words"
+            "see that the control has it, else it stops with an alarm, or use -f g1"
         )
         findings.add("CS395", "warning", 0, text)
     for extra in form.extras:

@@ -10,7 +10,7 @@ import numpy as np
 from cornersmooth.model import Bools, Ints
 from cornersmooth.nc_reader.dialects.base import BY_WORD, Memory
 from cornersmooth.nc_reader.elements import Element, Elements, Problem
-from cornersmooth.nc_reader.words import BSPLINE, NURBS, Table
+from cornersmooth.nc_reader.words import NURBS, Table
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine
@@ -52,10 +52,6 @@ def control_problems(table: Table, state: Reader, code: float, approach: Set[int
     if dialect.curves_need and not state.memory.high_speed:
         text = f"a curve where {dialect.curves_need} must be in force"
         yield from first_wrong(CONTROL_WORDS, motion == NURBS, table.line, text)
-    unnamed = letters - state.memory.spline_axes
-    if dialect.names_spline_axes and kind == "angles" and unnamed:
-        text = f"a spline of {' and '.join(sorted(unnamed))}, which no SPLINEPATH(1,X,Y,Z,...) names"
-        yield from first_wrong(CONTROL_WORDS, motion == BSPLINE, table.line, text)
     wanted = dialect.controls.get(kind)
     if wanted is not None and state.tip_control not in wanted:
         rows = table.rows_with(letters, code)
@@ -74,10 +70,9 @@ def axis_problems(
 ) -> Iterator[Problem]:
     """What is wrong with the rotary words of a run: beyond the limits of their axes, or words of modulo axes.
 
-    Those are from 0 to 360 degrees, and are told to go the shorter way (`Dialect.shorter_way`). Of curves, whose
-    control points may lie farther out, the ends in `run` count for limits; `step` is the last printed digit, degrees.
+    Those are from 0 to 360 degrees, and go the shorter way by a word. `step` is the last printed digit, degrees.
     """
-    for column, axis in enumerate(machine.axes):
+    for axis in machine.axes:
         name, values = axis.name, table.column(axis.name)
         given, told = ~np.isnan(values), ~np.isnan(table.column(f"{BY_WORD} {axis.name}"))
         if axis.modulo:
@@ -93,27 +88,20 @@ def axis_problems(
             text = f"{name} without {way} in force, which sends it the shorter way"
             yield from first_wrong(CONTROL_WORDS, given, table.line, text)
         if axis.limits is not None:
-            angles, line = (run.second[:, column], run.line) if len(run.curves) else (values, table.line)
-            beyond = (angles < axis.low - step / 2) | (angles > axis.high + step / 2)
-            for angle in angles[beyond][:1].tolist():
+            beyond = (values < axis.low - step / 2) | (values > axis.high + step / 2)
+            for angle in values[beyond][:1].tolist():
                 text = f"{name} goes to {angle:g} deg, its limits are {axis.low:g} and {axis.high:g}"
-                yield from first_wrong("CS581", beyond, line, text)
+                yield from first_wrong("CS581", beyond, table.line, text)
 
 
 def turn_problems(run: Elements, before: Sequence[float], machine: Machine) -> Iterator[Problem]:
     """Which rotary axes turn more than once round in one feed move; `before`: their words before the run, or NaN."""
-    curves = run.curves
-    of_points = np.repeat(run.line[run.kind == Element.CURVE], curves.points)
-    next_curve = np.cumsum(curves.points)[:-1] - 1
     for column, axis in enumerate(machine.axes):
         turn = np.abs(np.diff(run.second[:, column], prepend=before[column]))
         turn[run.kind != Element.LINE] = 0.0
-        between = np.abs(np.diff(curves.point[:, 3 + column]))
-        between[next_curve] = 0.0
-        for amount, line in ((turn, run.line), (between, of_points[1:])):
-            for degrees in amount[amount > MOST_TURN][:1].tolist():
-                text = f"{axis.name} turns by {degrees:.0f} deg in one feed move"
-                yield from first_wrong("CS526", amount > MOST_TURN, line, text)
+        for degrees in turn[turn > MOST_TURN][:1].tolist():
+            text = f"{axis.name} turns by {degrees:.0f} deg in one feed move"
+            yield from first_wrong("CS526", turn > MOST_TURN, run.line, text)
 
 
 def take_clamp(word: float, machine: Machine, memory: Memory) -> bool:

@@ -166,6 +166,9 @@ class Reader:
                 start = before.but(tip=tuple(factor * value for value in before.tip))
                 rotary = replace(self.rotary, tip_step=factor * self.rotary.tip_step)
                 machine, way = rotary.machine, self.dialect.shorter_way
+                if machine.names and len(run.curves):
+                    line = int(run.line[run.curves.element[0]])
+                    raise InputError("CS503", "a curve in rotary words", "write it as lines", file=self.name, line=line)
                 self.problems += axis_problems(table, run, machine, way, self.memory, rotary.angle_step)
                 if self.dialect.switches:
                     tip_control = rotary.tip_control

@@ -2,8 +2,7 @@
 
 A block runs linearly in its words. Under tool tip control that is the tip and the angles, without it the linear axes
 of the machine and the angles. Where the turn makes it matter a block becomes several lines, fine enough that nobody can
-tell them from the motion; curves become curves of a higher degree in tip and tool vector. So what measures need not
-know of rotary axes.
+tell them from the motion. So what measures need not know of rotary axes.
 """
 
 from __future__ import annotations
@@ -13,11 +12,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.nc_reader.curves import basis, bernstein, groups
-from cornersmooth.nc_reader.elements import Curves, Element, Elements
+from cornersmooth.model import Floats, Ints
+from cornersmooth.nc_reader.elements import Element, Elements
 from cornersmooth.nc_reader.execution import Modal
-from cornersmooth.nc_reader.needed_states import MOST_TURN
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine, RotaryAxis
@@ -28,9 +25,6 @@ LINE_SHARE, LEAST = 4.8e-3, 1e-7
 
 #: lines that one block becomes at most
 MOST_LINES: Final = 4096
-
-#: order of the curves that stand for curves in angles, and how often their spans are halved
-_ORDER, _HALVINGS = 8, 6
 
 #: last digit of F where it is moves per minute
 _F_STEP = 1e-3
@@ -168,7 +162,10 @@ class Rotary:
         position = np.vstack((before.tip, run.tip))
         angles = np.nan_to_num(np.vstack((before.second, run.second))[:, :2])
         tip, vector = self.tips(position, angles), self.directions(angles)
-        curves, arcs = self._curves(run.curves), run.arcs
+        curves, arcs = run.curves, run.arcs
+        if len(curves):  # of a machine without rotary axes: in rotary words they are refused
+            along = np.broadcast_to(self.machine.tool, (len(curves.point), 3))
+            curves = replace(curves, point=np.column_stack((curves.point[:, :3], along)))
         if len(arcs):  # axes that carry the part turn its circles, too
             there = angles[arcs.element + 1]
             centre = self.tips(arcs.centre, there)
@@ -277,72 +274,6 @@ class Rotary:
             feed_room=rate * off + _F_STEP * np.where(either, swing, length),
             least_feed=np.isin(rate, _FASTEST) | (rate * turn > FAST_TURN),
         )
-
-    def _curves(self, curves: Curves) -> Curves:
-        """Curves in tip and tool vector."""
-        if not len(curves):
-            return curves
-        found = []
-        for group in groups(curves, np.arange(len(curves))):
-            breaks, rows = group.spans, np.arange(len(group.index))
-            for halving in range(_HALVINGS + 1):
-                if halving:
-                    breaks = np.sort(np.append(breaks, (breaks[1:] + breaks[:-1]) / 2))
-                own = group.only(rows)
-                control, weight, good = self._elevated(own.knot, own.order, own.points, own.weight, breaks)
-                wild = np.abs(np.diff(own.points[:, :, 3:5], axis=1)).max(axis=(1, 2), initial=0.0) > MOST_TURN
-                keep = good | wild if halving < _HALVINGS else np.ones_like(good)
-                points = control.shape[1]
-                inner = np.repeat(breaks[1:-1], _ORDER - 1)
-                knot = np.concatenate(([breaks[0]] * _ORDER, inner, [breaks[-1]] * _ORDER))
-                chosen = group.index[rows[keep]]
-                count = len(chosen)
-                found.append(
-                    Curves(
-                        element=curves.element[chosen],
-                        end=curves.end[chosen],
-                        order=np.full(count, _ORDER, np.int64),
-                        points=np.full(count, points, np.int64),
-                        point=control[keep].reshape(-1, 6),
-                        weight=weight[keep].ravel(),
-                        knot=np.tile(knot, count),
-                    )
-                )
-                rows = rows[~keep]
-                if not len(rows):
-                    break
-        return Curves.joined(found)
-
-    def _elevated(
-        self, knot: Floats, order: int, points: Floats, weight: Floats, breaks: Floats
-    ) -> tuple[Floats, Floats, Bools]:
-        """Control points (k, p, 6) and weights (k, p) of a higher order, and whether (k,) they are near enough.
-
-        Interpolation, in homogeneous coordinates, between the breaks; what is rational of lower order is exact.
-        """
-        t = (1 - np.cos(np.pi * np.arange(_ORDER) / (_ORDER - 1))) / 2
-        between = (t[1:] + t[:-1]) / 2
-        start, width = breaks[:-1, None], np.diff(breaks)[:, None]
-        spans = len(breaks) - 1
-
-        def at(share: Floats) -> Floats:
-            values = basis(knot, order, (start + share * width).ravel())
-            below = weight @ values.T
-            six = np.einsum("up,kpd->kud", values, points * weight[:, :, None]) / below[:, :, None]
-            vector = self.directions(six[:, :, 3:5].reshape(-1, 2)).reshape(*six.shape[:2], 3)
-            whole = np.concatenate((six[:, :, :3], vector, np.ones_like(vector[:, :, :1])), axis=2)
-            whole *= below[:, :, None]
-            return whole.reshape(len(points), spans, len(share), 7)
-
-        nodes = at(t)
-        bezier = np.einsum("ij,ksjd->ksid", np.linalg.inv(bernstein(_ORDER, t)), nodes)
-        bezier[:, :, [0, -1]] = nodes[:, :, [0, -1]]
-        true = at(between)
-        close = np.einsum("ij,ksjd->ksid", bernstein(_ORDER, between), bezier)
-        off = np.linalg.norm(close[..., 3:6] / close[..., 6:] - true[..., 3:6] / true[..., 6:], axis=3)
-        good = off.max(axis=(1, 2)) * self.axis_length <= self.sagitta / 10
-        joined = np.concatenate((bezier[:, :, :-1].reshape(len(points), -1, 7), bezier[:, -1, -1:]), axis=1)
-        return joined[:, :, :6] / joined[:, :, 6:], joined[:, :, 6], good
 
 
 def tool_vectors(machine: Machine, angles: Floats) -> Floats:

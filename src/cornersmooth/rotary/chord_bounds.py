@@ -6,14 +6,11 @@ of two motions is between N + 1 even samples no larger than at them but for (M�
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from cornersmooth.kinematics.machine import Machine
-from cornersmooth.kinematics.poses import tool_axis
 from cornersmooth.model import Floats
-from cornersmooth.vectors import dot, norm, unit
+from cornersmooth.vectors import dot, norm
 
 
 def axis_bend(machine: Machine, turn: Floats, start: Floats, end: Floats, slack: Floats) -> Floats:
@@ -22,56 +19,8 @@ def axis_bend(machine: Machine, turn: Floats, start: Floats, end: Floats, slack:
     Tool axes (n, 3) at both ends may be off by the slack, rad.
     """
     turn = np.abs(turn)
-    away = np.maximum(_sine(machine, start), _sine(machine, end)) + slack + turn[:, 1] / 2
-    return _turning_bend(away, turn, np.zeros_like(turn))
-
-
-def axis_curve_bend(machine: Machine, words: Floats, weight: Floats) -> Floats:
-    """Bound (n,) on the second derivative of the tool axis along rational cubics of the angles.
-
-    Bézier points (4, n, 2), rad, are times their weights (4, n).
-    """
-    speed, bend = _rational(words, weight, np.abs)
-    away = _sine(machine, tool_axis(machine, np.degrees(words[0] / weight[0, :, None]))) + speed[:, 1]
-    return _turning_bend(away, speed, bend)
-
-
-def _rational(points: Floats, weight: Floats, size: Callable[[Floats], Floats]) -> tuple[Floats, Floats]:
-    """Bounds (n, e) on the sizes (..., d) -> (..., e) of the first two derivatives of rational cubics.
-
-    Bézier points (4, n, d) are times their weights (4, n), which are positive. With the value q = N/W less that at the
-    start, W q′ = N′ − W′ q and W q″ = N″ − 2 W′ q′ − W″ q.
-    """
-    weight = weight[..., None]
-    off, least = points - weight * (points[0] / weight[0]), weight.min(axis=0)
-    away = size(off / weight).max(axis=0)
-    (first, second), (slope, curve) = (
-        [measure(factor * np.diff(values, order, axis=0)).max(axis=0) for factor, order in ((3.0, 1), (6.0, 2))]
-        for values, measure in ((off, size), (weight, np.abs))
-    )
-    speed = (first + slope * away) / least
-    return speed, (second + 2.0 * slope * speed + curve * away) / least
-
-
-def _turning_bend(away: Floats, speed: Floats, bend: Floats) -> Floats:
-    """‖k″‖ (n,) of k = R₁(q₁) R₂(q₂) k₀ at most, for |q′| and |q″| (n, 2) and the distance of k from the first axis."""
-    away = np.minimum(away, 1.0)
-    total: Floats = away * speed[:, 0] ** 2 + 2 * speed[:, 0] * speed[:, 1] + speed[:, 1] ** 2
-    return total + away * bend[:, 0] + bend[:, 1]
-
-
-def lever_bend(lever: Floats, weight: Floats) -> Floats:
-    """Bound (n,) on |u″| of the direction u of rational cubics; infinite through the origin.
-
-    Bézier points (4, n, 3) are times their weights (4, n). With l = r u the part of u″ across u is that of
-    (l″ − 2 r′ u′)/r, the part along it |u′|²; both |r′| and r |u′| are at most |l′|.
-    """
-    speed, bend = (part[:, 0] for part in _rational(lever, weight, lambda vectors: norm(vectors)[..., None]))
-    points = lever / weight[..., None]
-    shortest = dot(points, unit(points.mean(axis=0))[None]).min(axis=0)
-    inverse = np.divide(1.0, shortest, out=np.full(len(shortest), np.inf), where=shortest > 0)
-    with np.errstate(invalid="ignore"):
-        bound: Floats = np.nan_to_num(bend * inverse + 3.0 * (speed * inverse) ** 2, nan=np.inf, posinf=np.inf)
+    away = np.minimum(np.maximum(_sine(machine, start), _sine(machine, end)) + slack + turn[:, 1] / 2, 1.0)
+    bound: Floats = away * turn[:, 0] ** 2 + 2 * turn[:, 0] * turn[:, 1] + turn[:, 1] ** 2
     return bound
 
 

@@ -111,21 +111,6 @@ def insertions(
     return Insertions(segment, fraction, inside, np.unique(open_.segment))
 
 
-def runs_evenly(
-    machine: Machine, start: Floats, end: Floats, from_angles: Floats, to_angles: Floats, tolerance: Floats
-) -> Bools:
-    """(m,) whether even angles (m, 2), degrees, keep the tool within tolerances (m,) of the ruled motion between axes.
-
-    The unit axes (m, 3) are those at both ends. Both motions are compared at the same share of their way.
-    """
-    axis, angles = (
-        np.hstack(pair).reshape(2 * len(start), pair[0].shape[1]) for pair in ((start, end), (from_angles, to_angles))
-    )
-    moving = np.repeat(np.arange(len(axis), dtype=np.float64)[:, None], 3, axis=1)
-    motion = RuledMotion(machine, moving, axis, np.repeat(tolerance, 2), None, None)
-    return motion.parts(motion.segments(angles, np.arange(0, len(axis), 2), branches=False)) == 1
-
-
 def fill(tip: Floats, axis: Floats, angles: Floats, more: Insertions) -> FilledPath:
     """Path with the points of `more` put in: n + m rows."""
     n = len(tip)

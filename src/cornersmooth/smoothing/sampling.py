@@ -49,8 +49,6 @@ class Rows:
     #: (r,): Rows at which the tool comes back into a cut that it has left at the row before; None where there is
     #: none.
     left: Bools | None = None
-    #: (r,): Of `all_dense_rows`: share of the parameter of the curve that they are on, above 0; NaN on straight motion.
-    place: Floats | None = None
 
 
 @dataclass(frozen=True)
@@ -76,13 +74,9 @@ def dense_rows(smoothed: SmoothProgram, circles: Ints | None = None, poses: int 
     return (layout.filled(own, layout.rows(own)) for own in layout.batches(poses))
 
 
-def all_dense_rows(smoothed: SmoothProgram, circles: Ints | None = None, *, halves: Numbers | None = None) -> Rows:
-    """All rows of `dense_rows` at once, made in the place where they stay.
-
-    `halves` (k,) are lines for each half of the transitions in place of `lines_per_half`: straight lines are left whole
-    then, and the rows have their `Rows.place`.
-    """
-    layout = _Layout.of(smoothed, divide=halves is None, circles=circles, halves=halves)
+def all_dense_rows(smoothed: SmoothProgram, circles: Ints | None = None) -> Rows:
+    """All rows of `dense_rows` at once, made in the place where they stay."""
+    layout = _Layout.of(smoothed, divide=True, circles=circles)
     whole, stop = layout.rows(slice(None)), 0
     for own in layout.batches():
         begin, stop = stop, stop + int(layout.counts[own].sum())
@@ -111,7 +105,6 @@ class _Layout:
     replaced: Bools  # (n,) poses with rows of runs
     curves: bool
     divide: bool  # whether lines in which the axis turns much are several
-    places: bool  # whether rows have their places on curves
 
     @classmethod
     def of(
@@ -121,12 +114,10 @@ class _Layout:
         curves: bool = False,
         divide: bool,
         circles: Ints | None = None,
-        halves: Numbers | None = None,
     ) -> _Layout:
-        program, places = smoothed.program, halves is not None
+        program = smoothed.program
         segments = segments_of(smoothed, dense=divide)
-        if halves is None:
-            halves = np.zeros(0, np.int32) if curves else lines_per_half(smoothed)
+        halves = np.zeros(0, np.int32) if curves else lines_per_half(smoothed)
         runs, replaced = _of_runs(smoothed, curves=curves)
         segments.lines[replaced] = 1
         counts = np.where(segments.has_line, segments.lines, 0)
@@ -138,7 +129,7 @@ class _Layout:
         if len(program.arcs):
             lines = arc_lines(program, smoothed.settings)
             counts[program.arcs.pose] = lines if circles is None else np.where(circles > 0, circles, lines)
-        return cls(smoothed, segments, halves, counts, runs, replaced, curves, divide, places)
+        return cls(smoothed, segments, halves, counts, runs, replaced, curves, divide)
 
     def batches(self, poses: int = 16384) -> Iterator[slice]:
         """Parts of the poses."""
@@ -155,7 +146,6 @@ class _Layout:
             np.zeros(total, np.int8),
             np.zeros(total, np.bool_),
             spline=np.tile((0.0, 1.0, 0.0), (total, 1)) if self.curves else None,
-            place=np.full(total, np.nan) if self.places else None,
         )
 
     def filled(self, own: slice, rows: Rows) -> Rows:
@@ -179,8 +169,6 @@ class _Layout:
         at = ranges(batch.first[here], counts[here])
         part = slice(*np.searchsorted(runs.move, (batch.poses[0], batch.poses[-1] + 1)))
         rows.tip[at], rows.other[at] = runs.points[part, :3], runs.points[part, 3:]
-        if rows.place is not None:
-            rows.place[at] = runs.knot[part]
         if rows.spline is not None:
             rows.curve[at], rows.joined[at] = runs.number[part], runs.number[part] == 1
             rows.spline[at, 0], rows.spline[at, 2] = runs.knot[part], runs.last_knot[part]
@@ -245,8 +233,6 @@ def _fill_transitions(smoothed: SmoothProgram, segments: Segments, batch: _Batch
         points, levers = construction.points(smoothed, rows[chosen], u)
         where = (last[chosen] - len(u))[:, None] + np.arange(len(u))
         batch.rows.tip[where], batch.rows.other[where] = points[:, 1:], unit(levers[:, 1:])
-        if batch.rows.place is not None:
-            batch.rows.place[where] = u
         batch.rows.move[where[:, len(u) // 2 :]] = smoothed.corners.after[rows[chosen]][:, None]
         first = segments.has_line[poses[chosen]]
         at = where[first, 0] - 1

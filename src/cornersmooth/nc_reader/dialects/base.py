@@ -27,7 +27,6 @@ class Memory:
 
     incremental: bool = False  #: G91 is in force, in which no motion is read
     high_speed: bool = False  #: look ahead of the kind that some controls ask for with curves is on
-    spline_axes: frozenset[str] = frozenset()  #: those that have been said to be axes of splines
     clamped: dict[str, bool] = field(default_factory=dict)  #: rotary axes with a clamp: held, or words let them turn
     keeps_tip: bool | None = None  #: whether the kinematics do, where the machine's file says what switches that
     shorter_way: bool = False  #: whether rotary axes go it
@@ -75,8 +74,6 @@ class Dialect:
     shorter_way: str = ""
     #: what must be in force for curves; empty for nothing
     curves_need: str = ""
-    #: whether SPLINEPATH says which axes are those of splines, the first three where it says nothing
-    names_spline_axes: bool = False
     #: whether tip control is switched by blocks that the machine's file names
     switches: bool = False
     #: G words of inches and of millimetres, and those that change nothing measured: of all its controls, of this one

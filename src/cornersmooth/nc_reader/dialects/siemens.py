@@ -107,8 +107,6 @@ class Siemens(Dialect):
                 motion[name] = value
             elif name in ("TRAORI", "TRAFOOF", *_AXIS_FRAMES, *_ORIENTATIONS):
                 self._transform(name, state)
-            elif name == "SPLINEPATH":
-                state.memory.spline_axes = frozenset(re.split("[(), ]+", text)[2:])
             elif name not in ("D", "N", "%") and name not in _SILENT_CALLS:
                 self.refuse(line, name, text, state)
         state.move(line, motion)
