@@ -344,6 +344,7 @@ def _provenance(
         tcp=form.orientation != "machine",
         source=program.source.name,
         operation=program.source.operation,
+        extras="-".join(extra.name for extra in form.extras),
         sha256="" if isinstance(source, Program) else sha256_of(source),
         weights=(1.0, *settings.weights),
     )

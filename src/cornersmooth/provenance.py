@@ -38,6 +38,7 @@ class Provenance:
     axis_tolerance: float | None = None  #: degrees: what the tool axis may be off, in place of ε at the axis point
     #: With ``_`` for blanks; ``"none"`` where the text says none, empty for that of the control's own table.
     work_offset: str = ""
+    extras: str = ""  #: functions of the control that were asked for
     operation: int = 0  #: number of the operation of the CL file that it holds alone; 0 for all
 
     def lines(self) -> tuple[str, ...]:
@@ -106,5 +107,6 @@ _FIELDS: Final[tuple[tuple[str, str, Callable[[Any], str], Callable[[str], Any]]
     ("WEIGHTS", "weights", weights_word, _weights),
     ("FEEDS", "planned_feeds", lambda on: "plan" if on else "", lambda word: word == "plan"),
     ("OFFSET", "work_offset", str, str),
+    ("WITH", "extras", str, str),
     ("OPERATION", "operation", lambda number: f"{number}" if number else "", int),
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -201,3 +202,15 @@ def test_jumps_of_programs_are_no_statements_of_cl_files(tmp_path: Path) -> None
     assert made.returncode == DONE
     assert made.stderr.startswith(b"PASSED")
     assert b"an NC program" in run("info", "part.nc", cwd=tmp_path).stdout
+
+
+@pytest.mark.parametrize(
+    ("word", "total"), [("G64 P0.02 Q0.01", "0.04"), ("G64 P0.02", "0.05"), ("G64 P0.02 Q0", "0.03"), ("G61", "")]
+)
+def test_blending_of_the_program_is_added_in_the_first_line(word: str, total: str, tmp_path: Path) -> None:
+    (tmp_path / "part.ngc").write_text(f"{word}\n" + PLAIN.format(CUTS))
+    on = ("--control", "linuxcnc", "--machine", THREE_AXES, "-e", 0.01)
+    report = json.loads(run("filter", "part.ngc", *on, "-o", "new.ngc", "--json", cwd=tmp_path).stdout)
+    more = f"; {total} mm with G64 P of the program" * bool(total)
+    assert report["verdict"] == "PASSED"
+    assert re.search(r"tip [\d.e-]+ mm, axis point [\d.e-]+ mm(.*)$", report["verdict_text"])[1] == more

@@ -26,19 +26,22 @@ FINI
 INCH = "UNITS/INCHES\n" + FIVE.replace("MMPM,700", "IPM,25")
 #: length and axis tolerance of the control's own smoothing: a tenth of ε, and of ε over H in degrees
 EPS, H = 0.02, 10.0
+THREE_AXES = Path(__file__).parents[2] / "samples" / "machines" / "three-axis.toml"
 
 
 def judged(folder: Path, control: str, old: str, new: str, *, cl: str = FIVE, more: tuple[str, ...] = ()) -> str:
     """First line of ``verify`` for a program in which something has been replaced; the right one passes."""
-    on = ("-e", EPS, "-H", H, "--control", control)
+    on: tuple[object, ...] = ("-e", EPS, "-H", H, "--control", control)
+    if control in ("linuxcnc", "haas"):
+        on += ("--machine", THREE_AXES)
     (folder / "part.cls").write_text(cl)
     made = run("smooth", "part.cls", *on, *more, "-o", "part.nc", "--force", cwd=folder)
     assert made.returncode == DONE, made.stderr
     text = (folder / "part.nc").read_text()
     right = run("verify", "part.cls", "part.nc", *on, cwd=folder)
     assert right.stdout.startswith(b"PASSED"), right.stdout
-    changed = re.sub(old, new, text, flags=re.MULTILINE)
-    assert changed != text
+    changed, count = re.subn(old, new, text, flags=re.MULTILINE)
+    assert count
     (folder / "part.nc").write_text(changed)
     return run("verify", "part.cls", "part.nc", *on, cwd=folder).stdout.decode().splitlines()[0]
 
@@ -106,3 +109,88 @@ def test_each_number_of_a_word_list_is_compared_or_has_a_share_or_a_reason(contr
         rest = re.sub(r"\(\?P<\w+>[^()]*\)", "", text)
         if re.search(r"\\d|\.\*|\[1-9\]", rest) and not rule.never:
             assert rule.compared or rule.numbers or re.search("measured|compared", rule.says), text
+
+
+# what the first line says beside ε
+
+PLAIN = """LOAD/TOOL,3,ADJUST,3
+SPINDL/RPM,3000,CLW
+RAPID
+GOTO/1,2,70,0,0,1
+FEDRAT/MMPM,700
+GOTO/1,2,9
+GOTO/13,6,9
+GOTO/25,1,10
+RAPID
+GOTO/25,1,70
+FINI
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "total"),
+    [
+        (r"G64 P[\d.]+ Q0", "G64 P0.005 Q0", "0.025"),
+        (r"G64 P[\d.]+ Q0", "G64 P0.02 Q0", "0.04"),
+        (r"G64 P[\d.]+ Q0", "G64 P0.005", "0.03"),
+    ],
+)
+def test_blending_of_linuxcnc_is_added_in_the_first_line(old: str, new: str, total: str, tmp_path: Path) -> None:
+    found = judged(tmp_path, "linuxcnc", old, new, cl=PLAIN)
+    assert found == f"PASSED: within 0.02 mm everywhere, {total} mm with what the control rounds itself"
+
+
+def test_blending_in_inches_is_added_in_millimetres(tmp_path: Path) -> None:
+    inch = (
+        "UNITS/INCHES\nLOAD/TOOL,3,ADJUST,3\nSPINDL/RPM,3000,CLW\nRAPID\nGOTO/1,2,2,0,0,1\nFEDRAT/IPM,25\nGOTO/1,2,1\n"
+        "GOTO/1,3,1\nGOTO/2,1,1\nRAPID\nGOTO/2,1,2\nFINI\n"
+    )
+    found = judged(tmp_path, "linuxcnc", r"G64 P[\d.]+ Q0", "G64 P0.0005 Q0", cl=inch)
+    assert "0.0327 mm with what" in found
+
+
+def test_what_the_control_rounds_is_added_when_it_is_written(tmp_path: Path) -> None:
+    (tmp_path / "part.cls").write_text(FIVE)
+    made = run(
+        "smooth", "part.cls", "-e", EPS, "--control", "siemens", "--with", "cycle832", "-o", "a.mpf", cwd=tmp_path
+    )
+    assert b"within 0.02 mm everywhere, 0.022 mm with what the control rounds itself" in made.stderr
+
+
+@pytest.mark.parametrize(
+    ("control", "old", "new"),
+    [
+        ("fanuc", r"^(G43\.5 .*)$", r"G5.1 Q1\n\1"),
+        ("mitsubishi", r"^(G43\.5 .*)$", r"G5 P10000\n\1"),
+        ("haas", r"^(G54)$", r"\1\nG187 P3 E0.001"),
+        ("siemens", "^TRAORI$", "CYCLE832(0.001,_FINISH,1)\nTRAORI"),
+        ("heidenhain", "^(9 FUNCTION.*)$", r"8 CYCL DEF 32.0 TOLERANCE\n8 CYCL DEF 32.1 T0.001\n\1"),
+    ],
+)
+def test_functions_that_nobody_asked_for_are_to_check(control: str, old: str, new: str, tmp_path: Path) -> None:
+    ends = {"fanuc": "G5.1 Q0", "mitsubishi": "G5 P0", "haas": "G187", "siemens": "CYCLE832(0,_OFF,1)"}
+    end = ends.get(control, "CYCL DEF 32.0 TOLERANCE\n98 CYCL DEF 32.1")
+    numbered = "97 " if control == "heidenhain" else ""
+    cl = PLAIN if control == "haas" else FIVE
+    both = rf"{old}((?:.|\n)*?)(^(?:\d+ )?M30)"
+    groups = re.compile(old).groups
+    found = judged(tmp_path, control, both, rf"{new}\g<{groups + 1}>{numbered}{end}\n\g<{groups + 2}>", cl=cl)
+    assert found.startswith("PASSED, 1 to check"), found
+
+
+@pytest.mark.parametrize(("control", "name"), [("fanuc", "aicc"), ("siemens", "cycle832"), ("heidenhain", "cycle32")])
+def test_functions_that_were_asked_for_are_not(control: str, name: str, tmp_path: Path) -> None:
+    assert judged(tmp_path, control, "SHA256", "SHA256", cl=FIVE, more=("--with", name)).startswith("PASSED:")
+
+
+@pytest.mark.parametrize(
+    ("control", "offset", "other"),
+    [("fanuc", "G54", "G55"), ("linuxcnc", "G54", "G59.1"), ("siemens", "G54", "G505"), ("haas", "G54", "G154 P3")],
+)
+def test_an_offset_that_was_not_compared_is_said(control: str, offset: str, other: str, tmp_path: Path) -> None:
+    # comments taken out, as on the way to the machine
+    without = rf"^[(;].*CORNERSMOOTH.*\n((?:.|\n)*?)^{re.escape(offset)}$"
+    found = judged(tmp_path, control, without, rf"\1{other}", cl=PLAIN)
+    assert found.startswith("PASSED")
+    assert found.endswith(f"offset {other}, not compared")
+    assert judged(tmp_path, control, f"^{re.escape(offset)}$", other, cl=PLAIN).startswith("FAILED")

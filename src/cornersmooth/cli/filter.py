@@ -37,7 +37,7 @@ from cornersmooth.cli.show import (
 from cornersmooth.comparing import limits_machine
 from cornersmooth.errors import CornersmoothError, SettingsError
 from cornersmooth.filter import Filtered, filter_program, verify_programs
-from cornersmooth.filter.checking import Checked, measure
+from cornersmooth.filter.checking import measure
 from cornersmooth.filter.program import read_program
 from cornersmooth.filter.runs import ProgramReader
 from cornersmooth.filter.state import VOCABULARIES
@@ -159,7 +159,7 @@ def verify_with_program(source: str, old: bytes, given: Options) -> int:
     )
     checked = found.checked
     assert checked is not None
-    judgement = Judgement(found.verdict, 0, 0, "", _problems(checked.wrong) or _measured(checked, settings.tolerance))
+    judgement = Judgement(found.verdict, 0, 0, "", _problems(checked.wrong) or _measured(found, settings.tolerance))
     path = None if given.text == STANDARD else given.text
     written = replace(NcFile.of(path, sha256_of(new), form), form=None)
     contents = _reported("verify", found, judgement, (source, old), name, written, form, settings, given.reports)
@@ -232,9 +232,12 @@ def _problems(wrong: Sequence[Problem]) -> str:
     return f"{len(wrong)} problem{'s' * (len(wrong) != 1)}" if wrong else ""
 
 
-def _measured(found: Checked, tolerance: float) -> str:
-    point = f", axis point {found.axis_point:.4g} mm" if found.axis_point == found.axis_point else ""
-    return f"within {tolerance:g} mm: tip {found.tip:.4g} mm{point}"
+def _measured(found: Filtered, tolerance: float) -> str:
+    assert found.checked is not None
+    tip, axis_point = found.checked.tip, found.checked.axis_point
+    point = f", axis point {axis_point:.4g} mm" if axis_point == axis_point else ""
+    more = f"; {tolerance + found.rounding:g} mm with G64 P of the program" * bool(found.rounding)
+    return f"within {tolerance:g} mm: tip {tip:.4g} mm{point}{more}"
 
 
 def _show(name: str, contents: Mapping[str, Any], found: Filtered, given: Options) -> None:
@@ -271,7 +274,7 @@ def _judgement(found: Filtered, tolerance: float) -> Judgement:
     elif found.checked.wrong:
         what = f"{_problems(found.checked.wrong)}; {what}"
     else:
-        what = f"{what} {_measured(found.checked, tolerance)}"
+        what = f"{what} {_measured(found, tolerance)}"
     return Judgement(found.verdict, 0, 0, unverified, what)
 
 

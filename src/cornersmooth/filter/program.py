@@ -33,6 +33,7 @@ from cornersmooth.verdict import Verdict
 _BY_LAW: Final = 10
 
 #: words that say the units of a program
+_BLENDING: Final = re.compile(rb"(?i)G64[ \t]*P[ \t]*(\d*\.?\d+)(?:[ \t]*Q[ \t]*(\d*\.?\d+))?")
 _UNITS: Final = re.compile(rb"(?i)G(20|21|70|71|700|710)(?!\d)|BEGIN PGM")
 
 
@@ -52,6 +53,7 @@ class Filtered:
     seconds: tuple[float, float] | None = None  #: planned time before and after; see `planned_times`
     #: what the control does in the runs before and after, where that was asked for
     motions: tuple[NcProgram, NcProgram] | None = None
+    rounding: float = 0.0  #: mm: by how much the control may round what has changed on its own: it adds to ε
     compared: bool = False  #: whether two programs were compared alone, and nothing was to be smoothed
 
     @property
@@ -238,7 +240,15 @@ def _result(
         units_said=_UNITS.search(old.data) is not None,
         seconds=planned_times(job, old, new, where, axes) if axes is not None and where else None,
         motions=pair(job, old, new, drawn) if paths and where else None,
+        rounding=max((place.run.state.unit * _rounding(new, place) for place in where), default=0.0),
     )
+
+
+def _rounding(new: Reading, place: Place) -> float:
+    """By how much G64 P lets the control round the blocks of a place, in units of the program; 0.0 for unknown."""
+    said = _BLENDING.findall(f"{place.run.state.rounding}\n".encode() + new.lines(place.first, place.stop))
+    # without Q lines are merged within P, too
+    return max((float(p) + float(q or p) for p, q in said), default=0.0)
 
 
 def compare_filtered(

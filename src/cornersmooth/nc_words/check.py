@@ -11,10 +11,11 @@ import numpy as np
 
 from cornersmooth.errors import InputError
 from cornersmooth.nc_reader.lexer import Lexer
+from cornersmooth.nc_reader.word_tables import word_table
 from cornersmooth.nc_reader.words import Line, Table
 from cornersmooth.nc_words.blocks import NOT_LISTED, Ruled, WordRules
 from cornersmooth.nc_words.machine_positions import MachinePositions
-from cornersmooth.nc_words.rules import UNLISTED, WordList, WordRule, shown, word_list, word_text
+from cornersmooth.nc_words.rules import UNLISTED, WordList, WordRule, any_of, shown, word_list, word_text
 from cornersmooth.nc_words.states import LINEAR, ROTARY, WordStates
 from cornersmooth.statements.comparison import KINDS
 
@@ -81,6 +82,9 @@ class WordCheck:
         self._before: tuple[int, str, Ruled] = 0, "", []
         self._code = -1.0
         self._weights = None if weights is None else tuple(weights)
+        self._needed = word_table(control)["grammar"].get("curves_need")
+        #: by how much the control may round on its own, in units of the program: added to what is measured
+        self.rounding = 0.0
 
     def watch(self, items: Iterable[Table | Line]) -> Iterator[Table | Line]:
         """Give on what the lines say, looked at; what is wrong is in `problems` when all is read."""
@@ -165,6 +169,7 @@ class WordCheck:
         if not words:
             return line
         before, ruled = len(self.problems), self._rules.of(words)
+        self._functions(number, words, ruled)
         if not self._frames(number, text):
             self._follow(number, text, ruled)
             self.problems += self._rules.problems(line, words, ruled)
@@ -180,6 +185,26 @@ class WordCheck:
         self._code = codes[-1] if codes else self._code
         self._move(number, {word.name: word.value for word in line.words}, [rule for _, rule in ruled])
         return line
+
+    def _functions(self, number: int, words: Sequence[str], ruled: Ruled) -> None:
+        """Take note of what the control rounds by words of a block, and of functions that nobody asked for."""
+        for word, rule in ruled:
+            shared = rule.pattern.fullmatch(word)
+            if shared and (length := shared.groupdict().get("length")):
+                # LinuxCNC: without Q lines are merged within P, too
+                self.rounding = max(self.rounding, float(length) * (1.0 + ("G64" in words and "Q0" not in words)))
+            if rule.extra and any_of(rule.extra, words) and not self._intended(" ".join(words)):
+                self.trusted.append((number, " ".join(words)))
+
+    def _intended(self, block: str) -> bool:
+        """Whether somebody has asked for a block of a function of the control, or curves need it."""
+        made = self._states.made
+        return "WITH" in made or (block == self._needed and made.get("FORM") != "G1")
+
+    @property
+    def offset(self) -> str:
+        """Work offset that nothing was compared with; empty for none."""
+        return self._states.unsure_offset
 
     def _on_trust(self, line: Line, words: Sequence[str], ruled: Ruled, before: int) -> Line:
         """Take a block of the user's on trust if there are problems from a number on, and leave its words out.

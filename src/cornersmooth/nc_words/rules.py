@@ -28,7 +28,7 @@ from cornersmooth.nc_reader.words import Word
 _ENDS: Final = frozenset(("OFF", "ORIENT"))
 
 #: keys of a word that are regular expressions
-_PATTERNS: Final = frozenset(("is", "needs", "must", "after", "then", "behind", "down", "bars"))
+_PATTERNS: Final = frozenset(("is", "needs", "must", "after", "then", "behind", "down", "bars", "extra"))
 
 
 @dataclass(frozen=True)
@@ -44,6 +44,7 @@ class WordRule:
     alone: bool = False  #: no other words may stand beside it
     #: what the numbers in its groups may be of the tolerance: ``length`` of ε, ``angle`` of that of the tool axis
     share: float | None = None
+    extra: re.Pattern[str] | None = None  #: words of its block that switch on what somebody must have asked for
     numbers: str = ""  #: what is done with its numbers, where they have no share and are not `compared`
     never: bool = False  #: the control has no such word
 

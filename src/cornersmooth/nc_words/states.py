@@ -143,6 +143,18 @@ class WordStates:
         return [held.text for held in on if not {held.rule.state, held.text} & self._left]
 
     @property
+    def made(self) -> Mapping[str, str]:
+        """What the head of a program of our own says."""
+        return self._made
+
+    @property
+    def unsure_offset(self) -> str:
+        """Work offset that nothing was compared with; empty for none."""
+        held = self._held.get(_OFFSET)
+        known = self._made and self._made.get("OFFSET") != "NONE" and _OFFSET not in self._left
+        return "" if held is None or known else held.text
+
+    @property
     def attentive(self) -> bool:
         """Whether the next motion must be looked at."""
         return self._changed or self.above
@@ -338,7 +350,7 @@ class WordStates:
         made_for = self._made.get("OFFSET", "")
         if held is None or _OFFSET in self._left or made_for == "NONE":
             return
-        wanted = made_for or held.rule.preset
+        wanted = made_for or next((rule.preset for rule in self._list.words if rule.preset), "")
         if wanted and re.split(r"=\+?", held.text)[-1].replace(" ", "_") != wanted:
             yield f"{held.text}, where the program was made for {wanted.replace('_', ' ')}"
 

@@ -107,7 +107,9 @@ def judge(found: Verification | None, findings: Iterable[Finding] = (), unverifi
         parts.append(holes + (f", first CL line {first}" if first else ""))
     if found is not None and not problems:
         axis = "" if found.axis_tolerance is None else f" and {found.axis_tolerance:g} deg"
-        parts.append(f"{'the rest ' if parts else ''}within {found.tolerance:g} mm{axis} everywhere")
+        more = f", {found.tolerance + found.rounding:g} mm with what the control rounds itself" * bool(found.rounding)
+        parts.append(f"{'the rest ' if parts else ''}within {found.tolerance:g} mm{axis} everywhere{more}")
+        parts += [f"offset {found.offset}, not compared"] if found.offset else []
     return Judgement(
         Verdict.of(problems=problems, unverified=bool(unverified), left_out=left_out),
         sum(finding.to_check for finding in findings),

@@ -204,7 +204,8 @@ class Verifier:
 
         found = self._found(task, chunks, reader.events, reader.retracts.places, said)
         unlooked = check.unlooked if self._words else "words beside the motion, which a table of your own may define"
-        return replace(found.not_verified(unlooked), trusted=tuple(check.trusted))
+        found = replace(found.not_verified(unlooked), rounding=scale * check.rounding, offset=check.offset)
+        return replace(found, trusted=tuple(check.trusted))
 
     def _wrong_offset(self, found: str) -> list[Problem]:
         """What is wrong with the work offset of the text, where the CL file names one."""
