@@ -75,6 +75,8 @@ def chain_lines(tip, axis, eps, h, form, feed=None, sharp=(), samples=4, scale=1
     """Motion blocks of one chain, from its first pose (not written) to its last; feed (n-1,) or a number or None."""
     n = len(tip)
     feeds = [None] * (n - 1) if feed is None else list(np.broadcast_to(feed, n - 1))
+    if form == "g6.2":  # F cannot change inside a curve
+        sharp = {*sharp, *(i for i in range(1, n - 1) if feeds[i - 1] != feeds[i])}
     cps, rounded = transitions(tip, axis, eps, h, sharp=sharp) if n > 2 else (np.zeros((0, 5, 6)), [])
     lines, last, said = [], None, None
 

@@ -76,7 +76,8 @@ class Reader:
         self.coarse = 0
         #: what was not looked at, and the NC line
         self.unlooked: list[tuple[int, str]] = []
-        self.retracts = Retracts(name, self.problems)
+        zero = [min(max(0.0, np.ceil(axis.low)), np.floor(axis.high)) for axis in clamps]
+        self.retracts = Retracts(name, self.problems, zero)
         #: the tilted plane that is on
         self.plane: TiltedPlane | None = None
         #: whether a plane that is off again has left the rotary axes where no word says
@@ -105,6 +106,7 @@ class Reader:
         self.flush()
         free = [name for name, clamped in self.memory.clamped.items() if not clamped]
         self.problems += [Problem("CS538", 0, 0, f"{name} is not clamped at the end") for name in free]
+        self.retracts.end(turned=False)
         self._settle()
         if self.ready:
             yield self._collected()
@@ -147,9 +149,8 @@ class Reader:
             if self.rotary is not None:
                 self.problems += clamp_problems(run, before.second, self.rotary.machine, self.memory)
             approach: frozenset[int] = frozenset()
-            if self.retracts.open:
-                aside = table.line[~np.isnan([table.column("X"), table.column("Y")]).all(axis=0)]
-                whole, run = run, self.retracts.arrive(run, aside)
+            if self.retracts.coming:
+                whole, run = run, self.retracts.arrive(run, self._words(before), free=self._turns_alone)
                 approach = frozenset(whole.line.tolist()).difference(run.line.tolist())
                 if not len(run.kind):
                     continue
@@ -175,7 +176,7 @@ class Reader:
                     self._tell_once(kinematics_problems(run, machine, self.memory, tip_control=tip_control))
                 run = replace(run, second=rotary.unwrapped(run.second, before.second))
                 self.problems += turn_problems(run, before.second, machine)
-                self._check_turned(run)
+                self._check_turned(run, before)
                 if self.dialect.retracts:
                     text = "rotary axes swing the tilted tool in a rapid that is not above a retract"
                     lines = run.line[rotary.swung(run, start)]
@@ -224,7 +225,8 @@ class Reader:
             self.wrong("CS506", line, f"a tilted plane under {self.tip_control}")
         self._above(line, "a tilted plane where the tool is not retracted")
         self.plane, self._told, self._left_turned = plane, set(), False
-        self.retracts.leave(self.elements)
+        self.retracts.end(turned=True)
+        self.retracts.leave(self.elements, self._words(self.modal))
         self.modal = self.modal.but(tip=(math.nan,) * 3)
         if plane.turned:
             self._turn(line)
@@ -245,17 +247,25 @@ class Reader:
         if self.tip_control:
             self.wrong("CS506", line, f"the end of a tilted plane under {self.tip_control}")
         self._above(line, "a tilted plane ends where the tool is not retracted")
+        self.retracts.end(turned=True)
         self.modal, self.plane = self.plane.left(self.modal, rotary=self.rotary is not None), None
         self._left_turned = True
 
-    def _check_turned(self, run: Elements) -> None:
-        """Complain of motion behind a plane where no word has said since how the rotary axes stand."""
+    def _check_turned(self, run: Elements, before: Modal) -> None:
+        """Complain of motion where no word has said how the rotary axes stand: behind a plane, or where it comes late.
+
+        Before their first words they count as at zero; the first may not turn a tool that has come down.
+        """
         assert self.rotary is not None
+        unsaid = np.isnan(np.vstack((before.second, run.second))[:, : len(self.rotary.names)])
         if self._left_turned:
-            unsaid = np.any(np.isnan(run.second[:, : len(self.rotary.names)]), axis=1)
             self._left_turned = False
             text = "motion after a tilted plane, and no word says where the rotary axes are"
-            self.problems += first_wrong("CS506", unsaid, run.line, text)
+            self.problems += first_wrong("CS506", unsaid[1:].any(axis=1), run.line, text)
+        down = ~np.isnan(np.vstack((before.tip, run.tip))[:-1]).any(axis=1)
+        late = down & (unsaid[:-1] & ~unsaid[1:]).any(axis=1)
+        text = "a rotary axis is sent to where it belongs after the tool has come down"
+        self.problems += first_wrong("CS531", late, run.line, text)
 
     def _above(self, line: Line, text: str) -> None:
         """Complain where the tool is not above a retract."""
@@ -277,6 +287,17 @@ class Reader:
             if len(known):
                 return float(known[-1])
         return self.modal.code
+
+    def _words(self, modal: Modal) -> Floats:
+        """(6,) words of tip and second triple that hold; without any word of a vector the tool is upright."""
+        unsaid = not (modal.rotary or modal.points) and math.isnan(modal.second[0])
+        return np.array((*modal.tip, *((0.0, 0.0, 1.0) if unsaid else modal.second)))
+
+    @property
+    def _turns_alone(self) -> bool:
+        """Whether rotary words turn their axes, and the tip stays behind."""
+        alone = self.tip_control in self.dialect.controls.get("machine", ("",))
+        return self.rotary is not None and alone and not self.memory.keeps_tip
 
     def _take_tool(self) -> None:
         """Go on with the length of another tool."""
@@ -401,7 +422,7 @@ class Reader:
 
     def leave(self, axes: str) -> None:
         """Say that axes go to positions of the machine."""
-        self.retracts.leave(self.elements)
+        self.retracts.leave(self.elements, self._words(self.modal))
         gone = "XYZ" if self.plane is not None else axes
         tip = tuple(math.nan if axis in gone else at for axis, at in zip("XYZ", self.modal.tip, strict=True))
         self.modal = self.modal.but(tip=tip)

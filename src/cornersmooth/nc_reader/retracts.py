@@ -1,16 +1,43 @@
 """Retracts, and the ways back from them.
 
-On the way back rapids do not say in full where they end, until all of the tip is known again. They are left out, and
-the tool must come straight down.
+A *way back* begins with a retract, or with the program. On it rapids do not say in full where they end; the first that
+does is the *arrival*. Those after a retract are left out of the motion, so they must not lead the tool anywhere else:
+over the arrival first, with the axis that it has there, and then down. One block may do all of this at once.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
 import numpy as np
 
 from cornersmooth.errors import InputError
-from cornersmooth.model import Floats, Ints
+from cornersmooth.model import Bools, Floats
 from cornersmooth.nc_reader.elements import Element, Elements, Problem
+
+#: a full turn, degrees
+_TURN: Final = 360.0
+
+
+class _Rapid(NamedTuple):
+    """A rapid of a way back: (6,) words before it and behind it, NaN where not known, in the plane that is on."""
+
+    before: Floats
+    behind: Floats
+    line: int
+    free: bool  #: whether rotary axes turn in it without the tip
+
+    def moves(self, letters: str) -> bool:
+        """Whether it moves any of X, Y and Z to where a word says."""
+        at = ["XYZ".index(letter) for letter in letters]
+        return bool((~np.isnan(self.behind[at]) & (self.behind[at] != self.before[at])).any())
+
+    @property
+    def turned(self) -> Bools:
+        """(3,) which words of the axis it changes."""
+        turned: Bools = ~np.isnan(self.behind[3:]) & (self.behind[3:] != self.before[3:])
+        return turned
 
 
 class Retracts:
@@ -21,25 +48,44 @@ class Retracts:
     name : str or None
         Of the program, for messages.
     problems : list of Problem
-        Takes ways back that are not straight above where they lead to.
+        Takes ways back that lead elsewhere, or down too early.
+    zero : sequence of float
+        Degrees at which each rotary axis is at zero, or as near as its limits let it.
     """
 
-    def __init__(self, name: str | None, problems: list[Problem]) -> None:
+    def __init__(self, name: str | None, problems: list[Problem], zero: Sequence[float] = ()) -> None:
         self._name, self._problems = name, problems
+        self._zero = np.append(zero, np.zeros(3 - len(zero)))
         #: whether an axis is at a position of the machine
         self.open = False
+        #: whether the program is on a way back
+        self.coming = True
         #: elements before which the tool is retracted, ascending
         self.places: list[int] = []
-        self._above: tuple[Floats, int] | None = None  # where the last rapid has gone, NaN where not known; its line
+        self._way: list[_Rapid] = []
+        self._left = np.full(6, np.nan)  # where the way back began
 
-    def leave(self, elements: int) -> None:
-        """Take note of a retract after so many elements."""
-        self.open = True
+    def leave(self, elements: int, words: Floats) -> None:
+        """Take note of a retract after so many elements, and where the words (6,) have the tool then."""
+        if not self.coming:
+            self._left = words
+        self.open = self.coming = True
         if self.places[-1:] != [elements]:
             self.places.append(elements)
 
-    def arrive(self, run: Elements, aside: Ints) -> Elements:
-        """Leave out the rapids of the way back; lines `aside` have words of X or Y, others only turn the rotary axes.
+    def end(self, *, turned: bool) -> None:
+        """Look at rapids that lead to no arrival: the program ends, or a plane begins or ends.
+
+        Where the axis has `turned` to is not looked at before a plane, which hangs on it.
+        """
+        unknown = np.full(6, np.nan)
+        unknown[3:] = unknown[3:] if turned else self._left[3:]
+        self._check(unknown, arrived=False)
+
+    def arrive(self, run: Elements, before: Floats, *, free: bool) -> Elements:
+        """Leave out the rapids of the way back from a retract, and look at where they lead.
+
+        The words (6,) are those before the run; `free`: whether rotary axes turn without the tip.
 
         Raises
         ------
@@ -48,26 +94,48 @@ class Retracts:
         """
         unknown = np.isnan(run.tip).any(axis=1)
         gone = unknown & (run.kind == Element.RAPID)
-        if (unknown & ~gone).any():
-            line = int(run.line[np.argmax(unknown & ~gone)])
+        if (fed := unknown & ~gone).any() and self.open:
             hint = "say X Y Z in rapid after a position of the machine, before the first feed"
-            raise InputError(
-                "CS503", "a feed move where not all of the position is known", hint, file=self._name, line=line
-            )
-        self.open = bool(unknown.all())
-        if (places := np.flatnonzero(gone & np.isin(run.line, aside))).size:
-            row = int(places[-1])
-            self._above = np.concatenate((run.tip[row], run.second[row])), int(run.line[row])
-        if not self.open:
-            arrival = int(np.argmin(unknown))
-            if self._above is not None:
-                self._check_approach(*self._above, np.concatenate((run.tip[arrival], run.second[arrival])))
-            self._above = None
-        return run.only(~gone) if gone.any() else run
+            what = "a feed move where not all of the position is known"
+            raise InputError("CS503", what, hint, file=self._name, line=int(run.line[np.argmax(fed)]))
+        arrived = not unknown.all()
+        count = int(np.argmin(unknown)) + 1 if arrived else len(unknown)
+        words = np.vstack((before, np.hstack((run.tip[:count], run.second[:count]))))
+        rapid = run.kind[:count] == Element.RAPID
+        self._way += [_Rapid(words[k], words[k + 1], int(run.line[k]), free) for k in np.flatnonzero(rapid).tolist()]
+        dropped = gone & self.open
+        if arrived:
+            self._check(words[-1], arrived=bool(rapid[-1]))
+            self.open = self.coming = False
+        return run.only(~dropped) if dropped.any() else run
 
-    def _check_approach(self, above: Floats, line: int, below: Floats) -> None:
-        """Complain where the tool does not come straight down: the last rapid must be over the end of the way back."""
-        unknown = np.isnan(above)
-        if np.abs(above - below)[~unknown].max(initial=0.0) > 0.0 or unknown[:3].sum() == 2:
-            text = "the last rapid of the way back from a retract is not over the position that it leads to"
-            self._problems.append(Problem("CS531", 0, line, text))
+    def _check(self, arrival: Floats, *, arrived: bool) -> None:
+        """Complain of the rapids of a way back to an arrival (6,), NaN where it is open; the last of them `arrived`."""
+        aside = False
+        for k, one in enumerate(self._way, 1 - len(self._way)):
+            last = arrived and not k
+            if one.moves("XY") and _elsewhere(one.behind[:2], arrival[:2]):
+                text = "a rapid of the way back from a retract is not over the position that it leads to"
+                self._problems.append(Problem("CS531", 0, one.line, text))
+            if one.turned.any() and not self._may_turn(one, arrival):
+                text = "the tool axis turns elsewhere on the way back from a retract"
+                self._problems.append(Problem("CS531", 0, one.line, text))
+            over = not _elsewhere(one.before[:2], arrival[:2]) and not _elsewhere(one.before[3:], arrival[3:])
+            if one.moves("Z") and not over and (aside or not last):
+                text = "the tool comes down from a retract before it is over its position, with its axis there"
+                self._problems.append(Problem("CS531", 0, one.line, text))
+            aside |= one.moves("XY")
+        self._way = []
+
+    def _may_turn(self, one: _Rapid, arrival: Floats) -> bool:
+        """Whether the axis turns to where it is at the arrival; without the tip also to zero, or back, by itself."""
+        angle, wanted, left = (words[one.turned] for words in (one.behind[3:], arrival[3:], self._left[3:]))
+        there = (angle == wanted) | np.isnan(wanted)
+        if one.free and not (one.moves("XY") or one.moves("Z")):
+            there |= (angle == left) | (angle % _TURN == 0.0) | (angle == self._zero[one.turned])
+        return bool(there.all())
+
+
+def _elsewhere(words: Floats, wanted: Floats) -> bool:
+    """Whether words are not those that are wanted; what is known of neither is alike."""
+    return not np.array_equal(words, wanted, equal_nan=True)

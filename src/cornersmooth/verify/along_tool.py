@@ -54,6 +54,13 @@ class AlongTool:
         number = bisect_left(self._retracts, element)
         return self._retracts[number] if number < len(self._retracts) else math.inf
 
+    def comes_down_first(self, element: int) -> bool:
+        """Whether a rapid comes down from a retract, and the next leads from there to another place, not along the tool."""
+        after = element + 1
+        if self.next_retract(element) != element or not self._ahead.has(after) or not self._is(Element.RAPID, after):
+            return False
+        return self.next_retract(after) != after and not (self._height(element, after) or self._height(after, element))
+
     def stays(self, element: int) -> bool:
         """Whether an element is a rapid along the tool beside a retract; then it is put to where the tool stays."""
         ahead = self._ahead

@@ -1,6 +1,13 @@
-"""Feeds: every written element must carry the feed of a CL move that its tip may run along within the tolerance."""
+"""Feeds as functions of the place: where an element runs along a CL move, it must carry the feed of that move.
+
+A vertex may be a little before its place or behind it: anywhere on the CL path, without a break, within the tolerance.
+Between the last place of the start of an element and the first of its end, every move counts. Where nothing lies
+between the two, any of the moves that the element may be on does.
+"""
 
 from __future__ import annotations
+
+from typing import Final
 
 import numpy as np
 
@@ -9,59 +16,84 @@ from cornersmooth.nc_reader.elements import Element, Elements, Problem
 from cornersmooth.nc_reader.tool import directions
 from cornersmooth.verify.cl_motion import Original
 from cornersmooth.verify.findings import Findings, Runs
+from cornersmooth.verify.free_space import free_interval
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.nearest import COLUMNS, on_segments
 from cornersmooth.verify.task import ARITHMETIC, Task
 
-#: segments on either side of a vertex that are looked at first (speed only)
-_FEW = 64
-
-#: wrong elements in a row that are looked at one by one; the rest of them goes with these
-_MOST_SINGLE = 50
+#: places nearer to a vertex of the CL path are at it, in segments
+_HAIR: Final = 1e-9
 
 
 def check_feeds(match: Match, found: Findings) -> None:
-    """Every element must carry the feed of its move: CS541 a wrong feed, CS542 none, CS543 the wrong feed mode."""
-    nc, feeding = match.nc, match.feeding
+    """Every element must carry the feed of its moves: CS541 a wrong feed, CS542 none, CS543 the wrong feed mode."""
+    nc, feeding, task = match.nc, match.feeding, match.task
     element = np.flatnonzero(feeding) + match.first + 1
     if not len(element):
         return
     start, end = match.motion.last[:-1][feeding], match.motion.last[1:][feeding]
-    low, high = _touched(match, start, end)
+    place = match.place[start], match.place[end]
     # a planned feed of what does not move the tool, as a table that turns about it, tells nothing but a time
     still = nc.least_feed[element] & (np.linalg.norm(match.six[end] - match.six[start], axis=1) <= ARITHMETIC)
     still &= end == start + 1  # a full circle has more vertices
     good = still | (nc.kind[element] == Element.RAPID)
-    for move in (low, high):
-        rows = np.flatnonzero(~good)
-        good[rows] = _fits(match.original, match.nc, element[rows], move[rows])
-    in_a_row = 0
-    for k in np.flatnonzero(~good).tolist():
-        in_a_row = in_a_row + 1 if k and not good[k - 1] else 0
-        if in_a_row < _MOST_SINGLE:
-            own = int(element[k])
-            good[k] = _fits(match.original, match.nc, own, np.arange(low[k], high[k] + 1)).any() or _joined(
-                match, own, _beside(match, int(start[k])), _beside(match, int(end[k]))
-            )
-    wrong = np.flatnonzero(~good)
-    if len(wrong):
-        first = wrong[np.diff(wrong, prepend=-2) > 1]
-        problems = [_problem(match.original, nc, int(element[k]), int(low[k])) for k in first.tolist()]
+    wrong = np.full(len(element), -1)
+    first, last = _runs_between(task, *place)
+    good |= (first == last) & (_misfit(task, nc, element, first, first) < 0)
+    if len(rows := np.flatnonzero(~good)):
+        own = start[rows]
+        guessed = match.continued & (match.section[own] == 0)  # where the batch begins is not where the stretch does
+        limits = np.where(guessed, 0, match.low[own]), match.high[own]
+        six = match.six[own], match.six[end[rows]]
+        from_, to = (where[rows] for where in place)
+        latest, earliest = _reach(task, six[0], from_, limits, 1), _reach(task, six[1], to, limits, -1)
+        between = latest + _HAIR < earliest - _HAIR
+        runs = _runs_between(task, latest, earliest)
+        wrong[rows] = np.where(between, _misfit(task, nc, element[rows], *runs), -1)
+        if len(some := np.flatnonzero(~between)):
+            limits, rows = (limits[0][some], limits[1][some]), rows[some]
+            around = (_reach(task, six[k][some], (from_, to)[k][some], limits, 2 * k - 1) for k in (0, 1))
+            runs = _runs_between(task, *around)
+            wrong[rows] = np.where(_fits_any(task, nc, element[rows], *runs), -1, first[rows])
+        good = wrong < 0
+    wrongs = np.flatnonzero(~good)
+    if len(wrongs):
+        shown = wrongs[np.diff(wrongs, prepend=-2) > 1]
+        moves = task.feed_runs[1][wrong[shown]]
+        problems = [
+            _problem(match.original, nc, *row) for row in zip(element[shown].tolist(), moves.tolist(), strict=True)
+        ]
         found.feeds = Runs(problems, begins=not good[0], ends=not good[-1])
 
 
-def _touched(match: Match, start: Ints, end: Ints) -> tuple[Ints, Ints]:
-    """First and last original move that an element runs along."""
-    length = match.path.length
-    owner = match.original.trail.owner
-    segment = match.segment[start]
-    rest = length[segment + 1] - match.path.lengths_at(match.place[start])
-    segment = np.where((rest <= match.margin) & (segment < match.high[start]), segment + 1, segment)
-    last = match.segment[end]
-    gone = match.path.lengths_at(match.place[end]) - length[last]
-    last = np.where((gone <= match.margin) & (last > segment), last - 1, last)
-    last = np.maximum(last, segment)
-    return owner[segment + 1], owner[last + 1]
+def _runs_between(task: Task, low: Floats, high: Floats) -> tuple[Ints, Ints]:
+    """(k,) first and last run of moves with one feed between two places of the CL path."""
+    run, owner = task.feed_runs[0], task.original.trail.owner
+    first = np.minimum((low + _HAIR).astype(np.int64), task.path.segments - 1)
+    last = np.maximum(np.ceil(high - _HAIR).astype(np.int64) - 1, first)
+    return run[owner[first + 1]], run[owner[last + 1]]
+
+
+def _misfit(task: Task, nc: Elements, element: Ints, first: Ints, last: Ints) -> Ints:
+    """(k,) first of some runs whose feed elements do not carry, from `first` to `last`; -1 for none."""
+    wrong, run, rows = np.full(len(element), -1), first.copy(), np.arange(len(element))
+    while len(rows):
+        fit = _fits(task.original, nc, element[rows], task.feed_runs[1][run[rows]])
+        wrong[rows[~fit]] = run[rows[~fit]]
+        rows = rows[fit & (run[rows] < last[rows])]
+        run[rows] += 1
+    return wrong
+
+
+def _fits_any(task: Task, nc: Elements, element: Ints, first: Ints, last: Ints) -> Bools:
+    """(k,) whether elements carry the feed of any of some runs, from `first` to `last`."""
+    found, run, rows = np.zeros(len(element), np.bool_), first.copy(), np.arange(len(element))
+    while len(rows):
+        fit = _fits(task.original, nc, element[rows], task.feed_runs[1][run[rows]])
+        found[rows[fit]] = True
+        rows = rows[~fit & (run[rows] < last[rows])]
+        run[rows] += 1
+    return found
 
 
 def _fits(original: Original, nc: Elements, element: Ints | int, move: Ints) -> Bools:
@@ -71,33 +103,27 @@ def _fits(original: Original, nc: Elements, element: Ints | int, move: Ints) -> 
     return np.isnan(asked) | nc.carry(element, asked, mode)
 
 
-def _beside(match: Match, vertex: int) -> Ints:
-    """Moves around its own that a vertex may be on."""
-    low, here, high = (int(segment[vertex]) for segment in (match.low, match.segment, match.high))
-    return _near(match.task, match.six[vertex, :3], low, here, high)
+def _reach(task: Task, six: Floats, place: Floats, limits: tuple[Ints, Ints], way: int) -> Floats:
+    """(k,) last places up to which the CL path stays within the tolerance of points (k, 6), from places on.
 
-
-def _near(task: Task, tip: Floats, low: int, here: int, high: int) -> Ints:
-    """Moves around that of a segment, from one segment to another, within the tolerance (`Task.radius`) of a tip."""
-    size = _FEW
-    while True:
-        segments = np.arange(max(here - size, low), min(here + size, high) + 1)
-        _, square = on_segments(tip[None, None], task.path.points, segments[None], COLUMNS["tip"])
-        off = segments[square[0] > task.radius**2]
-        begin, end = off[off < here].max(initial=low - 1) + 1, off[off > here].min(initial=high + 1)
-        if segments[0] <= max(begin - 1, low) and min(end, high) <= segments[-1]:
-            owner: Ints = task.original.trail.owner[begin + 1 : end + 1]
-            return owner
-        size *= 4
-
-
-def _joined(match: Match, element: int, first: Ints, last: Ints) -> bool:
-    """Whether a move of the first leads to one of the last along moves whose feed an element carries."""
-    moves = np.arange(min(first[0], last[0]), max(first[-1], last[-1]) + 1)
-    good = _fits(match.original, match.nc, element, moves)
-    run = np.cumsum(np.diff(good, prepend=False))
-    one, other = (set(run[good & np.isin(moves, part)].tolist()) for part in (first, last))
-    return not one.isdisjoint(other)
+    Forward or back, as `way` is 1 or -1; `limits`: the first and the last segment (k,) that may be reached.
+    """
+    points, radius = task.path.points, np.asarray(task.radius)
+    found, rows = place.copy(), np.arange(len(place))
+    segment = place.astype(np.int64) if way > 0 else np.ceil(place).astype(np.int64) - 1
+    segment = np.clip(segment, np.minimum(*limits), limits[1])
+    while len(rows):
+        start = points[segment].T
+        low, high = free_interval(six[rows].T, start, points[segment + 1].T - start, radius)
+        share = np.clip(found[rows] - segment, 0.0, 1.0)
+        free = (low <= share + _HAIR) & (share - _HAIR <= high)
+        end = np.clip(high, share, 1.0) if way > 0 else np.clip(low, 0.0, share)
+        found[rows[free]] = (segment + end)[free]
+        more = free & (
+            (end >= 1.0) & (segment < limits[1][rows]) if way > 0 else (end <= 0.0) & (segment > limits[0][rows])
+        )
+        rows, segment = rows[more], segment[more] + way
+    return found
 
 
 def out_of_hole(task: Task, nc: Elements, element: int, move: int) -> float:
@@ -112,11 +138,19 @@ def out_of_hole(task: Task, nc: Elements, element: int, move: int) -> float:
 
 def feed_at(task: Task, nc: Elements, element: int, move: int, place: float) -> list[Problem]:
     """What is wrong with the feed of an element of which only the end is compared: it leads to a place of a move."""
-    last, moves = task.path.segments - 1, np.array([move])
-    if last >= 0:
-        here = min(int(place), last)
-        moves = np.append(moves, _near(task, nc.tip[element], here, here, last))
-    if _fits(task.original, nc, element, moves).any():
+    first = last = task.feed_runs[0][[move]]
+    if task.path.segments > 0:
+        tip, at, limits = (
+            nc.tip[[element]],
+            np.array([place]),
+            (np.zeros(1, np.int64), np.array([task.path.segments - 1])),
+        )
+        six = task.six(tip, directions(nc, tip, nc.second[[element]]))
+        first, last = _runs_between(task, *(_reach(task, six, at, limits, way) for way in (-1, 1)))
+    if (
+        _fits(task.original, nc, element, np.array([move])).any()
+        or _fits_any(task, nc, np.array([element]), first, last)[0]
+    ):
         return []
     return [_problem(task.original, nc, element, move)]
 

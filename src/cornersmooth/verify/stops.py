@@ -200,7 +200,7 @@ class Stops:
                 if one.cost < found.setdefault(one.key, one).cost:
                     found[one.key] = one
 
-        if stands:  # a rapid for the digits of a stop alone
+        if stands and not self._comes_down_first(element):  # a rapid for the digits of a stop alone
             put(alive)
         for trace in alive:
             if not stands:
@@ -215,6 +215,10 @@ class Stops:
         for trace in alive:
             put(self._with_fault(trace, element))
         return sorted(found.values(), key=lambda one: one.cost)[:_AFTER_FAULT]
+
+    def _comes_down_first(self, element: int) -> bool:
+        """Whether the tool comes down from a retract to where it was, to go to another place in rapid from there."""
+        return self._along.comes_down_first(element) and not self.lines.stands(element + 1)
 
     def _moved_on(self, stop: int, element: int, begin: int) -> bool:
         """Whether no move between a stop and the next leads anywhere, or elements after one have run up to the last."""
@@ -373,11 +377,12 @@ class Stops:
         return self._fed[stop] or not self._hole[stop + 1] or self.lines.at(self._move[stop + 1] - 1, element)
 
     def _negligible(self, element: int) -> bool:
-        """Whether an element moves the tool by no more than digits show."""
+        """Whether an element moves the tool by no more than digits show, and not down first."""
         nc, at = self._ahead.nc, element - self._ahead.base
         both = slice(at - 1, at + 1)
         turn = self.lines.axis_length * np.ptp(directions(nc, nc.tip[both], nc.second[both]), axis=0)
-        return at > 0 and not beyond_digits(nc, np.diff(nc.tip[both], axis=0))[0] and max(turn) <= self.lines.room
+        still = at > 0 and not beyond_digits(nc, np.diff(nc.tip[both], axis=0))[0] and max(turn) <= self.lines.room
+        return still and not self._comes_down_first(element)
 
     # ------------------------------------------------------------------ what is certain
 

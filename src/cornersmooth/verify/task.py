@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from cornersmooth.model import Bools, Floats, Keep, Program
+from cornersmooth.model import Bools, Floats, Ints, Keep, Program
 from cornersmooth.nc_reader.elements import Elements
 from cornersmooth.verify.chain import Path
 from cornersmooth.verify.cl_motion import Original, original_motion
@@ -100,6 +100,21 @@ class Task:
         for name in ("tip", "axis_point") if self.apart else ():
             found[name] = self.path.only(COLUMNS[name]), self.tolerance + ARITHMETIC
         return found
+
+    @cached_property
+    def feed_runs(self) -> tuple[Ints, Ints]:
+        """(m,) run of moves with one feed that each move is in, and (r,) their first moves; what stands has no feed."""
+        program, pose, last = self.original.program, self.original.pose, self.original.trail.last
+        feed, mode = program.feed[pose], program.feed_mode[pose]
+        stands = np.diff(self.path.length[last], prepend=-np.inf) <= ARITHMETIC
+        moved = np.flatnonzero(~stands)
+        other = (mode[moved[1:]] != mode[moved[:-1]]) | ~(
+            (feed[moved[1:]] == feed[moved[:-1]]) | (np.isnan(feed[moved[1:]]) & np.isnan(feed[moved[:-1]]))
+        )
+        begins = np.zeros(len(pose), np.bool_)
+        begins[moved[1:][other]] = True
+        first = np.append(0, np.flatnonzero(begins))
+        return np.cumsum(begins), first
 
     def margin(self, nc: Elements) -> float:
         """Distance that printed digits may account for, mm: never more than a share of the tolerance."""
