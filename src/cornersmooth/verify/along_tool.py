@@ -55,7 +55,7 @@ class AlongTool:
         return self._retracts[number] if number < len(self._retracts) else math.inf
 
     def comes_down_first(self, element: int) -> bool:
-        """Whether a rapid comes down from a retract, and the next leads from there to another place, not along the tool."""
+        """Whether a rapid comes down from a retract, and the next leads away from there, not along the tool."""
         after = element + 1
         if self.next_retract(element) != element or not self._ahead.has(after) or not self._is(Element.RAPID, after):
             return False
