@@ -200,8 +200,8 @@ class Stops:
                 if one.cost < found.setdefault(one.key, one).cost:
                     found[one.key] = one
 
-        if stands and not self._comes_down_first(element):  # a rapid for the digits of a stop alone
-            put(alive)
+        if stands:  # a rapid for the digits of a stop alone
+            put(one for one in alive if not self._comes_down_first(one.stop, element))
         for trace in alive:
             if not stands:
                 put(self._from(trace, element))
@@ -216,9 +216,17 @@ class Stops:
             put(self._with_fault(trace, element))
         return sorted(found.values(), key=lambda one: one.cost)[:_AFTER_FAULT]
 
-    def _comes_down_first(self, element: int) -> bool:
-        """Whether the tool comes down from a retract to where it was, to go to another place in rapid from there."""
-        return self._along.comes_down_first(element) and not self.lines.stands(element + 1)
+    def _comes_down_first(self, stop: int, element: int) -> bool:
+        """Whether the tool comes down from a retract to where it was, to go to another place in rapid from there.
+
+        Unless a rapid of the CL file that leads nowhere, the last before the next stop, has it there.
+        """
+        if not self._along.comes_down_first(element) or self.lines.stands(element + 1):
+            return False
+        move = self._move[stop + 1] - 1
+        there = move > self._move[stop] and self.lines.kind[move] == Move.RAPID
+        first, behind = self._changes.elements_of(int(self._task.original.pose[move]))
+        return not (there and first <= element < behind)
 
     def _moved_on(self, stop: int, element: int, begin: int) -> bool:
         """Whether no move between a stop and the next leads anywhere, or elements after one have run up to the last."""
@@ -261,7 +269,7 @@ class Stops:
         if not trace.inside:
             if reaches:
                 yield _Trace(k + 1, element, False, trace, cost=trace.cost)
-            elif k >= 0 and (self._is_fed(k, element) if feeds else self._negligible(element)):
+            elif k >= 0 and (self._is_fed(k, element) if feeds else self._negligible(k, element)):
                 yield trace
             return
         if self._over(k, element):
@@ -376,13 +384,13 @@ class Stops:
         """Whether a feed move may follow a stop; it is only asked for before holes, else the decision says it."""
         return self._fed[stop] or not self._hole[stop + 1] or self.lines.at(self._move[stop + 1] - 1, element)
 
-    def _negligible(self, element: int) -> bool:
+    def _negligible(self, stop: int, element: int) -> bool:
         """Whether an element moves the tool by no more than digits show, and not down first."""
         nc, at = self._ahead.nc, element - self._ahead.base
         both = slice(at - 1, at + 1)
         turn = self.lines.axis_length * np.ptp(directions(nc, nc.tip[both], nc.second[both]), axis=0)
         still = at > 0 and not beyond_digits(nc, np.diff(nc.tip[both], axis=0))[0] and max(turn) <= self.lines.room
-        return still and not self._comes_down_first(element)
+        return still and not self._comes_down_first(stop, element)
 
     # ------------------------------------------------------------------ what is certain
 
