@@ -163,3 +163,44 @@ def test_what_means_more_is_not_drilled(cycle: str) -> None:
     text = f"UNITS/MM\nLOADTL/1\nSPINDL/RPM,900,CLW\nRAPID\nGOTO/5,6,40\nCYCLE/{cycle},RAPTO,3,FEDTO,-12,MMPM,80\n"
     with pytest.raises(InputError, match=r"6: error\[CS342\]"):
         postprocess((text + "GOTO/5,6,0\nCYCLE/OFF\nFINI\n").encode(), io.BytesIO(), reading={"dialect": "nx"})
+
+
+CATIA = (
+    "$$     CATIA APT VERSION 1.0\nUNITS/MM\nLOADTL/1\nSPINDL/900,RPM,CLW\nRAPID\nGOTO/5,6,40\nCYCLE/{}\nGOTO/5,6,0\n"
+    "CYCLE/OFF\nFINI\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("order", "cycle", "same"),
+    [
+        ("DEPTH,FEED,CLEAR", "DRILL,   26.0,   85.0,    1.0,MMPM", "DRILL,DEPTH,26,MMPM,85,CLEAR,1"),
+        ("depth, feed", "DRILL,    3.0,    5.0", "DRILL,DEPTH,3,PERMIN,5"),
+        ("DEPTH,SKIP,FEED,CLEAR,STEP", "DEEP,30,7,85,2,4,MMPM", "DEEP,DEPTH,30,MMPM,85,CLEAR,2,STEP,4"),
+        ("DEPTH,PITCH,CLEAR", "TAP,12,1.25,3", "TAP,DEPTH,12,MMPR,1.25,CLEAR,3"),
+        ("DEPTH,FEED,CLEAR", "DRILL,DEPTH,26,MMPM,85,CLEAR,1", "DRILL,DEPTH,26,MMPM,85,CLEAR,1"),
+    ],
+)
+def test_an_order_names_the_numbers_of_a_cycle(order: str, cycle: str, same: str) -> None:
+    found = []
+    for one, reading in ((cycle, {"cycle_order": order}), (same, {})):
+        stream = io.BytesIO()
+        result = postprocess(CATIA.format(one).encode(), stream, Settings(tolerance=0.02), reading=reading)
+        assert result.verdict is Verdict.PASSED
+        found.append([line for line in stream.getvalue().decode().splitlines() if not line.startswith("(")])
+    assert found[0] == found[1]
+
+
+def test_more_numbers_than_the_order_names_are_not_drilled() -> None:
+    for reading in ({}, {"cycle_order": "DEPTH,FEED"}):
+        with pytest.raises(InputError, match=r"error\[CS342\]"):
+            postprocess(CATIA.format("DRILL,26,85,1,MMPM").encode(), io.BytesIO(), reading=reading)
+    for wrong in ("DEPTH,SPEED", "DEPTH,DEPTH"):
+        with pytest.raises(SettingsError, match="CS230"):
+            read(CATIA.format("OFF").encode(), cycle_order=wrong)
+
+
+def test_rules_of_tables_are_refused_for_cl_files() -> None:
+    for rule in ({"scale": 1000.0}, {"flip_axis": True}, {"between_passes": 20.0}):
+        with pytest.raises(SettingsError, match="CS230"):
+            read(CATIA.format("OFF").encode(), **rule)

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cornersmooth import cl
 from cornersmooth.cl import points_table
 from cornersmooth.cl.points import looks_like_points, read_points
 from cornersmooth.errors import InputError
@@ -249,8 +250,8 @@ UNIT = "0,0,0,0,0,1\n"
         ("x,y,z,i,j\n1,2,3,4,5\n", "path.csv:1: error: cannot make out the columns of the header: no tool axis"),
         ("x,y,z,x,y,z\n" + UNIT, "path.csv:1: error: cannot make out the columns of the header: 'x' stands there"),
         ("x[mm],y[in],z\n1,2,3\n", "path.csv:1: error: cannot make out the columns of the header: mm and inch"),
-        ("x[m],y[m],z[m]\n1,2,3\n", "path.csv:1: error: column 'x[m]' is in 'm'; give lengths in mm or inch"),
-        ("x,y,z,f[mm/s]\n1,2,3,4\n", "path.csv:1: error: column 'f[mm/s]' is in 'mm/s'"),
+        ("x[ft],y[ft],z[ft]\n1,2,3\n", "path.csv:1: error: column 'x[ft]' is in 'ft'; give lengths in mm, m or inch"),
+        ("x,y,z,f[mm/rev]\n1,2,3,4\n", "path.csv:1: error: column 'f[mm/rev]' is in 'mm/rev'"),
         ("x,y,z,f\n1,2,3,4\n1,2,3,0\n", "path.csv:3: error: feed 0 is not positive; give the feed per minute"),
         ("x,y,z,f\n1,2,3,fast\n", "path.csv:2: error: 'fast' is not a number"),
         ("0,5 1,5 2,5 0,0 0,0 1,0\n", "path.csv:1: error: cannot tell decimal commas from separating commas; put semi"),
@@ -513,3 +514,64 @@ def test_a_path_that_is_a_part_of_a_millimetre_may_be_in_metres():
     ]
     assert "CS209" not in codes(read(text.replace("0.041", "4.1")))
     assert "CS209" not in codes(read(text.replace("x,y,z", "x [mm],y [mm],z [mm]")))
+
+
+def ruled(text: str, **options: object) -> Program:
+    return cl.read(text.encode(), name="path.csv", **options)  # type: ignore[arg-type]
+
+
+def test_metres_by_header_or_option():
+    body = "0,0,0.04,0,0,1,0.5\n0.014,0.003,0,0,0,1,0.5\n0.041,0.003,0,0,0,1,0.5\n"
+    named = read("x [m],y [m],z [m],i,j,k,f [mm/s]\n" + body)
+    assert named.tip.tolist() == [[0, 0, 40], [14, 3, 0], [41, 3, 0]]
+    assert named.feed.tolist() == [30.0] * 3
+    assert named.units == "mm"
+    assert not {"CS176", "CS209"} & set(codes(named))
+    scaled = ruled("x,y,z,i,j,k,f\n" + body, scale=1000.0)
+    assert scaled.tip == pytest.approx(named.tip)
+    assert scaled.feed.tolist() == [500.0] * 3
+    assert ruled("x,y,z,i,j,k,f [mm/min]\n" + body, scale=1000.0).feed.tolist() == [0.5] * 3
+    inches = ruled("x,y,z\n1,2,3\n2,2,3\n", units="inch", scale=0.5)
+    assert inches.tip == pytest.approx(np.array([[12.7, 25.4, 38.1], [25.4, 25.4, 38.1]]))
+    points = ruled("xa,ya,za,xb,yb,zb\n0,0,0,0,0,0.1\n0.02,0,0,0.02,0.06,0.08\n", scale=1000.0)
+    assert points.axis == pytest.approx(np.array([[0, 0, 1], [0, 0.6, 0.8]]))
+
+
+def test_axes_that_point_down_are_turned_round():
+    assert ruled("0,0,0,0,0,-1\n1,0,0,0.6,0,-0.8\n", flip_axis=True).axis.tolist() == [[0, 0, 1], [-0.6, 0, 0.8]]
+
+
+def test_between_passes_the_tool_goes_back_over_and_down():
+    one, two = "0,0,0,0,0,1,90\n9,0,0,0.6,0,0.8,90\n", "9,5,0,0.6,0,0.8,70\n0,5,0,0,0,1,70\n"
+    for text in (
+        "x,y,z,i,j,k,f\n" + one + "\n" + two,
+        "x,y,z,i,j,k,f\n" + one + "# pass 2\n" + two,
+        "pass,x,y,z,i,j,k,f\n" + "".join(f"{1 + k // 2},{row}\n" for k, row in enumerate((one + two).split())),
+    ):
+        program = ruled(text, between_passes=10.0, units="mm")
+        assert program.kind.tolist() == [1, 2, 1, 1, 2, 2]
+        back = np.array([[9, 0, 0], [15, 0, 8], [15, 5, 8], [9, 5, 0]])
+        assert program.tip[1:5] == pytest.approx(back)
+        assert program.axis[1:5] == pytest.approx(np.array([[0.6, 0, 0.8]] * 4))
+        assert program.feed[[1, 4, 5]].tolist() == [90, 70, 70]
+        assert program.line[[1, 2, 3, 4]].tolist() == [*program.line[[1, 1, 4, 4]]]
+        assert "CS200" not in codes(program)
+    same = "x,y,z,i,j,k\n0,0,0,0,0,1\n9,0,0,0,0,1\n"
+    assert ruled(same, between_passes=10.0).tip.tolist() == read(same).tip.tolist()
+
+
+def test_a_normal_beside_a_named_tool_axis_is_not_the_axis():
+    for names in ("i,j,k,nx,ny,nz", "tool_axis_x,tool_axis_y,tool_axis_z,normal_x,normal_y,normal_z"):
+        program = read(f"x,y,z,{names}\n0,0,0,0,0,1,0,1,0\n9,0,0,0,0,1,0,1,0\n")
+        assert program.axis.tolist() == [[0, 0, 1]] * 2
+        assert "CS173" in codes(program)
+
+
+@pytest.mark.parametrize("head", ["type,x,y,z,i,j,k,f", "move_type;x;y;z;i;j;k;f", "g,x,y,z,i,j,k,f"])
+def test_rapids_in_the_first_column(head: str):
+    words = ("G0", "G1") if head.startswith("g") else ("rapid", "feed")
+    rows = [f"{words[k in (1, 2)]},0,{k},0,0,0,1,{500 * (k in (1, 2)) or ''}" for k in range(4)]
+    text = head + "\n" + "\n".join(rows).replace(",", ";" if ";" in head else ",") + "\n"
+    program = cl.read(text.encode(), name="path.csv")
+    assert program.source.format == "points"
+    assert program.kind.tolist() == [1, 2, 2, 1]

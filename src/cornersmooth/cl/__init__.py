@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Final
 
 from cornersmooth.cl.arcs import RULES, ArcRule
+from cornersmooth.cl.cycles import order_of
 from cornersmooth.cl.dialects import NAMES as DIALECTS
 from cornersmooth.cl.grammar import joined
 from cornersmooth.cl.messages import error
@@ -44,6 +45,10 @@ def read(
     spindle: tuple[float, str] | None = None,
     operation: str | None = None,
     size_limit: bool = True,
+    scale: float = 1.0,
+    flip_axis: bool = False,
+    between_passes: float | None = None,
+    cycle_order: str | None = None,
 ) -> Program:
     """Read a tool path.
 
@@ -69,6 +74,14 @@ def read(
         Revolutions per minute, and ``CLW`` or ``CCLW``, for inputs that start no spindle.
     operation : str or None
         Name or number of the operation to read alone, as `cl.operations` finds them; None for the whole file.
+    scale : float
+        Of all lengths of a table of points, 1000 for metres.
+    flip_axis : bool
+        Turn the tool axes of a table round.
+    between_passes : float, mm, optional
+        How far the tool goes back along its axis between the passes of a table; None feeds straight on.
+    cycle_order : str, optional
+        Words of `cl.cycles.ORDER` for the numbers without a word of CYCLE, separated by commas.
     size_limit : bool
         Refuse inputs of more than 2 GB, and gzip files that grow 200-fold.
 
@@ -82,7 +95,8 @@ def read(
     InputError
         ``FILE:LINE: error: what; what to do``.
     SettingsError
-        CS230 for a format, dialect, unit or rule that does not exist; CS248 for a tool or a speed that the input has.
+        CS230 for a format, dialect, unit, rule or word that does not exist, and for a rule of tables and another file;
+        CS248 for a tool or a speed that the input has.
     """
     for what, value, choices in (
         ("format", format, FORMATS),
@@ -92,21 +106,30 @@ def read(
     ):
         if value is not None and value not in choices:
             raise SettingsError("CS230", f"unknown {what} {value!r}", f"use one of {', '.join(choices)}")
+    tables_only = scale != 1.0 or flip_axis or between_passes is not None
     data, name = load(source, name, size_limit=size_limit)
     if format is None:
-        from cornersmooth.cl.points import looks_like_points
+        from cornersmooth.cl.points import begins_with_names, looks_like_points
 
         head = data[:HEAD]
-        format = "points" if not _CL_STATEMENT.search(head) and looks_like_points(head) else "apt"
+        table = begins_with_names(head) or (not _CL_STATEMENT.search(head) and looks_like_points(head))
+        format = "points" if table else "apt"
     if format == "points":
-        from cornersmooth.cl.points import read_points
+        from cornersmooth.cl.points import TableRules, read_points
 
-        program = read_points(data, name=name, units=units, lenient=lenient)
+        rules = TableRules(scale, flip_axis, between_passes)
+        program = read_points(data, name=name, units=units, lenient=lenient, rules=rules)
     else:
         from cornersmooth.cl.apt import read_apt
 
+        if tables_only:
+            what = "scale, flipped axes and passes are of tables of points, and this is a CL file"
+            raise SettingsError("CS230", what, "leave them out", file=name)
         text = clean(data, name)
-        program = read_apt(text, name=name, dialect=dialect, units=units, arc_rule=arc_rule, lenient=lenient)
+        order = order_of(cycle_order)
+        program = read_apt(
+            text, name=name, dialect=dialect, units=units, arc_rule=arc_rule, lenient=lenient, cycle_order=order
+        )
     program = replace(program, source=replace(program.source, name=os.path.basename(name)))
     if operation is not None or tool_number is not None or spindle is not None:
         from cornersmooth.cl.operations import one_operation, with_tool

@@ -72,6 +72,7 @@ def read_apt(
     arc_rule: ArcRule | None = None,
     lenient: bool = False,
     fast: bool = True,
+    cycle_order: tuple[str, ...] = (),
 ) -> Program:
     """Read an APT / CL text; parameters are those of `cornersmooth.cl.read`.
 
@@ -93,6 +94,7 @@ def read_apt(
         off_known=known.multax_off is not None,
         arc_rule=arc_rule,
         lenient=lenient,
+        cycle_order=cycle_order,
     )
     if cut:
         state.note(cut, 0)

@@ -3,21 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final
 
 from cornersmooth.cl.grammar import Argument
+from cornersmooth.errors import SettingsError
+
+#: what numbers without a word may be
+ORDER: Final = ("DEPTH", "FEED", "PITCH", "CLEAR", "RAPTO", "RETURN", "STEP", "DWELL", "SKIP")
 
 #: millimetres per inch: threads per inch as a pitch
-_INCH = 25.4
+_INCH: Final = 25.4
+
+#: words of a cycle that have no number
+_KINDS: Final = frozenset("DRILL FACE SPOT CSINK REAM BORE DEEP BRKCHP TAP".split())
+_UNITS: Final = frozenset("MMPM IPM PERMIN MMPR IPR PERREV".split())
 
 
-def plain_cycle(args: Sequence[Argument], dialect: str) -> tuple[Argument, ...]:
+def order_of(text: str | None) -> tuple[str, ...]:
+    """Words of `ORDER` from a text (SettingsError CS230)."""
+    order = tuple(word.strip().upper() for word in text.split(",")) if text else ()
+    wrong = [word for word in order if word not in ORDER]
+    if wrong or len({*order} - {"SKIP"}) < len([word for word in order if word != "SKIP"]):
+        raise SettingsError("CS230", f"numbers of CYCLE cannot be {text!r}", f"name each once: {', '.join(ORDER)}")
+    return order
+
+
+def plain_cycle(args: Sequence[Argument], dialect: str, order: tuple[str, ...] = ()) -> tuple[Argument, ...]:
     """Arguments of a cycle without spellings that mean one thing only; all others stay as they are.
 
     ``RIGID`` with ``PITCH`` is a tap (Autodesk's CAMplete post), ``TPI`` its pitch in threads per inch (PTC Creo);
     ``FLOAT`` says what holds the tap (NX). ``CSKDIA`` beside a depth is the diameter that comes of it (PTC Creo).
     ``ORIENT,0`` of the CAMplete post has no meaning: "unknown orientation". ``OPTION,CAM,n`` is a remark (NX).
     """
-    own = list(args)
+    own = _named(args, order) if order else list(args)
     kind = own[0] if own else ""
     if kind == "RIGID" and _number_behind(own, "PITCH") is not None:
         own[0] = "TAP"
@@ -35,6 +53,20 @@ def plain_cycle(args: Sequence[Argument], dialect: str) -> tuple[Argument, ...]:
     if "OPTION" in own and own[own.index("OPTION") + 1 :][:1] == ["CAM"] and _number_behind(own, "CAM") is not None:
         _drop(own, "OPTION", 3)
     return tuple(own)
+
+
+def _named(args: Sequence[Argument], order: tuple[str, ...]) -> list[Argument]:
+    """Arguments whose numbers get the words of an order, where none of them has one; else as they are."""
+    words = [value for value in args if isinstance(value, str) and value]
+    numbers = [value for value in args if isinstance(value, float)]
+    units = [word for word in words if word in _UNITS]
+    if not {*words} <= _KINDS | _UNITS or len(numbers) > len(order) or len(units) > 1:
+        return list(args)
+    spelled = {"FEED": (units or ["PERMIN"])[0], "PITCH": "PERREV"}
+    named: list[Argument] = [word for word in words if word in _KINDS]
+    for word, value in zip(order, numbers, strict=False):
+        named += [] if word == "SKIP" else [spelled.get(word, word), value]
+    return named
 
 
 def _number_behind(args: Sequence[Argument], word: str) -> float | None:

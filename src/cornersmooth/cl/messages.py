@@ -96,7 +96,7 @@ ERRORS: Final[dict[str, tuple[str, str]]] = {
         "put semicolons or tabs between the columns, or write decimal points",
     ),
     "CS161": ("the file holds bytes that are no characters", "give a plain file in UTF-8 or Windows-1252"),
-    "CS162": ("column {column!r} is in {unit!r}", "give lengths in mm or inch and feeds per minute"),
+    "CS162": ("column {column!r} is in {unit!r}", "give lengths in mm, m or inch, and feeds per minute"),
     "CS163": ("coordinate beyond {limit:g}", "check the columns and the units"),
     "CS164": ("an empty cell where a number is expected", "fill it or leave the line out"),
     "CS165": (
@@ -150,11 +150,11 @@ FINDINGS: Final[dict[str, tuple[Severity, str]]] = {
     "CS177": ("note", "no column says which moves are rapid: the first pose is reached in rapid, all others at feed"),
     "CS200": (
         "warning",
-        "{what} before this line, and the tool feeds straight on; see that it may, or give a column type with rapid",
+        "{what} before this line, and the tool feeds straight on; see that it may, or say --between-passes",
     ),
     "CS209": (
         "warning",
-        "the whole path is {size:.3g} {units} long: are the numbers metres?; --units inch, or multiply them by 1000",
+        "the whole path is {size:.3g} {units} long: are the numbers metres?; then --scale 1000",
     ),
     "CS176": ("note", "the file states no units: mm assumed"),
 }

@@ -30,6 +30,15 @@ LEAST_DISTANCE: Final = 1.5
 
 
 @dataclass(frozen=True)
+class TableRules:
+    """How a table is meant, where it does not say so itself."""
+
+    scale: float = 1.0  #: of all lengths
+    flip_axis: bool = False  #: the tool axes point into the part
+    between_passes: float | None = None  #: mm: way back along the tool axis between passes; None feeds straight on
+
+
+@dataclass(frozen=True)
 class _Rows:
     """The numbers of a file and where they come from."""
 
@@ -47,6 +56,12 @@ class _Rows:
         return int(self.line[wrong.argmax()])
 
 
+def begins_with_names(data: bytes) -> bool:
+    """Whether the first line of a file names at least the columns of the tip: a CL file never does."""
+    first = next(table.leading_lines(data), "")
+    return "$$" not in first and points_header.is_header(first)
+
+
 def looks_like_points(data: bytes) -> bool:
     """Whether a file, or its head, starts like a point file: a row of numbers, or one line of names and then a row."""
     first = list(islice(table.leading_lines(data), 2))
@@ -55,7 +70,14 @@ def looks_like_points(data: bytes) -> bool:
     return points_header.is_header(first[0]) or any(table.is_row(line) for line in first)
 
 
-def read_points(data: bytes, *, name: str, units: Units | None = None, lenient: bool = False) -> Program:
+def read_points(
+    data: bytes,
+    *,
+    name: str,
+    units: Units | None = None,
+    lenient: bool = False,
+    rules: TableRules = TableRules(),
+) -> Program:
     """Read a CSV or column file: every row is a linear move to its pose, at feed or rapid (InputError CS150-CS166).
 
     A column says which moves are rapid; where there is none, the first is, and all others are at feed. Columns are
@@ -73,26 +95,40 @@ def read_points(data: bytes, *, name: str, units: Units | None = None, lenient: 
     if not len(values):
         raise error("CS150", name, 1)
     rows = _Rows(name, values, line, columns)
-    far = np.flatnonzero(np.abs(rows.take(columns.wanted)).max(axis=1) > FARTHEST)
+    written = columns.units if units in (None, columns.units) else None  # else the header does not count
+    factor = rules.scale * (columns.factor if written else 1.0)
+    far = np.flatnonzero(np.abs(rows.take(columns.wanted)).max(axis=1) * max(factor, 1.0) > FARTHEST)
     if len(far):
         raise error("CS163", name, int(line[far[0]]), limit=FARTHEST)
     findings = [] if units or columns.units else [finding("CS176", 0)]
     units = units or columns.units or "mm"
-    scale = MM_PER_UNIT[units]
+    scale = MM_PER_UNIT[units] * factor
     axis, axis_findings = _axis(rows, scale, lenient)
     kind, rapid_findings = _kind(rows)
     feed, feed_findings = _feed(rows, kind, lenient)
-    findings += [*axis_findings, *feed_findings, *rapid_findings, *_parted(rows, kind)]
-    size = float(np.ptp(rows.take(columns.tip), axis=0).max()) * scale
-    if 0.0 < size < SMALLEST and not columns.units:
-        findings.append(finding("CS209", 0, size=size / scale, units=units))
+    axis = -axis if rules.flip_axis else axis
+    parted = _parted(rows, kind)
+    findings += [*axis_findings, *feed_findings, *rapid_findings]
+    size = float(np.ptp(rows.take(columns.tip), axis=0).max())
+    if 0.0 < size * scale < SMALLEST and not columns.units and factor == 1.0:
+        findings.append(finding("CS209", 0, size=size, units=units))
     if columns.unused:
         findings.append(finding("CS173", text.header_line, len(columns.unused), names=", ".join(columns.unused)))
+    tip = rows.take(columns.tip) * scale
+    known = columns.feed_factor if written else None
+    feed *= scale if known is None else MM_PER_UNIT[units] * known
+    if rules.between_passes is None:
+        findings += [
+            finding("CS200", int(line[row[0]]), len(row), what=what) for what, row in parted.items() if len(row)
+        ]
+    else:
+        starts = np.unique(np.concatenate([*parted.values()]))
+        tip, axis, kind, feed, line = _over(tip, axis, kind, feed, line, starts, rules.between_passes)
     return Program.from_poses(
-        rows.take(columns.tip) * scale,
+        tip,
         axis,
         kind=kind,
-        feed=feed * scale,
+        feed=feed,
         line=line,
         units=units,
         source=Source(PurePath(name).name, format="points", dialect="csv"),
@@ -166,19 +202,34 @@ def _kind(rows: _Rows) -> tuple[NDArray[np.uint8], list[Finding]]:
     return kind, []
 
 
-def _parted(rows: _Rows, kind: NDArray[np.uint8]) -> list[Finding]:
-    """Findings of feed moves over a blank line, a comment or from one pass to the next, which may lead across a part.
+def _parted(rows: _Rows, kind: NDArray[np.uint8]) -> dict[str, Ints]:
+    """Rows that are fed to over a blank line, a comment or from one pass to the next, by what parts them.
 
-    A gap after every row is how the file is spelt.
+    Such a move may lead across the part. A gap after every row is how the file is spelt.
     """
     fed = kind[1:] != Move.RAPID
     gap = np.diff(rows.line)
-    found = [("a blank line or a comment is", gap > gap.min(initial=rows.line[-1]))]
+    found = {"a blank line or a comment is": gap > gap.min(initial=rows.line[-1])}
     if rows.columns.passes is not None:
         number = rows.values[:, rows.columns.passes]
-        found.append(("the number of the pass changes", (number[1:] != number[:-1]) & ~np.isnan(number[1:])))
-    at = [(what, 1 + np.flatnonzero(parted & fed)) for what, parted in found]
-    return [finding("CS200", int(rows.line[row[0]]), len(row), what=what) for what, row in at if len(row)]
+        found["the number of the pass changes"] = (number[1:] != number[:-1]) & ~np.isnan(number[1:])
+    return {what: 1 + np.flatnonzero(parted & fed) for what, parted in found.items()}
+
+
+def _over(
+    tip: Floats, axis: Floats, kind: NDArray[np.uint8], feed: Floats, line: Ints, starts: Ints, back: float
+) -> tuple[Floats, Floats, NDArray[np.uint8], Floats, Ints]:
+    """Poses with two rapids before each start of a pass: back along the axis of the one before, and over the start."""
+    unit = axis / np.linalg.norm(axis, axis=1, keepdims=True)
+    at, of = np.repeat(starts, 2), np.stack((starts - 1, starts), axis=1).ravel()
+    rapid = np.full(len(at), Move.RAPID, np.uint8)
+    return (
+        np.insert(tip, at, (tip + back * unit)[of], axis=0),
+        np.insert(axis, at, axis[of], axis=0),
+        np.insert(kind, at, rapid),
+        np.insert(feed, at, feed[np.maximum(at - 1, 0)]),
+        np.insert(line, at, line[of]),
+    )
 
 
 def _distances(rows: _Rows, distance: Floats) -> list[Finding]:

@@ -47,9 +47,25 @@ _PASSES = frozenset(
 _COUNTERS = ("n", "no", "nr", "num", "number", "id", "idx", "index", "line", "row", "point", "pose", "t", "time")
 
 #: units a header may state after a name, as in ``x [mm]``
-_LENGTHS: dict[str, Units] = {"mm": "mm", "in": "inch", "inch": "inch", "inches": "inch"}
-_FEED_UNITS: dict[str, Units] = {"mm/min": "mm", "mmpm": "mm", "in/min": "inch", "ipm": "inch", "inch/min": "inch"}
+_LENGTHS: dict[str, tuple[Units, float]] = {
+    **dict.fromkeys(("in", "inch", "inches"), ("inch", 1.0)),
+    **{
+        name: ("mm", factor)
+        for name, factor in (("mm", 1.0), ("m", 1000.0), ("cm", 10.0), ("um", 0.001), ("µm", 0.001))
+    },
+}
+_FEED_UNITS: dict[str, tuple[Units, float]] = {
+    **dict.fromkeys(("mm/min", "mmpm"), ("mm", 1.0)),
+    **dict.fromkeys(("in/min", "ipm", "inch/min"), ("inch", 1.0)),
+    "m/min": ("mm", 1000.0),
+    "mm/s": ("mm", 60.0),
+    "m/s": ("mm", 60000.0),
+}
 _UNIT = re.compile(r"[\[(<]\s*([^\])>]*?)\s*[\])>]|[_/](mm|in|inch)$")
+
+#: spellings that mean the tool axis, and those that mean a surface normal beside such a one
+_SURELY_AXES = {"i j k", "axisx axisy axisz", "toolaxisx toolaxisy toolaxisz", "toolx tooly toolz"}
+_NORMALS = {"nx ny nz", "normalx normaly normalz"}
 
 
 @dataclass(frozen=True)
@@ -67,6 +83,8 @@ class Columns:
     passes: int | None = None  #: numbers the passes
     unused: tuple[str, ...] = ()  #: names of columns that are not read; counters and times are not counted among them
     units: Units | None = None  #: what the header says about units
+    factor: float = 1.0  #: of lengths, to `units`
+    feed_factor: float | None = None  #: of feeds per minute; None where the header says nothing of them
 
     @property
     def wanted(self) -> tuple[int, ...]:
@@ -99,12 +117,14 @@ def from_header(text: str, file: str, line: int) -> Columns:
     if tip is None:
         raise error("CS156", file, line, why=f"no x, y and z in {text.strip()[:60]!r}")
     left = [name if column not in tip else "" for column, name in enumerate(plain)]
-    named: list[tuple[Triple, Meaning]] = [
-        (found, meaning)
+    spelled: dict[str, tuple[Triple, Meaning]] = {
+        spelling: (found, meaning)
         for meaning, spellings in _SECOND.items()
         for spelling in spellings
         if (found := _find((spelling,), left))
-    ]
+    }
+    surely = [spelling for spelling in spelled if spelling in _SURELY_AXES]
+    named = [found for spelling, found in spelled.items() if len(surely) != 1 or spelling not in _NORMALS]
     if len({found for found, _ in named}) > 1:  # a surface normal is no tool axis
         which = " and ".join(",".join(names[c].strip() for c in found) for found, _ in named)
         raise error("CS156", file, line, why=f"{which} may each be the tool axis")
@@ -120,11 +140,14 @@ def from_header(text: str, file: str, line: int) -> Columns:
     axis = [left[c] for c in second or ()]
     if scalar := _scalar([left[c] for c in rest], set(axis)):
         raise error("CS165", file, line, names=", ".join((*axis, scalar)))
-    units = _units(names, (*tip, *(second if second and meaning == "points" else ())), feed, file, line)
+    lengths = (*tip, *(second if second and meaning == "points" else ()))
+    units, factor, feed_factor = _units(names, lengths, feed, file, line)
     says: Rapid = "word" if rapid is None else _RAPIDS[left[rapid]]
     name = "" if rapid is None else names[rapid].strip()
     passes = next((c for c in rest if left[c] in _PASSES), None)
-    return Columns(len(names), tip, second, meaning, feed, rapid, says, name, passes, unused, units)
+    return Columns(
+        len(names), tip, second, meaning, feed, rapid, says, name, passes, unused, units, factor, feed_factor
+    )
 
 
 def is_header(text: str) -> bool:
@@ -159,8 +182,11 @@ def _find(spellings: tuple[str, ...], names: list[str]) -> Triple | None:
     return None
 
 
-def _units(names: list[str], lengths: tuple[int, ...], feed: int | None, file: str, line: int) -> Units | None:
-    said: set[Units] = set()
+def _units(
+    names: list[str], lengths: tuple[int, ...], feed: int | None, file: str, line: int
+) -> tuple[Units | None, float, float | None]:
+    """Units that names of columns have, and their factors: of lengths, and of feeds."""
+    found: dict[bool, set[tuple[Units, float]]] = {False: set(), True: set()}
     for column in (*lengths, *(() if feed is None else (feed,))):
         match = _UNIT.search(names[column].lower().strip(" \"'"))
         if match is None or not (match[1] or match[2]):
@@ -169,7 +195,9 @@ def _units(names: list[str], lengths: tuple[int, ...], feed: int | None, file: s
         known = (_FEED_UNITS if column == feed else _LENGTHS).get(unit)
         if known is None:
             raise error("CS162", file, line, column=names[column].strip(), unit=unit)
-        said.add(known)
-    if len(said) > 1:
-        raise error("CS156", file, line, why="mm and inch in one header")
-    return said.pop() if said else None
+        found[column == feed].add(known)
+    both = {units for some in found.values() for units, _ in some}
+    if len(both) > 1 or len(found[False]) > 1:
+        raise error("CS156", file, line, why=f"{'mm and inch' if len(both) > 1 else 'two units'} in one header")
+    factor, of_feed = (next((factor for _, factor in found[feeds]), None) for feeds in (False, True))
+    return next(iter(both), None), 1.0 if factor is None else factor, of_feed

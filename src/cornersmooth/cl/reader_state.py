@@ -24,6 +24,7 @@ class ReaderState(Poses):
 
     dialect: Dialect
     arc_rule: ArcRule | None = None  #: overrides the dialect's sense of rotation
+    cycle_order: tuple[str, ...] = ()  #: what the numbers without a word of CYCLE are
     arcs: list[Arc] = field(default_factory=list)  #: in the order of their end poses
     statements: list[Statement] = field(default_factory=list)
     stated_units: list[tuple[int, Units, int]] = field(default_factory=list)  #: line, units, pose

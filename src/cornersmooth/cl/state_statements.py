@@ -269,7 +269,7 @@ def _cutcom(state: ReaderState, record: Record) -> None:
 def _cycle(state: ReaderState, record: Record) -> None:
     state.hole = record.option not in _ENDS
     state.set_kind()
-    state.keep(replace(record, args=plain_cycle(record.args, state.dialect.name)))
+    state.keep(replace(record, args=plain_cycle(record.args, state.dialect.name, state.cycle_order)))
 
 
 def _frame(state: ReaderState, record: Record) -> None:

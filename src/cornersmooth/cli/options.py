@@ -31,7 +31,9 @@ if TYPE_CHECKING:
     from cornersmooth.settings import Settings
 
 #: arguments of `cornersmooth.read` that options give
-_ARGUMENTS = "format dialect units arc_rule operation lenient tool_number spindle".split()
+_ARGUMENTS = (
+    "format dialect units arc_rule operation lenient tool_number spindle scale flip_axis between_passes cycle_order"
+).split()
 
 Count = Annotated[int, click.IntRange(min=1)]
 Units = Literal["mm", "inch"]
@@ -264,6 +266,20 @@ class Options:
         "Take one operation of the CL file alone, with the tool, spindle and coolant that hold there; "
         "'cornersmooth info' lists them.",
     )
+    scale: Annotated[float, click.FloatRange(1e-6, 1e6)] = _reading(
+        "", "Factor of all lengths of a table of points: 1000 where they are metres.", 1.0
+    )
+    flip_axis: bool = _reading("", "Turn the tool axes of a table round: they point into the part.", False)
+    between_passes: Length | None = _reading(
+        "MM",
+        "Between the passes of a table, back along the tool axis by so much, over in rapid, and down at feed. A blank "
+        "line, a comment, or another number in a column pass begins a pass.",
+    )
+    cycle_order: str | None = _reading(
+        "WORD,...",
+        "What the numbers without a word of CYCLE are, as the post-processor table of CATIA has them: DEPTH, FEED, "
+        "PITCH, CLEAR, RAPTO, RETURN, STEP, DWELL or SKIP.",
+    )
     lenient: bool = _reading("", "Go on after errors in the input where it is safe.", False)
     no_size_limit: bool = _reading("", "Read inputs of more than 2 GB, and gzip files that grow 200-fold.", False)
     tool_number: Annotated[int, click.IntRange(1, 99999999)] | None = _reading(
@@ -433,7 +449,7 @@ def under(*headings: str) -> str:
 
 #: options that several commands have
 CURVES, LINES = under("Curves"), under("Lines")
-READING = "format dialect units arc_rule operation lenient no_size_limit"
+READING = "format dialect units arc_rule operation scale flip_axis between_passes cycle_order lenient no_size_limit"
 WRITING = f"control machine {under('Control', 'Program', 'Holes and planes')}"
 #: the feed of commands that only plan
 FEED_OF_ALL = {"heading": "Limits", "help": "Feed of all feed moves instead of the programmed ones."}
