@@ -10,6 +10,7 @@ from typing import Final
 from cornersmooth.cl.arcs import RULES, ArcRule
 from cornersmooth.cl.cycles import order_of
 from cornersmooth.cl.dialects import NAMES as DIALECTS
+from cornersmooth.cl.foreign import apt_of_simulation_cld, is_simulation_cld, refuse_foreign
 from cornersmooth.cl.grammar import joined
 from cornersmooth.cl.messages import error
 from cornersmooth.cl.source import clean, load
@@ -109,6 +110,7 @@ def read(
     tables_only = scale != 1.0 or flip_axis or between_passes is not None
     data, name = load(source, name, size_limit=size_limit)
     if format is None:
+        refuse_foreign(data, name)
         from cornersmooth.cl.points import begins_with_names, looks_like_points
 
         head = data[:HEAD]
@@ -126,6 +128,8 @@ def read(
             what = "scale, flipped axes and passes are of tables of points, and this is a CL file"
             raise SettingsError("CS230", what, "leave them out", file=name)
         text = clean(data, name)
+        if dialect is None and is_simulation_cld(text):
+            text, dialect = apt_of_simulation_cld(text, name), "plain"
         order = order_of(cycle_order)
         program = read_apt(
             text, name=name, dialect=dialect, units=units, arc_rule=arc_rule, lenient=lenient, cycle_order=order

@@ -16,6 +16,7 @@ ERRORS: Final[dict[str, tuple[str, str]]] = {
     "CS101": ("holds no tool positions", "give a CL file with GOTO statements, or a table of points"),
     "CS102": ("is a binary file", "write the CL data in readable form: NX .cls, CATIA .aptsource, Creo .ncl, ..."),
     "CS103": ("is not a complete gzip file: {why}", "compress it again"),
+    "CS206": ("not read: {what}", "{hint}"),
     "CS199": ("holds more than {limit}", "divide it; --no-size-limit reads it all the same"),
     # statements
     "CS104": ("{word} ends in a continuation sign but {next} follows", "complete the statement or remove the $"),

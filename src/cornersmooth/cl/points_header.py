@@ -15,13 +15,13 @@ Triple = tuple[int, int, int]
 
 _TIPS = (
     *("x y z", "xa ya za", "x1 y1 z1", "px py pz", "xp yp zp", "posx posy posz", "tipx tipy tipz"),
-    *("pointx pointy pointz", "xt yt zt", "ax ay az"),
+    *("pointx pointy pointz", "xt yt zt", "ax ay az", "pxw pyw pzw"),
 )
 _SECOND: dict[Meaning, tuple[str, ...]] = {
     "vectors": (
         *("i j k", "nx ny nz", "ox oy oz", "ti tj tk", "vx vy vz", "axisx axisy axisz", "ax ay az", "tx ty tz"),
         *("ux uy uz", "dx dy dz", "vi vj vk", "ai aj ak", "ii jj kk", "xv yv zv", "dirx diry dirz", "vecx vecy vecz"),
-        *("toolaxisx toolaxisy toolaxisz", "normalx normaly normalz", "toolx tooly toolz"),
+        *("toolaxisx toolaxisy toolaxisz", "normalx normaly normalz", "toolx tooly toolz", "oiw ojw okw"),
     ),
     "points": ("xb yb zb", "x2 y2 z2", "bx by bz", "qx qy qz", "xq yq zq", "axispointx axispointy axispointz"),
     "values": ("u v w",),

@@ -1,0 +1,90 @@
+"""Tool paths in formats that are no CL files: what they are, and what to export instead; Simulation CLD is read."""
+
+from __future__ import annotations
+
+import re
+from typing import Final
+
+from cornersmooth.cl.messages import error
+
+#: how much of a file tells its format
+HEAD: Final = 1 << 12
+
+_APT: Final = "a CL file in APT form"
+
+#: name of a format, what its head is like, and what to export instead
+_FORMATS: Final = tuple(
+    (name, re.compile(pattern, re.MULTILINE), hint)
+    for name, pattern, hint in (
+        ("Mastercam NCI file", rb"\A\s*1050\r?\n", "write the NC program with the post, and smooth it with 'filter'"),
+        (
+            "dump of an Autodesk post",
+            rb"^(!DEBUG: |\d+: on[A-Z]\w*\()",
+            "use the post 'CAMplete APT' or 'Simulation CLD'",
+        ),
+        ("robot program (KRL)", rb"^(&ACCESS |DEF +\w+ *\(|DEFDAT )", f"export {_APT}, or a table x,y,z,i,j,k"),
+        ("robot program (RAPID)", rb"^\s*(MODULE +\w+|MoveL +\[)", f"export {_APT}, or a table x,y,z,i,j,k"),
+        ("STEP file (ISO 10303-21)", rb"\A\s*ISO-10303-21;", f"export {_APT} of the tool path"),
+        ("JSON file", rb'\A\s*[\[{]\s*["\[{\]}\d-]', "write its poses as a table x,y,z,i,j,k"),
+        ("YAML file", rb"\A(---|\w+:\s*\n\s*-)", "write its poses as a table x,y,z,i,j,k"),
+        ("MATLAB script", rb"\A\s*\w+ *= *\[", "write the matrix as a table x,y,z,i,j,k, with writematrix"),
+        ("XML file", rb"\A\s*<\?xml", f"export {_APT}"),
+        ("CLData listing of SprutCAM", rb"^(MULTI)?GOTO +[XYZ] *-?[\d.]", f"export {_APT} with its APT post"),
+        ("spreadsheet or archive (zip)", rb"\APK\x03\x04", "save it as CSV"),
+        ("NumPy file", rb"\A\x93NUMPY", "write it with numpy.savetxt, with a header x,y,z,i,j,k"),
+    )
+)
+
+_CLD: Final = re.compile(rb"\A(#[^\n]*\n|\s*\n)*UNIT +(MM|IN)\b", re.IGNORECASE)
+_CLD_MOVE: Final = re.compile(r"(?:MOVE|RAPID|CUT)((?:\s+(?:T?[XYZ]|F)[-+]?[\d.]+)*)\s*")
+_CLD_WORD: Final = re.compile(r"(T?[XYZ]|F)([-+]?[\d.]+)")
+_CLD_AXES: Final = ("X", "Y", "Z", "TX", "TY", "TZ")
+
+
+def refuse_foreign(data: bytes, file: str) -> None:
+    """Refuse a tool path in another format (InputError CS206)."""
+    head = data[:HEAD].removeprefix(b"\xef\xbb\xbf")
+    for name, pattern, hint in _FORMATS:
+        if pattern.search(head):
+            raise error("CS206", file, 1, what=f"it is a {name}", hint=hint)
+
+
+def is_simulation_cld(data: bytes) -> bool:
+    """Whether a text is the Simulation CLD of Autodesk (post 43779)."""
+    return _CLD.match(data[:HEAD]) is not None
+
+
+def apt_of_simulation_cld(text: bytes, file: str) -> bytes:
+    """Statements of APT for the lines of a Simulation CLD, line for line (InputError CS206).
+
+    ``TOOL number diameter radius length``, then ``MOVE`` to where an operation begins and ``RAPID`` and ``CUT`` with
+    the words of X Y Z, of the tool axis TX TY TZ and of the feed F that change; ``#`` begins a comment.
+    """
+    words: dict[str, str] = {}
+    lines: list[str] = []
+    for number, line in enumerate(text.decode("utf-8", "replace").split("\n"), 1):
+        line = line.strip()
+        kind, _, rest = line.partition(" ")
+        cells = rest.split()
+        if not line or line.startswith("#"):
+            lines.append(f"$$ {line[1:].strip()}" if line else "")
+        elif kind == "UNIT" and rest.strip().upper() in ("MM", "IN"):
+            lines.append(f"UNITS/{'MM' if rest.strip().upper() == 'MM' else 'INCHES'}")
+        elif kind == "STOCK":
+            lines.append(f"STOCK/{','.join(cells)}")
+        elif kind == "TOOL" and len(cells) == 4:
+            lines.append(f"LOADTL/{cells[0]};CUTTER/{cells[1]},{cells[2]}")
+        elif _CLD_MOVE.fullmatch(line):
+            given = dict(_CLD_WORD.findall(line))
+            words |= given
+            if any(axis not in words for axis in _CLD_AXES):
+                raise error(
+                    "CS206", file, number, what="a move before all of X Y Z TX TY TZ are known", hint="begin with MOVE"
+                )
+            before = "" if kind == "CUT" else "RAPID;"
+            feed = f"FEDRAT/{given['F']},PERMIN;" if "F" in given else ""
+            lines.append(f"{feed}{before}GOTO/{','.join(words[axis] for axis in _CLD_AXES)}")
+        else:
+            what, hint = f"a line that Simulation CLD has not, {line[:40]!r}", "export it again, or as CAMplete APT"
+            raise error("CS206", file, number, what=what, hint=hint)
+    return "\n".join(lines).encode()
