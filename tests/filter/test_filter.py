@@ -353,3 +353,20 @@ def test_a_run_that_is_not_decided_stays(monkeypatch: pytest.MonkeyPatch) -> Non
     assert found.smoothed == 0
     assert found.data == PROGRAMS["fanuc words"][2].encode()
     assert any("the run was not verified" in one.reason for one in found.left)
+
+
+@pytest.mark.parametrize("eps", [0.02, 0.05, 0.1, 0.2])
+@pytest.mark.parametrize(("control", "name"), [("fanuc", ""), *((c, f"{c} vectors") for c in ("siemens", "heidenhain"))])
+def test_tool_vectors_are_judged_with_the_whole_tolerance(control: str, name: str, eps: float) -> None:
+    """Runs that are fitted with all of ε; the first is a small program of few corners."""
+    axes = "I{i:.6f} J{j:.6f} K{k:.6f}"
+    angles = np.radians([11, 12, 13, 12, 11, 10, 11])
+    body = "".join(
+        f"G1 X{10 * n + 10}. Y{(0, 4, 5, 0, 4, 0, 6)[n]}. Z10. {axes.format(i=np.sin(a), j=0, k=np.cos(a))}\n"
+        for n, a in enumerate(angles)
+    )
+    text = ISO.format(on="G43.5 H1", start="I0.173648 J0. K0.984808", cuts=f"G1 Z10. F800.\n{body}")
+    data = PROGRAMS[name][2] if name else text
+    found = filter_program(data.encode("latin-1"), form_of(control, ""), cs.Settings(tolerance=eps))
+    assert found.verdict is Verdict.PASSED, found.left
+    assert found.smoothed == found.cuts

@@ -25,7 +25,7 @@ from cornersmooth.verify import Verification, verify
 #: numbers that are the same, and parts of directions, in six digits
 _SAME, _SAME_DIRECTION = 1e-9, 2e-6
 
-#: of the tolerance: rotary words are read as lines, which may be off by a part of it before and after; `verify` takes
+#: of the tolerance, where a program has rotary words: they are read as lines, which may be off by a part of it before and after; `verify` takes
 #: off that of the new program
 _SHARE: Final = (1.0 - 2.0 * LINE_SHARE) / (1.0 - LINE_SHARE)
 
@@ -100,6 +100,7 @@ def _changed(line: int, text: str) -> Problem:
 def check(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> Checked:
     """Measure the runs that have changed, and compare what holds after each."""
     wrong: list[Problem] = []
+    share = _SHARE if set("ABC") & set(job.reader.axes) else 1.0
     largest = [0.0, 0.0]
     for place in where:
         text = _left_otherwise(place.run, new.at[place.stop])
@@ -107,7 +108,7 @@ def check(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> Check
             wrong.append(Problem("CS592", 0, place.stop, f"the program goes on otherwise after the run: {text}"))
     for own in shared(old, new, where):
         try:
-            found = measure(*pair(job, old, new, own), job.settings, share=_SHARE, processes=job.processes)[2]
+            found = measure(*pair(job, old, new, own), job.settings, share=share, processes=job.processes)[2]
         except CornersmoothError as error:
             wrong.append(Problem(error.code, 0, own[0].first + 1, error.what))
             continue
