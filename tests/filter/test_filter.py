@@ -356,7 +356,9 @@ def test_a_run_that_is_not_decided_stays(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 @pytest.mark.parametrize("eps", [0.02, 0.05, 0.1, 0.2])
-@pytest.mark.parametrize(("control", "name"), [("fanuc", ""), *((c, f"{c} vectors") for c in ("siemens", "heidenhain"))])
+@pytest.mark.parametrize(
+    ("control", "name"), [("fanuc", ""), *((c, f"{c} vectors") for c in ("siemens", "heidenhain"))]
+)
 def test_tool_vectors_are_judged_with_the_whole_tolerance(control: str, name: str, eps: float) -> None:
     """Runs that are fitted with all of ε; the first is a small program of few corners."""
     axes = "I{i:.6f} J{j:.6f} K{k:.6f}"

@@ -25,8 +25,8 @@ from cornersmooth.verify import Verification, verify
 #: numbers that are the same, and parts of directions, in six digits
 _SAME, _SAME_DIRECTION = 1e-9, 2e-6
 
-#: of the tolerance, where a program has rotary words: they are read as lines, which may be off by a part of it before and after; `verify` takes
-#: off that of the new program
+#: of the tolerance, where a program has rotary words: they are read as lines, which may be off by a part of it before
+#: and after; `verify` takes off that of the new program
 _SHARE: Final = (1.0 - 2.0 * LINE_SHARE) / (1.0 - LINE_SHARE)
 
 #: the last block of a run in distances: the word that says distances again after it

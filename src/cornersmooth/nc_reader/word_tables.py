@@ -6,6 +6,8 @@ What else is in them, rules and where words may stand, is explained in `nc_words
     A control whose table holds where this one says nothing; its words come after those of this one.
 ``points``
     Addresses whose numbers need their decimal point.
+``whole``
+    Those of them that count in full without it, in millimetres per minute.
 ``switches``
     Whether tip control is switched by blocks that the machine's file names.
 ``spelling``

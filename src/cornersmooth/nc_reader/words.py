@@ -47,6 +47,11 @@ class Word(NamedTuple):
         return self.start == self.stop
 
 
+def tools_first(words: Iterable[Word]) -> list[Word]:
+    """Words of a block in the order in which they act: M6 takes the tool that T chooses, wherever that stands."""
+    return sorted(words, key=lambda word: word.name != "T")
+
+
 #: what a column of a motion block is: a word of the line, or a number that stands for what it says in words
 Columns = dict[str, Word | float]
 

@@ -72,8 +72,11 @@ class WordRules:
         fitting = [rule for rule in self._words if rule.pattern.fullmatch(word)]
         return [] if fitting and fitting[0].never else fitting
 
-    def problems(self, line: Line, words: Sequence[str], ruled: Ruled) -> Iterator[Problem]:
-        """What is wrong with a block by itself: words off the list, twice, without others or beside others."""
+    def problems(self, line: Line, words: Sequence[str], ruled: Ruled, whole: str) -> Iterator[Problem]:
+        """What is wrong with a block by itself: words off the list, twice, without others or beside others.
+
+        Numbers of the addresses in `whole` need no point.
+        """
 
         def wrong(text: str) -> Problem:
             return Problem(NOT_LISTED, 0, line.number, text)
@@ -83,7 +86,7 @@ class WordRules:
                 yield wrong(f"{word} is beside nothing that it belongs to")
             elif rule is UNLISTED:
                 yield wrong(f"{word} is not on the list of words for this control")
-        for spelt in filter(self._lexer.without_point, line.words):
+        for spelt in (word for word in line.words if word.name not in whole and self._lexer.without_point(word)):
             yield wrong(f"{spelt.text} without a decimal point: the control may count it in its least increment")
         names = [word.name for word in line.words if word.name not in "GM"]
         names += [word for word in words if word[0] in "GM"]

@@ -30,6 +30,9 @@ _UNSURE_TOLD: Final = 3
 
 _CONTROL_CHARACTERS: Final = re.compile(r"[\x00-\x08\x0a-\x1f\x7f]")
 
+#: mark of the transfer, which a control that shows a program has taken off
+_TAPE: Final = "%"
+
 #: stands for any number in a block of the user's
 _ANY: Final = "9075301"
 
@@ -82,7 +85,8 @@ class WordCheck:
         self._before: tuple[int, str, Ruled] = 0, "", []
         self._code = -1.0
         self._weights = None if weights is None else tuple(weights)
-        self._needed = word_table(control)["grammar"].get("curves_need")
+        table = word_table(control)
+        self._needed, self._whole = table["grammar"].get("curves_need"), table.get("whole", "")
         #: by how much the control may round on its own, in units of the program: added to what is measured
         self.rounding = 0.0
 
@@ -172,7 +176,8 @@ class WordCheck:
         self._functions(number, words, ruled)
         if not self._frames(number, text):
             self._follow(number, text, ruled)
-            self.problems += self._rules.problems(line, words, ruled)
+            metric = self._states.holds("units", "G21") and self._states.holds("feed mode", "G94")
+            self.problems += self._rules.problems(line, words, ruled, self._whole if metric else "")
             self._states.take(number, words, ruled)
         self._line = number
         if own:
@@ -252,8 +257,9 @@ class WordCheck:
             return True
         if wanted := self._wanted:
             place = next((k for k, pattern in enumerate(wanted) if pattern.fullmatch(text)), None)
-            if place != 0:
-                self._states.unframed(NOT_LISTED, number, f"the program must begin with {shown(wanted[0])}")
+            missing = [pattern for pattern in wanted[:place] if pattern.pattern != _TAPE]
+            if missing:
+                self._states.unframed(NOT_LISTED, number, f"the program must begin with {shown(missing[0])}")
             self._wanted = () if place is None else wanted[place + 1 :]
             if place is not None:
                 self._opening = self._opening or text
@@ -270,6 +276,8 @@ class WordCheck:
         """Look at what holds when all is read."""
         first = self._tail[0][0] if self._tail else self._line
         ends, texts = self.list.end, [text for _, text in self._tail]
+        if texts and texts[-1] != _TAPE:
+            ends = tuple(pattern for pattern in ends if pattern.pattern != _TAPE)
         if len(texts) != len(ends) or not all(map(re.Pattern.fullmatch, ends, texts)):
             self._states.unframed(NOT_LISTED, first, f"the program must end with {', '.join(map(shown, ends))}, once")
         elif self._opening.partition(" ")[2] != texts[-1].partition(" ")[2]:

@@ -147,6 +147,10 @@ class WordStates:
         """What the head of a program of our own says."""
         return self._made
 
+    def holds(self, state: str, text: str) -> bool:
+        """Whether a state has been set so."""
+        return state in self._held and self._held[state].text == text
+
     @property
     def unsure_offset(self) -> str:
         """Work offset that nothing was compared with; empty for none."""

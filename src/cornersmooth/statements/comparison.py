@@ -211,6 +211,8 @@ def _habits(ours: list[Token], changes: list[int], end: float, away: _Away) -> s
     found |= {k for k in range(last, len(ours)) if ours[k].place >= end or not away(end, ours[k])}
     on: Token | None = None
     for k in range(len(ours) - 1, -1, -1):
+        if ours[k].optional:
+            continue
         if not off[k]:
             on = ours[k]
         elif on is not None and on.kind in _STOPPED:

@@ -58,6 +58,11 @@ _CODES: dict[float, tuple[str, float | str]] = {
     42.0: ("compensation", "RIGHT"),
 }
 
+#: what posts write before another tool on their own
+_BEFORE_TOOLS = (("stop", "OPSTOP"), ("spindle", "ORIENT"))
+
+_ENDINGS = ("OFF", "ORIENT")
+
 #: word that takes another tool
 _CHANGE = ("M", 6.0)
 
@@ -74,7 +79,10 @@ def said(events: Sequence[Event], places: Sequence[Place], means: Means) -> list
     moment = element = 0
     words = [(event.letter, event.value) for event in events]
     elements = [event.element for event in events]
+    changes = frozenset(words) & {_CHANGE}
     ends = [word == _CHANGE or (word[0] == "M" and of_m(word[1], means)[0] == "end") for word in words]
+    # R0 of M91, and what ends with the tool
+    idle = [word == ("G", 40.0) or (word[0] == "M" and of_m(word[1], means)[1] in _ENDINGS) for word in words]
     for k, (event, place) in enumerate(zip(events, places, strict=True)):
         letter, value = words[k]
         moment, element = moment + (event.element != element), event.element
@@ -97,15 +105,17 @@ def said(events: Sequence[Event], places: Sequence[Place], means: Means) -> list
             meaning = means[letter][0], value
         if meaning is None:
             continue
-        optional = False
-        if meaning == ("stop", "OPSTOP"):  # before another tool, and nothing moves between
-            after = next((j for j in range(k + 1, len(words)) if words[j] != ("G", 40.0)), None)  # R0 of M91
-            another = after is not None and words[after][0] == "T" and elements[after] == element
+        # without M6 the control may take the tool with T alone
+        optional = meaning[0] == "dwell" or (meaning[0] == "next tool" and _CHANGE in changes)
+        if meaning in _BEFORE_TOOLS:  # and nothing moves between
+            after = next((j for j in range(k + 1, len(words)) if not idle[j]), None)
+            tool = after is not None and (words[after][0] == "T" or words[after] == _CHANGE)
+            another = tool and elements[after or 0] == element
             optional = another and any(letter == "T" for letter, _ in words[:k])
         elif letter == "H":  # nothing moves before the next tool, or the end
             after = next((j for j in range(k + 1, len(words)) if ends[j]), None)
             optional = after is not None and elements[after] == element
         at, room, reach, others = place
         tokens.append(Token(*meaning, at, event.line, room, moment, optional, others, reach, element))
-        moment += meaning[0] in PAUSES and not optional
+        moment += meaning[0] == "dwell" or (meaning[0] in PAUSES and not optional)
     return tokens

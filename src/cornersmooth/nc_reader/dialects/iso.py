@@ -13,7 +13,7 @@ from cornersmooth.nc_reader.hole_cycles import HoleCycle, drill
 from cornersmooth.nc_reader.lexer import NUMBER, Lexer, fixed, number_of
 from cornersmooth.nc_reader.planes import TiltedPlane, room_of, rotated_frame, turned_frame
 from cornersmooth.nc_reader.word_tables import word_table
-from cornersmooth.nc_reader.words import MOTION_CODES, NURBS, Columns, Line, Word
+from cornersmooth.nc_reader.words import MOTION_CODES, NURBS, Columns, Line, Word, tools_first
 
 if TYPE_CHECKING:
     from cornersmooth.nc_reader.reader import Reader
@@ -94,7 +94,7 @@ class Iso(Dialect):
         given = {letter: value for letter, value, *_ in line.words}
         if given.get("G") == 5.0:
             state.memory.high_speed = given.get("P", 0.0) >= 10000.0
-        for letter, value, text, *_ in line.words:
+        for letter, value, text, *_ in tools_first(line.words):
             if letter == "G":
                 if value in MOTION_CODES:
                     motion["G"] = value

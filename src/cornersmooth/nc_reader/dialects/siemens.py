@@ -13,7 +13,7 @@ from cornersmooth.nc_reader.dialects.base import BY_WORD, Dialect
 from cornersmooth.nc_reader.hole_cycles import HoleCycle, drill, numbers
 from cornersmooth.nc_reader.lexer import NUMBER, Lexer, fixed, number_of
 from cornersmooth.nc_reader.planes import TiltedPlane, room_of, rotated_frame
-from cornersmooth.nc_reader.words import BSPLINE, POLY, Columns, Line, Word
+from cornersmooth.nc_reader.words import BSPLINE, POLY, Columns, Line, Word, tools_first
 
 if TYPE_CHECKING:
     from cornersmooth.nc_reader.reader import Reader
@@ -94,7 +94,7 @@ class Siemens(Dialect):
             self._plane(line, state)
             return
         motion: dict[str, float] = {}
-        for name, value, text, *_ in line.words:
+        for name, value, text, *_ in tools_first(line.words):
             if name == "G" and value in _CODES:
                 motion["G"] = value
             elif name == "G":

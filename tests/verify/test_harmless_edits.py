@@ -1,0 +1,131 @@
+"""What a shop changes in a right program without harm, and what is like it and wrong."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from oracle.command import DONE, run
+
+CL = """LOAD/TOOL,4,ADJUST,4
+SPINDL/RPM,3000,CLW
+COOLNT/FLOOD
+RAPID
+GOTO/0,0,50,0,0,1
+FEDRAT/MMPM,900
+GOTO/0,0,-3
+GOTO/20,0,-3
+GOTO/20,20,-3
+RAPID
+GOTO/20,20,50
+LOAD/TOOL,7,ADJUST,7
+SPINDL/RPM,2000,CLW
+RAPID
+GOTO/5,5,50
+GOTO/5,5,2
+FEDRAT/MMPM,300
+GOTO/5,5,-1
+DELAY/0.5
+GOTO/25,8,-1
+RAPID
+GOTO/25,8,50
+FINI
+"""
+ALL = ("fanuc", "haas", "mitsubishi", "siemens", "heidenhain", "linuxcnc")
+ISO = ("fanuc", "haas", "mitsubishi")
+THREE_AXES = Path(__file__).parents[2] / "samples" / "machines" / "three-axis.toml"
+
+
+def judged(folder: Path, control: str, *edits: tuple[str, str]) -> str:
+    """First line of ``verify`` for a program in which each of some patterns is replaced where it is found first."""
+    on: tuple[object, ...] = ("-e", 0.02, "--control", control)
+    if control in ("linuxcnc", "haas"):
+        on += ("--machine", THREE_AXES)
+    (folder / "part.cls").write_text(CL)
+    made = run("smooth", "part.cls", *on, "-o", "part.nc", "--force", cwd=folder)
+    assert made.returncode == DONE, made.stderr
+    text = (folder / "part.nc").read_text()
+    for old, new in edits:
+        text, count = re.subn(old, new, text, count=1, flags=re.MULTILINE)
+        assert count
+    (folder / "part.nc").write_text(text)
+    return run("verify", "part.cls", "part.nc", *on, cwd=folder).stdout.decode().splitlines()[0]
+
+
+@pytest.mark.parametrize("control", ["fanuc", "haas", "mitsubishi", "linuxcnc"])
+def test_the_tool_may_stand_behind_its_change(control: str, tmp_path: Path) -> None:
+    assert judged(tmp_path, control, ("^T4 M6$", "M6 T4"), ("^T7 M6$", "M6 T7")).startswith("PASSED")
+    assert judged(tmp_path, control, ("^T7 M6$", "M6 T4")).startswith("FAILED")
+    assert judged(tmp_path, control, ("^T7 M6$", "M6")).startswith("FAILED")
+
+
+@pytest.mark.parametrize("control", ["fanuc", "haas", "mitsubishi", "linuxcnc"])
+def test_the_next_tool_may_wait(control: str, tmp_path: Path) -> None:
+    assert judged(tmp_path, control, ("^T4 M6$", "T4 M6\nT7")).startswith("PASSED")
+    assert judged(tmp_path, control, ("^T4 M6$", "T4 M6\nT7"), ("^T7 M6$", "M6")).startswith("PASSED")
+    assert judged(tmp_path, control, ("^T4 M6$", "T4 M6\nT9")).startswith("PASSED")
+    assert judged(tmp_path, control, ("^T4 M6$", "T4 M6\nT9"), ("^T7 M6$", "M6")).startswith("FAILED")
+    assert judged(tmp_path, control, ("^T7 M6$", "T7")).startswith("FAILED")
+
+
+def test_the_next_tool_of_klartext_and_siemens_may_wait(tmp_path: Path) -> None:
+    assert judged(tmp_path, "siemens", ("^M6$", "M6\nT7")).startswith("PASSED")
+    old = r"^(\d+ TOOL CALL 4 Z.*)$"
+    assert judged(tmp_path, "heidenhain", (old, r"\1\n9 TOOL DEF 7")).startswith("PASSED")
+
+
+@pytest.mark.parametrize(("control", "verdict"), [("fanuc", "PASSED"), ("mitsubishi", "PASSED"), ("haas", "FAILED")])
+def test_a_feed_may_lack_its_point_where_it_counts_in_full(control: str, verdict: str, tmp_path: Path) -> None:
+    """Of Haas setting 77 says what F900 is worth."""
+    assert judged(tmp_path, control, (r"F900\.$", "F900")).startswith(verdict)
+    assert judged(tmp_path, control, (r"F900\.$", "F90")).startswith("FAILED")
+    assert judged(tmp_path, control, (r" Z-3\.0*(?= |$)", " Z-3")).startswith("FAILED")
+
+
+def test_a_feed_per_revolution_or_in_inches_needs_its_point(tmp_path: Path) -> None:
+    (tmp_path / "part.cls").write_text("UNITS/INCHES\n" + CL.replace("MMPM,900", "IPM,90"))
+    on = ("--control", "fanuc", "-e", 0.02)
+    assert run("smooth", "part.cls", *on, "-o", "part.nc", cwd=tmp_path).returncode == DONE
+    text = (tmp_path / "part.nc").read_text()
+    assert "F90.\n" in text
+    (tmp_path / "part.nc").write_text(text.replace("F90.\n", "F90\n"))
+    assert run("verify", "part.cls", "part.nc", *on, cwd=tmp_path).stdout.startswith(b"FAILED")
+
+
+@pytest.mark.parametrize("control", ISO)
+def test_marks_of_the_transfer_may_be_gone(control: str, tmp_path: Path) -> None:
+    assert judged(tmp_path, control, (r"\A%\n", "")).startswith("PASSED")
+    assert judged(tmp_path, control, (r"\n%\n\Z", "\n")).startswith("PASSED")
+    assert judged(tmp_path, control, (r"\A%\n", ""), (r"\n%\n\Z", "\n")).startswith("PASSED")
+    assert judged(tmp_path, control, (r"\A%\nO.*\n", "")).startswith("FAILED")
+    assert judged(tmp_path, control, (r"^M30\n%\n\Z", "%\nM30\n")).startswith("FAILED")
+    assert judged(tmp_path, control, (r"^M30\n%\n\Z", "%\n")).startswith("FAILED")
+    assert judged(tmp_path, control, (r"^T7 M6$", "%\nT7 M6")).startswith("FAILED")
+
+
+DWELLS = {
+    "fanuc": "G4 P2000",
+    "mitsubishi": "G4 P2000",
+    "haas": "G4 P2.",
+    "linuxcnc": "G4 P2",
+    "siemens": "G4 F2",
+    "heidenhain": "9 CYCL DEF 9.0 DWELL TIME\n9 CYCL DEF 9.1 DWELL 2",
+}
+
+
+@pytest.mark.parametrize("control", ALL)
+def test_time_may_pass(control: str, tmp_path: Path) -> None:
+    dwell = DWELLS[control]
+    assert judged(tmp_path, control, (r"^((\d+ )?(S3000 )?M3( M8)?)$", rf"\1\n{dwell}")).startswith("PASSED")
+    own = {"haas": r"G4 P0\.5", "linuxcnc": r"G4 P0\.5", "siemens": r"G4 F0\.5", "heidenhain": r"DWELL 0\.5"}
+    old = own.get(control, "G4 P500")
+    assert judged(tmp_path, control, (old, old.replace("500", "5").replace("\\.5", ".01"))).startswith("FAILED")
+
+
+@pytest.mark.parametrize("control", [one for one in ALL if one != "heidenhain"])
+def test_the_spindle_may_be_turned_for_another_tool(control: str, tmp_path: Path) -> None:
+    orient = "M19 R0" if control == "linuxcnc" else "M19"
+    assert judged(tmp_path, control, ("^T7", f"{orient}\nT7")).startswith("PASSED")
+    assert judged(tmp_path, control, (r"^(G1 .*X20\..* Y0\..*)$", rf"{orient}\n\1")).startswith("FAILED")
