@@ -46,6 +46,9 @@ _WITHIN_ARC: Final = GOTO_WORDS | frozenset(
     "$$ PAINT PPRINT REMARK DISPLY PARTNO TPRINT LETTER INTOL OUTTOL CUTTER TLDATA FEDRAT".split()
 )
 
+#: words within a MOVNRB record
+_WITHIN_SPLINE: Final = GOTO_WORDS | frozenset("MOVNRB $$ PPRINT REMARK DISPLY TPRINT".split())
+
 #: words of a NURBS record
 _WITHIN_CURVE: Final = frozenset({"KNOT", "CNTRL"})
 
@@ -147,6 +150,9 @@ def _plain(state: ReaderState, count: int, line: int) -> None:
         raise error("CS118", state.file, line, word="GOTO")
     if state.curve is not None:
         motion_statements.finish_curve(state)
+    if state.spline is not None:
+        motion_statements.pass_points(state, state.skip(count))
+        return
     state.arrive()
     state.take(count)
 
@@ -164,6 +170,8 @@ def _obey(state: ReaderState, record: Record) -> None:
         return
     if state.arc is not None and word not in _WITHIN_ARC:
         raise state.fail("CS121", state.arc)
+    if state.spline is not None and word not in _WITHIN_SPLINE:
+        motion_statements.leave_spline(state, record)
     if record.points and word not in GOTO_WORDS:
         line, args = record.points[0]
         raise state.fail("CS105", record, line, text=joined(args))
@@ -192,6 +200,8 @@ def _end(state: ReaderState) -> None:
         motion_statements.finish_curve(state)
     if state.arc is not None:
         raise state.fail("CS121", state.arc)
+    if state.spline is not None:
+        raise error("CS128", state.file, state.spline.line, why="MOVNRB/OFF is missing")
 
 
 def _refused(record: Record, word: str) -> str | None:

@@ -7,9 +7,12 @@ import re
 from dataclasses import replace
 from typing import Final
 
+import numpy as np
+
 from cornersmooth.cl.arcs import LEAST_DECIMALS, Arc, read_arc
 from cornersmooth.cl.grammar import NUMBER, Argument, Record, joined, number
 from cornersmooth.cl.messages import error
+from cornersmooth.cl.movnrb import Spline
 from cornersmooth.cl.nurbs import CURVE_DIGITS, Curve, lines_of
 from cornersmooth.cl.poses import Vector, check_range
 from cornersmooth.cl.reader_state import ReaderState
@@ -17,13 +20,16 @@ from cornersmooth.cl.state_statements import Handler
 from cornersmooth.cl.surfaces import read_drive_arc, read_helix
 from cornersmooth.cl.words import GOTO_WORDS
 from cornersmooth.errors import InputError
-from cornersmooth.model import Move
+from cornersmooth.model import MM_PER_UNIT, Floats, Move
 
 #: X1,Y2,Z3 or X1,Y2,Z3,I0,J0,K1, separated by commas or blanks
 _AFTER: Final = r"\s*{}\s*=?\s*(" + NUMBER.pattern.replace("(", "(?:").replace("(?:?:", "(?:") + ")"
 _LETTERED: Final = re.compile(
     "".join(map(_AFTER.format, "XYZ")) + "(?:" + "".join(map(_AFTER.format, "IJK")) + r")?\s*", re.IGNORECASE
 )
+
+#: mm: how far lines may be from the curves of MOVNRB
+SPLINE_MM: Final = 5e-4
 
 #: sine of the angle at which a tool axis meets a plane at least
 _PARALLEL: Final = 1e-6
@@ -46,6 +52,9 @@ def _goto(state: ReaderState, record: Record) -> None:
     if record.points and state.arc is None:
         state.note("CS195", record.points[0][0])
     poses = [(line, *_pose(state, record, args, line)) for line, args in ((record.line, record.args), *record.points)]
+    if state.spline is not None:
+        pass_points(state, np.array([(*tip, *(axis or (math.nan,) * 3), line) for line, tip, axis in poses]))
+        return
     if state.arc is not None:  # more points of one GOTO lie on the arc; the last one ends it
         state.arc = replace(state.arc, passes=tuple(state.system.point(tip) for _, tip, _ in poses[:-1]))
         poses = poses[-1:]
@@ -200,6 +209,71 @@ def finish_curve(state: ReaderState) -> None:
         state.add((x, y, z), axis, line)
 
 
+def _movnrb(state: ReaderState, record: Record) -> None:
+    """MOVNRB/...: rows of B-splines, then the same motion as points."""
+    option, spline = record.option, state.spline
+    if option in ("M3AXIS", "3AXIS", "M5AXIS", "5AXIS") and spline is None:
+        state.five_axes = "5" in str(option)
+    elif option == "ON" and spline is None:
+        _check_curve(state, record)
+        sizes = [int(value) for value in record.values if value == int(value)]
+        if len(record.values) != 5 or len(sizes) < 4 or record.values[2] != 0.0:
+            raise state.fail("CS128", record, why="MOVNRB/ON has order, knots, 0, control points and length")
+        state.spline = Spline(record.line, sizes[0], (sizes[1], sizes[3]), state.five_axes)
+    elif option in (1.0, 2.0, 3.0) and spline is not None and not spline.passing:
+        spline.rows[int(float(option))] += state.numbers(record, record.args[1:])
+    elif option == "NEXT" and spline is not None and not spline.passing:
+        if spline.complaint is not None:
+            raise error("CS128", state.file, spline.line, why=spline.complaint)
+        spline.passing = True
+    elif option == "OFF":
+        if spline is not None:
+            _end_spline(state, spline)
+    else:
+        raise state.fail("CS128", record, why=f"MOVNRB/{joined(record.args[:1])} is not understood here")
+
+
+def pass_points(state: ReaderState, rows: Floats) -> None:
+    """Keep the points (m, 7) after MOVNRB/NEXT until its end."""
+    assert state.spline is not None
+    if not state.spline.passing:
+        raise error("CS128", state.file, int(rows[0, 6]), why="GOTO comes before MOVNRB/NEXT")
+    state.spline.points.append(rows)
+
+
+def leave_spline(state: ReaderState, record: Record) -> None:
+    """Go on with the points alone: a statement among them acts at its own place (InputError CS128)."""
+    spline, state.spline = state.spline, None
+    assert spline is not None
+    if not spline.passing:
+        raise state.fail("CS128", record, why=f"{record.word} comes before MOVNRB/NEXT")
+    for rows in spline.points:
+        _add_rows(state, rows)
+
+
+def _end_spline(state: ReaderState, spline: Spline) -> None:
+    """Take the curve as lines, or the points where they are not on it."""
+    inch = (state.stated_units[-1][1] if state.stated_units else (state.feed_units or ["mm"])[0]) == "inch"
+    tolerance = SPLINE_MM / (MM_PER_UNIT["inch"] if inch else 1.0)
+    _at_feed(state, Record(spline.line, "MOVNRB"))
+    path = spline.path(tolerance) if spline.passing else None
+    if path is None:
+        raise error("CS128", state.file, spline.line, why="it is not complete, or would need too many lines")
+    if not spline.passes_by(path, state.last_tip()):
+        state.note("CS144", spline.line, what="a curve of MOVNRB that does not pass by its points")
+        leave_spline(state, Record(spline.line, "MOVNRB"))
+        return
+    state.spline = None
+    check_range(path[:, :3].ravel().tolist(), state.file, spline.line)
+    state.note("CS145", spline.line, tolerance=tolerance)
+    _add_rows(state, np.column_stack((path[1:], np.full(len(path) - 1, spline.line))))
+
+
+def _add_rows(state: ReaderState, rows: Floats) -> None:
+    for x, y, z, i, j, k, line in rows.tolist():
+        state.add((x, y, z), None if math.isnan(i) else (i, j, k), int(line))
+
+
 def _at_feed(state: ReaderState, record: Record) -> None:
     """Say that a rapid curve is read as a feed motion."""
     if state.rapid:
@@ -222,6 +296,7 @@ HANDLERS: Final[dict[str, Handler]] = {
     "AUTOPS": _nothing,
     "PSIS": _nothing,
     "NURBS": _nurbs,
+    "MOVNRB": _movnrb,
     "KNOT": _knot,
     "CNTRL": _control,
 }

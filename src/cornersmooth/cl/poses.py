@@ -149,6 +149,13 @@ class Poses:
         self.n += count
         self._taken += count
 
+    def skip(self, count: int) -> Floats:
+        """Pass over the next poses of the chunk: (count, 7) rows as `rows`."""
+        _ = self.rows  # those before them
+        assert self._chunk is not None
+        self._taken += count
+        return self._chunk.poses[self._taken - count : self._taken].copy()
+
     def append(self, tip: Vector, axis: Vector | None, line: int) -> None:
         """Append one pose (InputError CS113)."""
         check_range(tip, self.file, line)

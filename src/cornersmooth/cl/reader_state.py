@@ -12,6 +12,7 @@ from cornersmooth.cl.arcs import Arc, ArcRule
 from cornersmooth.cl.dialects import Dialect
 from cornersmooth.cl.grammar import Argument, Record, joined, number
 from cornersmooth.cl.messages import error, finding
+from cornersmooth.cl.movnrb import Spline
 from cornersmooth.cl.nurbs import Curve
 from cornersmooth.cl.poses import Poses, System, Vector
 from cornersmooth.errors import Finding, InputError
@@ -35,6 +36,8 @@ class ReaderState(Poses):
     hole: bool = False  #: every position is a hole
     arc: Arc | None = None  #: waits for its end
     curve: Curve | None = None  #: waits for more control points
+    spline: Spline | None = None  #: MOVNRB, until OFF
+    five_axes: bool = False  #: MOVNRB has two curves
     direction: tuple[str, Vector] | None = None  #: INDIRV or INDIRP, for the arc after it
     first_system: tuple[tuple[Argument, ...], System | None] | None = None  #: MSYS, MCS or MCSYS as written, and read
     offsets: dict[str, tuple[Argument, ...]] = field(default_factory=dict)  #: FIXTURE, WCS; $$-> CSYS, $$*CATIA0

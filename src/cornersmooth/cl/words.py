@@ -20,7 +20,7 @@ GOTO_WORDS: Final = frozenset({"GOTO", "CONT", "MOVE"})
 #: words that move the tool or place it; the readers carry them out
 MOTION_WORDS: Final = GOTO_WORDS | {
     *("FROM", "GODLTA", "GOHOME", "RETRCT", "CIRCLE", "MOVARC", "HELICAL", "NURBS", "KNOT", "CNTRL"),
-    *("INDIRV", "INDIRP", "AUTOPS", "PSIS", "TLON,GOFWD"),
+    *("MOVNRB", "INDIRV", "INDIRP", "AUTOPS", "PSIS", "TLON,GOFWD"),
 }
 
 #: codes for words that are not carried out
