@@ -72,6 +72,11 @@ UNREAD = (
         "SMOOTH/ON",
         "UNLOAD/TOOL",
         "START/X",
+        "PPWORD/M8",
+        "PPWORD/G53 Z0",
+        "PPWORD/M,8",
+        "SPINDL/3000,CLW,RANGE,2",
+        "SPINDL/3000,RANGE,LOW",
     ),
     *("SPEED/4000,CLW", "TOOL/3", "LOADTL/4,2", "LOADTL/4,HOLDER,2", "END/7", "CHUCK/1,2"),
 )

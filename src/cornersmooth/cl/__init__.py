@@ -146,7 +146,7 @@ def read(
 
 def _refuse(program: Program, name: str, lenient: bool) -> None:
     """Refuse what must not be missing from a program in silence: a spindle that is not understood, and turning."""
-    unknown = statements_not_understood(program)
+    unknown = statements_not_understood(program, at_all=True)
     turning = next((statement for statement in unknown if turns(statement)), None)
     if turning is not None and not lenient:
         raise error("CS179", name, turning.line, text=turning.text)

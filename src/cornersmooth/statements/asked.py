@@ -24,8 +24,8 @@ NOTHING = frozenset(
     "$$ PARTNO PPRINT REMARK LETTER TPRINT DISPLY END-OF-PATH OPNAME HEADER CSI_TOOL_PATH ISN SEQNO "
     # screen and plotter of the CAM system
     "PAINT PLOT OVPLOT PPLOT PLABEL LPRINT DRAFT DEBUG GOUGCK PALETTE "
-    # tolerances of the path as it was made, stock, names of machine and post-processor words
-    "INTOL OUTTOL TOLER LINTOL CSI_PATH_TOLERANCE STOCK MATERL MACHIN PPWORD "
+    # tolerances of the path as it was made, stock, name of the machine
+    "INTOL OUTTOL TOLER LINTOL CSI_PATH_TOLERANCE STOCK MATERL MACHIN "
     # the shape of the tool
     "CSI_SET_FLUTE_LENGTH CSI_SET_EXTENSION_LENGTH "
     # what the reader puts into the poses, or refuses
@@ -40,7 +40,7 @@ _NOTE = re.compile(r"\s*(\[HOLDER=[^\]]*\]|[\d.]+ ?(MM|IN|INCH)\b|STOCK SIZE\b)"
 #: words that say that a tool, a file or a speed is for a lathe
 _TURNING = {"TURN", "LATHE", "TURRET", "SETOOL", "GROOVE"}
 
-#: words of SPINDL for gears, which S chooses by itself
+#: words of SPINDL for gears
 _GEARS = {"RANGE", "HIGH", "LOW", "MEDIUM"}
 
 #: so many statements are named, and so many characters of each
@@ -65,7 +65,8 @@ class Asking:
     def __init__(self, program: Program, means: Means | None = None) -> None:
         self.program, self.means = program, means or {}
         self.tokens: list[Token] = []
-        self.not_understood: list[Statement] = []  #: not understood: nothing is compared with them
+        self.not_understood: list[Statement] = []  #: nothing is compared with them
+        self.in_part: list[Statement] = []  #: what is understood of them is compared
         self.place, self.line, self.moment = 0.0, 0, 0
         self.running, self.speed, self.diameter = "CLW", 0.0, 0.0
         self.tool, self.offset, self.offset_at = -1.0, 1.0, (-1, 0)
@@ -87,6 +88,9 @@ class Asking:
             "AUXFUN": self.auxiliary,
             "ZERO": lambda words, numbers, statement: work_offset_of(program) is not None,  # compared with the words
             "INSERT": lambda words, numbers, statement: _NOTE.match(" ".join(words)) is not None,
+            "PPWORD": lambda words, numbers, statement: (
+                len(words) == len(numbers) == 1 and words[0].isalpha() and len(words[0]) > 2
+            ),
             "MODE": lambda words, numbers, statement: words in (["MILL"], ["ABSOL"]) and not numbers,
             "SET": lambda words, numbers, statement: words == ["MODE", "ABSOL"] and not numbers,
             "REWIND": lambda words, numbers, statement: self.at_end(statement),
@@ -169,12 +173,14 @@ class Asking:
     def spindle(self, words: list[str], numbers: list[float], statement: Statement) -> bool:
         """Start, stop or orient the spindle, at revolutions or at a cutting speed of a cutter whose diameter is known.
 
-        RANGE says nothing of its speed; MAXRPM does where it is lower.
+        The gear of RANGE is in no program; MAXRPM is kept where the speed is not higher.
         """
         limits = {word: _behind(statement, word) for word in ("RANGE", "MAXRPM") if word in words}
         for limit in limits.values():
             if limit is not None:
                 numbers.remove(limit)
+        if "RANGE" in words:
+            self.in_part.append(statement)
         chosen = set(words) - {"MAXRPM"} - (_GEARS if "RANGE" in words else set())
         if len(numbers) > 1 or any(number < 0 for number in numbers):
             return False
@@ -279,12 +285,14 @@ def turns(statement: Statement) -> bool:
     )
 
 
-def statements_not_understood(program: Program) -> list[Statement]:
-    """CL statements that are not understood: neither compared, nor words that ask for nothing."""
+def statements_not_understood(program: Program, *, at_all: bool = False) -> list[Statement]:
+    """CL statements that are not understood: neither compared, nor words that ask for nothing; or only in part."""
     asking = Asking(program)
     for statement in program.statements:
         asking.take(statement, float(statement.pose))
-    return asking.not_understood
+    wholly = asking.not_understood
+    both = {id(statement): statement for statement in (*wholly, *asking.in_part)}
+    return wholly if at_all else sorted(both.values(), key=lambda statement: statement.line)
 
 
 def not_understood_text(program: Program) -> str:
