@@ -32,6 +32,13 @@ _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 class _Group(click.Group):
     """A group that lists its commands in parts, and knows which was probably meant."""
 
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Show the help where there is nothing to do, which is an error."""
+        if not args and not ctx.resilient_parsing:
+            click.echo(ctx.get_help(), err=True)
+            ctx.exit(2)
+        return super().parse_args(ctx, args)
+
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
@@ -78,9 +85,6 @@ def run(args: list[str] | None, ending: Shutdown) -> int:
         return result if isinstance(result, int) else 0
     except click.exceptions.Exit as leaving:
         return leaving.exit_code
-    except click.exceptions.NoArgsIsHelpError as helping:
-        click.echo(helping.ctx.get_help() if helping.ctx else "", err=True)
-        return 2
     except click.UsageError as wrong:
         where = f"{wrong.ctx.command_path} --help" if wrong.ctx else "cornersmooth --help"
         text = wrong.format_message().rstrip(".")

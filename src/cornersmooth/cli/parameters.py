@@ -9,7 +9,7 @@ import math
 import re
 from collections.abc import Callable
 from functools import partial
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import click
 from click.shell_completion import CompletionItem
@@ -17,7 +17,13 @@ from click.shell_completion import CompletionItem
 _LENGTH = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(mm|in|inch|\")?")
 
 
-class Value(click.ParamType[Any]):
+if TYPE_CHECKING:
+    _ParamType = click.ParamType[Any]
+else:  # click before 8.4 has no type for what it gives
+    _ParamType = click.ParamType
+
+
+class Value(_ParamType):
     """A value that a function reads from text; what its ValueError says is the message, and the name is in the help.
 
     `complete` gives what a shell offers, as `click.ParamType.shell_complete` does without the parameter.
