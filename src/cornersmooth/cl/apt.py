@@ -84,9 +84,7 @@ def read_apt(
     lines, at most 130 for any statements; the lines of a NURBS record may be `nurbs.MOST_LINES` poses for each control
     point. Raises InputError CS101-CS128 and CS181-CS193, with the line.
     """
-    block = first_block(data[:HEAD])
-    if block is not None:
-        raise error("CS198", name, data.count(b"\n", 0, block.start()) + 1, word=block[0].decode("latin-1").strip())
+    refuse_program(data, name)
     data, cut = without_card_columns(data, name)
     known = next(one for one in DIALECTS if one.name == dialect) if dialect else recognise(data)
     decode = _decoder(data)
@@ -243,6 +241,13 @@ def _unknown(state: ReaderState, record: Record, word: str) -> None:
         state.note("CS130", record.line, word=word)
     else:
         state.note("CS131", record.line)
+
+
+def refuse_program(data: bytes, name: str) -> None:
+    """Refuse an NC program (InputError CS198, with the line of its first block)."""
+    block = first_block(data[:HEAD])
+    if block is not None:
+        raise error("CS198", name, data.count(b"\n", 0, block.start()) + 1, word=block[0].decode("latin-1").strip())
 
 
 def _decoder(data: bytes) -> Decode:

@@ -61,7 +61,7 @@ FILTER = new_command(
 VERIFY = new_command(
     "verify",
     "IN NC",
-    "tolerance axis_length axis_tolerance control machine no_tcp trusted slower skip_cycles strict "
+    "tolerance axis_length axis_tolerance control machine no_tcp trusted work_offset slower skip_cycles strict "
     f"{READING} tool_number spindle tip_control reports as_json tool force quiet verbose",
     """
     Measure the NC program NC against the CL file IN, whoever wrote it.
@@ -83,6 +83,11 @@ VERIFY = new_command(
     epilog="Exit codes: 0 PASSED or INCOMPLETE; 1 FAILED or NOT VERIFIED, and INCOMPLETE under --strict; "
     "2 wrong usage or configuration; 3 an input cannot be read or is not valid; 4 output cannot be written.",
     strict="Take no verdict but PASSED: else 1 is returned.",
+    work_offset={
+        "heading": "Verification",
+        "metavar": "none",
+        "help": "'none': the program selects no work offset, as --work-offset none of smooth writes it.",
+    },
     reports="Write what was found: .json for the results, .csv for a row per pose, .html for a page to look at. May be "
     "repeated.",
     verbose="More: every problem, and how large deviations are and where along the path.",

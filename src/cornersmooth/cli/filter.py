@@ -13,7 +13,9 @@ import click
 from cornersmooth.cli.files import (
     STANDARD,
     check_endings,
+    check_inputs,
     check_path,
+    read_head,
     read_input,
     suffix_of,
     target_of,
@@ -38,7 +40,7 @@ from cornersmooth.comparing import limits_machine
 from cornersmooth.errors import CornersmoothError, SettingsError
 from cornersmooth.filter import Filtered, filter_program, verify_programs
 from cornersmooth.filter.checking import measure
-from cornersmooth.filter.program import read_program
+from cornersmooth.filter.program import read_program, refuse_cl_file
 from cornersmooth.filter.runs import ProgramReader
 from cornersmooth.filter.state import VOCABULARIES
 from cornersmooth.filter.times import time_as_it_is
@@ -69,6 +71,10 @@ def run_filter(given: Options) -> int:
     jobs = find_inputs(given, PATTERNS)
     if given.as_json and (len(jobs) != 1 or jobs[0].target == STANDARD):
         raise click.UsageError("--json needs one input and -o FILE; --report '{stem}.json' tells of several")
+    if len(jobs) == 1:  # what is wrong with the input comes before what is wrong with the output
+        check_inputs(jobs[0].source)
+        with told_of(jobs[0].source):
+            refuse_cl_file(read_head(jobs[0].source))
     for job in jobs:
         if given.directory:
             make_folder(os.path.dirname(job.target) or ".")

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, fields, is_dataclass
 from typing import TYPE_CHECKING, Any, BinaryIO, cast
 
 from cornersmooth import __version__
+from cornersmooth.cl.apt import refuse_program
 from cornersmooth.cli.files import Beginning, check_path, read_input, suffix_of, target_of, write_report
 from cornersmooth.cli.inputs import Input
 from cornersmooth.cli.options import Options
@@ -187,8 +188,10 @@ def _may_replace(job: Job, made_of: str, outcome: Outcome) -> bool | None:
 def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> dict[str, Any]:
     """Make text and reports; a verdict that is not good enough goes to the outcome, and why there was nothing to do."""
     given = job.given
-    may_replace = {} if job.batch else _check(job)
     source, name = read_input(job.source, size_limit=not given.no_size_limit)
+    if given.format is None:  # what is wrong with the input comes before what is wrong with the output
+        refuse_program(source, name)
+    may_replace = {} if job.batch else _check(job)
     made_of = ""
     if job.batch:
         made_of = _made_of(job, source)

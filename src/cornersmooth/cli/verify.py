@@ -68,6 +68,8 @@ def run_verify(given: Options) -> int:
     head = _take_over(given, nc, data)
     given = head.given
     given.check_axis()
+    if given.work_offset not in (None, "none"):
+        raise click.UsageError("--work-offset takes 'none' here: any other is read from the program")
     control, reader = given.load_control(), given.reading_back()
     machine = reader["machine"]
     measures = {name: getattr(given, name) for name in ("tolerance", "axis_length", "axis_tolerance")}
@@ -75,6 +77,8 @@ def run_verify(given: Options) -> int:
     if given.verbose or given.reports or given.as_json:  # it is looked at more than once
         nc = readable_twice(nc)
     trusted = [line for path in given.trusted for line in read_lines(path)]
+    if given.work_offset:
+        trusted.append("work offset")
     if head.remark:  # first: what follows may be hard to understand without it
         warn(head.remark, text)
     found = verify(
@@ -187,6 +191,7 @@ def _take_over(given: Options, nc: bytes | str | os.PathLike[str], source: bytes
     words |= {"machine": ("MACHINE", made.machine or None)} if made.machine in ("", *machine_names()) else {}
     words |= {"operation": ("OPERATION", str(made.operation))} if made.operation else {}
     words |= {"no_tcp": ("TCP", not made.tcp), "slower": ("FEEDS", made.planned_feeds)}
+    words |= {"work_offset": ("OFFSET", "none")} if made.work_offset == "none" else {}
     words = {name: word for name, word in words.items() if not typed(name)}
     if "axis_length" in words and (typed("axis_tolerance") or made.axis_tolerance is not None):
         del words["axis_length"]  # H is no measure where the axis has a tolerance of its own
@@ -226,6 +231,8 @@ def _loose(before: Options, given: Options, taken: set[str]) -> Iterator[str]:
         yield f"that operation {given.operation} is enough is the program's own word: name it with --operation"
     if "slower" in taken and given.slower:
         yield "feeds: that they may be lower is the program's own word: name it with --planned-feeds"
+    if "work_offset" in taken:
+        yield "that no work offset is selected is the program's own word: name it with --work-offset none"
 
 
 def _recognised(given: Options, head: bytes) -> _Head:

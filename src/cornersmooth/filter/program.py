@@ -155,12 +155,17 @@ def verify_programs(
     return replace(found, compared=True)
 
 
+def refuse_cl_file(head: bytes) -> None:
+    """Refuse a CL file by its beginning (InputError CS594)."""
+    if is_cl_file(head):
+        raise InputError("CS594", "this is a CL file, not an NC program", "make a program of it: 'cornersmooth smooth'")
+
+
 def read_program(
     data: bytes, form: Form, settings: Settings, *, tip_from_start: bool = False, inch: bool = False, processes: int = 1
 ) -> tuple[Job, Reading]:
     """Read a program, and see how it is to be written; parameters and errors as of `filter_program`."""
-    if is_cl_file(data[:HEAD]):
-        raise InputError("CS594", "this is a CL file, not an NC program", "make a program of it: 'cornersmooth smooth'")
+    refuse_cl_file(data[:HEAD])
     if form.curves:  # CS241
         line = next(name for name, one in form.table.forms.items() if not one.curve)
         what = f"{form.control} form {form.name} has curves, and a program is smoothed in lines"

@@ -241,7 +241,8 @@ class WordStates:
         for state in dict.fromkeys(rule.state for rule in rules):
             wanted = [rule.pattern for rule in rules if rule.state == state]
             if not any(any_of(pattern, self._said) for pattern in wanted):
-                yield state, " or ".join(map(shown, wanted))
+                usual = next((rule.preset for rule in rules if rule.state == state and rule.preset), "")
+                yield state, f"one such as {usual}" if usual else " or ".join(map(shown, wanted))
 
     # where axes turn, and where the tool moves
 

@@ -1,0 +1,48 @@
+"""Corners of everyday use, each of which was met by a user."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from oracle.command import BAD_INPUT, DONE, SMALL, USAGE, run
+from oracle.messages import one_line
+
+
+@pytest.fixture
+def part(tmp_path: Path) -> Path:
+    path = tmp_path / "part.cls"
+    path.write_bytes(SMALL)
+    return path
+
+
+@pytest.mark.parametrize("control", ["fanuc", "siemens", "heidenhain"])
+def test_a_program_without_a_work_offset(part: Path, control: str) -> None:
+    out = part.with_suffix(".nc")
+    assert run("smooth", part, "--control", control, "--work-offset", "none", "-o", out).returncode == DONE
+    found = run("verify", part, out)
+    assert found.returncode == 1
+    assert b"NOT VERIFIED: that no work offset is selected is the program's own word" in found.stdout
+    assert b"--work-offset none" in found.stdout
+    assert run("verify", part, out, "--work-offset", "none").stdout.startswith(b"PASSED")
+    assert run("verify", part, out, "--work-offset", "G55").returncode == USAGE
+
+
+def test_a_work_offset_that_is_missing_is_named_as_a_machinist_does(part: Path) -> None:
+    out = part.with_suffix(".nc")
+    run("smooth", part, "-o", out)
+    out.write_bytes(out.read_bytes().replace(b"G54\n", b""))
+    found = run("verify", part, out)
+    assert "work offset: one such as G54 must come before the first motion" in one_line(found.stderr)
+
+
+@pytest.mark.parametrize(("command", "other"), [("smooth", "filter"), ("filter", "smooth")])
+def test_the_wrong_kind_of_input_is_named_before_the_output(part: Path, command: str, other: str) -> None:
+    out, program = part.with_name("old.nc"), part.with_suffix(".nc")
+    run("smooth", part, "-o", program)
+    out.write_bytes(b"old")
+    result = run(command, program if command == "smooth" else part, "-o", out)
+    assert result.returncode == BAD_INPUT
+    assert f"'cornersmooth {other}'" in one_line(result.stderr)
+    assert out.read_bytes() == b"old"
