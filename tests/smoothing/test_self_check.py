@@ -1,14 +1,13 @@
-"""The paper's method measures itself: what strays stays sharp, what does not is as published."""
+"""The paper's method measures its own motion: transitions get smaller until it keeps the tolerance."""
 
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from cornersmooth import Program, Settings, smooth
-from cornersmooth.model import Status
-from cornersmooth.smoothing.construction import Construction
-from cornersmooth.smoothing.self_check import distances, passing, straying_remainders
-from cornersmooth.smoothing.zhang2016 import CONSTRUCTION
+from cornersmooth.smoothing.construction import legs_at
+from cornersmooth.smoothing.self_check import Motion, Original, bounded, most_taken, taken
 
 
 def bend(turn: float) -> Program:
@@ -18,60 +17,68 @@ def bend(turn: float) -> Program:
     return Program.from_poses(tip, axis, feed=1000.0)
 
 
-def test_what_strays_stays_sharp() -> None:
+@pytest.mark.parametrize("turn", [0.0, 0.3, 0.7])
+def test_corners_get_smaller_where_the_axis_swings(turn: float) -> None:
     settings = Settings(tolerance=0.01, axis_length=50.0, method="zhang2016")
-    assert smooth(bend(0.0), settings).corners.smoothed.all()
-    corners = smooth(bend(0.7), settings).corners
-    sharp = corners.status == Status.STRAYS
-    assert sharp.any()
-    assert not corners.trim_in[sharp].any()
-    assert not corners.tip_error[sharp].any()
-    assert np.isnan(corners.extra["jump_in"][sharp]).all()
+    corners = smooth(bend(turn), settings).corners
+    assert corners.smoothed.all()
+    assert (corners.extra["size"] > 0.0).all()
 
 
-def test_what_is_left_of_a_segment_strays() -> None:
-    """The tip leaves the corner far ahead of the axis, which turns fastest in the middle of its segment."""
-    tip = np.array([[-50.7695, 18.9255, -18.034], [-28.7223, 42.7584, -51.656], [-28.7985, 42.5602, -51.3588]])
-    axis = np.array([[0.85034, 0.0523, 0.52363], [0.49832, -0.82776, 0.25784], [0.74856, 0.10228, 0.65513]])
-    program = Program.from_poses(tip, axis, feed=1000.0)
-    settings = Settings(tolerance=0.031, axis_tolerance=2.959, method="zhang2016")
-    smoothed = Construction.smooth(CONSTRUCTION, program, settings)
-    assert smoothed.corners.smoothed.all()
-    assert straying_remainders(smoothed).tolist() == [0]
-    straight = Construction.smooth(CONSTRUCTION, bend(0.0), settings)
-    assert straight.corners.smoothed.all()
-    assert not len(straying_remainders(straight))
+def original() -> tuple[Original, Settings]:
+    program, settings = bend(0.3), Settings(tolerance=0.01, axis_length=20.0, method="zhang2016")
+    legs = legs_at(program, 20.0, np.array([1]), np.array([0]), np.array([2]))
+    tips, turns = (legs.tip_in, legs.tip_out), (legs.turn_in, legs.turn_out)
+    return Original(tips, turns, 20.0 * legs.axis), settings
 
 
-def test_going_back_is_told_from_the_farthest_sample() -> None:
-    """Many small steps back are as much as a large one."""
-    program = bend(0.0)
-    share = np.array([0.1, 0.5, 0.4, 0.3, 0.9])
-    tip = program.tip[0] + share[:, None] * (program.tip[1] - program.tip[0])
-    axis = np.tile([0.0, 0.0, 1.0], (len(share), 1))
-    for own_axis, length in ((False, np.sqrt(2.0)), (True, 1.0)):
-        *_, backwards = distances(program, 20.0, np.array([[0, 1]]), tip[None], axis[None], own_axis=own_axis)
-        assert np.isclose(backwards[0], 0.2 * 10.0 * length)
+PARTS = np.array([[-0.6, -0.2, 0.0, 0.3]])
 
 
-def test_distances_are_those_of_the_ruled_motion() -> None:
-    program = bend(0.3)
-    poses = np.array([[0, 1, 2]])
-    share = np.array([0.1, 0.5, 0.9, 1.0])
-    tip = program.tip[0] + share[:, None] * (program.tip[1] - program.tip[0])
-    axis = program.axis[0] + share[:, None] * (program.axis[1] - program.axis[0])
-    axis /= np.linalg.norm(axis, axis=1)[:, None]
-    off = np.array([0.0, 0.0, 0.25])
-    *found, backwards = distances(program, 20.0, poses, (tip + off)[None], axis[None])
-    assert np.allclose(found[0], 0.25, atol=1e-9)
-    assert (found[1] <= 0.25 + 1e-9).all()  # another point of its path may be nearer
-    assert (found[2] >= found[1] - 1e-9).all()
-    assert backwards[0] == 0.0
-    *_, backwards = distances(program, 20.0, poses, tip[None, ::-1], axis[None, ::-1])
-    assert backwards[0] > 4.0
+def test_the_original_takes_nothing() -> None:
+    path, settings = original()
+    motion = Motion(*path.at(PARTS), PARTS, PARTS)
+    assert taken(motion, path, np.zeros(1), settings) == pytest.approx(np.zeros((1, 4)), abs=1e-9)
+    assert most_taken(motion, path, np.zeros(1), settings, 2, None) == pytest.approx(0.0, abs=1e-9)
 
 
-def test_passing_is_the_least_distance_of_the_lines() -> None:
-    path = np.array([[[0.0, 0, 0], [10, 0, 0], [10, 10, 0]]])
-    assert np.allclose(passing(np.array([[4.0, 3.0, 0.0]]), path), 3.0)
-    assert np.allclose(passing(np.array([[13.0, 14.0, 0.0]]), path), 5.0)
+@pytest.mark.parametrize("off", [(0.0, 0.004, 0.0), (0.003, 0.0, 0.01)])
+def test_a_motion_beside_takes_its_distance(off: tuple[float, float, float]) -> None:
+    path, settings = original()
+    tip, lever = path.at(PARTS)
+    share = taken(Motion(tip + off, lever, PARTS, PARTS), path, np.zeros(1), settings)
+    assert share == pytest.approx(np.full((1, 4), np.linalg.norm(off) / 0.01))
+
+
+def test_tip_and_axis_point_out_of_step_take_what_no_common_pose_has() -> None:
+    """The tip is 0.02 of the segment ahead: the nearest common pose is between both, and both are off it by as much."""
+    path, settings = original()
+    ahead = PARTS[:, :2] + 0.02
+    tip, _ = path.at(ahead)
+    top = sum(path.at(PARTS[:, :2]))
+    share = taken(Motion(tip, top - tip, ahead, PARTS[:, :2]), path, np.zeros(1), settings)
+    poses = np.linspace(-1.0, 0.0, 20001)[None]
+    tips, levers = path.at(poses)
+    height = 20.0 * levers / np.linalg.norm(levers, axis=-1)[..., None]
+    for k in range(2):
+        lever = (top - tip)[0, k]
+        second = tip[0, k] + 20.0 * lever / np.linalg.norm(lever)
+        off = np.maximum(
+            np.linalg.norm(tips[0] - tip[0, k], axis=1), np.linalg.norm(tips[0] + height[0] - second, axis=1)
+        )
+        assert off.min() / 0.01 / 1.8 <= share[0, k] * (1.0 + 1e-3)
+
+
+def test_bounds_are_above_what_is_measured() -> None:
+    random = np.random.default_rng(5)
+    path, settings = original()
+    for _ in range(50):
+        tip, lever = path.at(PARTS)
+        errors = random.uniform(0.0, 0.01, 2)
+        tip_off, top_off = random.normal(size=(2, 1, 4, 3))
+        tip_off *= errors[0] / np.linalg.norm(tip_off, axis=-1)[..., None]
+        top_off *= errors[1] / np.linalg.norm(top_off, axis=-1)[..., None]
+        motion = Motion(tip + tip_off, lever + top_off - tip_off, PARTS, PARTS)
+        own, both = bounded(motion, path, (errors[[0]], errors[[1]]), 20.0)
+        share = taken(motion, path, np.zeros(1), settings)
+        assert share.max() * 0.01 <= max(own[0], both[0] / 1.8) * (1.0 + 1e-9)

@@ -18,12 +18,12 @@ from cornersmooth.model import Bools, Corners, Floats, Ints, Program
 
 
 def deviation_factor(weights: Floats, ratio: Floats | float) -> Floats:
-    """(...,) the factor c of weights (..., 2) and ratios (...,)."""
+    """(...,) the factor c of weights (..., 2) and ratios (...,): equations (10) to (12) without the sine."""
     return ratio * weights[..., 0] / (2.0 * (weights[..., 0] + weights[..., 1]))
 
 
 def basis(u: Floats) -> Floats:
-    """Polynomial basis (m, 5) at parameters (m,) in [0, 1]."""
+    """Polynomial basis (m, 5) at parameters (m,) in [0, 1]: equation (4)."""
     u = np.asarray(u, np.float64)
     second = u > 0.5
     s = 2.0 * np.where(second, 1.0 - u, u)
@@ -92,7 +92,7 @@ def control_points(
 
 
 def five_points(corner: Floats, leg_in: Floats, leg_out: Floats, ratio: Floats) -> Floats:
-    """Control points (g, 5, 3) from the corners (g, 3), the legs into and out of them (g, 3) and the ratios (g,)."""
+    """Control points (g, 5, 3) of corners and legs in and out (g, 3) and ratios (g,): equations (5) to (9)."""
     points = np.repeat(corner[:, None, :], 5, axis=1)
     points[:, 0] -= leg_in
     points[:, 1] -= ratio[:, None] * leg_in

@@ -56,7 +56,7 @@ class Legs(NamedTuple):
 
 
 def legs_at(program: Program, axis_length: float, pose: Ints, before: Ints, after: Ints) -> Legs:
-    """Segments at the corners `pose` with their neighbours `before` and `after`, (g,) each."""
+    """Segments at the corners `pose` with their neighbours `before` and `after`, (g,) each: equations (1) and (2)."""
     tip, axis, moved = program.tip, program.axis, program.moved
     corner, direction = tip[pose], axis[pose]
     return Legs(
@@ -186,12 +186,7 @@ def place_corners(
         if len(rows):
             legs = legs_at(program, settings.axis_length, pose[rows], before[rows], after[rows])
             part = construction.place(legs, settings)
-            rounded = part.status == Status.SMOOTHED
-            part.tip_error, part.axis_error = (e + rounded * legs.shift for e in (part.tip_error, part.axis_error))
-            for name in ("status", "limited_by", *_MEASURES):
-                getattr(found, name)[rows] = getattr(part, name)
-            for name, values in part.extra.items():
-                extra[name][rows] = values
+            put(found, rows, part, legs.shift)
         return min(start + BATCH, k)
 
     with ThreadPoolExecutor(THREADS) as pool:  # numpy leaves the interpreter free; batches share no rows
@@ -199,6 +194,16 @@ def place_corners(
             if progress is not None:
                 progress(done, k)
     return found
+
+
+def put(corners: Corners, rows: Ints, placed: Placed, shift: Floats) -> None:
+    """Put transitions in rows of corners, in place; their errors count by what the poses were moved, mm."""
+    moved = np.where(placed.status == Status.SMOOTHED, shift, 0.0)
+    placed.tip_error, placed.axis_error = placed.tip_error + moved, placed.axis_error + moved
+    for name in ("status", "limited_by", *_MEASURES):
+        getattr(corners, name)[rows] = getattr(placed, name)
+    for name, values in placed.extra.items():
+        corners.extra[name][rows] = values
 
 
 def _surroundings(program: Program, settings: Settings, pose: Ints, after: Ints) -> NDArray[np.uint8]:

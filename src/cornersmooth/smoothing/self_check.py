@@ -1,177 +1,142 @@
-"""Which transitions of the paper's method keep the tolerance: measured, as its equations do not guarantee it.
+"""How much of the tolerance the paper's motion takes: its equations do not bound it (docs/method.md).
 
-Equation (10) bounds each of the two curves, not the motion that their synchronisation makes of them. So transitions,
-and what they leave of the segments between them, are sampled and measured here against the original motion.
+Equation (10) bounds each of the two curves, not the motion that their synchronisation makes of them. Which pose of the
+original belongs to a parameter is known: with σ and β as in `cornersmooth.geometry.nurbs`, the tip at u is β·(b − a)
+from the pose that is the share σ(u) of the leg away from the corner, and the same holds of the axis point at v. As both
+only go forward, so do the poses. Nothing is searched for.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from cornersmooth.geometry import nurbs
-from cornersmooth.model import Bools, Floats, Ints, Program, SmoothProgram
-from cornersmooth.smoothing.construction import construction_of
-from cornersmooth.smoothing.sampling import nodes
-from cornersmooth.smoothing.segments import inner_points, lines_of, segments_of
-from cornersmooth.vectors import dot, norm, square, unit
-
-#: parameters at which transitions are measured, u = ½ in the middle, parts in which what is left of segments is
-#: measured, and corners or segments measured at once
-_SAMPLES, _PARTS, _MEASURED = np.linspace(0.0, 1.0, 17), 16, 512
-
-#: for the last digits of sums
-_HAIR: Final = 1.0 + 1e-9
+from cornersmooth.model import Floats, Ints
+from cornersmooth.settings import Settings
+from cornersmooth.vectors import norm, square, unit
 
 #: how far tip and axis point may be from a common pose, in what is allowed for each: nearly what verification allows
-_TOGETHER: Final = 1.8
+TOGETHER: Final = 1.8
 
-#: steps back that the digits of most controls do not show, mm
-_LEAST_BACK: Final = 1e-4
+#: for what lies between two samples
+_BETWEEN: Final = 0.98
 
-#: parts of every segment of the original in which the nearest pose is looked for, and steps to it from there
-_GRID: Final = 24
-_STEPS: Final = 3
-
-#: length below which a direction has no meaning
 _LEAST: Final = 1e-30
 
 
-def straying_transitions(smoothed: SmoothProgram) -> Ints:
-    """Rows of corners whose transitions stray."""
-    return _those(np.flatnonzero(smoothed.corners.smoothed), lambda rows: _transitions_stray(smoothed, rows))
+class Motion(NamedTuple):
+    """Sampled poses (g, m) about g corners, or between g pairs of them; vectors (g, m, 3), mm."""
+
+    tip: Floats  # from the tip of the corner
+    lever: Floats  # from tip to axis point
+    #: of the segment that tip, and axis point, are on: parts gone from the corner, below 0 before it, (g, m)
+    tip_at: Floats
+    axis_at: Floats
 
 
-def straying_remainders(smoothed: SmoothProgram) -> Ints:
-    """Rows of corners beside segments of which the transitions leave what strays.
+def motion_of(
+    tip_legs: tuple[Floats, Floats],
+    axis_legs: tuple[Floats, Floats],
+    trims: tuple[Floats, ...],
+    lever: Floats,
+    parameters: tuple[Floats, Floats],
+    shape: tuple[Floats, float],
+) -> Motion:
+    """Transitions at parameters u (m,) and v (g, m).
 
-    There tip and axis are out of step by what the two were cut unlike.
+    Legs (g, 3) are those of the curves, `trims` (g,) their parts of the segments: of the tip in and out, of the axis
+    point in and out. `shape` is weights (2,) and ratio.
     """
-    segments = segments_of(smoothed, dense=False)
-
-    def stray(pose: Ints) -> Bools:
-        ends = np.stack((segments.start[pose].astype(np.int64), pose), axis=1)
-        return _off_the_motion(smoothed, ends, *inner_points(smoothed, segments, pose, _PARTS))
-
-    unlike = (segments.entry != segments.axis_entry) | (segments.exit != segments.axis_exit)
-    pose = _those(np.flatnonzero(unlike & segments.has_line & (segments.start >= 0)), stray)
-    rows = np.unique(segments.row[np.concatenate((segments.start[pose], pose))])
-    return rows[rows >= 0]
-
-
-def _those(rows: Ints, stray: Callable[[Ints], Bools]) -> Ints:
-    """Rows that stray, looked at some at once."""
-    parts = np.split(rows, np.arange(_MEASURED, len(rows), _MEASURED))
-    return np.concatenate([part[stray(part)] for part in parts if len(part)] or [rows])
+    (u, v), (tip_in, tip_out, axis_in, axis_out) = parameters, trims
+    of_tip, of_axis = (nurbs.leg_coefficients(at, *shape) for at in (u[None], v))
+    at_tip, at_axis = of_tip[..., 1:].sum(axis=-1), of_axis[..., 1:].sum(axis=-1)  # σ, below 0 before the corner
+    tip = of_tip[..., 1:] @ np.stack(tip_legs, axis=1)
+    top = lever[:, None] + of_axis[..., 1:] @ np.stack(axis_legs, axis=1)
+    return Motion(
+        tip,
+        top - tip,
+        at_tip * np.where(at_tip < 0.0, tip_in[:, None], tip_out[:, None]),
+        at_axis * np.where(at_axis < 0.0, axis_in[:, None], axis_out[:, None]),
+    )
 
 
-def _transitions_stray(smoothed: SmoothProgram, rows: Ints) -> Bools:
-    """(g,) whether transitions stray, as synchronised lines or, as controls run both curves, at common parameters."""
-    settings, weights = smoothed.settings, smoothed.corners.weights[rows]
-    found = np.zeros(len(rows), np.bool_)
-    number = lines_of(smoothed, rows)
-    for count in np.unique(number):
-        same = np.flatnonzero(number == count)
-        tips, levers = construction_of(settings.method).points(smoothed, rows[same], nodes(int(count)))
-        found[same] = _beyond(smoothed, rows[same], _halved(tips), _halved(unit(levers)))
-    curves = nurbs.control_points(smoothed.program, smoothed.corners, rows, settings.axis_length)
-    tips, tops = (nurbs.evaluate(one, weights, _SAMPLES) for one in curves)
-    return found | _beyond(smoothed, rows, tips, tops - tips)
+class Original(NamedTuple):
+    """The segments about g corners, (g, 3) each: into it and out of it."""
+
+    tips: tuple[Floats, Floats]
+    turns: tuple[Floats, Floats]  # the axis-point segments less those of the tip
+    lever: Floats
+
+    def some(self, rows: Ints) -> Original:
+        """Those of some corners."""
+        tips, turns = ((one[0][rows], one[1][rows]) for one in (self.tips, self.turns))
+        return Original(tips, turns, self.lever[rows])
+
+    def at(self, part: Floats) -> tuple[Floats, Floats]:
+        """Tips from that of the corner, and levers, (g, m, 3), at parts (g, m) of the segments."""
+        before = (part < 0.0)[..., None]
+        tip, turn = (np.where(before, one[0][:, None], one[1][:, None]) for one in (self.tips, self.turns))
+        return part[..., None] * tip, self.lever[:, None] + part[..., None] * turn
 
 
-def _halved(points: Floats) -> Floats:
-    """Points (g, m, 3) with those in the middle between them."""
-    halved = np.repeat(points, 2, axis=1)[:, :-1]
-    halved[:, 1::2] = (points[:, 1:] + points[:, :-1]) / 2.0
-    return halved
+def taken(motion: Motion, original: Original, spare: Floats, settings: Settings, *, reserve: float = 0.0) -> Floats:
+    """(g, m) what each pose takes of the tolerances, 1 for the whole. `reserve`, mm, is left free at the axis point."""
+    height = settings.axis_scale
+    axis = unit(motion.lever)
+    common = settings.common_tolerance + spare[:, None]
+    tip, lever = original.at(motion.tip_at)
+    off_tip = norm(motion.tip - tip)
+    if settings.axis_tolerance is not None:  # both at one pose
+        return np.maximum(off_tip, height * norm(axis - unit(lever)) + reserve) / common
+    own_tip, own_lever = original.at(motion.axis_at)
+    own = norm(motion.tip - own_tip + height * (axis - unit(own_lever))) + reserve
+    together = np.maximum(off_tip, own) + _out_of_step(motion.tip_at, motion.axis_at, original)
+    return np.maximum(own, together / TOGETHER) / common
 
 
-def _beyond(smoothed: SmoothProgram, rows: Ints, tip: Floats, lever: Floats) -> Bools:
-    """(g,) whether sampled transitions are farther from the original than the method allows."""
-    program, corners, settings = smoothed.program, smoothed.corners, smoothed.settings
-    poses = np.stack((corners.before[rows], corners.pose[rows], corners.after[rows]), axis=1)
-    axis = unit(lever)
-    corner, direction, height = program.tip[poses[:, 1]], program.axis[poses[:, 1]], settings.axis_scale
-    passed = passing(corner, tip)
-    away = tip - corner[:, None], height * (axis - direction[:, None])
-    if settings.axis_tolerance is None:
-        passed = np.maximum(passed, passing(corner + height * direction, tip + height * axis))
-        away = away[0], away[0] + away[1]
-    at_corner = np.maximum(norm(away[0]), norm(away[1]))
-    if settings.lines == "long":  # of the points around the corner only that of its own parameter is sure to be kept
-        passed = np.maximum(passed, at_corner[:, tip.shape[1] // 2])
-    elif settings.axis_tolerance is not None:  # both at one pose
-        passed = np.maximum(passed, at_corner.min(axis=1))
-    return _off_the_motion(smoothed, poses, tip, axis) | (passed > _HAIR * settings.common_tolerance)
+def bounded(motion: Motion, original: Original, errors: tuple[Floats, Floats], height: float) -> tuple[Floats, Floats]:
+    """(g,) mm: bounds of what the axis point is off its path, and of what both are off a common pose.
 
-
-def _off_the_motion(smoothed: SmoothProgram, poses: Ints, tip: Floats, axis: Floats) -> Bools:
-    """(g,) whether samples are farther from the original through `poses`, or go back along it by more, than allowed."""
-    settings = smoothed.settings
-    height, own_axis = settings.axis_scale, settings.axis_tolerance is not None
-    *alone, together, backwards = distances(smoothed.program, height, poses, tip, axis, own_axis=own_axis)
-    off = together if own_axis else np.maximum(np.maximum(*alone), together / _TOGETHER)
-    steps = settings.tip_resolution, settings.axis_point_resolution * (height / settings.axis_length), _LEAST_BACK
-    return (off.max(axis=1) > _HAIR * settings.common_tolerance) | (backwards > 2.0 * max(steps))
-
-
-def distances(
-    program: Program, axis_length: float, poses: Ints, tip: Floats, axis: Floats, *, own_axis: bool = False
-) -> tuple[Floats, Floats, Floats, Floats]:
-    """How far sampled poses (g, m) are from the original motion through some poses (g, q) of a program, mm.
-
-    Gives (g, m) distances from the path of the tip, from that of the axis point, and of both from the pose that is
-    nearest in six dimensions; and (g,) by how much that pose goes back along the original, at most. With `own_axis` the
-    axis point is H times the axis wherever the tip is.
+    By the control polygons the tip is within `errors[0]` of its path, and Q within `errors[1]` of the straight path of
+    the axis point: equation (10). The axis point is off Q by what is missing of |Q − P| = H, and its path is off the
+    straight one by what the chord of the turn leaves of H.
     """
-    own = tip, axis_length * axis if own_axis else tip + axis_length * axis
-    tips, axes = program.tip[poses.T][:, :, None], program.axis[poses.T][:, :, None]
-    ways, turns = np.diff(tips, axis=0), np.diff(axes, axis=0)  # of each segment, (q - 1, g, 1, 3)
-
-    def original(share: Floats) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats]]:
-        """Tips and axis points (q - 1, g, m, 3), and their slopes, at shares (q - 1, g, m) of the segments."""
-        part = share[..., None]
-        ruled = axes[:-1] + part * turns
-        size = np.maximum(norm(ruled), _LEAST)[..., None]
-        lever = axis_length * ruled / size
-        turning = axis_length * (turns - dot(ruled, turns)[..., None] * ruled / size**2) / size
-        point = tips[:-1] + part * ways
-        return ((point, lever), (ways, turning)) if own_axis else ((point, point + lever), (ways, ways + turning))
-
-    grid = np.linspace(0.0, 1.0, _GRID + 1)
-    on_grid, _ = original(np.broadcast_to(grid, (*ways.shape[:2], len(grid))))
-
-    def nearest(*chosen: int) -> tuple[Floats, Floats, Floats, Ints]:
-        """Distances of both from the pose at which those `chosen` are nearest together, and where that is."""
-        squares: Floats = sum(square(own[k][:, :, None] - on_grid[k][:, :, None]) for k in chosen)  # type: ignore[assignment]
-        share = found = grid[squares.argmin(axis=-1)]
-        best = np.full(share.shape, np.inf)
-        for _ in range(_STEPS + 1):  # those of Gauss and Newton
-            here, slope = original(share)
-            away = sum(square(own[k] - here[k]) for k in chosen)
-            found, best = np.where(away < best, share, found), np.minimum(away, best)
-            towards = sum(dot(own[k] - here[k], slope[k]) for k in chosen)
-            steep = sum(square(slope[k]) for k in chosen)
-            share = np.clip(share + towards / np.maximum(steep, _LEAST), 0.0, 1.0)
-        here, _ = original(found)
-        leg = best.argmin(axis=0)
-        chosen_of = (norm(own[0] - here[0]), norm(own[1] - here[1]), found)
-        tip_off, axis_off, share = (np.take_along_axis(one, leg[None], axis=0)[0] for one in chosen_of)
-        return tip_off, axis_off, share, leg
-
-    swings = axis_length * turns if own_axis else ways + axis_length * turns
-    size = np.sqrt(square(ways) + square(swings))[..., 0].T
-    *common, share, leg = nearest(0, 1)
-    row = np.arange(len(poses))[:, None]
-    length = (np.cumsum(size, axis=1) - size)[row, leg] + share * size[row, leg]
-    back = (np.maximum.accumulate(length, axis=1) - length).max(axis=1)
-    return nearest(0)[0], nearest(1)[1], np.maximum(*common), back
+    missing = np.abs(norm(motion.lever) - height).max(axis=1)
+    sag = height - np.sqrt(np.maximum(height**2 - np.maximum(*map(square, original.turns)) / 4.0, 0.0))
+    own = errors[1] + missing + sag
+    return own, np.maximum(errors[0], own) + _out_of_step(motion.tip_at, motion.axis_at, original).max(axis=1)
 
 
-def passing(point: Floats, path: Floats) -> Floats:
-    """(g,) distance of points (g, 3) from polylines (g, m, 3), mm."""
-    start, way = path[:, :-1] - point[:, None], np.diff(path, axis=1)
-    share = np.clip(-dot(start, way) / np.maximum(square(way), _LEAST), 0.0, 1.0)
-    return norm(start + share[..., None] * way).min(axis=1)
+def _out_of_step(tip_at: Floats, axis_at: Floats, original: Original) -> Floats:
+    """(g, m) mm: what tip and axis point are off the pose between their own at which they are off by as much."""
+    sizes = [
+        np.where(at < 0.0, norm(one[0])[:, None], norm(one[1])[:, None])
+        for at, one in ((tip_at, original.tips), (axis_at, _sums(original)))
+    ]
+    apart = np.abs(tip_at - axis_at) * sizes[0] * sizes[1] / np.maximum(sizes[0] + sizes[1], _LEAST)
+    # one before the corner, one behind it: the pose is that of the corner
+    return np.where(tip_at * axis_at < 0.0, np.maximum(np.abs(tip_at) * sizes[0], np.abs(axis_at) * sizes[1]), apart)
+
+
+def _sums(original: Original) -> tuple[Floats, Floats]:
+    return original.tips[0] + original.turns[0], original.tips[1] + original.turns[1]
+
+
+def most_taken(
+    motion: Motion, original: Original, spare: Floats, settings: Settings, middle: int, passing: Floats | None
+) -> Floats:
+    """(g,) what transitions take at most; `middle` is the sample at u = ½.
+
+    `passing`, mm, bounds how far lines pass the axis point of the corner; None for curves, which pass it at u = ½.
+    """
+    share = taken(motion, original, spare, settings)
+    most: Floats = np.maximum(np.delete(share, middle, axis=1).max(axis=1) / _BETWEEN, share[:, middle])
+    if settings.axis_tolerance is not None:
+        return most
+    axis = unit(motion.lever[:, middle]) - unit(original.lever)
+    at_corner = norm(motion.tip[:, middle] + settings.axis_scale * axis)
+    if passing is not None and settings.lines != "long":  # of long lines only the point at u = ½ is sure to be kept
+        at_corner = np.minimum(at_corner, passing)
+    return np.maximum(most, at_corner / (settings.common_tolerance + spare))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields, replace
 from typing import Any, Final
 
 import numpy as np
@@ -12,26 +11,39 @@ from cornersmooth.geometry import nurbs
 from cornersmooth.model import Corners, Floats, Ints, LimitedBy, Program, SmoothProgram, Status
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.construction import (
+    BATCH,
     Construction,
     Legs,
     Placed,
     Progress,
     divide,
     half_cosine,
+    legs_at,
+    put,
     refuse_turns,
-    with_rows,
 )
-from cornersmooth.smoothing.segments import Segments
-from cornersmooth.smoothing.self_check import straying_remainders, straying_transitions
+from cornersmooth.smoothing.proportional import EXACT
+from cornersmooth.smoothing.segments import Segments, segments_of
+from cornersmooth.smoothing.self_check import TOGETHER, Motion, Original, bounded, most_taken, motion_of, taken
 from cornersmooth.smoothing.synchronise import REPORT_PARAMETERS, matching_parameters, synchronisation_report
 from cornersmooth.vectors import angle_between, dot, norm, unit
 
-#: what `Corners.extra` holds: the largest ``||Q−P|−H|`` that the synchronisation leaves (mm), and the jumps of the axis
-#: at both ends of the transition (rad)
-EXTRA = ("sync_residual", "jump_in", "jump_out")
+#: what `Corners.extra` holds: the largest ``||Q−P|−H|`` that the synchronisation leaves (mm), the jumps of the axis at
+#: both ends of the transition (rad), and the length (15) of a curve whose segments have room for it (mm)
+EXTRA = ("sync_residual", "jump_in", "jump_out", "size")
 
-#: part of the tolerance for corners that leave it: the bound (10) holds for each curve, not for the synchronised motion
-_SMALLER: Final = 0.99
+#: rounds of making transitions smaller until they keep the tolerance; parts of a segment at which what transitions
+#: leave of it is looked at; by what both its transitions become smaller where it strays, and how often
+_ROUNDS: Final = 30
+_PARTS: Final = np.array([0.25, 0.5, 0.75])
+_SMALLER: Final = 0.7
+_TIMES: Final = 12
+
+#: where transitions of other weights than 1 are looked at: they may bend within little of the parameter
+_MORE_PARAMETERS: Final = np.linspace(0.0, 1.0, 33)
+
+#: a size whose motion takes the tolerance but for this is the size that just keeps it
+_JUST: Final = 1e-6
 
 
 class Zhang2016(Construction):
@@ -42,20 +54,27 @@ class Zhang2016(Construction):
     def smooth(
         self, program: Program, settings: Settings, progress: Progress | None = None, processes: int = 1
     ) -> SmoothProgram:
-        """Smooth a whole program; corners whose motion leaves the tolerance get a smaller one, or stay sharp."""
+        """Smooth a whole program; corners beside segments whose rest strays get smaller, or stay sharp."""
         smoothed = super().smooth(program, settings, progress, processes)
-        rows = straying_transitions(smoothed)
-        if len(rows):
-            smaller = super().smooth(program, settings.but(tolerance=_SMALLER * settings.tolerance), None, processes)
-            smoothed = replace(smoothed, corners=with_rows(smoothed.corners, smaller.corners, rows))
-        for strays in (straying_transitions, straying_remainders):
-            rows = strays(smoothed)
-            if len(rows):
-                smoothed = replace(smoothed, corners=_left_sharp(smoothed.corners, rows))
+        corners = smoothed.corners
+        rows = straying_remainders(smoothed)
+        for number in range(_TIMES):
+            if not len(rows):
+                break
+            legs = legs_at(program, settings.axis_length, corners.pose[rows], corners.before[rows], corners.after[rows])
+            size = _SMALLER * corners.extra["size"][rows]
+            part = self.sized(legs, settings, np.zeros(len(rows)) if number == _TIMES - 1 else size)
+            part.status[part.status == Status.TOO_SHORT] = Status.STRAYS
+            put(corners, rows, part, legs.shift)
+            rows = straying_remainders(smoothed)
         return smoothed
 
     def place(self, legs: Legs, settings: Settings) -> Placed:
-        """Trim tip and axis-point segments each on its own, as the paper does: equations (10), (15), (16) and (19).
+        """Trim tip and axis-point segments each on its own, as the paper does, by the lengths that just keep ε."""
+        return self.sized(legs, settings, np.full(len(legs.axis), np.inf))
+
+    def sized(self, legs: Legs, settings: Settings, most: Floats) -> Placed:
+        """Place transitions (g,) of a length of at most `most`, mm: equations (10) to (16) and (19).
 
         (16) and (19) give the curve with the larger sine the tolerance and the other one its share by the ratio of the
         sines; put into (15) that is one and the same length for both: 3(w1+w2)ε/(2·w1·max(sin α/2, sin β/2)).
@@ -63,41 +82,44 @@ class Zhang2016(Construction):
         tip, axis = (legs.tip_in, legs.tip_out), (legs.tip_in + legs.turn_in, legs.tip_out + legs.turn_out)
         (tip_sizes, tip_sine), (axis_sizes, axis_sine) = _turn(*tip), _turn(*axis)
         g = len(tip_sine)
-        factor = 2.0 * nurbs.deviation_factor(
-            np.array(settings.weights), settings.ratio
-        )  # 2·w1/(3(w1+w2)) in the paper
+        shape = np.array(settings.weights), settings.ratio
+        factor = 2.0 * float(nurbs.deviation_factor(*shape))  # 2·w1/(3(w1+w2)) in the paper
+        spare = legs.spare(settings)
         by_tolerance = np.minimum(
-            divide(settings.common_tolerance, factor * tip_sine),
-            divide(settings.axis_point_tolerance, factor * axis_sine),
+            divide(settings.common_tolerance + spare, factor * tip_sine),
+            divide(settings.axis_point_tolerance + spare, factor * axis_sine),
         )
-        tip_length, axis_length = (
-            np.minimum(np.minimum(*sizes) / 2.0, by_tolerance) for sizes in (tip_sizes, axis_sizes)
-        )
+        halves = np.minimum(*tip_sizes) / 2.0, np.minimum(*axis_sizes) / 2.0
 
         status = np.full(g, Status.SMOOTHED, np.uint8)
         status[(tip_sine == 0.0) & (axis_sine == 0.0)] = Status.STRAIGHT
         sizes = np.hypot(tip_sizes[0], axis_sizes[0]) * np.hypot(tip_sizes[1], axis_sizes[1])
         cosine = (dot(*tip) + dot(*axis)) / sizes
         refuse_turns(status, cosine, half_cosine(legs, settings.axis_length), settings)
+
+        # the size: the length (15) of both curves where their segments have room for it
+        size = np.minimum(np.minimum(by_tolerance, np.maximum(*halves)), most)
+        rows = np.flatnonzero(status == Status.SMOOTHED)
+        found = np.zeros((4, g))
+        for number in range(_ROUNDS):
+            found[:, rows], share = _measured(legs, settings, rows, *(np.minimum(half, size)[rows] for half in halves))
+            over = share > 1.0 + EXACT
+            rows = rows[over]
+            if not len(rows):
+                break
+            size[rows] *= (1.0 - _JUST) / share[over] if number < _ROUNDS // 2 else 0.5
+        status[rows] = Status.STRAYS
+        tip_length, axis_length = np.minimum(halves[0], size), np.minimum(halves[1], size)
         short = np.maximum(tip_length, axis_length) <= 4.0 * settings.tip_resolution
         status[(status == Status.SMOOTHED) & short] = Status.TOO_SHORT
         smoothed = status == Status.SMOOTHED
         tip_length, axis_length = np.where(smoothed, tip_length, 0.0), np.where(smoothed, axis_length, 0.0)
-        by_segment = (tip_length < by_tolerance) | (axis_length < by_tolerance)
+        by_segment = (np.minimum(*halves) < size) | (np.maximum(*halves) <= size)
         limited_by = np.where(by_segment, LimitedBy.SEGMENT, LimitedBy.TOLERANCE).astype(np.uint8)
         limited_by[~smoothed] = LimitedBy.NOTHING
-
         tip_trims, axis_trims = (
             [np.divide(length, size, out=np.zeros(g), where=size > 0.0) for size in sizes]
             for length, sizes in ((tip_length, tip_sizes), (axis_length, axis_sizes))
-        )
-        *left, orientation = synchronisation_report(
-            (tip_trims[0][:, None] * tip[0], tip_trims[1][:, None] * tip[1]),
-            (axis_trims[0][:, None] * axis[0], axis_trims[1][:, None] * axis[1]),
-            settings.axis_length * legs.axis,
-            np.broadcast_to(np.array(settings.weights), (g, 2)),
-            np.broadcast_to(np.float64(settings.ratio), (g,)),
-            settings.axis_length,
         )
         return Placed(
             status,
@@ -105,14 +127,16 @@ class Zhang2016(Construction):
             *(tip_trims[0], tip_trims[1], axis_trims[0], axis_trims[1]),
             tip_error=factor * tip_length * tip_sine,  # equation (10)
             axis_error=factor * axis_length * axis_sine,
-            orientation_error=np.where(smoothed, orientation, 0.0),
-            extra={name: np.where(smoothed, values, np.nan) for name, values in zip(EXTRA, left, strict=True)},
+            orientation_error=np.where(smoothed, found[3], 0.0),
+            extra={
+                name: np.where(smoothed, values, np.nan) for name, values in zip(EXTRA, (*found[:3], size), strict=True)
+            },
         )
 
     def points(self, smoothed: SmoothProgram, rows: Ints, u: Floats) -> tuple[Floats, Floats]:
-        """The axis-point curve at the synchronised parameters."""
+        """The axis-point curve at the synchronised parameters: equations (20) to (22) and, at the ends, (26)."""
         corners, height = smoothed.corners, smoothed.settings.axis_length
-        weights = corners.weights[rows]
+        weights = np.array(smoothed.settings.weights)
         tip_curve, axis_curve = nurbs.control_points(smoothed.program, corners, rows, height)
         v, _ = matching_parameters(tip_curve, axis_curve, weights, u, height)
         points = nurbs.evaluate(tip_curve, weights, np.concatenate(([0.0], u)))
@@ -137,23 +161,23 @@ class Zhang2016(Construction):
         return fraction, np.where(apart[:, None, None], ruled, axis)
 
     def axes(self, program: Program, corners: Corners, settings: Settings, rows: Ints, u: Floats) -> Floats:
-        """Axes with the axis-point curve at its own parameter v(u): equations (20) to (22).
+        """Axes with the axis-point curve at its own parameter v(u): equations (20) to (23).
 
         v(u) is followed from u = 0 over a common set of parameters and interpolated in between.
         """
         distinct, which = np.unique(rows, return_inverse=True)
         tip_curve, axis_curve = nurbs.control_points(program, corners, distinct, settings.axis_length)
-        weights = corners.weights[distinct]
+        weights = np.array(settings.weights)
         v, _ = matching_parameters(tip_curve, axis_curve, weights, REPORT_PARAMETERS, settings.axis_length)
         cell = np.clip(np.searchsorted(REPORT_PARAMETERS, u, side="right") - 1, 0, len(REPORT_PARAMETERS) - 2)
         part = (u - REPORT_PARAMETERS[cell]) / (REPORT_PARAMETERS[cell + 1] - REPORT_PARAMETERS[cell])
         at = v[which, cell] + part * (v[which, cell + 1] - v[which, cell])
-        tips = nurbs.evaluate(tip_curve[which], weights[which], u[:, None])[:, 0]
-        return unit(nurbs.evaluate(axis_curve[which], weights[which], at[:, None])[:, 0] - tips)
+        tips = nurbs.evaluate(tip_curve[which], weights, u[:, None])[:, 0]
+        return unit(nurbs.evaluate(axis_curve[which], weights, at[:, None])[:, 0] - tips)
 
     def report_columns(self, corners: Corners, rows: Ints) -> dict[str, Floats]:
         """What the synchronisation leaves at every corner."""
-        residual, jump_in, jump_out = (corners.extra[name][rows] for name in EXTRA)
+        residual, jump_in, jump_out = (corners.extra[name][rows] for name in EXTRA[:3])
         return {
             "sync_residual_mm": residual,
             "joint_jump_in_deg": np.degrees(jump_in),
@@ -162,7 +186,7 @@ class Zhang2016(Construction):
 
     def report_summary(self, corners: Corners) -> dict[str, float]:
         """The largest of what the synchronisation leaves."""
-        residual, jump_in, jump_out = (corners.extra[name][corners.smoothed] for name in EXTRA)
+        residual, jump_in, jump_out = (corners.extra[name][corners.smoothed] for name in EXTRA[:3])
         jump = max(jump_in.max(initial=0.0), jump_out.max(initial=0.0))
         return {
             "max_sync_residual_mm": float(residual.max(initial=0.0)),
@@ -186,12 +210,67 @@ def _turn(leg_in: Floats, leg_out: Floats) -> tuple[tuple[Floats, Floats], Float
     return sizes, np.where(np.minimum(*sizes) > 0.0, norm(unit(leg_out) - unit(leg_in)) / 2.0, 0.0)
 
 
-def _left_sharp(corners: Corners, rows: Ints) -> Corners:
-    k = len(corners)
-    names = (item.name for item in fields(Corners) if "trim" in item.name or "error" in item.name)
-    nothing: dict[str, Any] = dict.fromkeys(names, np.zeros(k))
-    status, limited_by = np.full(k, Status.STRAYS, np.uint8), np.full(k, LimitedBy.NOTHING, np.uint8)
-    return with_rows(corners, replace(corners, status=status, limited_by=limited_by, extra={}, **nothing), rows)
+def _measured(
+    legs: Legs, settings: Settings, rows: Ints, tip_length: Floats, axis_length: Floats
+) -> tuple[tuple[Floats, ...], Floats]:
+    """Residual, jumps and turn of transitions with these lengths (15), and what of the tolerances they take (g,)."""
+    tips, turns = (legs.tip_in[rows], legs.tip_out[rows]), (legs.turn_in[rows], legs.turn_out[rows])
+    original = Original(tips, turns, settings.axis_length * legs.axis[rows])
+    axes = tips[0] + turns[0], tips[1] + turns[1]
+    trims = [divide(length, norm(leg)) for legs, length in ((tips, tip_length), (axes, axis_length)) for leg in legs]
+    trims = [np.where(np.isfinite(trim), trim, 0.0) for trim in trims]
+    tip_legs, axis_legs = (
+        (trims[k][:, None] * both[0], trims[k + 1][:, None] * both[1]) for k, both in ((0, tips), (2, axes))
+    )
+    shape = np.array(settings.weights), settings.ratio
+    u = REPORT_PARAMETERS if settings.weights == (1.0, 1.0) and settings.axis_tolerance is None else _MORE_PARAMETERS
+    v, *report = synchronisation_report(tip_legs, axis_legs, original.lever, *shape, settings.axis_length, u)
+    lines = settings.round_feed_changes
+    at = np.broadcast_to(u, v.shape)  # controls run curves at common parameters
+    if lines:  # which begin and end where straight motion does, equation (26), and in between are at v
+        u, at = np.pad(u, 1, mode="edge"), np.pad(v, ((0, 0), (1, 1)), constant_values=((0, 0), (0.0, 1.0)))
+    motion = motion_of(tip_legs, axis_legs, tuple(trims), original.lever, (u, at), shape)
+    middle = len(u) // 2
+    factor, spare = float(nurbs.deviation_factor(*shape)), legs.spare(settings)[rows]
+    errors = factor * norm(tip_legs[1] - tip_legs[0]), factor * norm(axis_legs[1] - axis_legs[0])
+    own, both = bounded(motion, original, errors, settings.axis_length)
+    passing = own + (settings.chord if lines else 0.0)
+    share = np.maximum(passing, both / TOGETHER) / (settings.common_tolerance + spare)
+    if settings.axis_tolerance is not None:
+        share[:] = np.inf
+    doubtful = np.flatnonzero(share > 1.0)
+    some, there = Motion(*(part[doubtful] for part in motion)), original.some(doubtful)
+    share[doubtful] = most_taken(some, there, spare[doubtful], settings, middle, passing[doubtful] if lines else None)
+    return tuple(report), share
+
+
+def straying_remainders(smoothed: SmoothProgram) -> Ints:
+    """Rows of corners beside segments of which the transitions leave what strays.
+
+    There tip and axis are out of step by what the two were cut unlike.
+    """
+    program, settings = smoothed.program, smoothed.settings
+    segments = segments_of(smoothed, dense=False)
+    unlike = (segments.entry != segments.axis_entry) | (segments.exit != segments.axis_exit)
+    pose = np.flatnonzero(unlike & segments.has_line & (segments.start >= 0))
+    found = [pose[:0]]
+    for part in np.split(pose, np.arange(BATCH, len(pose), BATCH)):
+        start = segments.start[part]
+        step = program.tip[part] - program.tip[start]
+        lever = settings.axis_length * program.axis[start]
+        turn = settings.axis_length * program.axis[part] - lever
+        tip_at, axis_at = (
+            low[part, None] + _PARTS * (high - low)[part, None]
+            for low, high in ((segments.entry, segments.exit), (segments.axis_entry, segments.axis_exit))
+        )
+        tip = tip_at[..., None] * step[:, None]
+        motion = Motion(tip, lever[:, None] + axis_at[..., None] * (step + turn)[:, None] - tip, tip_at, axis_at)
+        original, none = Original((step, step), (turn, turn), lever), np.zeros(len(part))
+        share = taken(motion, original, none, settings, reserve=settings.interpolation_tolerance)
+        found.append(part[share.max(axis=1) > 1.0])
+    pose = np.concatenate(found)
+    rows = np.unique(segments.row[np.concatenate((segments.start[pose], pose))])
+    return rows[rows >= 0]
 
 
 def _great_circle(one: Floats, other: Floats, share: Floats) -> Floats:
