@@ -47,7 +47,7 @@ def test_damaged_programs(name: str) -> None:
     for seed in range(200 if THOROUGH else 6):
         old = damaged(text, random.Random(f"{name} {seed}"))
         found = filter_program(old, form, cs.Settings(tolerance=0.02, lines="long" if seed % 2 else "dense"))
-        assert found.verdict is Verdict.PASSED, (seed, found.checked)
+        assert found.verdict is (Verdict.PASSED if found.runs else Verdict.NOT_SMOOTHED), (seed, found.checked)
         assert found.smoothed + sum(one.count for one in found.left) == found.cuts
         # every line outside of runs is in the new program, in the same order
         runs = ProgramReader(form.table.dialect, form.machine).read(old).runs

@@ -11,8 +11,7 @@ import pytest
 import cornersmooth as cs
 from cornersmooth.errors import SettingsError
 from cornersmooth.filter import Filtered, filter_program, verify_programs
-from cornersmooth.filter.runs import ProgramReader
-from cornersmooth.filter.state import VOCABULARIES
+from cornersmooth.filter.runs import FILTERED, ProgramReader
 from cornersmooth.verdict import Verdict
 from filter.programs import ISO, PROGRAMS, WORDS, X, Y, Z, cuts
 from oracle.command import BAD_INPUT, DONE, run
@@ -63,7 +62,7 @@ def test_smooths_what_smooth_has_written(path: Path) -> None:
     parts = re.fullmatch(r"\w+\.(\w+)-g1-?(.*?)(-axes)?", path.stem)
     assert parts is not None
     control, machine, axes = parts.groups()
-    if control not in VOCABULARIES:
+    if control not in FILTERED:
         return
     form = cs.choose_form(control, "g1", machine=cs.load_machine(machine) if machine else None, tcp=not axes)
     found = filter_program(path.read_bytes(), form, cs.Settings(tolerance=EPS))
@@ -187,7 +186,7 @@ def test_what_is_jumped_to_is_left(jump: str) -> None:
 
 
 def test_a_jump_back_into_a_piece_that_was_read_before_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cornersmooth.filter.runs.CHUNK", 200)
+    monkeypatch.setattr("cornersmooth.control.program.CHUNK", 200)
     lines = [f"N{k} {line}\n" for k, line in enumerate(RUN.splitlines(), start=1)]
     text = ISO.format(on="G43.4 H1", start="A20. C30.", cuts="".join(lines)).replace("M30", "IF [#1 EQ 1] GOTO 5\nM30")
     reading = ProgramReader("fanuc", cs.load_machine("table-ac")).read(text.encode())

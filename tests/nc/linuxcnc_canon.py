@@ -49,6 +49,10 @@ class Canon:
     def dwell(self, seconds):
         self._say("dwell", seconds)
 
+    def set_feed_rate(self, rate):
+        """In mm, or degrees, a minute; of no kind that others count."""
+        self._say("feed_rate", rate * self.scale)
+
     def change_tool(self, pocket):
         self._say("tool", pocket)
 

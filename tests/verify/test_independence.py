@@ -11,7 +11,7 @@ import pytest
 #: the name `cornersmooth.verify` is the function
 FOLDERS = [
     Path(str(import_module(f"cornersmooth.{name}").__file__)).parent
-    for name in ("verify", "statements", "nc_words", "nc_reader")
+    for name in ("verify", "statements", "nc_words", "nc_reader", "control")
 ]
 MODULES = [path for folder in FOLDERS for path in sorted(folder.rglob("*.py"))]
 ALLOWED = (
@@ -19,6 +19,7 @@ ALLOWED = (
     "cornersmooth.statements",
     "cornersmooth.nc_words",
     "cornersmooth.nc_reader",
+    "cornersmooth.control",
     "cornersmooth.model",
     "cornersmooth.errors",
     "cornersmooth.processes",  # who does the work, not how

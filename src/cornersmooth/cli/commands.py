@@ -280,17 +280,22 @@ CONFIG = new_command(
 EXPLAIN = new_command(
     "explain",
     "[CODE]",
-    "as_json",
+    "stream control machine no_tcp tip_control units as_json",
     """
     Explain the code of a message: its cause, what to do, and how it is printed. Without a code, list them all.
+
+    With --stream, show a finished program as its control understands it: what each block sets and where it leads.
 
     \b
     Examples:
       cornersmooth explain
       cornersmooth explain CS337
       cornersmooth explain 337 --json
+      cornersmooth explain --stream part.nc --control haas --machine table-bc
     """,
+    epilog=EXIT_CODES_OF_READERS,
     module="lookup",
+    units="Units of a program that does not say them.",
 )
 
 COMPLETION = new_command(

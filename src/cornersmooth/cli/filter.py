@@ -37,12 +37,13 @@ from cornersmooth.cli.show import (
     warn,
 )
 from cornersmooth.comparing import limits_machine
+from cornersmooth.control.listing import listing
+from cornersmooth.control.program import Text
 from cornersmooth.errors import CornersmoothError, SettingsError
 from cornersmooth.filter import Filtered, filter_program, verify_programs
 from cornersmooth.filter.checking import measure
 from cornersmooth.filter.program import read_program, refuse_cl_file
-from cornersmooth.filter.runs import ProgramReader
-from cornersmooth.filter.state import VOCABULARIES
+from cornersmooth.filter.runs import FILTERED, ProgramReader
 from cornersmooth.filter.times import time_as_it_is
 from cornersmooth.kinematics import Machine
 from cornersmooth.nc import Form
@@ -290,8 +291,8 @@ def filter_form_of(given: Options) -> Form:
     Raises SettingsError CS240: a control whose programs are not read as a filter.
     """
     control = given.load_control()
-    if control.dialect not in VOCABULARIES:
-        known = ", ".join(sorted(VOCABULARIES))
+    if control.dialect not in FILTERED:
+        known = ", ".join(sorted(FILTERED))
         raise SettingsError("CS240", f"programs for {control.name} are not read as a filter", f"use one of {known}")
     return given.choose_form()
 
@@ -346,10 +347,22 @@ def time_of_program(data: bytes, name: str, given: Options) -> int:
     return 0
 
 
+def explain_program(source: str, given: Options) -> int:
+    """Show what the control does in each block of a program."""
+    data, name = read_input(source)
+    with told_of(name):
+        refuse_cl_file(data[:HEAD])
+    control = given.reading_back()["control"]
+    reader = ProgramReader(control, given.load_machine(), tcp=not given.no_tcp, **how_read(given))
+    lines = list(listing(reader.stream(Text.of(data))))
+    say(given, {"schema": "cornersmooth-stream/1", "name": name, "control": control, "stream": lines}, lines)
+    return 0
+
+
 def describe_program(data: bytes, name: str) -> dict[str, Any]:
     """Say what an NC program holds, as far as words tell that need no machine."""
     control = recognise_control(data[:HEAD])
-    reading = ProgramReader(control if control in VOCABULARIES else "fanuc", None).read(data)
+    reading = ProgramReader(control if control in FILTERED else "fanuc", None).read(data)
     return {
         "schema": "cornersmooth-info/2",
         "name": name,

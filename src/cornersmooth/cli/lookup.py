@@ -170,6 +170,12 @@ _WIDTH: Final = 80
 
 def run_explain(given: Options) -> int:
     """Do the work of the command; return its exit code."""
+    if given.stream:
+        if given.name is not None:
+            raise click.UsageError("--stream shows a program: leave the code out")
+        from cornersmooth.cli.filter import explain_program
+
+        return explain_program(str(given.stream), given)
     known, code = codes(), given.name
     if code is not None:
         number = re.fullmatch(r"(?:CS)?(\d{3})", code.strip("[]"), re.IGNORECASE)

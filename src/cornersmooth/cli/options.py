@@ -291,6 +291,7 @@ class Options:
     tip_control: bool = _reading(
         "", "Tool tip control is on where the NC program begins: a subprogram, or kinematics that are always on.", False
     )
+    stream: Path | None = _reading("PROGRAM", "Show what the control does in each block of a program; ? is not known.")
     tool: ToolShape = _reading(
         "D[,R[,TAPER[,LENGTH]]]",
         "Shape of the tool: diameter, corner radius, taper in degrees, length. [default: that of the file]",

@@ -13,7 +13,7 @@ state             what a control remembers from block to block; what may have ch
 left              cuts that stay as they are, with the reason
 ================= =====================================================================================================
 
-- what words do: `words.toml`, `state`; what is a run: `runs`
+- what words do, and what holds: `control`; what is a run: `runs`
 - `spelling`: how the program writes numbers; `motion`: what a control does in a run; `writing`: blocks in its place
 - `checking`: program against program; `program`: all of it, as one call
 """

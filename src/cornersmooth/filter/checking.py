@@ -10,10 +10,10 @@ from typing import Final
 
 import numpy as np
 
+from cornersmooth.control.state import State
 from cornersmooth.errors import CornersmoothError
 from cornersmooth.filter.motion import Job, Stretch, motion, motion_of_runs, program_of
 from cornersmooth.filter.runs import Reading, Run
-from cornersmooth.filter.state import State
 from cornersmooth.model import Program
 from cornersmooth.nc_reader import NcProgram, Problem
 from cornersmooth.nc_reader.block_tables import CHUNK
@@ -173,11 +173,10 @@ def _left_otherwise(run: Run, state: State) -> str:
         there[3:], wanted[3:], room[3:] = unit(there[3:]), unit(wanted[3:]), _SAME_DIRECTION
     if not (np.abs(there - wanted) <= room).all():
         return f"the run ends at {_told(state.axes, place)}, not at {_told(state.axes, run.place[-1].tolist())}"
-    mine = (state.absolute, state.feed_mode, state.unit, state.motion)
-    theirs = (run.state.absolute, run.state.feed_mode, run.state.unit, 1.0)
-    if mine != theirs:
-        return "G90, G91, G93, G94 or the kind of motion is another one after the run"
-    if run.state.feed_mode == 94 and not math.isclose(state.feed, run.feed, rel_tol=1e-9):
+    wanted_groups = run.state.groups | {"motion": "line"}
+    if other := [name for name, value in wanted_groups.items() if state.groups[name] != value]:
+        return f"{', '.join(other)} is another one after the run"
+    if run.state.groups["feed"] == "minute" and not math.isclose(state.feed, run.feed, rel_tol=1e-9):
         return f"the feed after the run is {state.feed:g}, not {run.feed:g}"
     return ""
 

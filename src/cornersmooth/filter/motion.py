@@ -12,7 +12,6 @@ import numpy as np
 from cornersmooth.errors import InputError
 from cornersmooth.filter.runs import ProgramReader, Reading, Run
 from cornersmooth.filter.spelling import Spelling
-from cornersmooth.filter.state import INVERSE_TIME
 from cornersmooth.model import Floats, Move, Program, Statement
 from cornersmooth.nc.form import Form
 from cornersmooth.nc_reader import NcProgram
@@ -46,7 +45,7 @@ def motion_of_runs(job: Job, reading: Reading, runs: Sequence[Run]) -> NcProgram
     stretches = []
     for run in runs:
         text = reading.lines(run.first, run.stop)
-        if not run.state.absolute:  # in places, with their own feeds
+        if run.state.groups["distance"] == "incremental":  # in places, with their own feeds
             feeds = [re.search(rb"F[ \t]*[\d.]+", line.upper()) for line in text.splitlines()]
             pairs = zip(in_places(job, run), feeds, strict=True)
             text = b"".join(block + b" " + (feed[0] if feed else b"") + b"\n" for block, feed in pairs)
@@ -61,7 +60,7 @@ def motion(job: Job, stretches: Sequence[Stretch], form: Form) -> NcProgram:
     """
     head = _head(form, inch=stretches[0].run.state.unit != 1.0)
     parts, lines = [head], [np.zeros(head.count(b"\n"), np.int64)]
-    modes = [0, *(stretch.run.state.feed_mode for stretch in stretches)]
+    modes = ["", *(stretch.run.state.groups["feed"] or "" for stretch in stretches)]
     for stretch, before in zip(stretches, modes, strict=False):
         start = _start(job, stretch.run, form, before)
         text = stretch.text if stretch.text.endswith(b"\n") else stretch.text + b"\n"
@@ -110,14 +109,14 @@ def _head(form: Form, *, inch: bool) -> bytes:
     return "".join(f"{line}\n" for line in lines).encode()
 
 
-def _start(job: Job, run: Run, form: Form, before: int | None) -> bytes:
+def _start(job: Job, run: Run, form: Form, before: str) -> bytes:
     """Blocks that bring the machine to the start of a run and say what holds there; `before` is the feed mode."""
-    state, words = run.state, form.table.words.feed_mode
+    state, words, mode = run.state, form.table.words.feed_mode, run.state.groups["feed"]
     lines = [_block(job, run, run.start, form, rapid=True)]
-    if 2 in words and state.feed_mode != before:
-        lines.append(words[2 if state.feed_mode == INVERSE_TIME else 0].encode())
-    feed = b" F%.5f" % state.feed if state.feed_mode != INVERSE_TIME and not math.isnan(state.feed) else b""
-    if state.motion == 1.0 or feed:  # a whole block, though nothing moves: it is read with those around it
+    if 2 in words and mode != before:
+        lines.append(words[2 if mode == "inverse" else 0].encode())
+    feed = b" F%.5f" % state.feed if mode != "inverse" and not math.isnan(state.feed) else b""
+    if state.groups["motion"] == "line" or feed:  # a whole block, though nothing moves: it is read with those around it
         lines.append(_block(job, run, run.start, form, rapid=False) + feed)
     return b"".join(line + b"\n" for line in lines)
 

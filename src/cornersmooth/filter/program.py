@@ -32,9 +32,8 @@ from cornersmooth.verdict import Verdict
 #: how many times more cuts than poses of CL files are looked at where times need no plan
 _BY_LAW: Final = 10
 
-#: words that say the units of a program
+#: words that let LinuxCNC blend
 _BLENDING: Final = re.compile(rb"(?i)G64[ \t]*P[ \t]*(\d*\.?\d+)(?:[ \t]*Q[ \t]*(\d*\.?\d+))?")
-_UNITS: Final = re.compile(rb"(?i)G(20|21|70|71|700|710)(?!\d)|BEGIN PGM")
 
 
 @dataclass(frozen=True)
@@ -242,7 +241,7 @@ def _result(
         runs=len(where),
         left=old.left(),
         checked=checked,
-        units_said=_UNITS.search(old.data) is not None,
+        units_said="units" in old.said,
         seconds=planned_times(job, old, new, where, axes) if axes is not None and where else None,
         motions=pair(job, old, new, drawn) if paths and where else None,
         rounding=max((place.run.state.unit * _rounding(new, place) for place in where), default=0.0),

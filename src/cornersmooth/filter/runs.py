@@ -3,22 +3,34 @@
 from __future__ import annotations
 
 import re
-from bisect import bisect_right
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.filter.state import ANGLES, ANY, INVERSE_TIME, NONE, VECTOR, VOCABULARIES, State
+from cornersmooth.control.program import Stream, Text
+from cornersmooth.control.rows import Rows
+from cornersmooth.control.state import PRESET, State
+from cornersmooth.control.table import table_of
 from cornersmooth.kinematics import Machine
-from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.nc_reader.block_tables import CHUNK
+from cornersmooth.model import Bools, Floats
 from cornersmooth.nc_reader.dialects import dialect_of
-from cornersmooth.nc_reader.line_patterns import LinePatterns, Lines
+from cornersmooth.nc_reader.word_tables import CONTROLS
+
+#: what a run asks of tool tip control: the words of its tool axis, none, or either of both
+ANGLES, VECTOR, NONE, ANY = "angles", "vectors", "off", "any"
+
+#: controls whose programs are read: the neutral form has no manual that says what words do
+FILTERED: Final = tuple(control for control in CONTROLS if control != "generic")
+
+#: how messages call the words of the tool axis
+_TOLD: Final = {ANGLES: "rotary words", VECTOR: "tool vectors", "both": "rotary words and tool vectors"}
+
+#: words of Siemens under which the tool axis runs as its words say, beside those that the control has by itself
+_EVEN: Final = {VECTOR: ("ORIVECT", "ORIPLANE", "ORIWKS", PRESET), ANGLES: ("ORIAXES", "ORIMKS", PRESET)}
 
 #: degrees that a rotary word may change by in a cut: from half a turn on controls do not agree on the way
 _HALF_TURN: Final = 180.0
@@ -29,21 +41,8 @@ _LEAST: Final = 2
 #: what `Reading.why` says of lines that are no cuts, and of plain cuts
 _NO_CUT, _CUT = 0, 1
 
-#: lines before the first block: they name the program
-_TITLE: Final = re.compile(r"(?i)(%.*|[O:]\s*(\d+|<[^>]*>|[A-Z][^#\[(]*))")
-_WEAK_FEED: Final = re.compile(rb"(?i)F[ \t]*\d+(?![\d.])")
-_MARK: Final = b"\xef\xbb\xbf"
-
 #: words beside an end that shape the corner there: it belongs to the blocks on both sides
 _CORNER_WORDS: Final = re.compile(rb"(?i),\s*[RC]\s*[\d.]|\b(?:RNDM?|CHF|CHR|FRCM?)\b")
-
-#: what sends a control to other lines of the program; numbers of lines beside it, and a jump to a line that the
-#: program works out
-_JUMPS: Final = re.compile(
-    rb"(?i)(?:GOTO[BFCS]?|M[ \t]*0*(?:9[6-9]|198)(?!\d)|G[ \t]*0*6[56]|THEN|REPEATB?|CALL|UNTIL)[^\n]*"
-)
-_TARGET: Final = re.compile(rb"(?i)(?:GOTO[BFCS]?|REPEATB?|LBL|(?<![A-Z])[NPQ])\s*(\d{1,9})")
-_COMPUTED: Final = re.compile(rb"(?i)GOTO[BFCS]?\s*[^\d\s]|M[ \t]*0*9[6-9][^\n]*P\s*[#\[]")
 
 
 @dataclass(frozen=True)
@@ -79,24 +78,18 @@ class Left:
 
 
 @dataclass
-class Reading:
+class Reading(Text):
     """What was read."""
 
-    data: bytes
-    start: Ints  #: (l + 1,) first byte of each line, and the end
-    state: State  #: at the end
     runs: list[Run] = field(default_factory=list)
     #: (l,) for each line 0 where it is no cut, 1 for a plain cut, else 2 plus the number of the reason in `reasons`
     why: NDArray[np.uint16] = field(init=False)
     reasons: list[str] = field(default_factory=list)
     at: dict[int, State] = field(default_factory=dict)  #: before the lines that were asked for
+    said: frozenset[str] = frozenset()  #: groups that the program has set (`State.said`)
 
     def __post_init__(self) -> None:
-        self.why = np.zeros(len(self.start) - 1, np.uint16)
-
-    def lines(self, first: int, stop: int) -> bytes:
-        """Bytes of lines that follow one another."""
-        return self.data[int(self.start[first]) : int(self.start[stop])]
+        self.why = np.zeros(len(self), np.uint16)
 
     def left(self) -> tuple[Left, ...]:
         """Why cuts are left, the most first."""
@@ -137,146 +130,102 @@ class ProgramReader:
         self.lexer = dialect_of(control, "" if machine is None else "".join(names)).lexer
         self._weak_feed = "F" in self.lexer.points  # in inches a feed without a point may count otherwise
         self.lexer.points = self.lexer.points - {"F"}
-        self._first = State(VOCABULARIES[control], self.axes, unit=25.4 if inch else 1.0)
-        if tip_from_start:
-            self._first.tip = self.wanted
+        self._first = State(table_of(control), self.axes)
+        self._first.groups |= {"units": "inch"} if inch else {}
+        self._first.groups |= {"tip": self.wanted} if tip_from_start else {}
+
+    def stream(self, text: Text) -> Stream:
+        """Read a program as a stream."""
+        return Stream(text, self.lexer, self._first, weak_feed=self._weak_feed)
 
     def read(self, data: bytes, stops: Iterable[int] = ()) -> Reading:
         """Read a program, whatever it is; remember the state before some lines."""
-        start = np.flatnonzero(np.frombuffer(data, np.uint8) == ord("\n")) + 1
-        start = np.concatenate(([0], start, [] if data.endswith(b"\n") else [len(data)])).astype(np.int64)
-        found, asked, started = Reading(data, start, self._first.copy()), sorted(set(stops)), False
-        chunks = list(self._chunks(found))
-        others = [(first + k, lines.line(k)) for first, lines, bulk in chunks for k in np.flatnonzero(~bulk).tolist()]
-        targets = _targets(found, [line for _, line in others])
-        corners = _near([number for number, line in others if _CORNER_WORDS.search(line)], len(found.why))
-        for first, lines, bulk in chunks:
-            bulk[[number - first for number in targets if first <= number < first + len(bulk)]] = False
-            columns = lines.columns(np.flatnonzero(bulk)) if bulk.any() else {}
-            before = np.concatenate(([0], np.cumsum(bulk)))
-            for a, b in pairwise(np.flatnonzero(np.diff(bulk, prepend=~bulk[0], append=~bulk[-1])).tolist()):
-                if bulk[a]:
-                    started, own = True, slice(before[a], before[b])
-                    self._take_rows(found, first + a, {key: one[own] for key, one in columns.items()}, corners, asked)
-                    continue
-                for k in range(a, b):
-                    line, number = lines.line(k), first + k
-                    block = self.lexer.comment.sub("", line.decode("latin-1")).strip()
-                    if block and (started or not _TITLE.fullmatch(block)):
-                        started = True
-                        self._take_line(found, number, line, known=number not in targets)
-                    found.at |= {stop: found.state.copy() for stop in _within(asked, number, number + 1)}
+        found = Reading(**vars(Text.of(data)))
+        stream, asked, last = self.stream(found), sorted(set(stops), reverse=True), self._first
+        corners = _near([number for number, line in stream.others if _CORNER_WORDS.search(line)], len(found))
+        for item in stream:
+            first, count = (item.first, len(item)) if isinstance(item, Rows) else (item.line, 1)
+            if isinstance(item, Rows):
+                self._take_rows(found, item, corners)
+            elif item.cuts:
+                found.why[first] = found.number(why_not(item.after, self.wanted) or item.cuts)
+            while asked and asked[-1] < first + count:
+                stop = asked.pop()
+                found.at[stop] = item.after(stop - first) if isinstance(item, Rows) and stop > first else item.before
+            last = item.after(count) if isinstance(item, Rows) else item.after
+        found.at |= dict.fromkeys(asked, last)
+        found.said = last.said
         return found
 
-    def _chunks(self, found: Reading) -> Iterator[tuple[int, Lines, Bools]]:
-        """Lines from a number on, and which of them are plain motion blocks: these have no words of other kinds."""
-        patterns, first = LinePatterns(self.lexer), _begin(found)
-        while first < len(found.why):
-            stop = int(np.searchsorted(found.start, found.start[first] + CHUNK))
-            stop = min(max(stop, first + 1), len(found.why))
-            while stop < len(found.why) and found.lines(stop - 1, stop).rstrip().endswith(b"~"):
-                stop += 1
-            chunk = found.lines(first, stop).removeprefix(_MARK if first == 0 else b"")
-            chunk = chunk if chunk.endswith(b"\n") else chunk + b"\n"
-            lines = Lines.of(self.lexer.unfolded(chunk), patterns)
-            bulk = lines.bulk().copy()
-            if b"~" in chunk:
-                bulk[[k for k in range(stop - first) if b"~" in found.lines(first + k, first + k + 1)]] = False
-            yield first, lines, bulk
-            first = stop
-
-    def _take_line(self, found: Reading, number: int, text: bytes, *, known: bool) -> None:
-        if not known:  # who jumps here may come from anywhere
-            found.state.lose_all()
-        why = found.state.take(text, self.lexer)
-        if why:
-            found.why[number] = found.number(found.state.why_not(self.wanted) or why)
-
-    def _take_rows(
-        self, found: Reading, first: int, columns: dict[str, Floats], corners: Bools, asked: list[int]
-    ) -> None:
-        """Take motion blocks; note the runs among them."""
-        state, count = found.state, len(next(iter(columns.values())))
-        blank, here = np.full(count, np.nan), slice(first, first + count)
-        code, _ = _filled(columns.get("G", blank), state.motion)
-        feed, _ = _filled(columns.get("F", blank), state.feed)
-        if state.feed_mode == INVERSE_TIME:
-            feed = columns.get("F", blank)
-        elif self._weak_feed and state.unit != 1.0 and _WEAK_FEED.search(found.lines(first, first + count)):
-            feed = blank
-        arc = (code == 2.0) | (code == 3.0)
-        odd = np.zeros(count, np.bool_)
-        for name in columns.keys() - {"G", "F", *self.axes}:
-            odd |= ~np.isnan(columns[name])
-        lost = (odd & ~arc) | ~(arc | (code == 0.0) | (code == 1.0))
-        if self.wanted == VECTOR:  # what missing words of a vector are is not known
-            given = np.sum([~np.isnan(columns.get(letter, blank)) for letter in "IJK"], axis=0)
-            lost |= ~arc & (given > 0) & (given < 3)
-        place, said = np.empty((count + 1, len(self.axes))), np.zeros(count, np.bool_)
-        for k, letter in enumerate(self.axes):
-            words = columns.get(letter, blank)
-            words = np.where(arc, np.nan, words) if letter in "IJK" else words
-            said |= ~np.isnan(words)
-            place[0, k] = state.place[letter]
-            place[1:, k] = self._places(words, state, letter, lost)
-        cut, known, moved = (code == 1.0) & said, np.isfinite(place), np.abs(np.diff(place, axis=0))
-        plain = cut & ~lost & (known[1:] & known[:-1]).all(axis=1)
+    def _take_rows(self, found: Reading, rows: Rows, corners: Bools) -> None:
+        """Note the runs among motion blocks, and why others are left."""
+        count, here = len(rows), slice(rows.first, rows.first + len(rows))
+        arc = (rows.code == 2.0) | (rows.code == 3.0)
+        cut, known, moved = (
+            (rows.code == 1.0) & rows.moves,
+            np.isfinite(rows.place),
+            np.abs(np.diff(rows.place, axis=0)),
+        )
+        plain = cut & ~rows.lost & (known[1:] & known[:-1]).all(axis=1)
         why = np.where(cut, found.number("the place before or after it is not known"), _NO_CUT).astype(np.uint16)
-        why[plain & ~np.isfinite(feed)] = found.number("its feed is not known")
-        plain &= np.isfinite(feed) & (feed > 0.0)
+        why[plain & ~np.isfinite(rows.feed)] = found.number("its feed is not known")
+        plain &= np.isfinite(rows.feed) & (rows.feed > 0.0)
         left = np.zeros(count, np.bool_)
         wide = (moved[:, 3:] >= _HALF_TURN).any(axis=1) & (self.wanted != VECTOR)
-        for rows, reason in (
+        for some, reason in (
             (~(moved[:, :3] > 0.0).any(axis=1), "the tip stays where it is"),
             (wide, "a rotary axis turns by half a turn or more in it"),
             (corners[here], "the program rounds its corner by words of its own"),
         ):
-            why[plain & rows] = found.number(reason)
-            left |= rows
+            why[plain & some] = found.number(reason)
+            left |= some
         plain &= ~left
-        if (arc & (said | odd)).any():
+        if (arc & (rows.moves | rows.odd)).any():
             why[arc] = found.number("an arc")
-        if reason := state.why_not(self.wanted):
+        if reason := why_not(rows.before, self.wanted):
             why[cut | arc] = found.number(reason)
             plain[:] = False
-
-        def after(k: int) -> State:
-            return state.after(place[k], code[k - 1], feed[k - 1]) if k else state.copy()
-
         edges = np.flatnonzero(np.diff(plain, prepend=False, append=False))
         for a, b in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
             if b - a < _LEAST:
                 why[a:b] = found.number("a single cut between other blocks: it has no corner")
                 continue
             why[a:b] = _CUT
-            own, last = place[a : b + 1], float(feed[b - 1])
-            kept = own[1:] if not state.absolute else own[-1:]
-            found.runs.append(Run(first + a, first + b, after(a), kept.copy(), own.min(axis=0), own.max(axis=0), last))
+            own, state = rows.place[a : b + 1], rows.after(a)
+            kept = own[1:] if state.groups["distance"] == "incremental" else own[-1:]
+            low, high, first = own.min(axis=0), own.max(axis=0), rows.first
+            found.runs.append(Run(first + a, first + b, state, kept.copy(), low, high, float(rows.feed[b - 1])))
         found.why[here] = why
-        found.at |= {stop: after(stop - first) for stop in _within(asked, first, first + count)}
-        found.state = after(count)
-
-    def _places(self, words: Floats, state: State, letter: str, lost: Bools) -> Floats:
-        """(n,) where an axis is after each block."""
-        if state.absolute is None:
-            lost = lost | ~np.isnan(words)
-        if state.absolute is False and letter not in "IJK":
-            known = np.where(np.logical_or.accumulate(lost), np.nan, 0.0)
-            return state.place[letter] + np.cumsum(np.nan_to_num(words)) + known
-        value, last = _filled(np.where(lost, np.nan, words), state.place[letter])
-        gone = np.maximum.accumulate(np.where(lost, np.arange(len(words)), -1))
-        return np.where((gone >= 0) & (gone >= last), np.nan, value)
 
 
-def _within(ascending: list[int], after: int, last: int) -> list[int]:
-    """Numbers above one bound and up to another."""
-    return ascending[bisect_right(ascending, after) : bisect_right(ascending, last)]
+def why_not(state: State, wanted: str) -> str:
+    """Say why cuts in a state are left as they are; empty where they need not be.
 
-
-def _filled(values: Floats, before: float) -> tuple[Floats, Ints]:
-    """Give what was said last in each row, and in which row, -1 for before."""
-    last = np.maximum.accumulate(np.where(np.isnan(values), -1, np.arange(len(values))))
-    return np.where(last < 0, before, values[last]), last
+    `wanted` is the kind of tool tip control that must be on; `NONE` where it must be off, `ANY` for either.
+    """
+    groups, frames, tip = state.groups, state.frames, state.groups["tip"]
+    if frames:
+        return f"places of the part are turned, scaled or called by a macro ({', '.join(sorted(frames))})"
+    if tip is None:
+        return "it is not known whether tool tip control is on"
+    if wanted == NONE and tip != NONE:
+        return "tool tip control is on, and --no-tcp says that it is not"
+    if wanted in (ANGLES, VECTOR) and tip not in (wanted, "both"):
+        return (
+            "tool tip control is off"
+            if tip == NONE
+            else f"tool tip control is for {_TOLD[tip]}, not for {_TOLD[wanted]}"
+        )
+    even = all(groups.get(group, PRESET) in _EVEN.get(wanted, ()) for group in ("orientation", "coordinates"))
+    if not even and wanted in (ANGLES, VECTOR):
+        return f"the control turns the tool by a law of its own between {_TOLD[wanted]}"
+    if groups["compensation"] != "off":
+        return "the radius of the cutter is taken account of, or that is not known"
+    if None in (groups["distance"], groups["units"], groups["feed"]):
+        return "units, distances (G90, G91) or the kind of feed are not known"
+    if frames is None:
+        return "it is not known whether places of the part are turned, scaled or called by a macro"
+    return "feed per revolution (G95)" if groups["feed"] == "revolution" else ""
 
 
 def _near(lines: Sequence[int], count: int) -> Bools:
@@ -285,28 +234,3 @@ def _near(lines: Sequence[int], count: int) -> Bools:
     for step in (0, 1, 2):
         near[at + step] = True
     return near[1:-1]
-
-
-def _targets(found: Reading, others: Sequence[bytes]) -> set[int]:
-    """Lines to which the program may jump: those of all numbers that stand beside jumps in some lines."""
-    jumps = [match[0] for match in map(_JUMPS.search, others) if match]
-    if not jumps:
-        return set()
-    numbers = {int(word) for jump in jumps for word in _TARGET.findall(jump)}
-    if _COMPUTED.search(b"\n".join(jumps)):
-        pattern = re.compile(rb"(?im)^[ \t/]*N[ \t]*\d+")
-    else:
-        some = b"|".join(b"0*%d" % number for number in sorted(numbers)) or rb"(?!)"
-        pattern = re.compile(rb"(?im)^[ \t/]*N[ \t]*(?:%b)(?!\d)" % some)
-    at = [match.start() for match in pattern.finditer(found.data)]
-    return set((np.searchsorted(found.start, np.array(at, np.int64), side="right") - 1).tolist())
-
-
-def _begin(found: Reading) -> int:
-    """Line from which on the program is executed: that of the first ``%``, if a listing stands before it."""
-    for match in re.finditer(rb"(?m)^[ \t]*%[ \t]*\r?$", found.data):
-        before, behind = found.data[: match.start()], found.data[match.end() :]
-        if behind.strip() and not re.search(rb"(?i)\bM(?:0?2|30)\b|^[ \t]*(?:N\d+[ \t]*)?G\d", before, re.MULTILINE):
-            return int(np.searchsorted(found.start, match.start(), side="right")) - 1
-        break
-    return 0

@@ -15,7 +15,6 @@ from cornersmooth.errors import CornersmoothError
 from cornersmooth.filter.motion import Job, motion_of_runs, program_of
 from cornersmooth.filter.runs import Reading, Run
 from cornersmooth.filter.spelling import numbered, numbers_of
-from cornersmooth.filter.state import INVERSE_TIME
 from cornersmooth.kinematics import Machine, solutions, tool_axis
 from cornersmooth.model import Floats
 from cornersmooth.nc import Frame, write
@@ -122,8 +121,8 @@ def _split(job: Job, form: Form, text: bytes, runs: Sequence[Run]) -> Iterator[l
         begin = _turned(angles, [line for line in lines[:cut] if not _is_mode(line)])
         angles = _turned(begin, kept)
         said = next((k for k, line in enumerate(kept) if not _is_mode(line)), 0)
-        own = _INVERSE if run.state.feed_mode == INVERSE_TIME else _MINUTE
-        head = [] if run.state.absolute else [b"G90"]
+        own = _INVERSE if run.state.groups["feed"] == "inverse" else _MINUTE
+        head = [] if run.state.groups["distance"] == "absolute" else [b"G90"]
         if mode != own and not {_INVERSE, _MINUTE} & {*kept[:said]}:
             head.append(mode)
         if rounding and run.state.rounding and not any(map(_ROUNDING.match, kept[:said])):
@@ -147,7 +146,7 @@ def _split(job: Job, form: Form, text: bytes, runs: Sequence[Run]) -> Iterator[l
             tail.append(f"{look.feed}{run.feed:.10g}".encode())
         if rounding and run.state.rounding:
             tail.append(run.state.rounding.encode())
-        yield [*head, *kept, *tail, *([] if run.state.absolute else [b"G91"])]
+        yield [*head, *kept, *tail, *([] if run.state.groups["distance"] == "absolute" else [b"G91"])]
 
 
 def _is_mode(line: bytes) -> bool:

@@ -18,6 +18,9 @@ What else is in them, rules and where words may stand, is explained in `nc_words
     What words say beside the motion, as `statements` has it: the kind, then the word of the CL file. What is no value
     here the control has no word for. A third part says of what kind alone a word is the end
     (``M89 = "coolant OFF THRU"``). ``""``: not the word of a control that this one is like.
+``[does]``
+    What words do to what the control remembers, a row a word: `control.table` explains it. Each key may name several
+    words; here each has its own.
 """
 
 from __future__ import annotations
@@ -41,15 +44,17 @@ CONTROLS: Final = tuple(sorted(item.name.removesuffix(".toml") for item in _LIST
 def word_table(control: str) -> Mapping[str, Any]:
     """Table of a control, with what it takes over of the control that it is like."""
     table = tomllib.loads(_LISTS.joinpath(f"{control}.toml").read_text(encoding="utf-8"))
+    does = {word: row for words, row in table.pop("does", {}).items() for word in words.split(" | ")}
     if "like" in table:
         base = word_table(table.pop("like"))
+        does |= {word: row for word, row in base["does"].items() if word not in does}
         table = {
             **base,
             **table,
             "means": base["means"] | table.get("means", {}),
             **{key: [*table.get(key, ()), *base[key]] for key in ("word", "block")},
         }
-    return table
+    return table | {"does": does}
 
 
 @cache

@@ -1,0 +1,160 @@
+"""A whole program as a stream: runs of motion blocks, and other lines one by one, each with the state around it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+
+from cornersmooth.control.rows import Rows, execute_rows
+from cornersmooth.control.state import State
+from cornersmooth.control.unread import execute
+from cornersmooth.model import Bools, Ints
+from cornersmooth.nc_reader.block_tables import CHUNK
+from cornersmooth.nc_reader.lexer import Lexer
+from cornersmooth.nc_reader.line_patterns import LinePatterns, Lines
+
+#: lines before the first block: they name the program
+_TITLE: Final = re.compile(r"(?i)(%.*|[O:]\s*(\d+|<[^>]*>|[A-Z][^#\[(]*))")
+_WEAK_FEED: Final = re.compile(rb"(?i)F[ \t]*\d+(?![\d.])")
+_MARK: Final = b"\xef\xbb\xbf"
+
+#: what sends a control to other lines of the program; numbers of lines beside it, and a jump to a line that the
+#: program works out
+_JUMPS: Final = re.compile(
+    rb"(?i)(?:GOTO[BFCS]?|M[ \t]*0*(?:9[6-9]|198)(?!\d)|G[ \t]*0*6[56]|THEN|REPEATB?|CALL|UNTIL)[^\n]*"
+)
+_TARGET: Final = re.compile(rb"(?i)(?:GOTO[BFCS]?|REPEATB?|LBL|(?<![A-Z])[NPQ])\s*(\d{1,9})")
+_COMPUTED: Final = re.compile(rb"(?i)GOTO[BFCS]?\s*[^\d\s]|M[ \t]*0*9[6-9][^\n]*P\s*[#\[]")
+
+
+#: the end of a program, or a block with a G word; words of a language are no block
+_BLOCK: Final = re.compile(rb"(?im)\bM(?:0?2|30)\b|^[ \t]*(?:N\d+[ \t]*)?G\d(?![^\n(;]*[A-Z]{2,} [A-Z]{2,})")
+
+
+@dataclass
+class Text:
+    """A text and its l lines."""
+
+    data: bytes
+    start: Ints  #: (l + 1,) first byte of each line, and the end
+
+    @classmethod
+    def of(cls, data: bytes) -> Text:
+        """Find the lines of a text."""
+        ends = np.flatnonzero(np.frombuffer(data, np.uint8) == ord("\n")) + 1
+        return cls(data, np.concatenate(([0], ends, [] if data.endswith(b"\n") else [len(data)])).astype(np.int64))
+
+    def __len__(self) -> int:
+        return len(self.start) - 1
+
+    def lines(self, first: int, stop: int) -> bytes:
+        """Bytes of lines that follow one another, from 0."""
+        return self.data[int(self.start[first]) : int(self.start[stop])]
+
+
+@dataclass(frozen=True)
+class Act:
+    """A line that is no plain motion block."""
+
+    line: int  #: from 0
+    text: bytes  #: with every part of the block that is on lines after it
+    before: State
+    after: State
+    cuts: str  #: why it is left as it is, where it cuts; else empty
+
+
+class Stream:
+    """What a control does in a program, whatever it is.
+
+    Parameters
+    ----------
+    lexer : Lexer
+        Of the control; numbers of feeds may stand without a point.
+    state : State
+        Where the program begins.
+    """
+
+    def __init__(self, text: Text, lexer: Lexer, state: State, *, weak_feed: bool = False) -> None:
+        self.text, self._lexer, self._state, self._weak_feed = text, lexer, state, weak_feed
+        self._chunks = list(self._read())
+        #: lines that are no plain motion blocks, with their numbers from 0
+        self.others = [
+            (first + k, lines.line(k)) for first, lines, bulk in self._chunks for k in np.flatnonzero(~bulk).tolist()
+        ]
+        self._targets = _targets(text, [line for _, line in self.others])
+
+    def __iter__(self) -> Iterator[Rows | Act]:
+        """Execute the program; each item has the state before it, and after it."""
+        state, started = self._state.copy(), False
+        for first, lines, bulk in self._chunks:
+            plain = bulk.copy()
+            plain[[number - first for number in self._targets if first <= number < first + len(bulk)]] = False
+            columns = lines.columns(np.flatnonzero(plain)) if plain.any() else {}
+            count = np.concatenate(([0], np.cumsum(plain)))
+            for a, b in pairwise(np.flatnonzero(np.diff(plain, prepend=~plain[0], append=~plain[-1])).tolist()):
+                if plain[a]:
+                    own = {key: one[count[a] : count[b]] for key, one in columns.items()}
+                    rows = execute_rows(state, first + a, own, weak_feed=self._weak(state, first + a, first + b))
+                    started, state = True, rows.after(b - a)
+                    yield rows
+                    continue
+                for k in range(a, b):
+                    block = self._lexer.comment.sub("", lines.line(k).decode("latin-1")).strip()
+                    if block and (started or not _TITLE.fullmatch(block)):
+                        started, before = True, state.copy()
+                        if first + k in self._targets:  # who jumps here may come from anywhere
+                            state.lose_all()
+                        cuts = execute(state, lines.line(k), self._lexer)
+                        yield Act(first + k, lines.line(k), before, state.copy(), cuts)
+
+    def _weak(self, state: State, first: int, stop: int) -> bool:
+        """Whether feeds of some lines are written so that the control may count them in another unit."""
+        inch = self._weak_feed and state.unit != 1.0
+        return inch and _WEAK_FEED.search(self.text.lines(first, stop)) is not None
+
+    def _read(self) -> Iterator[tuple[int, Lines, Bools]]:
+        """Lines from a number on, and which of them are plain motion blocks: these have no words of other kinds."""
+        text, patterns, first = self.text, LinePatterns(self._lexer), _begin(self.text)
+        while first < len(text):
+            stop = int(np.searchsorted(text.start, text.start[first] + CHUNK))
+            stop = min(max(stop, first + 1), len(text))
+            while stop < len(text) and text.lines(stop - 1, stop).rstrip().endswith(b"~"):
+                stop += 1
+            chunk = text.lines(first, stop).removeprefix(_MARK if first == 0 else b"")
+            chunk = chunk if chunk.endswith(b"\n") else chunk + b"\n"
+            lines = Lines.of(self._lexer.unfolded(chunk), patterns)
+            bulk = lines.bulk().copy()
+            if b"~" in chunk:
+                bulk[[k for k in range(stop - first) if b"~" in text.lines(first + k, first + k + 1)]] = False
+            yield first, lines, bulk
+            first = stop
+
+
+def _targets(text: Text, others: Sequence[bytes]) -> set[int]:
+    """Lines to which the program may jump: those of all numbers that stand beside jumps in some lines."""
+    jumps = [match[0] for match in map(_JUMPS.search, others) if match]
+    if not jumps:
+        return set()
+    numbers = {int(word) for jump in jumps for word in _TARGET.findall(jump)}
+    if _COMPUTED.search(b"\n".join(jumps)):
+        pattern = re.compile(rb"(?im)^[ \t/]*N[ \t]*\d+")
+    else:
+        some = b"|".join(b"0*%d" % number for number in sorted(numbers)) or rb"(?!)"
+        pattern = re.compile(rb"(?im)^[ \t/]*N[ \t]*(?:%b)(?!\d)" % some)
+    at = [match.start() for match in pattern.finditer(text.data)]
+    return set((np.searchsorted(text.start, np.array(at, np.int64), side="right") - 1).tolist())
+
+
+def _begin(text: Text) -> int:
+    """Line from which on the program is executed: that of the first ``%``, if a listing stands before it."""
+    for match in re.finditer(rb"(?m)^[ \t]*%[ \t]*\r?$", text.data):
+        before, behind = text.data[: match.start()], text.data[match.end() :]
+        if behind.strip() and not _BLOCK.search(before):
+            return int(np.searchsorted(text.start, match.start(), side="right")) - 1
+        break
+    return 0

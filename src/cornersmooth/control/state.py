@@ -1,0 +1,183 @@
+"""What is surely known of a control between two blocks of a program, and what a block changes.
+
+A block is executed in one order, whatever its words: groups that they set, then what they do, then its feed and where
+it goes. None and NaN stand for what is not known.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Final
+
+from cornersmooth.control.table import FRAME, Row, Table
+from cornersmooth.nc_reader.words import Line, Word
+
+#: what holds where a program begins; groups of frames are ``"off"``, all others as the control has them by itself
+_STARTS: Final[Mapping[str, str | None]] = {
+    "motion": None,
+    "distance": "absolute",
+    "units": "mm",
+    "feed": "minute",
+    "tip": "off",
+    "compensation": "off",
+}
+#: value of a group that no word has set yet
+PRESET: Final = "preset"
+
+#: mm
+_UNITS: Final = {"mm": 1.0, "inch": 25.4}
+
+#: what a change of a group does beside
+_CHANGES: Final = {"units": ("length", "feed"), "feed": ("feed",), "offset": ("shift",)}
+
+#: motions that cut
+CUTS: Final = ("line", "arc")
+
+#: letters of a tool vector, and of all axes that a machine may have
+VECTOR: Final = frozenset("IJK")
+_AXES: Final = "XYZABC"
+
+
+@dataclass
+class State:
+    """What holds between two blocks."""
+
+    table: Table
+    axes: tuple[str, ...]  #: letters of X Y Z and of the words of the tool axis, as the lexer names them
+    groups: dict[str, str | None] = field(default_factory=dict)
+    #: last word of each axis, in units of the program; where the machine is, if that is known
+    place: dict[str, float] = field(default_factory=dict)
+    feed: float = math.nan  #: as written
+    said: frozenset[str] = frozenset()  #: groups that words of the program have set, whatever became of them
+
+    def __post_init__(self) -> None:
+        if not self.groups:
+            starts: dict[str, str | None] = {
+                name: "off" if name.startswith(FRAME) else PRESET for name in (*self.table.groups, "path")
+            }
+            foreign = {
+                f"{FRAME}{letter}": "off" for letter in _AXES if letter not in self.axes and "I" not in self.axes
+            }
+            self.groups = {**starts, **foreign, **_STARTS}
+        self.place = self.place or dict.fromkeys(self.axes, math.nan)
+
+    def copy(self) -> State:
+        """Return the same state, to be changed on its own."""
+        return replace(self, groups=dict(self.groups), place=dict(self.place))
+
+    @property
+    def unit(self) -> float:
+        """Millimetres per unit; NaN where it is not known."""
+        return _UNITS.get(self.groups["units"] or "", math.nan)
+
+    @property
+    def frames(self) -> tuple[str, ...] | None:
+        """Words that turn, scale or mirror the places of the part; None where it is not known whether any does."""
+        values = [value for group, value in self.groups.items() if group.startswith(FRAME)]
+        on = tuple(value for value in values if value not in (None, "off"))
+        return None if None in values and not on else on
+
+    @property
+    def rounding(self) -> str:
+        """Words that say how exactly corners are passed; empty where there are none, or where that is not known."""
+        path = self.groups["path"]
+        return "" if path in (None, PRESET) else path
+
+    def lose_place(self, letters: Iterable[str] | None = None) -> None:
+        """Take the places of some axes, or of all, as unknown."""
+        self.place |= dict.fromkeys(set(self.axes if letters is None else letters) & self.place.keys(), math.nan)
+
+    def lose_all(self) -> None:
+        """Take all as unknown."""
+        self.lose_place()
+        self.groups, self.feed = dict.fromkeys(self.groups), math.nan
+
+    def or_not(self, other: State) -> None:
+        """Take as unknown what another state, which may hold instead, has not the same."""
+        self.lose_place(letter for letter, value in self.place.items() if value != other.place[letter])
+        self.groups = {name: value if other.groups[name] == value else None for name, value in self.groups.items()}
+        self.feed = self.feed if self.feed == other.feed else math.nan
+        self.said &= other.said
+
+    def execute(self, line: Line) -> bool:
+        """Execute a line of words; return whether it may cut."""
+        before = self.copy() if line.skipped else self
+        if line.tape:
+            self.lose_all()
+        cuts = self._words(line.words) if line.words else False
+        if line.skipped:  # the operator chooses
+            self.or_not(before)
+        return cuts
+
+    def _words(self, words: tuple[Word, ...]) -> bool:
+        given = {word.name: word.value for word in words}
+        named = [name for name in map(_name, words) if name not in (*self.axes, "F", *_AXES)]
+        rows = [self.table.row(name, given, alone=len(words) == 1) for name in named]
+        does = {effect for row in rows for effect in self._set(row, words)}
+        # what belongs to other words of the block, or to the motion that holds
+        beside = self.table.arguments.get(self.groups["motion"] or "", frozenset[str]())
+        beside = beside.union(*(row.beside for row in rows))
+        does |= {effect for name, row in zip(named, rows, strict=True) if name not in beside for effect in row.does}
+        if "anything" in does:
+            self.lose_all()
+            return False
+        if "dwell" in does:
+            return False
+        if "F" not in beside and ("F" in given or "feed" in does):
+            self.feed = given.get("F", math.nan)
+        if "tool" in does and self.groups["tip"] != "off":
+            self.groups["tip"] = None
+        axes = [letter for letter in self.axes if letter in given and letter not in beside]
+        if "machine" in does:
+            # tip control keeps the tip in the part, which turns with the tables: then all of its place may change
+            self.lose_place(axes if axes and self.groups["tip"] == "off" else None)
+        elif does & {"place", "tool"}:
+            self.lose_place()
+        else:
+            self._go(given, axes, does)
+        for letter in sorted(given.keys() - beside):
+            if f"{FRAME}{letter}" in self.groups:
+                self.groups[f"{FRAME}{letter}"] = f"axis {letter}, which the machine has not"
+        return bool(axes) and self.groups["motion"] in CUTS and "machine" not in does
+
+    def _set(self, row: Row, words: Iterable[Word]) -> set[str]:
+        """Set the groups of a word; return what the change does beside."""
+        does: set[str] = set()
+        for group, value in row.sets:
+            if group in ("offset", "path") and value is not None:
+                own = (word.text.replace(" ", "") for word in words if word.name in row.beside)
+                value = " ".join((value, *own))
+            if self.groups.get(group) != value or value is None:
+                does |= set(_CHANGES.get(group, ()))
+            if group.startswith(FRAME):
+                does.add("place")
+            self.groups[group] = value
+            self.said |= {group}
+        return does
+
+    def _go(self, given: Mapping[str, float], axes: Iterable[str], does: set[str]) -> None:
+        """Take the places of a block."""
+        if does & {"length", "shift"}:
+            self.lose_place(None if "shift" in does else "XYZ")
+        named, distance = set(axes), self.groups["distance"]
+        for letter in named:
+            added = self.place[letter] if distance == "incremental" and letter not in VECTOR else 0.0
+            self.place[letter] = math.nan if distance is None else given[letter] + added
+        if 0 < len(VECTOR & named) < len(VECTOR):  # what the others are then is not known
+            self.lose_place(VECTOR)
+
+
+def _name(word: Word) -> str:
+    """Name of a word in the table."""
+    if word.name in ("G", "M"):
+        return f"{word.name}{word.value:g}"
+    if word.name == "side":
+        return f"side {word.value:g}"
+    if word.name == "block":
+        return word.text.upper()
+    if len(word.name) > 1 and re.search(r"\(\s*\)", word.text):
+        return f"{word.name}()"
+    return word.name

@@ -1,0 +1,156 @@
+"""What each word of a control does to what the control remembers: a row a word.
+
+The rows are `[does]` of the control's table in ``nc_reader/word_lists``. A row is ``"WORDS" = "EFFECTS: LETTERS"``::
+
+    "G43.4" = "tip=angles length: H"
+
+WORDS
+    Words with `` | `` between them, as the control's lexer names them: ``G1``, ``M6``, ``T``, ``TRAORI``, a whole block
+    of Klartext. ``PLANE *`` stands for all that begin so, ``/.../`` for all that a regular expression matches. Words
+    that are named themselves come first, then rows in order. ``ROT alone`` is a word that has no other beside it,
+    ``G10 R`` one that has that letter.
+EFFECTS
+    ``GROUP=VALUE`` sets a modal group. The value ``.`` is the word itself, ``?`` is not known. All others: `LOSES`.
+LETTERS
+    What belongs to the word in its block, and so is no place and no feed.
+
+A control that is ``like`` another has its rows, too, behind its own; ``""`` takes one back. Words of spindle, coolant,
+stops, registers and the end are in `[means]`. A word without a row may do anything.
+
+What a change of a group does beside is the same for all controls, and is in `state`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from functools import cache, lru_cache
+from typing import Final
+
+from cornersmooth.nc_reader.word_tables import means_of, word_table
+
+#: groups of words that turn, scale or mirror the places of the part begin so
+FRAME: Final = "frame."
+
+#: modal groups beside those of frames, and the values of those that somebody reads; none where it is any word
+GROUPS: Final[Mapping[str, str]] = {
+    "motion": "rapid line arc",
+    "distance": "absolute incremental",
+    "units": "mm inch",
+    "feed": "minute inverse revolution",
+    "tip": "off angles vectors both",
+    "compensation": "off on",
+    **dict.fromkeys(("offset", "path", "plane", "spindle", "coolant", "orientation", "coordinates"), ""),
+}
+
+#: what each effect leaves unknown
+LOSES: Final[Mapping[str, str]] = {
+    "nothing": "",
+    "dwell": "",  # and the other words of the block are no motion
+    "length": "XYZ count anew, those of the block already",
+    "shift": "all axes count anew, those of the block already",
+    "place": "the machine may be anywhere; places of the block are not those of the part",
+    "machine": "the axes of the block go to places of the machine, all axes where it names none",
+    "tool": "as `place`, and whether tip control is still on",
+    "anything": "all",
+}
+
+#: what a word of `[means]` does by its kind, where it is not the group of the kind
+_OF_KIND: Final = {"stop": "nothing", "end": "anything", "register": "length", "offset": "length"}
+_COMPENSATION: Final = {"OFF": "off", "LEFT": "on", "RIGHT": "on"}
+
+_REMEMBERED: Final = 4096
+
+
+@dataclass(frozen=True)
+class Row:
+    """What a word does."""
+
+    sets: tuple[tuple[str, str | None], ...] = ()  #: groups and their values; None where it is not known which
+    does: frozenset[str] = frozenset()  #: of `LOSES`
+    beside: frozenset[str] = frozenset()  #: letters of words of its own
+
+    @classmethod
+    @lru_cache(_REMEMBERED)
+    def of(cls, word: str, text: str) -> Row:
+        """Take a row of the table apart; ValueError where it is none."""
+        effects, _, beside = text.partition(":")
+        sets, does = [], set()
+        for effect in effects.split():
+            group, given, value = effect.partition("=")
+            if given and _is_value(group, value):
+                sets.append((group, None if value == "?" else word if value == "." else value))
+            elif effect in LOSES:
+                does.add(effect)
+            else:
+                raise ValueError(
+                    f"{word!r} does {effect!r}: not one of {', '.join(LOSES)}, and no group with its value"
+                )
+        return cls(tuple(sets), frozenset(does), frozenset(beside.split()))
+
+
+def _is_value(group: str, value: str) -> bool:
+    """Whether a group may have a value."""
+    return group.startswith(FRAME) or (
+        group in GROUPS and (not GROUPS[group] or value in (*GROUPS[group].split(), "?"))
+    )
+
+
+#: what a word without a row does
+UNKNOWN: Final = Row(does=frozenset(("anything",)))
+
+
+@dataclass(frozen=True)
+class Table:
+    """The rows of a control."""
+
+    control: str
+    named: Mapping[str, str]  #: effects of words by their names
+    patterns: tuple[tuple[re.Pattern[str], str], ...]  #: of words by a pattern, in order
+    groups: tuple[str, ...]  #: all that are set by a word
+    #: letters that belong to a motion while it holds
+    arguments: Mapping[str, frozenset[str]]
+
+    def row(self, name: str, letters: Collection[str] = (), *, alone: bool = False) -> Row:
+        """What a word does in a block with some letters; `alone` where it has no other word."""
+        for key in (f"{name} alone",) * alone + tuple(f"{name} {letter}" for letter in letters):
+            if key in self.named:
+                return Row.of(name, self.named[key])
+        if name in self.named:
+            return Row.of(name, self.named[name])
+        found = (text for pattern, text in self.patterns if pattern.fullmatch(name))
+        text = next(found, None)
+        return UNKNOWN if text is None else Row.of(name, text)
+
+
+@cache
+def table_of(control: str) -> Table:
+    """The table of a control, one of `CONTROLS`."""
+    named: dict[str, str] = {}
+    patterns = []
+    for word, text in word_table(control)["does"].items():
+        if not text:
+            continue
+        if word.startswith("/") and word.endswith("/"):
+            patterns.append((re.compile(word[1:-1]), text))
+        elif word.endswith("*"):
+            patterns.append((re.compile(re.escape(word[:-1]) + ".*"), text))
+        else:
+            named[word] = text
+    named |= {word: _of_means(*meaning) for word, meaning in means_of(control).items()}
+    rows = [Row.of("", text) for text in (*named.values(), *(text for _, text in patterns))]
+    arguments: dict[str, frozenset[str]] = {}
+    for row in rows:
+        for group, value in row.sets:
+            if group == "motion" and value is not None:
+                arguments[value] = arguments.get(value, frozenset()) | row.beside
+    groups = sorted({group for row in rows for group, _ in row.sets})
+    return Table(control, named, tuple(patterns), tuple(groups), arguments)
+
+
+def _of_means(kind: str, value: str) -> str:
+    """Effects of a word that `[means]` has."""
+    if kind == "compensation":
+        return f"compensation={_COMPENSATION[value]}"
+    return _OF_KIND.get(kind, f"{kind}={value}")

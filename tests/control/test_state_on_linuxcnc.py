@@ -1,0 +1,86 @@
+"""What the machine claims to know of a program with lines dropped at random is what LinuxCNC's interpreter knows."""
+
+from __future__ import annotations
+
+import math
+import random
+import shutil
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import cornersmooth as cs
+from cornersmooth.control.program import Text
+from cornersmooth.control.rows import Rows
+from cornersmooth.control.state import State
+from cornersmooth.filter.runs import ProgramReader
+from filter.foreign import CANON, PYTHON
+from filter.test_filter_by_foreign_readers import THREE_AXES, seeded
+from oracle.share import how_many
+
+#: digits of the interpreter's own numbers
+SAME = 1e-6
+
+
+def dropped(text: str, rng: random.Random) -> str:
+    """The program without some of its lines; subprograms stay whole, so that it still is a program."""
+    lines = text.splitlines()
+    kept = [line for line in lines if line.startswith("o") or rng.random() > 0.15]
+    return "\n".join(kept) + "\n"
+
+
+def interpreted(text: str, folder: Path) -> list[tuple[str, int, list[float]]] | None:
+    """Kinds, lines and numbers of the interpreter; None where it refuses the program."""
+    (folder / "program.ngc").write_text(text)
+    found = subprocess.run(
+        [PYTHON, CANON, folder / "program.ngc"], capture_output=True, text=True, check=False, timeout=120
+    )
+    rows = [line.split() for line in found.stdout.splitlines()]
+    return None if found.returncode else [(row[0], int(row[1]), [float(one) for one in row[2:]]) for row in rows]
+
+
+def claimed(text: str) -> Iterator[tuple[int, State, bool]]:
+    """The state behind each line, and whether the line is a motion block and nothing else."""
+    reader = ProgramReader("linuxcnc", cs.load_machine(THREE_AXES), tcp=False)
+    for item in reader.stream(Text.of(text.encode())):
+        if isinstance(item, Rows):
+            yield from ((item.first + k + 1, item.after(k + 1), True) for k in range(len(item)))
+        else:
+            yield item.line + 1, item.after, False
+
+
+@pytest.mark.linuxcnc
+@pytest.mark.skipif(shutil.which("rs274") is None, reason="LinuxCNC is not installed")
+def test_what_is_claimed_is_what_the_interpreter_knows(tmp_path: Path) -> None:
+    compared = {"place": 0, "motion": 0, "feed": 0}
+    for seed in range(how_many(60, 2000)):
+        text = dropped(seeded(seed), random.Random(seed))
+        rows = interpreted(text, tmp_path)
+        if rows is None:
+            continue
+        motions: dict[int, list[tuple[str, list[float]]]] = {}
+        feeds: dict[int, float] = {}
+        for kind, line, numbers in rows:
+            if kind in ("rapid", "feed", "arc"):
+                motions.setdefault(line, []).append((kind, numbers))
+            elif kind == "feed_rate":
+                feeds[line] = numbers[0]
+        for line, state, plain in claimed(text):
+            motion = {"rapid": "rapid", "line": "feed", "arc": "arc"}.get(state.groups["motion"] or "")
+            ends = motions.get(line, [])
+            for kind, numbers in ends if plain else ends[-1:]:
+                if motion is not None and plain:
+                    assert kind == motion, (seed, line)
+                    compared["motion"] += 1
+                for value, letter in zip(numbers, "XYZ", strict=False):
+                    place = state.unit * state.place[letter]
+                    if not math.isnan(place):
+                        assert place == pytest.approx(value, abs=SAME), (seed, line, letter)
+                        compared["place"] += 1
+            feed = state.unit * state.feed
+            if line in feeds and state.groups["feed"] == "minute" and not math.isnan(feed):
+                assert feed == pytest.approx(feeds[line], abs=SAME), (seed, line)
+                compared["feed"] += 1
+    assert min(compared.values()) > 100, compared

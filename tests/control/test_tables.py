@@ -1,0 +1,173 @@
+"""The rows of each control: well formed, inherited and taken back, and of one mind with the tables of the writer."""
+
+from __future__ import annotations
+
+import math
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+import cornersmooth as cs
+from cornersmooth.control.listing import listing
+from cornersmooth.control.program import Act, Text
+from cornersmooth.control.state import State
+from cornersmooth.control.table import UNKNOWN, Row, table_of
+from cornersmooth.control.unread import execute
+from cornersmooth.filter.runs import ProgramReader
+from cornersmooth.nc_reader import word_tables
+from cornersmooth.nc_reader.dialects import dialect_of
+from cornersmooth.nc_reader.word_tables import CONTROLS
+
+GOLDEN = sorted((Path(__file__).parents[1] / "nc" / "golden").glob("*.nc"))
+AXES = ("X", "Y", "Z", "A", "C")
+
+
+def after(control: str, *blocks: str) -> State:
+    """State behind some blocks, where all places were known and a tip control of both kinds was on."""
+    lexer, state = dialect_of(control, "AC").lexer, State(table_of(control), AXES)
+    state.place, state.feed = dict.fromkeys(AXES, 1.0), 100.0
+    state.groups |= {"motion": "line", "tip": "both"}
+    for block in blocks:
+        execute(state, block.encode(), lexer)
+    return state
+
+
+@pytest.mark.parametrize("control", CONTROLS)
+def test_rows_are_well_formed(control: str) -> None:
+    table = table_of(control)
+    assert table.row("G0" if control != "heidenhain" else "RAPID").sets == (("motion", "rapid"),)
+
+
+@pytest.mark.parametrize("text", ["tipp=off", "tip=of", "places", "units=inches", "feed", "tip=off; length"])
+def test_a_row_with_a_slip_is_refused(text: str) -> None:
+    with pytest.raises(ValueError, match="not one of"):
+        Row.of("G43", text)
+
+
+@pytest.mark.parametrize("control", CONTROLS)
+def test_a_word_without_a_row_may_do_anything(control: str) -> None:
+    assert table_of(control).row("WHOKNOWS") is UNKNOWN
+    state = after(control, "G777" if control != "heidenhain" else "WHO KNOWS")
+    assert set(state.groups.values()) == {None}
+    assert all(map(math.isnan, (*state.place.values(), state.feed)))
+
+
+@pytest.mark.parametrize("control", CONTROLS)
+def test_blocks_that_the_writer_has_for_tip_control_do_that(control: str) -> None:
+    """The writer's table is the manual told again: what switches a mode on and off there does so here."""
+    tip, count = {"vector": ("vectors", "both"), "angles": ("angles", "both")}, 0
+    for form in cs.nc.load_control(control).forms.values():
+        for orientation, mode in form.modes.items():
+            if orientation not in tip or not mode.on or control == "linuxcnc":  # there the machine's file has the words
+                continue
+            on = [block.replace("{offset}", "1") for block in mode.on]
+            state = after(control, *on)
+            assert state.groups["tip"] in tip[orientation], (form.name, orientation)
+            assert state.frames == ()
+            off = after(control, *on, *mode.off)
+            assert off.groups["tip"] == "off", (form.name, orientation)
+            count += 1
+    assert count or control in ("linuxcnc", "generic")
+
+
+@pytest.mark.parametrize("control", CONTROLS)
+def test_units_coolant_and_spindle_of_the_writer_are_those_of_the_table(control: str) -> None:
+    table = cs.nc.load_control(control)
+    for units, word in table.layout.units.items():
+        block = f"BEGIN PGM A {word}" if control == "heidenhain" else word
+        assert after(control, block).groups["units"] == units
+    for name, blocks in table.words.coolant.items():
+        state = after(control, *(f"L {block}" if control == "heidenhain" else block for block in blocks))
+        assert state.groups["coolant"] in (name, "FLOOD" if name == "ON" else name)
+        assert state.groups["motion"] == "line"
+
+
+@pytest.mark.parametrize("path", GOLDEN, ids=[path.stem for path in GOLDEN])
+def test_every_word_that_the_writer_writes_has_a_row(path: Path) -> None:
+    """Nothing but the end of a program makes all unknown."""
+    parts = re.fullmatch(r"\w+\.(\w+?)-(?:g1|g6\.2|bspline|poly|spl)-?(.*?)(-axes)?", path.stem)
+    assert parts is not None
+    control, machine, _ = parts.groups()
+    reader = ProgramReader(control, cs.load_machine(machine) if machine else None)
+    ends = [
+        item.text.decode()
+        for item in reader.stream(Text.of(path.read_bytes()))
+        if isinstance(item, Act) and item.after.groups["units"] is None
+    ]
+    assert ends
+    assert re.fullmatch(r"(N?\d+ )?(M30|M2|%|END PGM.*|L M30)", ends[0].strip()), ends[0]
+
+
+def test_a_table_that_is_like_another_has_its_rows_and_takes_some_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A shop's Haas that has G43.4, a word of its own, and not G254."""
+    lists = Path(str(word_tables._LISTS))
+    shutil.copytree(lists, tmp_path / "lists")
+    (tmp_path / "lists" / "shop.toml").write_text(
+        'like = "haas"\n[grammar]\n[does]\n"G43.4" = "tip=angles length: H"\n"M321" = "nothing"\n"G254" = ""\n'
+    )
+    monkeypatch.setattr(word_tables, "_LISTS", tmp_path / "lists")
+    word_tables.word_table.cache_clear()
+    try:
+        shop, haas = table_of.__wrapped__("shop"), table_of("haas")
+    finally:
+        word_tables.word_table.cache_clear()
+        word_tables.means_of.cache_clear()
+    assert haas.row("G43.4") is UNKNOWN
+    assert shop.row("G43.4") == Row.of("G43.4", "tip=angles length: H")
+    assert shop.row("G234") == haas.row("G234")
+    assert shop.row("G254") is UNKNOWN
+    assert shop.row("M321") == Row.of("M321", "nothing")
+    assert shop.row("M88").sets == (("coolant", "THRU"),)
+
+
+@pytest.mark.parametrize(
+    ("control", "block", "lost"),
+    [
+        ("fanuc", "G4 P500 X2.", ""),
+        ("fanuc", "G43.4 H1", "XYZ"),
+        ("fanuc", "G10 L2 P1 X5.", "XYZAC"),
+        ("fanuc", "G55", "XYZAC"),
+        ("fanuc", "M6", "XYZAC"),
+        ("fanuc", "G1 X5. L2", "XYZAC"),
+        ("linuxcnc", "G43 H1", "XYZ"),
+        ("linuxcnc", "G53 G0 Z0", "XYZAC"),  # under tip control the part turns with the tables
+        ("siemens", 'T="MILL"', "XYZAC"),
+        ("siemens", "MCALL CYCLE81(1,2,3)", "XYZAC"),
+        ("siemens", "R1=5", "XYZAC"),
+        ("siemens", "X=R1", "X"),
+        ("heidenhain", "L X+5 RR", ""),
+        ("heidenhain", "CC X+5 Y+5", ""),
+        ("heidenhain", "L IX+5", "XYZAC"),
+    ],
+)
+def test_what_a_block_leaves_unknown(control: str, block: str, lost: str) -> None:
+    state = after(control, block)
+    assert "".join(letter for letter in AXES if math.isnan(state.place[letter])) == lost
+
+
+def test_modal_words_that_keep_their_letters() -> None:
+    """R of an arc is no word of its own, nor in the blocks after it."""
+    assert after("fanuc", "G2 X5. R8.", "X9. R8.").place == {"X": 9.0, "Y": 1.0, "Z": 1.0, "A": 1.0, "C": 1.0}
+    assert math.isnan(after("fanuc", "G1 X5. R8.").place["X"])
+    assert after("linuxcnc", "G64 P0.03 Q0.01", "G4 P1.5").rounding == "G64 P0.03 Q0.01"
+    assert after("haas", "G154 P2", "X5.", "G154 P2").place["X"] == 5.0
+    assert math.isnan(after("haas", "G154 P2", "X5.", "G154 P3").place["X"])
+
+
+def test_a_skipped_block_leaves_what_both_ways_have() -> None:
+    state = after("fanuc", "/G0 G91 X5. M8")
+    assert (state.groups["motion"], state.groups["distance"], state.groups["coolant"]) == (None, None, None)
+    assert state.groups["tip"] == "both"
+    assert math.isnan(state.place["X"])
+    assert state.place["Y"] == 1.0
+
+
+def test_a_listing_shows_what_is_not_known() -> None:
+    reader = ProgramReader("fanuc", None)
+    shown = list(listing(reader.stream(Text.of(b"G21 G90\nG0 X1. Y2.\nG777\n"))))
+    assert shown[1].endswith("rapid X1 Y2 Z? I? J? K?")
+    assert shown[2].endswith("all unknown")
