@@ -204,3 +204,16 @@ def test_rules_of_tables_are_refused_for_cl_files() -> None:
     for rule in ({"scale": 1000.0}, {"flip_axis": True}, {"between_passes": 20.0}):
         with pytest.raises(SettingsError, match="CS230"):
             read(CATIA.format("OFF").encode(), **rule)
+
+
+def test_an_origin_of_catia_without_a_shift_is_a_work_offset_that_is_not_compared() -> None:
+    data = CATIA.format("OFF").replace("LOADTL/1", "ORIGIN/0,0,0,1,1\nLOADTL/1").encode()
+    assert postprocess(data, io.BytesIO(), Settings(tolerance=0.02)).verdict is Verdict.NOT_VERIFIED
+    for wrong in (data.replace(b"ORIGIN/0,0,0", b"ORIGIN/0,0,1"), data.replace(b"$$     CATIA APT VERSION", b"$$")):
+        with pytest.raises(InputError, match=r"error\[CS117\]: ORIGIN changes"):
+            read(wrong)
+
+
+def test_a_g_code_of_prefun_is_told_as_one() -> None:
+    with pytest.raises(InputError, match=r"error\[CS115\]: PREFUN/54 is not understood\nhint: a G code may move"):
+        read(b"UNITS/MM\nPREFUN/54\nGOTO/0,0,0\n")

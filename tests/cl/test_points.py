@@ -13,6 +13,7 @@ from cornersmooth import cl
 from cornersmooth.cl import points_table
 from cornersmooth.cl.points import looks_like_points, read_points
 from cornersmooth.errors import InputError
+from cornersmooth.kinematics import load_machine
 from cornersmooth.model import FeedMode, Move, Program
 from oracle.loops import bytecodes
 from oracle.messages import one_line
@@ -575,3 +576,24 @@ def test_rapids_in_the_first_column(head: str):
     program = cl.read(text.encode(), name="path.csv")
     assert program.source.format == "points"
     assert program.kind.tolist() == [1, 2, 2, 1]
+
+
+@pytest.mark.parametrize(("names", "unit"), [("A [deg],C [deg]", 1.0), ("a_rad,c_rad", np.radians(1.0))])
+def test_angles_of_a_machine_take_the_place_of_the_tool_axis(names: str, unit: float):
+    machine = load_machine("table-ac")
+    angles = [(0.0, 0.0), (30.0, 0.0), (30.0, 90.0)]
+    rows = "".join(f"{k},0,0,{a * unit:.12f},{c * unit:.12f}\n" for k, (a, c) in enumerate(angles))
+    program = ruled(f"x,y,z,{names}\n{rows}", machine=machine)
+    assert program.tip[:, 0].tolist() == [0, 1, 2]
+    assert program.axis[:, 2] == pytest.approx(np.cos(np.radians([0, 30, 30])))
+    # ISO 841: a table turns against its sign, so the tool turns with it, seen from the part: about X, then about Z
+    assert program.axis == pytest.approx(np.array([[0, 0, 1], [0, -0.5, 0.75**0.5], [0.5, 0, 0.75**0.5]]), abs=1e-9)
+    with pytest.raises(InputError, match=r"no tool axis in"):
+        ruled(f"x,y,z,{names}\n{rows}")
+    with pytest.raises(InputError, match=r"A, C are angles without \[deg\] or \[rad\]"):
+        ruled(f"x,y,z,a,c\n{rows}", machine=machine)
+
+
+def test_tips_alone_may_have_a_column_of_passes():
+    program = ruled("pass,x,y,z\n1,0,0,0\n1,9,0,0\n2,9,5,0\n", between_passes=5.0)
+    assert program.axis.tolist() == [[0, 0, 1]] * 5

@@ -15,6 +15,7 @@ from cornersmooth.cl.grammar import joined
 from cornersmooth.cl.messages import error
 from cornersmooth.cl.source import clean, load
 from cornersmooth.errors import SettingsError
+from cornersmooth.kinematics import Machine
 from cornersmooth.model import MM_PER_UNIT, Program, Statement, Units
 from cornersmooth.statements.asked import statements_not_understood, turns
 
@@ -50,6 +51,7 @@ def read(
     flip_axis: bool = False,
     between_passes: float | None = None,
     cycle_order: str | None = None,
+    machine: Machine | None = None,
 ) -> Program:
     """Read a tool path.
 
@@ -83,6 +85,8 @@ def read(
         How far the tool goes back along its axis between the passes of a table; None feeds straight on.
     cycle_order : str, optional
         Words of `cl.cycles.ORDER` for the numbers without a word of CYCLE, separated by commas.
+    machine : Machine, optional
+        Whose rotary angles a table has in place of tool axes; the positions are those of the tip on the part.
     size_limit : bool
         Refuse inputs of more than 2 GB, and gzip files that grow 200-fold.
 
@@ -119,7 +123,7 @@ def read(
     if format == "points":
         from cornersmooth.cl.points import TableRules, read_points
 
-        rules = TableRules(scale, flip_axis, between_passes)
+        rules = TableRules(scale, flip_axis, machine, between_passes)
         program = read_points(data, name=name, units=units, lenient=lenient, rules=rules)
     else:
         from cornersmooth.cl.apt import read_apt

@@ -17,6 +17,7 @@ from cornersmooth.cl.messages import error, finding
 from cornersmooth.cl.points_header import Columns
 from cornersmooth.cl.poses import UNIT_TOLERANCE
 from cornersmooth.errors import Finding
+from cornersmooth.kinematics import Machine, tool_axis
 from cornersmooth.model import MM_PER_UNIT, Bools, Floats, Ints, Move, Program, Source, Units
 
 #: largest spread of |B−A| over its mean in a file of second points
@@ -35,6 +36,7 @@ class TableRules:
 
     scale: float = 1.0  #: of all lengths
     flip_axis: bool = False  #: the tool axes point into the part
+    machine: Machine | None = None  #: whose rotary angles stand for the tool axes
     between_passes: float | None = None  #: mm: way back along the tool axis between passes; None feeds straight on
 
 
@@ -90,7 +92,7 @@ def read_points(
     and feeds that are not positive are left out, with findings.
     """
     text = table.clean(data, name)
-    columns = _find_columns(text, name)
+    columns = _find_columns(text, name, rules.machine)
     values, line = table.numbers(text, columns, name)
     if not len(values):
         raise error("CS150", name, 1)
@@ -103,7 +105,11 @@ def read_points(
     findings = [] if units or columns.units else [finding("CS176", 0)]
     units = units or columns.units or "mm"
     scale = MM_PER_UNIT[units] * factor
-    axis, axis_findings = _axis(rows, scale, lenient)
+    if rules.machine is not None and columns.angles:
+        angles = rows.take(columns.angles) * np.array(columns.degrees)
+        axis, axis_findings = tool_axis(rules.machine, angles), list[Finding]()
+    else:
+        axis, axis_findings = _axis(rows, scale, lenient)
     kind, rapid_findings = _kind(rows)
     feed, feed_findings = _feed(rows, kind, lenient)
     axis = -axis if rules.flip_axis else axis
@@ -136,13 +142,14 @@ def read_points(
     )
 
 
-def _find_columns(text: table.PointText, name: str) -> Columns:
+def _find_columns(text: table.PointText, name: str, machine: Machine | None) -> Columns:
+    rotary = machine.names if machine is not None and len(machine.names) == 2 else ()
     if text.header is not None and text.header_certain:
-        return points_header.from_header(text.header, name, text.header_line)
+        return points_header.from_header(text.header, name, text.header_line, rotary)
     if not text.width:
         raise error("CS150", name, 1)
     if text.header is not None:
-        columns = points_header.from_header(text.header, name, text.header_line)
+        columns = points_header.from_header(text.header, name, text.header_line, rotary)
         if columns.width == text.width:
             return columns
     return points_header.from_width(text.width, name, text.row_line)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from typing import Literal
@@ -61,7 +62,13 @@ _FEED_UNITS: dict[str, tuple[Units, float]] = {
     "mm/s": ("mm", 60.0),
     "m/s": ("mm", 60000.0),
 }
-_UNIT = re.compile(r"[\[(<]\s*([^\])>]*?)\s*[\])>]|[_/](mm|in|inch)$")
+_UNIT = re.compile(r"[\[(<]\s*([^\])>]*?)\s*[\])>]|[_/](mm|in|inch|deg|rad)$")
+
+#: degrees in the unit of an angle
+_ANGLES = {
+    **dict.fromkeys(("deg", "degree", "degrees", "°"), 1.0),
+    **dict.fromkeys(("rad", "radian", "radians"), 180.0 / math.pi),
+}
 
 #: spellings that mean the tool axis, and those that mean a surface normal beside such a one
 _SURELY_AXES = {"i j k", "axisx axisy axisz", "toolaxisx toolaxisy toolaxisz", "toolx tooly toolz"}
@@ -84,12 +91,15 @@ class Columns:
     unused: tuple[str, ...] = ()  #: names of columns that are not read; counters and times are not counted among them
     units: Units | None = None  #: what the header says about units
     factor: float = 1.0  #: of lengths, to `units`
+    #: of the rotary axes of a machine, in place of a tool axis, in their order, and the degrees in their units
+    angles: tuple[int, ...] = ()
+    degrees: tuple[float, ...] = ()
     feed_factor: float | None = None  #: of feeds per minute; None where the header says nothing of them
 
     @property
     def wanted(self) -> tuple[int, ...]:
         """Columns of tip and axis, which must hold a number in every row."""
-        return (*self.tip, *(self.second or ()))
+        return (*self.tip, *(self.second or ()), *self.angles)
 
 
 def from_width(width: int, file: str, line: int) -> Columns:
@@ -101,8 +111,8 @@ def from_width(width: int, file: str, line: int) -> Columns:
     raise error("CS159", file, line, got=width)
 
 
-def from_header(text: str, file: str, line: int) -> Columns:
-    """Columns that a header line names.
+def from_header(text: str, file: str, line: int, rotary: tuple[str, ...] = ()) -> Columns:
+    """Columns that a header line names; the rotary axes of a machine may take the place of a tool axis.
 
     Raises InputError CS156 where the names leave tip or axis open, CS162 for unknown units, CS165 for a quaternion.
     """
@@ -132,10 +142,13 @@ def from_header(text: str, file: str, line: int) -> Columns:
     meaning: Meaning = named[0][1] if named else "none"
     feed = next((left.index(name) for name in _FEEDS if name in left), None)
     rapid = next((left.index(name) for name in _RAPIDS if name in left), None)
-    used = {*tip, *(second or ()), feed, rapid}
+    angles, degrees = _rotary(names, left, rotary if second is None else (), file, line)
+    used = {*tip, *(second or ()), *angles, feed, rapid}
     rest = [c for c, name in enumerate(left) if name and c not in used and name not in _COUNTERS]
     unused = tuple(names[c].strip() for c in rest)
-    if unused and second is None:  # an axis in a spelling we do not know must not become +Z in silence
+    if (
+        second is None and not angles and not {left[c] for c in rest} <= _PASSES
+    ):  # an axis in a spelling we do not know must not become +Z in silence
         raise error("CS156", file, line, why=f"no tool axis in {', '.join(unused)}")
     axis = [left[c] for c in second or ()]
     if scalar := _scalar([left[c] for c in rest], set(axis)):
@@ -146,8 +159,28 @@ def from_header(text: str, file: str, line: int) -> Columns:
     name = "" if rapid is None else names[rapid].strip()
     passes = next((c for c in rest if left[c] in _PASSES), None)
     return Columns(
-        len(names), tip, second, meaning, feed, rapid, says, name, passes, unused, units, factor, feed_factor
+        *(len(names), tip, second, meaning, feed, rapid, says, name, passes, unused),
+        units=units,
+        factor=factor,
+        angles=angles,
+        degrees=degrees,
+        feed_factor=feed_factor,
     )
+
+
+def _rotary(
+    names: list[str], left: list[str], rotary: tuple[str, ...], file: str, line: int
+) -> tuple[tuple[int, ...], tuple[float, ...]]:
+    """Columns of all rotary axes of a machine, and the degrees in their units; nothing where one has no column."""
+    columns = tuple(left.index(name.lower()) for name in rotary if name.lower() in left)
+    if not columns or len(columns) < len(rotary):
+        return (), ()
+    units = [_UNIT.search(names[column].lower().strip(" \"'")) for column in columns]
+    found = [_ANGLES.get((unit[1] or unit[2] or "").strip()) if unit else None for unit in units]
+    degrees = tuple(value for value in found if value is not None)
+    if len(degrees) < len(columns):
+        raise error("CS156", file, line, why=f"{', '.join(sorted(rotary))} are angles without [deg] or [rad]")
+    return columns, degrees
 
 
 def is_header(text: str) -> bool:

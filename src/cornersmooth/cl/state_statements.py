@@ -205,6 +205,23 @@ def _mcs(state: ReaderState, record: Record) -> None:
         state.note("CS146", record.line, word="MCS", into="the work offset")
 
 
+def _prefun(state: ReaderState, record: Record) -> None:
+    """PREFUN/n: a G code (ISO 4343), which may be any motion."""
+    if record.option not in _ENDS:
+        want = "a G code may move the tool: leave it out, and put it into the program with --header"
+        raise state.fail("CS115", record, want=want)
+    state.keep(record)
+
+
+def _origin(state: ReaderState, record: Record) -> None:
+    """ORIGIN/x,y,z,number,group of CATIA: without a shift it is a work offset, which is not compared."""
+    values = record.values
+    if state.dialect.name == "catia" and len(values) == len(record.args) == 5 and not any(values[:3]):
+        state.keep(record)
+    else:
+        _turn(state, record)
+
+
 def _zero(state: ReaderState, record: Record) -> None:
     """ZERO/n of CAMplete: the work offset, one for the whole program, where that of no ZERO is the first."""
     number = number_of(Statement(state.n, record.line, record.word, record.args))
@@ -327,6 +344,8 @@ FED: Final[dict[str, Handler]] = {
     "FEDRAT": _feed,
     **{word: _turn for word, code in REFUSED_WORDS.items() if code == TURNS},
     "ZERO": _zero,
+    "ORIGIN": _origin,
+    "PREFUN": _prefun,
     "CYCLE": _cycle,
 }
 

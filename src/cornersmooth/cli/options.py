@@ -390,7 +390,8 @@ class Options:
 
     def reading(self) -> dict[str, Any]:
         """Keyword arguments of `cornersmooth.read`."""
-        return {name: getattr(self, name) for name in _ARGUMENTS} | {"size_limit": not self.no_size_limit}
+        more = {"size_limit": not self.no_size_limit, "machine": self.load_machine()}
+        return {name: getattr(self, name) for name in _ARGUMENTS} | more
 
     def read(self) -> tuple[bytes, str, bool]:
         """Contents and name of the input, and whether it is an NC program; options of the other kind are refused."""
