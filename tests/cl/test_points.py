@@ -597,3 +597,9 @@ def test_angles_of_a_machine_take_the_place_of_the_tool_axis(names: str, unit: f
 def test_tips_alone_may_have_a_column_of_passes():
     program = ruled("pass,x,y,z\n1,0,0,0\n1,9,0,0\n2,9,5,0\n", between_passes=5.0)
     assert program.axis.tolist() == [[0, 0, 1]] * 5
+
+
+@pytest.mark.parametrize("first", ["PARTNO X Y Z", "PPRINT X,Y,Z", "REMARK x y z i j k", "$$ X Y Z", "PARTNO/X,Y,Z"])
+def test_a_text_of_a_cl_file_is_no_header(first: str):
+    program = cl.read(f"{first}\nRAPID\nGOTO/0,0,0,0,0,1\nGOTO/1,0,0\n".encode(), name="x")
+    assert (program.source.format, len(program)) == ("apt", 2)

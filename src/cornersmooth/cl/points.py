@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import PurePath
@@ -16,6 +17,7 @@ from cornersmooth.cl.bulk import FARTHEST
 from cornersmooth.cl.messages import error, finding
 from cornersmooth.cl.points_header import Columns
 from cornersmooth.cl.poses import UNIT_TOLERANCE
+from cornersmooth.cl.words import TEXT_WORDS
 from cornersmooth.errors import Finding
 from cornersmooth.kinematics import Machine, tool_axis
 from cornersmooth.model import MM_PER_UNIT, Bools, Floats, Ints, Move, Program, Source, Units
@@ -59,9 +61,10 @@ class _Rows:
 
 
 def begins_with_names(data: bytes) -> bool:
-    """Whether the first line of a file names at least the columns of the tip: a CL file never does."""
+    """Whether the first line of a file names at least the columns of the tip: in a CL file only a text does."""
     first = next(table.leading_lines(data), "")
-    return "$$" not in first and points_header.is_header(first)
+    words = re.split(r"[\s/]+", first.strip().upper(), maxsplit=1)
+    return words[0] not in TEXT_WORDS and "$$" not in first and points_header.is_header(first)
 
 
 def looks_like_points(data: bytes) -> bool:
