@@ -92,13 +92,13 @@ class Retracts:
         InputError
             CS503 for a feed move before all of the tip is known.
         """
-        unknown = np.isnan(run.tip).any(axis=1)
+        unknown: Bools = np.logical_or.reduce(np.isnan(run.tip), axis=1)
         gone = unknown & (run.kind == Element.RAPID)
         if (fed := unknown & ~gone).any() and self.open:
             hint = "say X Y Z in rapid after a position of the machine, before the first feed"
             what = "a feed move where not all of the position is known"
             raise InputError("CS503", what, hint, file=self._name, line=int(run.line[np.argmax(fed)]))
-        arrived = not unknown.all()
+        arrived = bool(not unknown.all())
         count = int(np.argmin(unknown)) + 1 if arrived else len(unknown)
         words = np.vstack((before, np.hstack((run.tip[:count], run.second[:count]))))
         rapid = run.kind[:count] == Element.RAPID

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from cornersmooth.model import Program
 from cornersmooth.statements.asked import Asking
@@ -11,6 +11,7 @@ from cornersmooth.statements.asked import Asking
 #: words of CYCLE: plain drilling, depths, feeds, and those that say nothing of either
 _PLAIN = {"DRILL", "FACE", "SPOT", "CSINK", "REAM", "BORE", "DEEP", "DEEP2", "BRKCHP", "TAP"}
 _AT_FEED = {"REAM", "BORE"}
+_PECKING = {"DEEP", "DEEP2", "BRKCHP"}
 _DEPTH = ("FEDTO", "DEPTH")
 #: feed words with the number of millimetres in their unit (0: that of the file) and whether they are per revolution
 _FEEDS = {
@@ -22,7 +23,8 @@ _FEEDS = {
     "PERREV": (0.0, True),
 }
 _RETURNS = ("RTRCTO", "RETURN")
-_OTHER = {"RAPTO", "CLEAR", *_RETURNS, "STEP", "INCR", "1STPECK", "SUBPECK", "DWELL"}
+_STEPS = ("STEP", "INCR", "1STPECK", "SUBPECK")
+_OTHER = {"RAPTO", "CLEAR", *_RETURNS, *_STEPS, "DWELL"}
 
 
 #: statements that say how fast the spindle turns
@@ -43,6 +45,9 @@ class Drilling:
     #: leaves it open.
     clearance: float = math.nan
     retract: float = math.nan
+    #: mm: pecks, the last one again and again; none where one feed leads to the bottom, or the statement leaves it open
+    steps: tuple[float, ...] = ()
+    breaks_chips: bool = False  #: whether pecks stay in the hole
 
     @property
     def level(self) -> float:
@@ -60,6 +65,7 @@ def drilling(args: tuple[float | str, ...], program: Program, speed: float = 0.0
     """
     values: dict[str, float] = {}
     kinds, word, in_turns = set(), "", False
+    pecks: dict[str, list[float]] = {name: [] for name in _STEPS}
     for value in args:
         if value == "REV" and word == "DWELL":
             in_turns = True
@@ -79,6 +85,8 @@ def drilling(args: tuple[float | str, ...], program: Program, speed: float = 0.0
             return Drilling()
         else:
             values[word] = value
+            if word in pecks:
+                pecks[word].append(value)
     depths = [values[name] for name in _DEPTH if name in values]
     if not kinds or len(depths) != 1:
         return Drilling()
@@ -87,9 +95,10 @@ def drilling(args: tuple[float | str, ...], program: Program, speed: float = 0.0
         depth = -depth
     elif "DEPTH" not in values:
         depth = abs(depth)
-    if depth < 0:
-        return Drilling()
     unit = program.mm_per_unit
+    steps = tuple(unit * step for name in _STEPS for step in pecks[name])
+    if depth < 0 or any(step <= 0.0 for step in steps):
+        return Drilling()
     feeds = [(values[name] * (scale or unit), turn) for name, (scale, turn) in _FEEDS.items() if name in values]
     feed, per_revolution = feeds[0] if len(feeds) == 1 else (math.nan, False)
     dwell = values.get("DWELL", 0.0)
@@ -98,13 +107,13 @@ def drilling(args: tuple[float | str, ...], program: Program, speed: float = 0.0
     dwell = float(round(1000.0 * (dwell * 60.0 / speed if in_turns else dwell)))
     above = _height(values, ("RAPTO",) if program.source.dialect == "hsm" else ("RAPTO", "CLEAR"), unit)
     retract = _height(values, _RETURNS, unit)
+    found = Drilling(depth * unit, feed, per_revolution, dwell, clearance=above, retract=retract)
     if "TAP" not in kinds:
-        feed_out = bool(kinds & _AT_FEED)
-        return Drilling(depth * unit, feed, per_revolution, dwell, feed_out=feed_out, clearance=above, retract=retract)
-    if len(kinds) > 1 or math.isnan(feed) or not (per_revolution or speed):
+        pecking = steps if kinds & _PECKING else ()
+        return replace(found, feed_out=bool(kinds & _AT_FEED), steps=pecking, breaks_chips="BRKCHP" in kinds)
+    if len(kinds) > 1 or steps or math.isnan(feed) or not (per_revolution or speed):
         return Drilling()
-    pitch = feed if per_revolution else feed / speed
-    return Drilling(depth * unit, pitch, True, dwell, tap=True, feed_out=True, clearance=above, retract=retract)
+    return replace(found, feed=feed if per_revolution else feed / speed, per_revolution=True, tap=True, feed_out=True)
 
 
 def _height(values: dict[str, float], words: tuple[str, ...], unit: float) -> float:
@@ -150,7 +159,7 @@ def _goes_on(before: tuple[float | str, ...], args: tuple[float | str, ...], *, 
 
 def _alike(word: float | str) -> str:
     """One name for words that say the same of a cycle."""
-    families = (_DEPTH, _RETURNS, tuple(_FEEDS), ("RAPTO", "CLEAR"), ("STEP", "INCR", "1STPECK", "SUBPECK"))
+    families = (_DEPTH, _RETURNS, tuple(_FEEDS), ("RAPTO", "CLEAR"), _STEPS)
     return next((family[0] for family in families if word in family), str(word))
 
 

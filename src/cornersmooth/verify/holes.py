@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,10 @@ from cornersmooth.verify.cl_motion import Original, selecting
 from cornersmooth.verify.motions import digit_errors
 from cornersmooth.verify.nearest import COLUMNS, on_segments
 from cornersmooth.verify.task import ARITHMETIC
+
+#: how far above the last depth a rapid ends at least, as a share of a peck, and no more than so many mm; by how many mm
+#: the last peck may be deeper: nothing worth a peck is left
+_ABOVE, _LEAST_ABOVE, _REST = 1.0 / 32.0, 0.1, 0.01
 
 #: elements that are compared with a pose together, as the next ones will be wanted, too
 _WINDOW = 16
@@ -201,6 +206,14 @@ class HoleLines:
             say("CS563", first, f"a rapid goes {-before:.4f} mm into the uncut hole", -before)
         free = 0.0 if math.isnan(cycle.clearance) else cycle.clearance  # height down to which rapids may go
         drilled, deep, above = 0.0, False, math.inf
+        gap = _gap(cycle) + self.room
+        begins = height.get(feeds[0] - 1, self.height(move, max(feeds[0] - 1, 0)))
+        if begins > max(cycle.clearance, 0.0) + self.room:
+            say(
+                "CS564",
+                feeds[0],
+                f"feeding begins {begins:.4f} mm above the hole, the cycle says {cycle.clearance:g} (RAPTO)",
+            )
         for k, here in height.items():
             if self.feeds(k):
                 if not (math.isnan(cycle.feed) or self._carries(k, cycle.feed, per_revolution=cycle.per_revolution)):
@@ -214,13 +227,51 @@ class HoleLines:
                     say("CS562", k, "a hole is drilled again")
                 deep = deep or here <= self.room - cycle.depth
                 drilled, free = max(drilled, -here), min(free, here)
+            elif here < above and drilled > self.room and here + drilled < gap:
+                say("CS563", k, "a rapid goes down onto the bottom of a hole, or short of it")
             elif here < free - self.room:
                 where = "into the uncut hole" if free <= 0.0 else "below the height where the feed begins (RAPTO)"
                 say("CS563", k, f"a rapid goes {free - here:.4f} mm {where}", free - here)
             above = here
         if above < -self.room:
             say("CS563", last, "the tool leaves a hole sideways", -above)
+        if cycle.steps:
+            for k, text in self._wrong_pecks(height, cycle):
+                say("CS562", k, text)
         return found, False
+
+    def _wrong_pecks(self, height: dict[int, float], cycle: Drilling) -> Iterator[tuple[int, str]]:
+        """Elements that end pecks which are not those of the cycle, and what is wrong; heights in order.
+
+        A control may count the first from where feeding begins, and the last one takes what is left.
+        """
+        pecks: list[tuple[int, float, float]] = []  # the last element of each, its depth, how high the tool was before
+        above = top = math.inf
+        fed = False
+        for k, here in height.items():
+            feeds = self.feeds(k) and here < above
+            if feeds:
+                pecks[len(pecks) - fed :] = [(k, -here, pecks[-1][2] if fed else top if pecks else above)]
+            top = here if feeds or top == math.inf else max(top, here)
+            fed, above = feeds, here
+        done, steps = 0.0, [*cycle.steps, *cycle.steps[-1:] * len(pecks)]
+        for number, ((k, depth, before), step) in enumerate(zip(pecks, steps, strict=False)):
+            last, peck = number == len(pecks) - 1, depth - done
+            least = -math.inf if last else step - max(before, 0.0) if not number else step
+            out, clear = before > self.room, before >= -self.room or done <= self.room
+            stays = number and before + done < _gap(cycle) - self.room
+            if not least - self.room <= peck <= step + (_REST if last else 0.0) + self.room:
+                yield k, f"a peck is {peck:.4f} mm deep, the cycle says {step:g}"
+            elif stays or (number and not (clear or cycle.breaks_chips)):
+                yield k, "the tool does not come up between pecks as the cycle says"
+            elif number and cycle.breaks_chips and out and before + done > 2.0 * step + self.room:
+                yield k, "the tool leaves the hole between pecks that break chips in it"
+            done = depth
+
+
+def _gap(cycle: Drilling) -> float:
+    """How far above the last depth of a peck rapids end at least, mm."""
+    return min(_ABOVE * min(cycle.steps, default=0.0), _LEAST_ABOVE)
 
 
 def _straight(kind: NDArray[np.uint8]) -> Bools:
