@@ -17,8 +17,9 @@ from cornersmooth.cl import read
 from cornersmooth.geometry import nurbs
 from cornersmooth.model import SmoothProgram
 from cornersmooth.nc import choose_form, fit_settings, write
-from cornersmooth.nc.curve_blocks import Run, SplineBlocks, _intervals
-from cornersmooth.nc.findings import Findings
+from cornersmooth.nc.block_rows import BlockRows
+from cornersmooth.nc.curves import SplineCount, _intervals
+from cornersmooth.nc.messages import Findings
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from nc.grammars import reader
@@ -130,13 +131,13 @@ def test_single_splines_are_warned_of(count: int, said: int) -> None:
 @pytest.mark.parametrize("step", [1, 3, 100])
 def test_spline_blocks_are_counted_in_windows_of_ten(blocks: str, said: int, step: int) -> None:
     findings = Findings()
-    splines = SplineBlocks(4, np.arange(100, 200), findings)
+    counted = SplineCount(np.arange(100, 200), findings)
     kinds = np.array(list(blocks))
     for first in range(0, len(kinds), step):
         part, move = kinds[first : first + step], np.arange(first, min(first + step, len(kinds)))
         none = np.zeros(len(part))
-        splines.prepare(Run(none[:, None], move, part == "G", none, none, 2 * (part == "s").astype(np.int8)))
-    splines.finish()
+        counted.take(BlockRows(none[:, None], move, part == "G", none, none, 2 * (part == "s").astype(np.int8)))
+    counted.finish()
     assert sum(finding.count for finding in findings.all()) == said
     if said:
         assert findings.all()[0].line >= 100 + blocks.index("s")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from cornersmooth.errors import Finding, SettingsError
 from cornersmooth.model import Ints, SmoothProgram, Units
-from cornersmooth.nc.block_writer import BlockWriter
+from cornersmooth.nc.blocks import Blocks
 from cornersmooth.nc.circles import Circles, plan_circles, with_arcs
 from cornersmooth.nc.control import Control
 from cornersmooth.nc.control_tables import (
@@ -19,18 +19,22 @@ from cornersmooth.nc.control_tables import (
     load_control,
     parse_control,
 )
+from cornersmooth.nc.coordinates import Coordinates
+from cornersmooth.nc.curves import SplineCount
 from cornersmooth.nc.cycle_blocks import upright_poses
-from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.form_choice import check_program, choose_form
+from cornersmooth.nc.holes import Holes
 from cornersmooth.nc.long_rows import coarse_rows, long_rows
-from cornersmooth.nc.motion_writer import MotionWriter
-from cornersmooth.nc.operation import Operation
+from cornersmooth.nc.messages import Findings
+from cornersmooth.nc.modals import Modals
+from cornersmooth.nc.motion import Motion
 from cornersmooth.nc.own_words import own_words
 from cornersmooth.nc.planes import Planes, check_travel_in_planes, check_travel_without_axes, plan_planes
-from cornersmooth.nc.program_frame import POINT_APPROACH, Frame, Stream
+from cornersmooth.nc.program_frame import BLEND_STEP, POINT_APPROACH, Frame, Stream
 from cornersmooth.nc.rotary_rows import rotary_rows
 from cornersmooth.nc.rotary_words import rotary_way, within_reach
+from cornersmooth.nc.script import Script
 from cornersmooth.nc.statement_writer import StatementWriter
 from cornersmooth.nc.warnings import add_warnings
 from cornersmooth.settings import Settings
@@ -169,39 +173,40 @@ def write(
     frame = frame or Frame()
     values = frame.values(chosen, program, smoothed.settings)
     frame.refuse_tool(chosen, program)
-    operation = Operation(chosen, values, frame.texts(chosen, values), findings, units=program.units)
-    statements = StatementWriter(
-        chosen, program, findings, operation, comments=frame.comments, skip_cycles=frame.skip_cycles
-    )
-    native = frame.cycles == "native"
+    modals = Modals(chosen, values, frame.texts(chosen, values), findings, program.units)
+    modals.now["blend"] = usual_blend = round(float(values["blend"]) / BLEND_STEP) if chosen.table.lines.rounding else 0
+    comments, skip, native = frame.comments, frame.skip_cycles, frame.cycles == "native"
+    statements = StatementWriter(chosen, program, findings, modals, comments=comments, skip_cycles=skip)
     upright = upright_poses(program, chosen, drills=native)
     planes = plan_planes(program, smoothed.settings, chosen, upright, findings, drills=native)
     check_travel_in_planes(planes, program, chosen, findings)
     circles = plan_circles(program, smoothed.settings, chosen, planes, upright)
     add_warnings(chosen, smoothed, circles, findings)
     stretch = chosen.stretch(smoothed.settings.axis_length)
-    writer = BlockWriter(chosen, program, statements, findings, circles, stretch, values["blend"], modal=frame.modal)
+    tilting = Coordinates(chosen, program.units, stretch, modal=frame.modal)
+    counted = SplineCount(program.line, findings) if chosen.curve == "bspline" else None
+    blocks = Blocks(program, circles, modals, findings, counted, usual_blend=usual_blend)
     approach = max(frame.approach, POINT_APPROACH) if chosen.orientation == "point" else frame.approach
-    motion = MotionWriter(
-        program, writer, upright, planes, statements, operation, findings, approach, frame.retract, native
-    )
+    motion = Motion(program, tilting, modals, blocks, findings, approach, frame.retract)
+    script = Script(statements, motion, Holes(motion, statements, native), upright, planes)
     of_rows = Findings()  # rows are made in a thread of their own: their findings come last
     with _BackgroundWriter(stream) as behind:
         text = frame.start(behind, chosen)
-        for lines in motion.text(operation.start()):
-            text.write(lines)
+        motion.say(modals.start())
         chunks = (
-            (rows, writer.ticks(rows.tip, rows.other)) for rows in _rows(smoothed, chosen, circles, planes, of_rows)
+            (rows, tilting.ticks(rows.tip, rows.other)) for rows in _rows(smoothed, chosen, circles, planes, of_rows)
         )
         for rows, ticks in chunks if len(program) < _MANY else _one_ahead(chunks):
-            for lines in motion.write(rows, ticks):
+            script.run(rows, ticks)
+            for lines in script.take():
                 text.write(lines)
             if progress is not None and len(rows.move):
                 progress(int(rows.move[-1]) + 1, len(program))
-        for lines in motion.finish():
+        script.finish()
+        for lines in script.take():
             text.write(lines)
     findings.add_all(of_rows.all())
-    return Written(motion.written, findings.all())
+    return Written(blocks.written, findings.all())
 
 
 def _rows(smoothed: SmoothProgram, form: Form, circles: Circles, planes: Planes, findings: Findings) -> Iterator[Rows]:

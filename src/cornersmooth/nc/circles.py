@@ -15,13 +15,11 @@ import numpy as np
 
 from cornersmooth.geometry.arcs import arc_points, arc_radii, divided
 from cornersmooth.model import Bools, Floats, Ints, Keep, Program
-from cornersmooth.nc.control import Motion
-from cornersmooth.nc.curve_blocks import Curves, Run
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.planes import Planes
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.sampling import Rows
-from cornersmooth.text import RowFormat, to_ticks
+from cornersmooth.text import to_ticks
 from cornersmooth.vectors import norm
 
 #: largest turn of one circular block: in R form a control cannot tell which way to go near 180 degrees
@@ -97,43 +95,6 @@ def plan_circles(program: Program, settings: Settings, form: Form, planes: Plane
         deviation = _deviation(program, blocks, PLANES[plane], height > 0.0, written, step, frames, flat)
         blocks[deviation > tolerance] = 0
     return Circles(blocks, plane + FIRST_PLANE, height < 0.0, ticks)
-
-
-class ArcBlocks(Curves):
-    """Circular blocks: the end point and the radius, and which way round by the code, or by a word at the end."""
-
-    def __init__(self, circles: Circles, motion: Motion, line: RowFormat) -> None:
-        self._circles, self._blank = circles, " " if motion.spaces else ""
-        self._codes, self._directions = (motion.clockwise, motion.counterclockwise), motion.arc_directions
-        self._said = 2 if motion.arc_directions else 3  # coordinates in a block
-        words = (*line.words[: self._said], f"{self._blank}{motion.radius}".encode())
-        self.format: RowFormat = replace(line, words=words, decimals=(line.decimals[:1] * len(words)))
-
-    def rows(self, run: Run) -> Bools:
-        """(r,) rows on arcs."""
-        return np.zeros(len(run), np.bool_) if run.arc is None else run.arc >= 0
-
-    def _turned(self, run: Run) -> Ints:
-        """0 for arcs that go clockwise, 1 for the others."""
-        assert run.arc is not None
-        return (~self._circles.clockwise[run.arc[self.rows(run)]]).astype(np.int64)
-
-    def add_prefixes(self, run: Run, table: list[bytes], chosen: Ints) -> int:
-        """Codes."""
-        chosen[self.rows(run)] = len(table) + self._turned(run)
-        table += [f"{code}{self._blank}".encode() for code in self._codes]
-        return 0
-
-    def add_suffixes(self, run: Run, table: list[bytes], chosen: Ints) -> None:
-        """Directions."""
-        if self._directions:
-            chosen[self.rows(run)] += len(table) * (1 + self._turned(run))
-            table += [f"{self._blank}{turn}".encode() + end for turn in self._directions for end in list(table)]
-
-    def numbers(self, run: Run, curved: Bools) -> Ints:
-        """End points and radii."""
-        assert run.arc is not None
-        return np.column_stack((run.ticks[curved, : self._said], self._circles.radius[run.arc[curved]]))
 
 
 def with_arcs(rows: Iterator[Rows], program: Program, circles: Circles) -> Iterator[Rows]:

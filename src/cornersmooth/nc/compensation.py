@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from cornersmooth.errors import InputError
 from cornersmooth.model import Program, Statement
 from cornersmooth.nc.control import Blocks
-from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
-from cornersmooth.nc.operation import Operation
+from cornersmooth.nc.messages import Findings, refused
+from cornersmooth.nc.modals import Modals
 from cornersmooth.nc.statement_args import numbers_of, whole_number, words_of
 
 #: words for planes, with the G code of each
@@ -18,7 +17,7 @@ _PLANES: Final = {"XYPLAN": 17, "ZXPLAN": 18, "YZPLAN": 19}
 
 
 def begin_compensation(
-    statement: Statement, form: Form, program: Program, operation: Operation, findings: Findings, *, diameter: float
+    statement: Statement, form: Form, program: Program, modals: Modals, findings: Findings, *, diameter: float
 ) -> tuple[int, Blocks] | None:
     """Plane (17, 18 or 19) and blocks of CUTCOM/LEFT|RIGHT[,plane][,n]; None where it is not understood.
 
@@ -27,28 +26,16 @@ def begin_compensation(
     """
     names, numbers, words = words_of(statement), numbers_of(statement), form.table.words
     if not words.compensation_left and names[:1] in (["LEFT"], ["RIGHT"]):
-        raise InputError(
-            "CS336",
-            f"{form.control} is given no cutter compensation, and the path would be cut without it",
-            "let the CAM system put the cutter's radius into the path",
-            file=program.source.name,
-            line=statement.line,
-        )
+        raise refused("CS336", program, statement.line, control=form.control)
     side = {"LEFT": words.compensation_left, "RIGHT": words.compensation_right}.get((names or [""])[0])
-    register = whole_number(numbers or [float(operation.offset)])
+    register = whole_number(numbers or [float(modals.offset)])
     if not side or len(names) > 2 or not set(names[1:]) <= _PLANES.keys() or register is None:
         return None
     if words.compensation_entry:
         _check_entry(statement, program, findings, diameter)
-    tip = operation.mode is not form.upright and form.orientation not in ("fixed", "machine")
-    where = "it may be used with tool tip control (--cycles native does without, along Z), and that " if tip else ""
-    findings.add(
-        "CS319",
-        "warning",
-        statement.line,
-        "cutter compensation is left to the control, which offsets the path in the plane and not along the tool; "
-        f"see that {where}the register holds what the CAM system meant",
-    )
+    tip = modals.mode is not form.upright and form.orientation not in ("fixed", "machine")
+    also = "it may be used with tool tip control (--cycles native does without, along Z), and that " if tip else ""
+    findings.note("CS319", statement.line, also=also)
     plane = _PLANES[names[1]] if len(names) > 1 else 17
     return plane, tuple(block.format(register=register) for block in side)
 
@@ -60,16 +47,6 @@ def _check_entry(statement: Statement, program: Program, findings: Findings, dia
         return
     length = math.hypot(*(tip[pose] - tip[pose - 1])[:2])
     if not length > 0.0:
-        raise InputError(
-            "CS344",
-            "cutter compensation begins on a move without any way in the plane, which the control refuses",
-            "let the CAM system lead in on a line, or put the cutter's radius into the path",
-            file=program.source.name,
-            line=statement.line,
-        )
+        raise refused("CS344", program, statement.line)
     if length <= diameter / 2.0:
-        text = (
-            f"cutter compensation begins on a move of {length:g} mm in the plane: the control refuses it where the "
-            "register holds the whole radius of the tool"
-        )
-        findings.add("CS345", "warning", statement.line, text)
+        findings.note("CS345", statement.line, length=length)

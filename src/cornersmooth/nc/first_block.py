@@ -16,8 +16,8 @@ from cornersmooth.errors import InputError
 from cornersmooth.kinematics import Machine, check_travel, solutions
 from cornersmooth.kinematics.position import nose_position
 from cornersmooth.model import Floats
-from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
+from cornersmooth.nc.messages import Findings
 from cornersmooth.nc.planes import turned_part
 
 #: cosine of the angle from Z beyond which a tool is tilted
@@ -56,7 +56,7 @@ def check_first_block(
     places = np.zeros((0, 3)) if machine is None or before is None else _starts(machine, tip, before, place)
     if machine is None or before is None or angles is None or not len(places):
         if _rise(machine, axis, before) < _FLAT:
-            _warn_of_below(findings, where[1])
+            findings.note("CS392", where[1])
         return
     turned = before + _PLACES[:, None] * (angles - before)
     frame = turned_part(machine, before)
@@ -73,21 +73,9 @@ def check_first_block(
         what = f"in the first block of a tool, from the height of the retract: {refused[0].what}"
         raise InputError(refused[0].code, what, refused[0].hint, file=where[0], line=where[1])
     if refused:
-        text = (
-            "the first block of a tool leaves the travel from some places of X and Y at the height of the retract; "
-            "move X and Y near the position before, or give [tool_change] X and Y in the machine file"
-        )
-        findings.add("CS391", "warning", where[1], text)
+        findings.note("CS391", where[1])
     if any(start[2] < tip[2] - _BELOW for start in tips):
-        _warn_of_below(findings, where[1])
-
-
-def _warn_of_below(findings: Findings, line: int) -> None:
-    text = (
-        "the first block of a tool may come from below its end, as the part is turned far; "
-        "see that table and fixture are clear of it, or bring X and Y near before"
-    )
-    findings.add("CS392", "warning", line, text)
+        findings.note("CS392", where[1])
 
 
 def _starts(machine: Machine, tip: Floats, before: Floats, place: Floats | None) -> Floats:

@@ -23,9 +23,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from cornersmooth.errors import InputError
 from cornersmooth.model import FeedMode, Program, Statement
-from cornersmooth.nc.findings import Findings
+from cornersmooth.nc.messages import Findings, refused
 from cornersmooth.nc.statement_args import milliseconds, words_of
 
 #: more pecks in one hole are a misunderstanding
@@ -220,11 +219,9 @@ class HoleCycles:
         self._args = in_force(self._args, statement.args, self.program)
         self.read(speed)
         if has_fixed_order(statement.args, self.program):
-            text = "CYCLE without words is read as depth, feed, clearance; see that the positions are tops of holes"
-            self.findings.add("CS385", "warning", statement.line, text)
+            self.findings.note("CS385", statement.line)
         if self.now is not None and self.now.pecking and not self.now.steps:
-            text = "CYCLE with pecks does not say how deep they are; see that the tool may drill in one feed"
-            self.findings.add("CS321", "warning", statement.line, text)
+            self.findings.note("CS321", statement.line)
 
     def read(self, speed: float | None) -> None:
         """Read the last cycle at another speed of the spindle: a dwell may count in revolutions."""
@@ -233,15 +230,8 @@ class HoleCycles:
     def leave_out(self, why: str, line: int, holes: int) -> None:
         """Count holes that are not drilled, the first at a line; raises CS342 where they may not be left out."""
         if not self.skip:
-            raise InputError(
-                "CS342",
-                f"the hole cycle is not written: {why}",
-                "give --skip-cycles to leave its holes out; the program says NOT DRILLED where they are",
-                file=self.program.source.name,
-                line=self.line or line,
-            )
-        text = f"hole not drilled, the tool only goes over it: {why}"
-        self.findings.add("CS315", "warning", line, text, holes)
+            raise refused("CS342", self.program, self.line or line, why=why)
+        self.findings.note("CS315", line, holes, why=why)
 
     @property
     def line(self) -> int:

@@ -13,21 +13,21 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program
+from cornersmooth.nc.block_rows import BlockRows
+from cornersmooth.nc.blocks import feed_digits, feed_ticks
 from cornersmooth.nc.control import Blocks
-from cornersmooth.nc.curve_blocks import Run
+from cornersmooth.nc.coordinates import Coordinates
 from cornersmooth.nc.cycle_blocks import hole_feeds, kind_of
 from cornersmooth.nc.hole_cycles import Cycle
+from cornersmooth.nc.motion import NOWHERE, Motion
+from cornersmooth.nc.statement_writer import StatementWriter
 from cornersmooth.smoothing.sampling import Rows
 from cornersmooth.text import format_number
 from cornersmooth.vectors import dot
-
-if TYPE_CHECKING:
-    from cornersmooth.nc.motion_writer import MotionWriter
 
 #: mm left above the last depth before feeding goes on, and moved up to break a chip
 PECK_GAP = 0.5
@@ -40,43 +40,44 @@ _SAME_AXIS = 1e-9
 
 
 @dataclass
-class HoleWriter:
+class Holes:
     """Writes the holes of a program."""
 
-    motion: MotionWriter  #: what the moves over holes and into them are written by
+    motion: Motion  #: what the moves over holes and into them are written by
+    statements: StatementWriter  #: the cycle in force, and the spindle
     native: bool = False  #: whether holes are cycles of the control, where they can be
 
     @cached_property
-    def _approach(self) -> Ints:
+    def _approached(self) -> Ints:
         """(n,) pose from which the run of holes is approached that each pose belongs to, -1 for none."""
         kind = self.motion.program.kind
         return np.maximum.accumulate(np.where(kind == Move.HOLE, -1, np.arange(len(kind))))
 
-    def write(self, rows: Rows) -> Iterator[bytes]:
-        """Holes of one cycle, of the control or as plain moves; those left out are only approached."""
-        motion = self.motion
-        cycle, program, poses = motion.statements.cycles.now, motion.program, rows.move
-        heights = travel_height(program, poses, self._approach[poses])
-        lines, line = program.line[poses], int(program.line[poses[0]])
+    def write(self, rows: Rows) -> None:
+        """Write holes of one cycle, of the control or as plain moves; those left out are only approached."""
+        motion, poses, cycle = self.motion, rows.move, self.statements.cycles.now
+        program, motion.return_to = motion.program, NOWHERE
+        heights = travel_height(program, poses, self._approached[poses])
         kind, why = self._cycle_of_control(cycle, poses)
         if cycle is None or (cycle.tap and not kind):
-            motion.statements.cycles.leave_out(why, line, len(poses))
-            yield from self._over_holes(rows, heights)
+            self.statements.cycles.leave_out(why, int(program.line[poses[0]]), len(poses))
+            self._over_holes(rows, heights)
             return
         travel = np.maximum(heights, max(cycle.retract, cycle.clearance or 0.0))
         clearance = travel if cycle.clearance is None else np.full(len(poses), cycle.clearance)
         if kind:
-            yield from self._cycles(cycle, kind, poses, travel, clearance)
+            self._cycles(cycle, kind, poses, travel, clearance)
             return
-        motion.findings.add_each("CS316", "note", lines, "hole of a cycle written as plain moves")
-        before = -1 if motion.operation.comes_first else int(poses[0]) - 1
-        motion.warnings.of_holes(poses, before, travel, clearance)
+        motion.findings.note_each("CS316", program.line[poses])
+        motion.warnings.of_holes(poses, -1 if motion.modals.comes_first else int(poses[0]) - 1, travel, clearance)
         hole, tip, rapid, dwell = hole_moves(cycle, program, poses, travel, clearance)
-        move = poses[hole]
-        run = replace(Run.straight(program, motion.ticks_at(rows, tip, hole), move), rapid=rapid, dwell=dwell)
-        if not np.isnan(cycle.feed):
-            run = replace(run, feed=np.full(len(move), cycle.feed), mode=np.full(len(move), int(cycle.feed_mode)))
-        yield from motion.emit_above(motion.moving(run), cycle.dwell)
+        feed, mode = hole_feeds(cycle, program, poses[hole])
+        plain = BlockRows.straight(program, motion.ticks_at(rows, tip, hole), poses[hole])
+        plain = motion.moving(replace(plain, rapid=rapid, dwell=dwell, feed=feed, mode=mode))
+        per_turn = bool((plain.mode[~plain.rapid][-1:] == FeedMode.PER_REVOLUTION).all())
+        waits = plain.dwell is not None and plain.dwell.any()
+        line = self.statements.cycles.line
+        motion.emit_above(plain, self.statements.dwell(cycle.dwell, line, per_turn=per_turn) if waits else ())
 
     def _cycle_of_control(self, cycle: Cycle | None, poses: Ints) -> tuple[str, str]:
         """Cycle of the control that drills holes, as `kind_of` names it; empty for none, and then why no tap can be.
@@ -86,88 +87,108 @@ class HoleWriter:
         motion = self.motion
         if cycle is None:
             return "", "its words are not understood"
-        kind = kind_of(cycle, motion.writer.form, motion.program, poses)
+        kind = kind_of(cycle, motion.at.form, motion.program, poses)
         if not kind:
             return "", "a tap, and the control has no such cycle for it"
-        if cycle.tap and not (motion.statements.clockwise and motion.statements.speed and motion.operation.turning):
+        if cycle.tap and not (self.statements.clockwise and motion.modals.speed and motion.modals.turning):
             return "", "a tap takes a spindle that turns clockwise at a known speed"
-        if not motion.takes_cycles:
+        if motion.at.tip_control:
             where = "the tool does not stay along Z between its changes, or nothing says that the rotary axes do"
             return "", f"a tap, and {where}"
         return kind if self.native or cycle.tap else "", ""
 
-    def _cycles(self, cycle: Cycle, kind: str, poses: Ints, travel: Floats, clearance: Floats) -> Iterator[bytes]:
-        """Holes as cycles of the control, each from the height at which the tool goes from hole to hole."""
-        motion, program, writer = self.motion, self.motion.program, self.motion.writer
-        motion.findings.add_each("CS347", "note", program.line[poses], "hole written as a cycle of the control")
-        if kind == "tap":
-            text = "a tap is left to the control's cycle: see that it turns the spindle with the feed"
-            motion.findings.add_each("CS348", "warning", program.line[poses], text)
-        motion.warnings.of_cut(int(poses[0]), turning=motion.operation.turning)
-        feeds, modes = hole_feeds(cycle, program, poses)
-        table = writer.form.table.cycles
-        once = next(
-            (k for k, block in enumerate(getattr(table, kind)) if "{x}" in block), 0
-        )  # before those of each hole
-        frame = np.eye(3) if writer.plane is None else writer.plane.frame
-        said: tuple[str, ...] = ()
-        for k, pose in enumerate(poses.tolist()):
-            tip = program.tip[pose]
-            over = writer.ticks((tip + travel[k] * frame[:, 2])[None], program.axis[[pose]])
-            if not said or motion.position is None or motion.position[2] != over[0, 2]:
-                yield from motion.text(table.off if said else ())
-                said = ()
-                yield from motion.emit(motion.moving(Run.straight(program, over, poses[[k]], rapid=True)))
-                yield from motion.text(motion.operation.go_on())
-                yield from motion.text(writer.feed_mode(int(modes[0])))
-            blocks = self._blocks(cycle, kind, tip @ frame, travel[k], clearance[k], feeds[k], int(modes[k]))
-            yield from motion.text(blocks[once:] if said == blocks[:once] and said else blocks)
-            said = blocks[:once] or blocks
-            motion.position = motion.last = over[0]
-        yield from motion.text(table.off)
-        writer.forget_feed()
-
-    def _blocks(
-        self, cycle: Cycle, kind: str, top: Floats, travel: float, clearance: float, feed: float, mode: int
-    ) -> Blocks:
-        """Blocks of one hole with its top, (3,) mm, and heights above it; distances are those of written heights."""
-        writer, unit = self.motion.writer, self.motion.program.mm_per_unit
-        table, speed = writer.form.table, self.motion.statements.speed or 0.0
-        decimals, plus = writer.form.tip_decimals(self.motion.program.units), writer.form.mode.motion.signs
-
-        def rounded(value: float) -> float:
-            return float(format_number(value, decimals))
-
-        x, y, z = (top / unit).tolist()
-        places = {"x": x, "y": y, "top": rounded(z), "bottom": rounded(z - cycle.depth / unit)}
-        places |= {"travel": rounded(z + travel / unit), "clearance": rounded(z + clearance / unit)}
-        places |= {"setup": places["clearance"] - places["top"], "above": places["travel"] - places["top"]}
-        pitch = feed / unit / (1.0 if mode == FeedMode.PER_REVOLUTION or not speed else speed)
-        values = {name: format_number(value, decimals, plus=plus) for name, value in places.items()} | {
-            "depth": format_number(places["top"] - places["bottom"], decimals),
-            "step": format_number(cycle.steps[0] / unit if cycle.steps else 0.0, decimals),
-            "feed": writer.feed_word(feed, mode),
-            "milliseconds": cycle.dwell,
-            "seconds": format_number(cycle.dwell / 1000.0, 3, trim=True),
-            "pitch": format_number(pitch, max(decimals, table.digits.most)),
-            "speed": format_number(speed, table.digits.speed, trim=True).rstrip("."),
-        }
-        return tuple(block.format(**values) for block in getattr(table.cycles, kind))
-
-    def _over_holes(self, rows: Rows, height: Floats) -> Iterator[bytes]:
+    def _cycles(self, cycle: Cycle, kind: str, poses: Ints, travel: Floats, clearance: Floats) -> None:
+        """Write holes as cycles of the control, each from the height at which the tool goes from hole to hole."""
         motion, program = self.motion, self.motion.program
-        decimals = motion.writer.form.tip_decimals(program.units)
-        poses = rows.move
+        lines = program.line[poses]
+        motion.findings.note_each("CS347", lines)
+        if kind == "tap":
+            motion.findings.note_each("CS348", lines)
+        motion.warnings.of_cut(int(poses[0]), turning=motion.modals.turning)
+        mode = int(hole_feeds(cycle, program, poses[:1])[1][0])
+        made = cycle_blocks(cycle, kind, motion.at, program, poses, (travel, clearance), motion.modals.speed or 0.0)
+        for k, (before, goes, blocks, over) in enumerate(made):
+            if goes:
+                motion.say(before)
+                motion.emit(motion.moving(BlockRows.straight(program, over[None], poses[[k]], rapid=True)))
+                motion.say(motion.modals.go_on())
+                motion.say(motion.modals.set(feed_mode=mode))
+            motion.say(blocks)
+            motion.stand(over)
+        motion.say(motion.at.form.table.cycles.off)
+        motion.modals.now["feed"] = -1
+
+    def _over_holes(self, rows: Rows, height: Floats) -> None:
+        """Go over holes that are left out, and say so."""
+        motion, program, poses = self.motion, self.motion.program, rows.move
         tips = program.tip[poses] + height[:, None] * program.axis[poses]
         ticks = motion.ticks_at(rows, tips, np.arange(len(poses)))
-        for index, pose in enumerate(poses.tolist()):
-            tip = (program.tip[pose] / program.mm_per_unit).tolist()
-            place = " ".join(
-                f"{letter}{format_number(value, decimals)}" for letter, value in zip("XYZ", tip, strict=True)
+        for k, pose in enumerate(poses.tolist()):
+            numbers = (
+                format_number(x, motion.at.decimals[0]) for x in (program.tip[pose] / program.mm_per_unit).tolist()
             )
-            yield from motion.text(motion.statements.warning_comment(f"NOT DRILLED: HOLE AT {place}"))
-            run = Run.straight(program, ticks[index : index + 1], poses[index : index + 1], rapid=True)
-            yield from motion.emit_above(motion.moving(run))
+            place = " ".join(map("".join, zip("XYZ", numbers, strict=True)))
+            motion.say(self.statements.warning_comment(f"NOT DRILLED: HOLE AT {place}"))
+            one = BlockRows.straight(program, ticks[k : k + 1], poses[k : k + 1], rapid=True)
+            motion.emit_above(motion.moving(one))
+
+
+def cycle_blocks(
+    cycle: Cycle,
+    kind: str,
+    at: Coordinates,
+    program: Program,
+    poses: Ints,
+    heights: tuple[Floats, Floats],
+    speed: float,
+) -> Iterator[tuple[Blocks, bool, Blocks, Ints]]:
+    """Holes as a cycle of the control, from travel and clearance (h,) mm above each.
+
+    For each hole: blocks before, whether the tool goes over it then, blocks of the hole, and the row of ticks over it.
+    Blocks before those of each place, and the way over it, are written where they change.
+    """
+    table, frame = at.form.table.cycles, np.eye(3) if at.plane is None else at.plane.frame
+    once = next((k for k, block in enumerate(getattr(table, kind)) if "{x}" in block), 0)
+    over = at.ticks(program.tip[poses] + heights[0][:, None] * frame[:, 2], program.axis[poses])
+    feeds, modes = hole_feeds(cycle, program, poses)
+    words = [feed_digits(ticks, at) for ticks in feed_ticks(feeds, modes, program, at).tolist()]
+    said: Blocks = ()
+    for k, pose in enumerate(poses.tolist()):
+        goes = k == 0 or bool(over[k, 2] != over[k - 1, 2])
+        before, said = (table.off if said else (), ()) if goes else ((), said)
+        turns = 1.0 if modes[k] == FeedMode.PER_REVOLUTION or not speed else speed
+        values = _numbers(cycle, at, program, program.tip[pose] @ frame, (heights[0][k], heights[1][k]))
+        values |= {
+            "feed": words[k],
+            "pitch": format_number(
+                feeds[k] / program.mm_per_unit / turns, max(at.decimals[0], at.form.table.digits.most)
+            ),
+            "speed": format_number(speed, at.form.table.digits.speed, trim=True).rstrip("."),
+        }
+        blocks = tuple(block.format(**values) for block in getattr(table, kind))
+        yield before, goes, blocks[once:] if said and said == blocks[:once] else blocks, over[k]
+        said = blocks[:once] or blocks
+
+
+def _numbers(
+    cycle: Cycle, at: Coordinates, program: Program, top: Floats, above: tuple[float, float]
+) -> dict[str, str]:
+    """Numbers of a hole with its top, (3,) mm, travel and clearance above it; distances are of written heights."""
+    unit, decimals, plus = program.mm_per_unit, at.decimals[0], at.motion.signs
+
+    def rounded(value: float) -> float:
+        return float(format_number(value, decimals))
+
+    (x, y, z), (travel, clearance) = (top / unit).tolist(), above
+    places = {"x": x, "y": y, "top": rounded(z), "bottom": rounded(z - cycle.depth / unit)}
+    places |= {"travel": rounded(z + travel / unit), "clearance": rounded(z + clearance / unit)}
+    places |= {"setup": places["clearance"] - places["top"], "above": places["travel"] - places["top"]}
+    return {name: format_number(value, decimals, plus=plus) for name, value in places.items()} | {
+        "depth": format_number(places["top"] - places["bottom"], decimals),
+        "step": format_number(cycle.steps[0] / unit if cycle.steps else 0.0, decimals),
+        "milliseconds": str(cycle.dwell),
+        "seconds": format_number(cycle.dwell / 1000.0, 3, trim=True),
+    }
 
 
 def hole_moves(

@@ -23,8 +23,8 @@ from cornersmooth.geometry.arcs import arc_points, divided
 from cornersmooth.kinematics import Machine, machine_position, solutions, tool_axis
 from cornersmooth.model import Bools, Floats, Ints, Keep, Move, Numbers, Program
 from cornersmooth.nc.cycle_blocks import has_cycles
-from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
+from cornersmooth.nc.messages import Findings
 from cornersmooth.nc.tools import ToolTravel, tool_starts
 from cornersmooth.settings import Settings
 from cornersmooth.text import format_number
@@ -90,14 +90,14 @@ def plan_planes(
         line = int(program.line[first])
         plane, why = _plane(program.axis[first], settings, form)
         if plane is None:
-            findings.add("CS357", "warning", line, f"no tilted plane: {why}: under tool tip control as other motion")
+            findings.note("CS357", line, why=why)
             continue
         name = (*plane.words.values(), *map(str, [] if plane.angles is None else plane.angles.tolist()))
         number = planes.setdefault(name, len(found))
         if number == len(found):
             found.append(plane)
         of[first:stop] = number
-        findings.add("CS356", "note", line, "run with one axis of the tool written in a tilted plane of the control")
+        findings.note("CS356", line)
     return Planes(of, tuple(found))
 
 
@@ -219,9 +219,9 @@ def check_travel_in_planes(planes: Planes, program: Program, form: Form, finding
         if refused is not None and not fit:
             raise refused
         if refused is not None:
-            said = " ".join(f"{name}{angle:.3f}" for name, angle in zip(machine.names, fit[0].tolist(), strict=True))
-            text = f"a tilted plane stays within the travel with {said} only; see that the control takes these angles"
-            findings.add("CS379", "warning", int(program.line[poses[0]]), text)
+            names = zip(machine.names, fit[0].tolist(), strict=True)
+            said = " ".join(f"{name}{angle:.3f}" for name, angle in names)
+            findings.note("CS379", int(program.line[poses[0]]), angles=said)
 
 
 def check_travel_without_axes(machine: Machine, program: Program) -> None:

@@ -7,15 +7,14 @@ by 300 degrees leads a tool that leans by 30 degrees all the way round. The tool
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Final, NoReturn
+from typing import Final
 
 import numpy as np
 
-from cornersmooth.errors import InputError
 from cornersmooth.kinematics import Machine, tool_axis
 from cornersmooth.model import Bools, Floats, Ints, Program
-from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
+from cornersmooth.nc.messages import Findings
 from cornersmooth.nc.tools import tool_starts
 from cornersmooth.vectors import dot
 
@@ -58,11 +57,9 @@ def retracts_before(form: Form, angles: Floats, rapid: Bools, line: Ints, findin
     assert form.machine is not None
     rows = rows_that_swing(form.machine, angles, np.concatenate(([False], rapid))) - 1
     if not possible:
-        text = "rotary axes swing the tilted tool in a rapid, and the control's table has no retract: keep clear there"
-        findings.add_each("CS340", "warning", line[rows], text)
+        findings.note_each("CS340", line[rows])
         return rows[:0]
-    text = "retract before a rapid in which rotary axes swing the tilted tool: they turn at its height"
-    findings.add_each("CS341", "note", line[rows], text)
+    findings.note_each("CS341", line[rows])
     return rows
 
 
@@ -100,13 +97,6 @@ def _along_pole(machine: Machine, axis: Floats, first: Floats) -> bool:
         return False
     across = axis - dot(axis, np.broadcast_to(machine.axes[0].unit, axis.shape))[:, None] * machine.axes[0].unit
     return bool(np.abs(across).max() <= _PARALLEL)
-
-
-def refuse_compensated(program: Program, pose: int) -> NoReturn:
-    """Give up at a rewind within cutter compensation, which would have to be cancelled and begun again."""
-    what = "a rotary axis would have to turn back in a cut with cutter compensation"
-    hint = "let the CAM system put the cutter's radius into the path"
-    raise InputError("CS377", what, hint, file=program.source.name, line=int(program.line[pose]))
 
 
 def _angle(a: Floats, b: Floats) -> Floats:

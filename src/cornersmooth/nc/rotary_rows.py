@@ -10,9 +10,9 @@ import numpy as np
 from cornersmooth.kinematics import Machine, inverse_time, machine_position, tool_axis
 from cornersmooth.methods import METHODS
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program, SmoothProgram
-from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import TIP_SHARE, Form
 from cornersmooth.nc.long_rows import LONG_CHUNK, corner_blends, line_limits
+from cornersmooth.nc.messages import Findings
 from cornersmooth.nc.rotary_words import RotaryWay, machine_of
 from cornersmooth.nc.tools import ToolTravel
 from cornersmooth.rotary import FilledPath, fill, insertions, rapid_moves
@@ -84,10 +84,8 @@ def rotary_rows(
             line=line,
             file=program.source.name,
         )
-        text = "the tool axis jumps further than rotary axes can follow within the tolerance; see what it does there"
-        findings.add_each("CS369", "warning", line[more.unsolved + 1], text)
-        text = f"point inserted so that {' and '.join(machine.names)} keep the tool within the tolerance"
-        findings.add_each("CS367", "note", line[more.segment + 1], text)
+        findings.note_each("CS369", line[more.unsolved + 1])
+        findings.note_each("CS367", line[more.segment + 1], names=" and ".join(machine.names))
         filled = fill(way.tip[here], way.axis[here], way.angles[here], more)
         start, at_pose = segments_of_rows(way.move, here.start, here.stop)
         held = left | np.append(left[1:], False)  # both rows of a place where a cut is left
@@ -162,13 +160,11 @@ def _timed(
             before = len(filled.pose)
             filled = _merged(smoothed, machine_of(form).with_longest_tool(), filled, chunk, rate, limits, fastest)
             if len(filled.pose) < before:
-                text = "block merged with its neighbour: shorter than inverse time (G93) can say"
-                findings.add("CS372", "note", 0, text, before - len(filled.pose))
+                findings.note("CS372", 0, before - len(filled.pose))
             rate = _rates(filled, chunk, program, settings, form)
         assert rate is not None
         beyond = filled.pose[own][rate[own] > fastest]
-        text = f"block slowed down: it is shorter than F{fastest:.10g} of inverse time (G93) can say"
-        findings.add_each("CS371", "warning", program.line[chunk.move[beyond]], text)
+        findings.note_each("CS371", program.line[chunk.move[beyond]], fastest=fastest)
         rate = np.minimum(rate, fastest)
     return filled, np.round(rate, INVERSE_TIME_DECIMALS)
 

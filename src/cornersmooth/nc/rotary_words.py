@@ -12,8 +12,8 @@ from cornersmooth.geometry.ragged import starts
 from cornersmooth.kinematics import Machine, solutions
 from cornersmooth.memory import return_free_memory
 from cornersmooth.model import Bools, Floats, Ints, Move, Program, SmoothProgram
-from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
+from cornersmooth.nc.messages import Findings, refused
 from cornersmooth.nc.rewinds import from_zero
 from cornersmooth.rotary import rapid_moves, rewound_angles, rotary_angles, still_poses
 from cornersmooth.rotary.axis_findings import reach_error
@@ -88,22 +88,15 @@ def _check_reach(machine: Machine, program: Program, axis: Floats, move: Ints, t
         raise reach_error(machine, program.axis[pose], float(beyond[pose]), int(program.line[pose]), file)
     rows = np.flatnonzero(solutions(machine, axis).beyond > tolerance)
     if len(rows):
-        what = (
-            f"the method turns the tool out of what {machine.names[0]} of {machine.name} reaches, within the tolerance"
-        )
-        hint = "use --method proportional, which does not"
-        raise InputError("CS361", what, hint, file=file, line=int(program.line[move[rows[0]]]))
+        line = int(program.line[move[rows[0]]])
+        raise refused("CS361", program, line, axis=machine.names[0], machine=machine.name)
 
 
 def _note_rewinds(machine: Machine, angles: Floats, left: Bools, line: Ints, findings: Findings) -> None:
     rows = np.flatnonzero(left)
     turn = np.abs(angles[rows] - angles[rows - 1])
     column = int(np.argmax(turn[0]))
-    text = (
-        f"the cut is left along the tool and gone on with where {machine.names[column]} has turned by "
-        f"{turn[0, column]:.4g} deg above the retract: expect a mark on the part"
-    )
-    findings.add_each("CS376", "warning", line[rows], text)
+    findings.note_each("CS376", line[rows], name=machine.names[column], turn=float(turn[0, column]))
 
 
 def within_reach(smoothed: SmoothProgram, form: Form) -> SmoothProgram:

@@ -10,14 +10,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from cornersmooth.errors import InputError
-from cornersmooth.model import Move, Program, Statement
+from cornersmooth.model import FeedMode, Move, Program, Statement
 from cornersmooth.nc.compensation import begin_compensation
 from cornersmooth.nc.control import Blocks, Words
-from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.hole_cycles import HoleCycles
-from cornersmooth.nc.operation import Operation
+from cornersmooth.nc.messages import Findings, refused
+from cornersmooth.nc.modals import Modals
 from cornersmooth.nc.program_frame import comment_lines
 from cornersmooth.nc.statement_args import (
     milliseconds,
@@ -52,15 +51,10 @@ class StatementWriter:
     form: Form
     program: Program
     findings: Findings  #: takes what is noticed
-    operation: Operation  #: what is on around the motion
+    modals: Modals  #: what the control remembers
     comments: bool = True  #: whether comments are written
     skip_cycles: bool = False  #: whether hole cycles that cannot be written are left out with a warning
-    plane: int = 17  #: the plane selected, kept by who writes the motion
     changed: bool = False  #: a tool change, or the way home, left the machine elsewhere
-    speed: float | None = None  #: of the spindle, revolutions per minute
-    compensated: bool = False
-    per_revolution: bool = False  #: the feed in force, kept by who writes the motion
-    tool: int | None = None  #: loaded last
     _direction: str = "clockwise"
     _diameter: float = 0.0
     cycles: HoleCycles = field(init=False)
@@ -115,12 +109,6 @@ class StatementWriter:
         """Whether the spindle was last told to turn clockwise, or nothing."""
         return self._direction == "clockwise"
 
-    def end_compensation(self) -> list[str]:
-        """Blocks that switch cutter compensation off, where it is on."""
-        blocks = list(self.words.compensation_off) if self.compensated else []
-        self.compensated = False
-        return blocks
-
     def comment(self, text: str) -> list[str]:
         """Comments that hold a text."""
         return self.warning_comment(text) if self.comments else []
@@ -131,8 +119,7 @@ class StatementWriter:
         return comment_lines(text, layout.comment, layout.comment_orders)
 
     def _not_understood(self, statement: Statement) -> None:
-        text = f"{statement.word} is not translated: written as a comment; see whether the machine needs it"
-        self.findings.add("CS310", "warning", statement.line, text)
+        self.findings.note("CS310", statement.line, word=statement.word)
 
     def load(self, statement: Statement) -> list[str] | None:
         """LOADTL/n, LOAD/TOOL,n[,ADJUST,m], TURRET/n[,OSETNO,m]."""
@@ -140,14 +127,14 @@ class StatementWriter:
         if loaded is None:
             return None
         number, offset = loaded
-        if (number, offset) == (self.tool, self.operation.offset):  # CATIA loads a tool twice
+        if (number, offset) == (self.modals.tool, self.modals.offset):  # CATIA loads a tool twice
             return self.comment(statement.text)
-        blocks = self.operation.end_tool(statement.line, another=self.tool not in (None, number))
-        if number != self.tool:
-            blocks += self.operation.change_position()
+        blocks = self.modals.end_tool(statement.line, another=self.modals.tool not in (None, number))
+        if number != self.modals.tool:
+            blocks += self.modals.change_position()
             blocks += self._tool_change(number, statement)
         self.changed = True
-        self.tool, self.operation.offset = number, offset
+        self.modals.tool, self.modals.offset = number, offset
         return blocks
 
     def _tool_change(self, number: int, statement: Statement) -> list[str]:
@@ -155,15 +142,9 @@ class StatementWriter:
         blocks = self.words.tool_change
         if not any("{speed}" in block for block in blocks):
             return [block.format(tool=number) for block in blocks]
-        speed = self._first_speed(statement) or self.speed
+        speed = self._first_speed(statement) or self.modals.speed
         if not speed:
-            raise InputError(
-                "CS354",
-                f"the tool change of the control table has {{speed}}, and the CL file gives tool {number} none",
-                "add SPINDL, or --spindle",
-                file=self.program.source.name,
-                line=statement.line,
-            )
+            raise refused("CS354", self.program, statement.line, tool=number)
         return [block.format(tool=number, speed=self._speed_text(speed)) for block in blocks]
 
     def _first_speed(self, load: Statement) -> float | None:
@@ -199,14 +180,9 @@ class StatementWriter:
 
     def go_home(self, statement: Statement) -> list[str]:
         """GOHOME without coordinates: to the height of the retract."""
-        blocks = self.operation.go_home()
-        if not self.form.table.program.retract:
-            text = "GOHOME without coordinates is no motion in this program; see where the tool goes"
-            self.findings.add("CS332", "warning", statement.line, text)
-            return [*self.comment(statement.text), *blocks]
-        text = "GOHOME without coordinates is written as the retract of the control's table"
-        self.findings.add("CS332", "warning", statement.line, text)
-        self.changed = True
+        blocks = self.modals.go_home()
+        self.changed |= self.modals.can_rewind
+        self.findings.note("CS332", statement.line, which=int(self.modals.can_rewind))
         return [*self.comment(statement.text), *blocks]
 
     def toolno(self, statement: Statement) -> list[str] | None:
@@ -218,7 +194,7 @@ class StatementWriter:
         number = whole_number(numbers_of(statement))
         if number is None or words_of(statement) != ["TOOL"]:
             return None
-        if number == self.tool:
+        if number == self.modals.tool:
             return self.comment(statement.text)
         blocks = [block.format(tool=number) for block in self.words.tool_select]
         return blocks or self.comment(statement.text)
@@ -238,10 +214,10 @@ class StatementWriter:
         if "LOCK" in words or "ORIENT" in words:
             if numbers not in ([], [0.0]) or not self.words.spindle_orient:
                 return None
-            self.operation.switch("spindle", ())
+            self.modals.switch("spindle", ())
             return list(self.words.spindle_orient)
         if "OFF" in words or "NOMORE" in words or numbers == [0.0]:
-            self.operation.switch("spindle", ())
+            self.modals.switch("spindle", ())
             return list(self.words.spindle_off) or None
         if len(numbers) > 1 or any(number < 0.0 for number in numbers):
             return None
@@ -249,29 +225,27 @@ class StatementWriter:
         if numbers and speed is None:
             return None
         if numbers and (cutting := _cutting_unit(words)):
-            text = f"SPINDL in {cutting} is written as revolutions at the cutter's diameter"
-            self.findings.add("CS322", "note", statement.line, text)
+            self.findings.note("CS322", statement.line, unit=cutting)
         if "CLW" in words or "CCLW" in words:
             self._direction = "counterclockwise" if "CCLW" in words else "clockwise"
         direction = getattr(self.words, self._direction)
-        if speed is None and self.speed is None:
-            text = "the spindle is started without a speed: a control takes the one that holds from before"
-            self.findings.add("CS335", "warning", statement.line, text)
-            self.operation.switch("spindle", (direction,))
+        if speed is None and self.modals.speed is None:
+            self.findings.note("CS335", statement.line)
+            self.modals.switch("spindle", (direction,))
             return [direction]
-        self.speed = self.speed if speed is None else speed
-        self.cycles.read(self.speed)
-        digits = self._speed_text(self.speed or 0.0)
+        self.modals.speed = self.modals.speed if speed is None else speed
+        self.cycles.read(self.modals.speed)
+        digits = self._speed_text(self.modals.speed or 0.0)
         turning = tuple(block.format(speed=digits, direction=direction) for block in self.words.spindle_speed)
-        if not self.operation.on["spindle"] and id(statement) in self._ahead_of_tools:
-            return self.operation.later("spindle", turning)
-        self.operation.switch("spindle", turning)
+        if not self.modals["spindle"] and id(statement) in self._ahead_of_tools:
+            return self.modals.later("spindle", turning)
+        self.modals.switch("spindle", turning)
         return [direction] if speed is None else [*self._outside_tip_control(), *turning]
 
     def _outside_tip_control(self) -> list[str]:
         """Blocks before a new speed, where the control takes none under tool tip control."""
-        blocks = self.operation.pause() if self.words.speed_without_tip_control else []
-        self.changed |= bool(blocks) and self.operation.retracted
+        blocks = self.modals.pause() if self.words.speed_without_tip_control else []
+        self.changed |= bool(blocks) and self.modals["high"]
         return blocks
 
     def coolant(self, statement: Statement) -> list[str] | None:
@@ -283,22 +257,22 @@ class StatementWriter:
         if numbers_of(statement) or len(kinds) != 1:
             return None
         if "OFF" in words or kinds == ["NOMORE"]:
-            off = self.operation.coolant_end()
-            self.operation.switch("coolant", ())
+            off = self.modals.coolant_end()
+            self.modals.switch("coolant", ())
             return list(off) or None
         blocks = self.words.coolant.get(kinds[0])
         if blocks is None:
             return None
-        if not self.operation.on["coolant"] and id(statement) in self._ahead_of_tools:
-            return self.operation.later("coolant", blocks)
-        before = self.operation.coolant_before(blocks)
-        self.operation.switch("coolant", blocks)
+        if not self.modals["coolant"] and id(statement) in self._ahead_of_tools:
+            return self.modals.later("coolant", blocks)
+        before = self.modals.coolant_before(blocks)
+        self.modals.switch("coolant", blocks)
         return [*before, *blocks]
 
     def halt(self, blocks: Blocks) -> list[str]:
         """STOP and OPSTOP."""
         if blocks:
-            self.operation.halt()
+            self.modals.halt()
         return list(blocks)
 
     def delay(self, statement: Statement) -> list[str] | None:
@@ -306,56 +280,52 @@ class StatementWriter:
         numbers, words = numbers_of(statement), words_of(statement)
         if len(numbers) != 1 or words not in ([], ["DWELL"], ["REV"]):
             return None
-        time = milliseconds(numbers[0], "REV" in words, self.speed)
+        time = milliseconds(numbers[0], "REV" in words, self.modals.speed)
         if time is None:
             return None
-        return self.dwell(time, statement.line) if self.words.dwell else None
+        per_turn = self.modals["feed_mode"] == FeedMode.PER_REVOLUTION
+        return self.dwell(time, statement.line, per_turn=per_turn) if self.words.dwell else None
 
-    def dwell(self, time: int, line: int) -> list[str]:
-        """Blocks that wait for so many milliseconds, for a line of the CL file."""
+    def dwell(self, time: int, line: int, *, per_turn: bool) -> list[str]:
+        """Blocks that wait for so many milliseconds, for a line of the CL file; under feed per revolution or not."""
         seconds = format_number(time / 1000.0, 3, trim=True)
-        if time and self.per_revolution and self.words.dwell_turns:
-            text = f"a dwell under feed per revolution: it counts turns of the spindle {self.words.dwell_turns}"
-            self.findings.add("CS383", "warning", line, text)
+        if time and per_turn and self.words.dwell_turns:
+            self.findings.note("CS383", line, where=self.words.dwell_turns)
         return [block.format(milliseconds=time, seconds=seconds) for block in self.words.dwell] if time else []
 
     def compensation(self, statement: Statement) -> list[str] | None:
         """CUTCOM/LEFT|RIGHT[,plane][,n] and CUTCOM/OFF."""
         if words_of(statement)[:1] in (["OFF"], ["NOMORE"]):
-            self.compensated = False
-            return list(self.words.compensation_off) or None
+            return (self.modals.set(compensation=()) or list(self.words.compensation_off)) or None
         begun = begin_compensation(
-            statement, self.form, self.program, self.operation, self.findings, diameter=self._diameter
+            statement, self.form, self.program, self.modals, self.findings, diameter=self._diameter
         )
         if begun is None:
             return None
-        plane, blocks = begun
-        change = [self.words.plane[plane]] if plane != self.plane and plane in self.words.plane else []
-        self.compensated, self.plane = True, plane
-        return [*change, *blocks]
+        change = self.modals.set(plane=begun[0])
+        self.modals.now["compensation"] = begun[1]
+        return [*change, *begun[1]]
 
     def hole_cycle(self, statement: Statement) -> list[str]:
         """CYCLE: kept for the holes that follow."""
         if words_of(statement)[:1] in (["OFF"], ["NOMORE"]):
             self.cycles.end()
             return []
-        self.cycles.begin(statement, self.speed)
+        self.cycles.begin(statement, self.modals.speed)
         return self.comment(statement.text)
 
     def end(self, statement: Statement) -> list[str]:
         """END: the end of the text; in the middle of the path a stop."""
         if not (self.program.kind[statement.pose :] != Move.FROM).any():
             return []
-        text = "END comes before the last motion: written as a program stop; see that this is meant"
-        self.findings.add("CS318", "warning", statement.line, text)
+        self.findings.note("CS318", statement.line)
         return [*self.comment(statement.text), *self.halt(self.words.stop)]
 
     def insert(self, statement: Statement) -> list[str]:
         """INSERT: text for the NC file; as a comment, since its meaning is not known."""
         text = spoken_text(statement)
         if id(statement) in self._unknown:
-            what = "INSERT is written as a comment; put them in by hand where the machine needs them"
-            self.findings.add("CS320", "warning", statement.line, what)
+            self.findings.note("CS320", statement.line)
         return self.comment(text)
 
     def auxiliary(self, statement: Statement) -> list[str] | None:
@@ -364,23 +334,21 @@ class StatementWriter:
         if number is None or words_of(statement) or number in (2, 6, 30, 98, 99):
             return None
         blocks = (f"M{number}",)
-        if any(blocks[0] in pair for pair in self.operation.clamps):
-            text = f"AUXFUN/{number} clamps a rotary axis or lets it turn: left out, the machine's file says where"
-            self.findings.add("CS359", "warning", statement.line, text)
+        if any(blocks[0] in pair for pair in self.modals.clamps):
+            self.findings.note("CS359", statement.line, number=number)
             return self.comment(statement.text)
         if number in (3, 4, 5):
-            self.operation.switch("spindle", () if number == 5 else blocks)
+            self.modals.switch("spindle", () if number == 5 else blocks)
         off = {self.words.coolant.get("OFF"), *self.words.coolant_off.values()}
         if blocks not in off | set(self.words.coolant.values()):
             return list(blocks)
-        before = self.operation.coolant_before(blocks)
-        self.operation.switch("coolant", () if blocks in off else blocks)
+        before = self.modals.coolant_before(blocks)
+        self.modals.switch("coolant", () if blocks in off else blocks)
         return [*(block for block in before if block not in blocks), *blocks]
 
     def paint(self, statement: Statement) -> list[str]:
         """PAINT: colours and speeds of the CAM system's screen."""
-        text = "PAINT is left out: it only says what the CAM screen shows"
-        self.findings.add("CS317", "note", statement.line, text)
+        self.findings.note("CS317", statement.line)
         return []
 
     def start(self, statement: Statement) -> list[str]:

@@ -1,0 +1,294 @@
+"""Rows that are no lines: arcs, splines and polynomials as words of their blocks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cornersmooth.geometry.bsplines import Splines
+from cornersmooth.geometry.ragged import ranges
+from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.nc.block_rows import BlockRows
+from cornersmooth.nc.circles import Circles
+from cornersmooth.nc.coordinates import Coordinates
+from cornersmooth.nc.messages import Findings
+from cornersmooth.slices import some_rows
+from cornersmooth.text import RowFormat, format_number, to_ticks
+
+#: texts, and which of them each of some rows has
+Part = tuple[list[bytes], Ints]
+
+#: control points that a curve has more than knot intervals
+_DEGREE = 3
+
+#: combinations of texts that are made whether a row has them or not
+_FEW = 256
+
+#: blocks that are counted together, and how many of them must be splines
+_WINDOW, _LEAST = 10, 6
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Words of k rows on curves or arcs."""
+
+    rows: Bools  #: (r,) which rows these are
+    code: Part  #: before the numbers, in place of the code of a line
+    behind: tuple[Part, ...] = ()  #: after the numbers, before the feed
+    after: Part | None = None  #: blocks that follow
+    #: other numbers than those of lines: their format, and (k, c) ticks
+    numbers: tuple[RowFormat | SplFormat, Ints] | None = None
+
+
+def spelt(values: Floats | Ints, write: Callable[[float], str]) -> Part:
+    """A text for each distinct value."""
+    distinct = np.unique(values)
+    return [write(value).encode() for value in distinct.tolist()], np.searchsorted(distinct, values)
+
+
+def joined(*parts: Part) -> Part:
+    """Texts that stand side by side, and which of them each row has; of many, those that some row has."""
+    texts, ids = [b""], np.zeros(len(parts[0][1]), np.int64)
+    for more, which in parts:
+        if len(more) == 1:
+            texts = [text + more[0] for text in texts]
+        elif len(texts) == 1:
+            texts, ids = [texts[0] + text for text in more], which
+        else:
+            count, ids = len(more), ids * len(more) + which
+            used = np.arange(count * len(texts))
+            if len(used) > _FEW:
+                used = np.unique(ids)
+                ids = np.searchsorted(used, ids)
+            texts = [texts[k // count] + more[k % count] for k in used.tolist()]
+    return texts, ids
+
+
+def prepared(rows: BlockRows, at: Coordinates) -> BlockRows:
+    """The rows that become blocks: one for each knot interval of polynomials, none for where a BSPLINE begins."""
+    if at.form.curve == "bspline":
+        if rows.spline is not None:
+            rows = replace(rows, spline=_intervals(rows.spline, rows.curve))
+        return some_rows(rows, rows.curve != 1)
+    return _spans(rows, at.decimals) if at.form.curve in ("poly", "spl") else rows
+
+
+def shape_of(rows: BlockRows, at: Coordinates, circles: Circles, *, open_spline: bool) -> Shape | None:
+    """Words of rows on curves or arcs; None where there are none. `open_spline`: the block before is on one."""
+    on_arc = np.zeros(len(rows), np.bool_) if rows.arc is None else rows.arc >= 0
+    if not at.form.curve:
+        return _arcs(rows, on_arc, at, circles) if on_arc.any() else None
+    curved = rows.curve > 0
+    if not curved.any():
+        return None
+    if at.form.curve == "g6.2":
+        return _knots(rows, curved, at)
+    return _spline(rows, curved, at, open_spline) if at.form.curve == "bspline" else _polynomial(rows, curved, at)
+
+
+def _arcs(rows: BlockRows, on_arc: Bools, at: Coordinates, circles: Circles) -> Shape:
+    """Circular blocks: the end point and the radius, and which way round by the code, or by a word at the end."""
+    assert rows.arc is not None
+    motion, line, arc = at.motion, at.format, rows.arc[on_arc]
+    turned = (~circles.clockwise[arc]).astype(np.int64)
+    count = 2 if motion.arc_directions else 3  # coordinates in a block
+    words = (*line.words[:count], f"{at.gap}{motion.radius}".encode())
+    form = replace(line, words=words, decimals=line.decimals[:1] * len(words))
+    codes = [f"{code}{at.gap}".encode() for code in (motion.clockwise, motion.counterclockwise)]
+    turns = [f"{at.gap}{turn}".encode() for turn in motion.arc_directions]
+    numbers = np.column_stack((rows.ticks[on_arc, :count], circles.radius[arc]))
+    return Shape(on_arc, (codes, turned), ((turns, turned),) if turns else (), numbers=(form, numbers))
+
+
+def _knots(rows: BlockRows, curved: Bools, at: Coordinates) -> Shape:
+    """FANUC's G06.2: a knot before and a weight after every control point, the last four knots in blocks of their own.
+
+    The first control point is the current position (B-63324EN/03 4.17).
+    """
+    assert rows.spline is not None
+    decimals, spline = at.form.table.digits.weight, rows.spline[curved]
+    begin = [b"", f"G6.2{at.gap}P4{at.gap}".encode()], (rows.curve[curved] == 1).astype(np.int64)
+    knot = spelt(spline[:, 0], lambda value: f"K{format_number(value, decimals, trim=True)}{at.gap}")
+    weight = spelt(spline[:, 1], lambda value: f"{at.gap}R{format_number(value, decimals, trim=True)}")
+    last = spelt(spline[:, 2], lambda value: 4 * f"K{format_number(value, decimals, trim=True)}\n" if value else "")
+    return Shape(curved, joined(begin, knot), (weight,), last)
+
+
+def _spline(rows: BlockRows, curved: Bools, at: Coordinates, open_spline: bool) -> Shape:
+    """Siemens' BSPLINE: the first control point is where the block before ended; knot intervals PL and weights PW.
+
+    With the clamped knots u the block of control point j has PL = u[j+2] − u[j+1]: 0, 1/2, 1/2, 0 for five points.
+    Curves that follow one another are one spline with triple knots between them, with the same intervals.
+    """
+    assert rows.spline is not None
+    decimals, spline = at.form.table.digits.weight, rows.spline[curved]
+    begins = (curved & ~np.concatenate(([open_spline], curved[:-1])))[curved].astype(np.int64)
+    width, weight = (
+        spelt(spline[:, k], lambda value, word=word: f" {word}={format_number(value, decimals, trim=True).rstrip('.')}")  # type: ignore[misc]
+        for k, word in enumerate(("PL", "PW"))
+    )
+    return Shape(curved, ([b"", b"BSPLINE SD=3 "], begins), (width, weight))
+
+
+def _polynomial(rows: BlockRows, curved: Bools, at: Coordinates) -> Shape:
+    """One block for each knot interval.
+
+    Siemens' POLY: ``PO[X]=(end, a2, a3)`` of a parameter from 0 to 1. The control takes a0 from where the block before
+    ended and a1 = end − a0 − a2 − a3. Only for weights 1: the denominator of POLY acts on the geometry axes alone.
+
+    Heidenhain's SPL (iTNC 530): end point, then ``K3X K2X K1X K3Y ...`` of a parameter that runs from 1 to 0.
+    X(t) = K3·t³ + K2·t² + K1·t + X; the sum gives the start of the block again and may differ by a micrometre.
+    """
+    assert rows.bezier is not None
+    start, first, second, end = np.moveaxis(rows.bezier[curved], 1, 0)
+    none, digits = np.zeros(len(end), np.int64), at.form.table.digits.coefficient
+    if at.form.curve == "poly":
+        square, cube = 3.0 * (start - 2.0 * first + second), end - 3.0 * second + 3.0 * first - start
+        names = [
+            name
+            for k, word in enumerate(at.words)
+            for name in (f"{') ' if k else ''}PO[{word.rstrip('=')}]=(".encode(), b",", b",")
+        ]
+        form = RowFormat(tuple(names), (at.decimals[0], digits, digits) * len(at.words))
+        numbers = to_ticks(np.stack((end, square, cube), axis=2).reshape(len(end), -1), form.decimals)
+        return Shape(curved, ([b"POLY "], none), (([b") PL=1"], none),), numbers=(form, numbers))
+    slope, square, cube = 3.0 * (second - end), 3.0 * (end - 2.0 * second + first), start - 3.0 * first
+    factors = np.stack((cube + 3.0 * second - end, square, slope), axis=2).reshape(len(end), -1)
+    numbers = np.concatenate((to_ticks(end, at.decimals), to_ticks(factors, digits)), axis=1)
+    return Shape(curved, ([b"SPL "], none), numbers=(SplFormat(at.words, at.decimals, digits), numbers))
+
+
+class SplFormat:
+    """Rows of SPL: coefficients of ten and more have an exponent, so rows are put together one by one."""
+
+    def __init__(self, letters: Sequence[str], decimals: Sequence[int], coefficient: int) -> None:
+        self._letters, self._decimals, self._digits = letters, decimals, coefficient
+
+    def rows(
+        self, ticks: Ints, prefix: Sequence[bytes], prefix_id: Ints, suffix: Sequence[bytes], suffix_id: Ints
+    ) -> tuple[bytes, Ints]:
+        """Text, and where each row starts in it."""
+        axes = len(self._letters)
+        texts = []
+        for row, numbers in enumerate(ticks.tolist()):
+            words = [
+                letter + format_number(number / 10.0**decimals, decimals, plus=True)
+                for letter, number, decimals in zip(self._letters, numbers[:axes], self._decimals, strict=True)
+            ]
+            words += [
+                f"K{3 - place % 3}{self._letters[place // 3]}{self._coefficient(number)}"
+                for place, number in enumerate(numbers[axes:])
+            ]
+            texts.append(prefix[int(prefix_id[row])] + " ".join(words).encode() + suffix[int(suffix_id[row])])
+        offsets = np.concatenate(([0], np.cumsum([len(text) for text in texts]))).astype(np.int64)
+        return b"".join(texts), offsets
+
+    def _coefficient(self, ticks: int) -> str:
+        value = ticks / 10.0**self._digits
+        if abs(value) < 10.0:
+            return format_number(value, self._digits, plus=True)
+        mantissa, exponent = f"{value:+.8E}".split("E")
+        return f"{mantissa}E{exponent[0]}{int(exponent[1:]):03d}"
+
+
+def _intervals(spline: Floats, curve: NDArray[np.int8]) -> Floats:
+    """`BlockRows.spline` with the interval u[j+2] − u[j+1] in place of the knot u[j] of each control point j."""
+    last = np.flatnonzero(spline[:, 2] > 0.0)
+    final = np.zeros(len(spline))
+    if len(last):  # the last knot of the curve that each row belongs to
+        final = spline[last[np.minimum(np.searchsorted(last, np.arange(len(spline))), len(last) - 1)], 2]
+    ahead = []
+    for shift in (1, 2):
+        none = np.zeros(min(shift, len(spline)), np.int8)
+        following, number = np.append(spline[shift:, 0], none), np.append(curve[shift:], none)
+        ahead.append(np.where(number == curve + shift, following, final))
+    return np.column_stack((ahead[1] - ahead[0], spline[:, 1:]))
+
+
+def _spans(rows: BlockRows, decimals: Sequence[int]) -> BlockRows:
+    """Leave the rows that carry an interval; each begins and ends in printed digits, where the one before ended.
+
+    Its tangents stay: their control points move with the ends.
+    """
+    kept = some_rows(rows, (rows.curve == 0) | (rows.curve > _DEGREE))
+    curved = np.flatnonzero(kept.curve > 0)
+    if len(curved):
+        assert kept.bezier is not None
+        scale = 10.0 ** np.array(decimals)
+        end = to_ticks(kept.bezier[curved, 3], decimals) / scale
+        start = np.concatenate((end[:1], end[:-1]))
+        start[kept.curve[curved] == _DEGREE + 1] = rows.ticks[rows.curve == 1] / scale
+        for points, place in (((0, 1), start), ((3, 2), end)):
+            shift = place - kept.bezier[curved, points[0]]
+            for point in points:
+                kept.bezier[curved, point] += shift
+    return kept
+
+
+def bezier_points(points: Floats, curve: NDArray[np.int8], spline: Floats) -> Floats:
+    """Bézier points (r, 4, c) of the knot intervals of curves, in the last rows of each; zero elsewhere.
+
+    A curve has p control points (r, c) for p − 3 knot intervals, and all weights 1; `spline` is as in `Rows`.
+    """
+    intervals = np.zeros((len(points), 4, points.shape[1]))
+    first = np.flatnonzero(curve == 1)
+    ends = np.append(np.flatnonzero((curve[1:] <= 1) & (curve[:-1] > 0)) + 1, len(curve) if curve[-1] > 0 else [])
+    counts = (ends - first).astype(np.int64)
+    rows = ranges(first, counts)
+    own = _splines(curve[rows], spline[rows], counts)
+    low = own.knot[own.span_knot]
+    matrix = own.bernstein(np.arange(len(low)), low, low + own.width)
+    taps = rows[own.span_control[:, None] + np.arange(4)]
+    intervals[taps[:, -1]] = matrix @ points[taps]
+    return intervals
+
+
+def _splines(curve: NDArray[np.int8], spline: Floats, counts: Ints) -> Splines:
+    """Knot vectors of clamped curves: rows 1, 5, 6 and so on of each have the distinct knots but for the last."""
+    knot, last = spline[:, 0], np.cumsum(counts) - 1
+    chosen = (curve == 1) | (curve > _DEGREE + 1)
+    knots = np.insert(knot[chosen], np.cumsum(chosen)[last], spline[last, 2])
+    return Splines(knots, counts - 2)
+
+
+class SplineCount:
+    """Counts the places at which fewer than six of ten blocks are BSPLINE (SINUMERIK programming manual 12/2019).
+
+    Ten feed blocks from the beginning of every spline on are counted; what comes after a rapid is no spline.
+    """
+
+    def __init__(self, line: Ints, findings: Findings) -> None:
+        self._line, self._findings = line, findings
+        self._flags, self._moves = np.zeros(0, np.bool_), np.zeros(0, np.int64)  # of blocks that are not counted yet
+        self._before = False  # whether the block before these is a spline
+
+    def take(self, rows: BlockRows) -> None:
+        """Count blocks, one a row."""
+        for part in np.split(np.arange(len(rows)), np.flatnonzero(np.diff(rows.rapid.astype(np.int8))) + 1):
+            if rows.rapid[part[0]]:
+                self.finish()
+                continue
+            self._flags = np.concatenate((self._flags, rows.curve[part] > 0))
+            self._moves = np.concatenate((self._moves, rows.move[part]))
+            self._count(len(self._flags) - _WINDOW)
+
+    def finish(self) -> None:
+        """Count what is left where no further feed block follows."""
+        self._count(len(self._flags) - 1)
+        self._before = False
+
+    def _count(self, last: int) -> None:
+        """Count the windows that begin up to a block, and forget these blocks."""
+        if last < 0:
+            return
+        flags = self._flags
+        starts = np.flatnonzero(flags & ~np.concatenate(([self._before], flags[:-1])))
+        starts = starts[starts <= last]
+        total = np.concatenate(([0], np.cumsum(flags)))
+        few = starts[total[np.minimum(starts + _WINDOW, len(flags))] - total[starts] < _LEAST]
+        self._findings.note_each("CS325", self._line[self._moves[few]])
+        self._before = bool(flags[last])
+        self._flags, self._moves = flags[last + 1 :], self._moves[last + 1 :]

@@ -1,0 +1,286 @@
+"""The motion of a program in blocks: rows as they come, the approach of a tool, retracts, where the tool is.
+
+Python runs per stretch of rows, never per row.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cornersmooth.kinematics.poses import continued
+from cornersmooth.kinematics.position import nose_position
+from cornersmooth.model import Bools, Floats, Ints, Move, Program
+from cornersmooth.nc.block_rows import BlockRows
+from cornersmooth.nc.blocks import Blocks
+from cornersmooth.nc.control import INVERSE_TIME
+from cornersmooth.nc.coordinates import Coordinates
+from cornersmooth.nc.curves import bezier_points
+from cornersmooth.nc.first_block import UPRIGHT, check_first_block
+from cornersmooth.nc.messages import Findings, refused
+from cornersmooth.nc.modals import Modals
+from cornersmooth.nc.rewinds import retracts_before
+from cornersmooth.nc.warnings import MotionWarnings
+from cornersmooth.slices import some_rows
+from cornersmooth.smoothing.sampling import Rows
+
+#: a pose that no program has
+NOWHERE = 1 << 62
+
+
+@dataclass
+class Motion:
+    """Writes rows, and remembers where the tool is."""
+
+    program: Program
+    tilting: Coordinates  #: of tools under tool tip control
+    modals: Modals
+    blocks: Blocks
+    findings: Findings
+    #: approach, retract: mm; along the tool, after a retract and before one
+    approach: float = 0.0
+    retract: float = 0.0
+    at: Coordinates = field(init=False)  #: those of the tool at hand
+    position: Ints | None = None  #: where the tool is, in ticks; None where it may be elsewhere
+    last: Ints | None = None  #: what was written last, before a tool change too
+    last_at: Coordinates | None = None  #: and in which coordinates
+    warnings: MotionWarnings = field(init=False)
+    text: list[bytes] = field(default_factory=list)  #: that is not taken yet
+    repeated: int = 0  #: rows that move nothing
+    return_to: int = NOWHERE  #: first pose after a tool change, until it is reached
+    _begun: int = -1  #: last move after a hole or a FROM that has been begun
+
+    def __post_init__(self) -> None:
+        self.at = self.tilting
+        self.warnings = MotionWarnings(self.program, self.findings)
+
+    def say(self, blocks: Sequence[str]) -> None:
+        """Write blocks that are no rows."""
+        self.blocks.written += len(blocks)
+        if blocks:
+            self.text.append(("\n".join(blocks) + "\n").encode("ascii"))
+
+    def take(self, at: Coordinates) -> None:
+        """Take the coordinates of another tool, or of another tilted plane."""
+        if at is not self.at:
+            self.at, self.modals.mode = at, at.form.mode
+            self.modals.tilt = at.plane.words if at.plane is not None else {}
+            self.stand(None)
+
+    def change_tool(self, pose: int) -> None:
+        """Take note that the machine is elsewhere, and that another tool may begin at a pose."""
+        self.return_to = pose
+        self.stand(None)
+        self.warnings.another_tool()
+
+    # ------------------------------------------------------------------------------------------------ rows
+
+    def lines(self, rows: Rows, ticks: Ints) -> None:
+        """Write rows of one kind, with their numbers in ticks of `tilting`."""
+        move, arc, program, at = rows.move, rows.arc, self.program, self.at
+        if at is not self.tilting:
+            ticks = at.ticks(rows.tip, rows.other)
+        self._go_back(int(move[0]), rows.other[:1])
+        elsewhere = self._begins_elsewhere(int(move[0]))
+        if arc is not None and arc[0] >= 0:  # after a tool change, a hole or a FROM the tool is not at its start
+            self._go_to(at.ticks(program.tip[move[:1] - 1], rows.other[:1]), move[:1])
+        elif elsewhere and program.kind[move[0] - 1 : move[0] + 1].tolist() == [Move.FROM, Move.ARC]:  # in lines
+            self._go_to(self.ticks_at(rows, program.tip[move[:1] - 1], np.zeros(1, np.int64)), move[:1])
+        self._join(ticks, rows.joined)
+        feed, mode, bezier = program.feed[move], program.feed_mode[move].astype(np.int64), None
+        if rows.rate is not None and at.plane is None:
+            timed = ~np.isnan(rows.rate)
+            feed, mode = np.where(timed, rows.rate, feed), np.where(timed, INVERSE_TIME, mode)
+        if at.form.curve in ("poly", "spl") and rows.spline is not None and (rows.curve > 0).any():
+            bezier = bezier_points(at.numbers(rows.tip, rows.other), rows.curve, rows.spline)
+        rapid, rest = program.kind[move] == Move.RAPID, {"spline": rows.spline, "blend": rows.blend, "left": rows.left}
+        whole = BlockRows(ticks, move, rapid, feed, mode, rows.curve, arc=arc, bezier=bezier, **rest)  # type: ignore[arg-type]
+        moving = self.moving(whole.with_programmed_feed(program) if elsewhere else whole)
+        self.repeated += len(whole) - len(moving)
+        self.emit_above(moving)
+
+    def _begins_elsewhere(self, move: int) -> bool:
+        """Whether rows of a move are the first after a hole or a stated position: the tool is not at its start."""
+        if move in (0, self._begun) or self.program.kind[move - 1] not in (Move.FROM, Move.HOLE):
+            return False
+        self._begun = move
+        return True
+
+    def _go_back(self, move: int, near: Floats) -> None:
+        """Go to the pose after a tool change even if it repeats the last one before, and so is no row."""
+        kind = self.program.kind
+        begin, self.return_to = self.return_to, NOWHERE
+        passed = begin + np.flatnonzero(kind[begin:move] != Move.FROM)
+        if self.last is None or not len(passed) or kind[begin - 1] == Move.HOLE:  # which none repeats
+            return
+        self.emit(BlockRows.straight(self.program, self._again(self.last, passed[:1], near), np.array([move])))
+
+    def _again(self, last: Ints, pose: Ints, near: Floats) -> Ints:
+        """Ticks (1, c) of what was written last, a pose (1,), in the coordinates at hand.
+
+        `near` is the orientation of the first row to come.
+        """
+        form = self.at.form
+        if self.last_at is self.at:
+            return last[None]
+        other = self.program.axis[pose]
+        if form.rotary and form.machine is not None:
+            if len(last) == len(self.at.words):
+                other = self.at.angles(last[None])
+            elif self.last_at is None or self.last_at.plane is None:
+                other = np.zeros((1, 2))  # the tool before stays along Z, so that pose does
+            else:
+                other = continued(form.machine, other, near, np.array([-1]), 0.0)[0]
+        return self.at.ticks(self.program.tip[pose], other)
+
+    def _join(self, ticks: Ints, joined: Bools) -> None:
+        """Give first control points that follow without a line the digits of the row before."""
+        places = np.flatnonzero(joined)
+        if len(places) and places[0] == 0:
+            if self.position is not None:
+                ticks[0] = self.position
+            places = places[1:]
+        ticks[places] = ticks[places - 1]
+
+    def ticks_at(self, rows: Rows, tips: Floats, own: Ints) -> Ints:
+        """Ticks of tips reached with the orientation of rows, which `own` names for each of them."""
+        other = rows.other[own]
+        if self.at.form.orientation == "point":
+            other = other + (tips - rows.tip[own])
+        return self.at.ticks(tips, other)
+
+    def rotary_blocks(self, ticks: Ints, *, unwind: bool = True) -> dict[str, tuple[str, ...]]:
+        """Blocks of the rotary axes, with where a row has them; a tool that stays along Z has them at zero."""
+        if self.at.plane is not None and self.at.plane.angles is not None:
+            ticks = self.tilting.ticks(np.zeros((1, 3)), self.at.plane.angles[None])[0]
+        return self.tilting.rotary_blocks(ticks, unwind=unwind)
+
+    def _go_to(self, ticks: Ints, move: Ints) -> None:
+        """Go to a place at the feed of a move, if the tool is elsewhere."""
+        self.emit(self.moving(BlockRows.straight(self.program, ticks, move)))
+
+    def moving(self, rows: BlockRows) -> BlockRows:
+        """Leave out the rows that do not move the tool in the written digits."""
+        ticks = rows.ticks
+        new = np.ones(len(ticks), np.bool_)
+        new[1:] = (ticks[1:] != ticks[:-1]).any(axis=1)
+        if self.position is not None:
+            new[0] = bool((ticks[0] != self.position).any())
+        kept = new | (rows.curve > 0)
+        return rows if kept.all() else some_rows(rows, kept)
+
+    def emit_above(self, rows: BlockRows, dwell: Sequence[str] = ()) -> None:
+        """Write rows; where rotary axes swing the tool in a rapid, or turn back in a cut, the tool goes up before."""
+        first = 0
+        for row, in_cut in self._turns(rows):
+            if row > first:
+                self.emit(some_rows(rows, slice(first, row)), dwell)
+            if in_cut:
+                self._leave_cut(some_rows(rows, slice(row, row + 1)))
+            else:
+                self.go_home()
+            first = row + in_cut
+        self.emit(some_rows(rows, slice(first, None)) if first else rows, dwell)
+
+    def emit(self, rows: BlockRows, dwell: Sequence[str] = (), above: float = 0.0) -> None:
+        """Write rows; after a retract the tool comes down along its axis from so many mm above."""
+        if not len(rows):
+            return
+        first, pose, at, modals = rows.ticks[0], int(rows.move[0]), self.at, self.modals
+        if modals.comes_first and not above:
+            self.warnings.of_first(pose, at.form, rapid=bool(rows.rapid[0]))
+        if not modals.begun:
+            if at is self.tilting:
+                self.warnings.of_tip_control(pose, at.form)
+            self.say(modals.begin(self.rotary_blocks(first)))
+        self.say(modals.go_on())
+        if modals["high"]:
+            modals.now["high"] = False
+            height = above or self.approach * bool(rows.rapid[0])
+            self._look_at_first(at.lifted(first, height), pose)
+            self._approach_first(first, height)
+            rows = rows if above else rows.with_programmed_feed(self.program)
+        self.warnings.of_tool(pose, modals.tool)
+        if not rows.rapid.all():
+            self.warnings.of_cut(int(rows.move[np.argmin(rows.rapid)]), turning=bool(modals["spindle"]))
+        if at.form.rotary:
+            self.warnings.of_turns(rows, at.form, at.angles)
+        self.stand(rows.ticks[-1])
+        self.last_at, modals.halted = at, False
+        words, modals.waiting = modals.waiting, ""
+        self.text.append(self.blocks.text(rows, at, words, dwell))
+
+    def stand(self, ticks: Ints | None) -> None:
+        """Take note of where the tool is, and how it would go back along its axis from there."""
+        self.position, self.modals.along = ticks, ()
+        if ticks is not None:
+            self.last = ticks
+            if self.retract:
+                self.modals.along = (self.at.rapid(self.at.lifted(ticks, self.retract)),)
+
+    # ------------------------------------------------------------------------------------------------ retracts
+
+    def go_home(self) -> None:
+        """Go to the height of the retract, first back along the tool."""
+        if self.modals.goes_back and self.modals.along and self.position is not None:
+            self.position = self.at.lifted(self.position, self.retract)
+        self.say(self.modals.go_home())
+
+    def _turns(self, rows: BlockRows) -> list[tuple[int, bool]]:
+        """Rows before which the tool goes up so that rotary axes turn there, and whether that is within a cut."""
+        turns = [] if rows.left is None else [(row, True) for row in np.flatnonzero(rows.left).tolist()]
+        if self.at.form.rotary and rows.rapid.any():
+            before = rows.ticks[:1] if self.position is None else self.position[None]
+            angles, lines = self.at.angles(np.concatenate((before, rows.ticks))), self.program.line[rows.move]
+            possible = self.modals.can_rewind
+            found = retracts_before(self.at.form, angles, rows.rapid, lines, self.findings, possible)
+            turns += [(row, False) for row in found.tolist()]
+        return sorted(turns)
+
+    def _leave_cut(self, back: BlockRows) -> None:
+        """Leave a cut along the tool, and come back to the row where it goes on, with other rotary words, at feed."""
+        assert self.position is not None
+        if self.modals["compensation"]:
+            raise refused("CS377", self.program, int(self.program.line[back.move[0]]))
+        away = self.at.form.rewind
+        self.say([self.at.rapid(self.at.lifted(self.position, away))])
+        self.say(self.modals.go_home(along=False))
+        self.emit(back, above=away)
+
+    def _approach_first(self, first: Ints, above: float) -> None:
+        """Bring the tool over its first position, and to where it comes down along its axis."""
+        at, down = self.at, bool(above) and self.modals.can_rewind
+        start = at.lifted(first, above) if down else first
+        # a tilted tool under tool tip control, or in a tilted plane, goes there in one block (`first_block`), and so do
+        # words of a second point, which would turn the tool elsewhere without Z
+        if at.form.orientation != "point" and at.tool_axis(start)[2] >= UPRIGHT:
+            self.say([at.rapid(start, chosen=np.arange(len(start)) != 2)])
+        if down:
+            words, self.modals.waiting = self.modals.waiting, ""
+            self.say([at.rapid(start, words)])
+
+    def _look_at_first(self, end: Ints, move: int) -> None:
+        """Look at the block that leads a tilted tool to its first position from the height of the retract."""
+        at, form, axis = self.at, self.at.form, self.at.tool_axis(end)
+        if form.orientation not in ("angles", "fixed") or axis[2] >= UPRIGHT or not self.modals.can_rewind:
+            return
+        machine = None if form.machine is None else form.machine.with_tool(self.modals.tool)
+        angles = at.angles(end[None])[0] if form.rotary else None
+        if at.plane is not None:
+            angles = at.plane.angles
+        where = self.program.source.name, int(self.program.line[move])
+        check_first_block(form, machine, at.tip(end), axis, angles, self._nose(), where, self.findings)
+
+    def _nose(self) -> Floats | None:
+        """(2,) mm, where the retract has left X and Y of the spindle nose; None where that is not known."""
+        at, machine = self.last_at, self.at.form.machine
+        if machine is None:
+            return None
+        change = dict(machine.tool_change)
+        if self.position is None and {"X", "Y"} <= change.keys():
+            return np.array((change["X"], change["Y"]))
+        if at is None or self.last is None or not at.form.rotary or {"X", "Y"} & change.keys():
+            return None
+        return nose_position(machine, at.tip(self.last)[None], at.angles(self.last[None]))[0, :2]

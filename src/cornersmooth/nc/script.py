@@ -1,0 +1,136 @@
+"""One pass over statements and rows: what comes in which order.
+
+A statement changes what the control remembers; a stretch of rows asks for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+
+import numpy as np
+
+from cornersmooth.model import Bools, Ints, Move, Statement
+from cornersmooth.nc.coordinates import Coordinates
+from cornersmooth.nc.holes import Holes
+from cornersmooth.nc.motion import Motion
+from cornersmooth.nc.planes import Planes
+from cornersmooth.nc.statement_args import with_starts
+from cornersmooth.nc.statement_writer import StatementWriter
+from cornersmooth.slices import some_rows
+from cornersmooth.smoothing.sampling import Rows
+
+
+@dataclass
+class Script:
+    """Writes rows and statements in order."""
+
+    statements: StatementWriter
+    motion: Motion
+    holes: Holes
+    upright: Bools  #: (n,) `cycle_blocks.upright_poses`
+    planes: Planes
+    _coordinates: dict[tuple[str, int | None], Coordinates] = field(
+        default_factory=dict
+    )  #: besides those of tip control
+    _plane: int = -1  #: tilted plane of the tool at hand
+    _next_statement: int = 0
+    _in_order: tuple[Statement, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._in_order = with_starts(self.motion.program)
+
+    def take(self) -> list[bytes]:
+        """Text that was written since it was taken last."""
+        text, self.motion.text = self.motion.text, []
+        return text
+
+    def run(self, rows: Rows, ticks: Ints) -> None:
+        """Write a block of rows, with their numbers in ticks, and the statements before and between them."""
+        moves, start = rows.move, 0
+        for statement in self._statements_until(int(moves[-1])) if len(moves) else []:
+            if self.statements.only_counted(statement):  # thousands of them must not cut the rows to pieces
+                continue
+            stop = int(np.searchsorted(moves, statement.pose))
+            self._between(rows, ticks, start, stop)
+            start = max(start, stop)
+            self._statement(statement)
+        self._between(rows, ticks, start, len(moves))
+
+    def finish(self) -> None:
+        """Write the statements after the last row, and the blocks that end the program."""
+        motion, modals = self.motion, self.motion.modals
+        for statement in self._in_order[self._next_statement :]:
+            self._statement(statement)
+        if motion.repeated:
+            motion.findings.note("CS312", 0, motion.repeated)
+        if motion.blocks.counted is not None:
+            motion.blocks.counted.finish()
+        last = modals.set(compensation=())
+        rotary = {} if motion.last is None else motion.rotary_blocks(motion.last, unwind=False)
+        motion.say([*last, *modals.end(rotary)])
+
+    def _statements_until(self, pose: int) -> Sequence[Statement]:
+        begin, order = self._next_statement, self._in_order
+        while self._next_statement < len(order) and order[self._next_statement].pose <= pose:
+            self._next_statement += 1
+        return order[begin : self._next_statement]
+
+    def _statement(self, statement: Statement) -> None:
+        blocks, changed = self.statements.blocks(statement), self.statements.changed
+        if changed:  # a tool change leaves the machine elsewhere
+            self.motion.change_tool(statement.pose)
+            self.statements.changed = False
+        if changed or self.motion.modals.halted:
+            self.motion.modals.now["feed"] = -1
+        self.motion.say(blocks)
+
+    def _between(self, rows: Rows, ticks: Ints, start: int, stop: int) -> None:
+        """Write rows between statements, holes apart from the others."""
+        if start >= stop:
+            return
+        poses = rows.move[start:stop]
+        hole, plane = self.motion.program.kind[poses] == Move.HOLE, self.planes.of[poses]
+        edges = np.flatnonzero((hole[1:] != hole[:-1]) | (plane[1:] != plane[:-1]))
+        for first, last in pairwise([0, *(1 + edges).tolist(), stop - start]):
+            part = slice(start + first, start + last)
+            self._take_coordinates(int(poses[first]))
+            if hole[first]:
+                self.holes.write(some_rows(rows, part))
+            else:
+                self.motion.lines(some_rows(rows, part), ticks[part])
+
+    def _take_coordinates(self, pose: int) -> None:
+        """Take the coordinates of a pose; between tilted planes, and beside them, the tool goes up."""
+        plane, modals = int(self.planes.of[pose]), self.motion.modals
+        if modals.begun and plane == self._plane:
+            return
+        at = self._coordinates_of(pose, plane)
+        beside, self._plane = self._plane != plane, plane
+        if modals.begun or (beside and not modals["high"]):
+            self.motion.go_home()
+        self.motion.take(at)
+
+    def _coordinates_of(self, pose: int, plane: int) -> Coordinates:
+        """Coordinates of a pose: of its plane, of tools along Z, or of the tool at hand where its length counts."""
+        form, tool = self.motion.tilting.form, self.motion.modals.tool
+        if plane >= 0:
+            key: tuple[str, int | None] = ("plane", plane)
+        elif self.upright[pose]:
+            key = ("upright", 0)
+        elif form.machine is not None and form.machine.tool_lengths and form.orientation == "machine":
+            key = ("tool", tool)
+        else:
+            return self.motion.tilting
+        if key not in self._coordinates:
+            if key[0] == "tool" and form.machine is not None:
+                at = replace(self.motion.tilting, form=replace(form, machine=form.machine.with_tool(tool)))
+            else:
+                mode = form.plane if plane >= 0 else form.upright
+                assert mode is not None
+                along = replace(form, orientation="fixed", mode=mode)
+                own = self.planes.planes[plane] if plane >= 0 else None
+                at = replace(self.motion.tilting, form=along, stretch=along.stretch(1.0), plane=own, tip_control=False)
+            self._coordinates[key] = at
+        return self._coordinates[key]
