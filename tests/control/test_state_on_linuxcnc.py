@@ -1,4 +1,4 @@
-"""What the machine claims to know of a program with lines dropped at random is what LinuxCNC's interpreter knows."""
+"""What the machine claims to know of a program with lines dropped and mixed up is what LinuxCNC knows."""
 
 from __future__ import annotations
 
@@ -25,10 +25,14 @@ SAME = 1e-6
 
 
 def dropped(text: str, rng: random.Random) -> str:
-    """The program without some of its lines; subprograms stay whole, so that it still is a program."""
+    """The program without some of its lines, some twice, two in each other's place; subprograms stay subprograms."""
     lines = text.splitlines()
-    kept = [line for line in lines if line.startswith("o") or rng.random() > 0.15]
-    return "\n".join(kept) + "\n"
+    free = [k for k, line in enumerate(lines) if not line.startswith("o")]
+    for _ in range(rng.randrange(3)):
+        one, other = rng.choice(free), rng.choice(free)
+        lines[one], lines[other] = lines[other], lines[one]
+    times = [1 if line.startswith("o") else rng.choices((0, 1, 2), (0.12, 0.84, 0.04))[0] for line in lines]
+    return "".join(f"{line}\n" * count for line, count in zip(lines, times, strict=True))
 
 
 def interpreted(text: str, folder: Path) -> list[tuple[str, int, list[float]]] | None:

@@ -89,8 +89,8 @@ class Stream:
         self._targets = _targets(text, [line for _, line in self.others])
 
     def __iter__(self) -> Iterator[Rows | Act]:
-        """Execute the program; each item has the state before it, and after it."""
-        state, started = self._state.copy(), False
+        """Execute the program; each item has the state before it, and after it. Nothing changes them any more."""
+        state, started = self._state, False
         for first, lines, bulk in self._chunks:
             plain = bulk.copy()
             plain[[number - first for number in self._targets if first <= number < first + len(bulk)]] = False
@@ -106,11 +106,11 @@ class Stream:
                 for k in range(a, b):
                     block = self._lexer.comment.sub("", lines.line(k).decode("latin-1")).strip()
                     if block and (started or not _TITLE.fullmatch(block)):
-                        started, before = True, state.copy()
+                        started, before, state = True, state, state.copy()
                         if first + k in self._targets:  # who jumps here may come from anywhere
                             state.lose_all()
                         cuts = execute(state, lines.line(k), self._lexer)
-                        yield Act(first + k, lines.line(k), before, state.copy(), cuts)
+                        yield Act(first + k, lines.line(k), before, state, cuts)
 
     def _weak(self, state: State, first: int, stop: int) -> bool:
         """Whether feeds of some lines are written so that the control may count them in another unit."""

@@ -69,7 +69,7 @@ def execute_rows(state: State, first: int, columns: Mapping[str, Floats], *, wea
         moves |= ~np.isnan(words)
         place[0, k] = state.place[letter]
         place[1:, k] = _places(words, state, letter, lost)
-    return Rows(first, state.copy(), code, place, feed, moves, odd, lost)
+    return Rows(first, state, code, place, feed, moves, odd, lost)
 
 
 def _places(words: Floats, state: State, letter: str, lost: Bools) -> Floats:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Final
 
 from cornersmooth.control.table import FRAME, Row, Table
@@ -66,7 +66,7 @@ class State:
 
     def copy(self) -> State:
         """Return the same state, to be changed on its own."""
-        return replace(self, groups=dict(self.groups), place=dict(self.place))
+        return State(self.table, self.axes, dict(self.groups), dict(self.place), self.feed, self.said)
 
     @property
     def unit(self) -> float:
@@ -114,7 +114,8 @@ class State:
 
     def _words(self, words: tuple[Word, ...]) -> bool:
         given = {word.name: word.value for word in words}
-        named = [name for name in map(_name, words) if name not in (*self.axes, "F", *_AXES)]
+        of_motion = {*self.axes, "F", *_AXES}
+        named = [name for name in map(_name, words) if name not in of_motion]
         rows = [self.table.row(name, given, alone=len(words) == 1) for name in named]
         does = {effect for row in rows for effect in self._set(row, words)}
         # what belongs to other words of the block, or to the motion that holds
