@@ -117,6 +117,23 @@ def test_the_option_and_the_file_do_not_both_name_the_work_offset() -> None:
     assert (verdict, "G55" in text) == (Verdict.PASSED, False)
 
 
+def test_cutcom_on_before_its_side_says_nothing_more() -> None:
+    cut = CUT.replace("GOTO/14", "CUTCOM/ON\nCUTCOM/LEFT, 3\nGOTO/14") + "CUTCOM/OFF\nGOTO/40., 0., 0.\n"
+    verdict, text = written(part(section(3, cut)))
+    assert verdict is Verdict.PASSED
+    assert text.count("G41 D3") == 1
+    for alone in (cut.replace("CUTCOM/LEFT, 3\n", ""), cut.replace("CUTCOM/ON\n", "CUTCOM/ON\nGOTO/1., 0., 0.\n")):
+        assert written(part(section(3, alone)))[0] is Verdict.NOT_VERIFIED
+
+
+def test_an_arc_in_a_turned_plane_turns_about_its_axis() -> None:
+    arc = CUT + "CIRCLE/27., 10., 0., 0., 0., -1., 10., 90., 0.0, 0.0, 0.0\nGOTO/37., 10., 0.\n"
+    program = read(part(section(4, arc, axes=TURNED)))
+    assert program.arcs.normal == pytest.approx(np.array([[0, -0.6, 0.8]]))
+    assert np.degrees(program.arcs.sweep) == pytest.approx([90])
+    assert written(part(section(4, arc, axes=TURNED)))[0] is Verdict.PASSED
+
+
 def test_zero_of_apt_still_changes_the_coordinates() -> None:
     with pytest.raises(InputError, match=r"error\[CS117\]: ZERO changes"):
         read(b"UNITS/MM\nZERO/1\nGOTO/0,0,0\n")

@@ -21,6 +21,7 @@ FOREIGN = {
     "STEP file": b"ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\n#50=CARTESIAN_POINT('',(0.0,0.0,40.0));\n",
     "JSON": b'{"poses":[{"position":[0,0,40],"axis":[0,0,1]}]}\n',
     "YAML": b"poses:\n- position: {x: 0.0, y: 0.0, z: 0.04}\n",
+    "YAML file": b"header:\n  seq: 0\nposes:\n  - x: 1\n",
     "MATLAB": b"P = [\n0 0 40 0 0 1;\n14 3 0 0.1 0 0.995;\n];\n",
     "SprutCAM": b"PARTNO A\nUNITS MM\nGOTO X 0 Y 0 Z 40\nMULTIGOTO X 14 Y 3 Z 0 A 5.7 C 90\n",
     "XML": b"<?xml version='1.0'?>\n<cld><linear/></cld>\n",

@@ -26,7 +26,7 @@ _FORMATS: Final = tuple(
         ("robot program (RAPID)", rb"^\s*(MODULE +\w+|MoveL +\[)", f"export {_APT}, or a table x,y,z,i,j,k"),
         ("STEP file (ISO 10303-21)", rb"\A\s*ISO-10303-21;", f"export {_APT} of the tool path"),
         ("JSON file", rb'\A\s*[\[{]\s*["\[{\]}\d-]', "write its poses as a table x,y,z,i,j,k"),
-        ("YAML file", rb"\A(---|\w+:\s*\n\s*-)", "write its poses as a table x,y,z,i,j,k"),
+        ("YAML file", rb"\A(---\s|\w+:[ \t]*\n[ \t]*(- |\w+:))", "write its poses as a table x,y,z,i,j,k"),
         ("MATLAB script", rb"\A\s*\w+ *= *\[", "write the matrix as a table x,y,z,i,j,k, with writematrix"),
         ("XML file", rb"\A\s*<\?xml", f"export {_APT}"),
         ("CLData listing of SprutCAM", rb"^(MULTI)?GOTO +[XYZ] *-?[\d.]", f"export {_APT} with its APT post"),

@@ -77,6 +77,8 @@ class StatementWriter:
         handler = _HANDLERS.get(word)
         if handler is not None:
             written = handler(self, statement)
+            if written is None and statement.word == "CUTCOM" and id(statement) not in self._unknown:
+                written = []  # ON before the side
             if written is not None:
                 return [*written, *(self.comment(statement.text) if self._has_other_words(statement) else ())]
             self._not_understood(statement)

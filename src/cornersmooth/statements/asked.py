@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -71,6 +72,11 @@ class Asking:
         self.running, self.speed, self.diameter = "CLW", 0.0, 0.0
         self.tool, self.offset, self.offset_at = -1.0, 1.0, (-1, 0)
         said = {statement.word for statement in program.statements}
+        sides = [one for one in program.statements if one.word == "CUTCOM"]
+        #: CUTCOM/ON right before that with a side, as Autodesk's CAMplete post writes it
+        self.announcing = {
+            id(one) for one, after in pairwise(sides) if one.pose == after.pose and {"LEFT", "RIGHT"} & {*after.args}
+        }
         self.lathe = "TURRET" in said  # cutting speeds are those at the part
         self.loads_alone = not said & {"LOADTL", "LOAD", "TURRET"}
         self.handlers: dict[str, Handler] = {
@@ -223,6 +229,8 @@ class Asking:
 
     def compensation(self, words: list[str], numbers: list[float], statement: Statement) -> bool:
         """Cutter compensation left, right or off."""
+        if words == ["ON"] and not numbers and id(statement) in self.announcing:
+            return True
         side = _ALIKE.get(words[0], words[0]) if words else ""
         register = (numbers or [self.offset])[0]
         if (
