@@ -348,7 +348,7 @@ class Corners:
 
     The five control points of a smoothed row follow from it (`cornersmooth.geometry.nurbs.control_points`): with X
     the pose, D⁻ and D⁺ the segments to its neighbours `before` and `after`, the tip curve P has
-    ``X − trim_in·D⁻, X − ratio·trim_in·D⁻, X, X + ratio·trim_out·D⁺, X + trim_out·D⁺``, and the axis-point curve Q the
+    ``X − trim_in·D⁻, X − ⅔·trim_in·D⁻, X, X + ⅔·trim_out·D⁺, X + trim_out·D⁺``, and the axis-point curve Q the
     same with the axis points and `axis_trim_*`.
     """
 
@@ -365,8 +365,6 @@ class Corners:
     axis_trim_in: Floats
     axis_trim_out: Floats
     weights: Floats  #: (k, 2): w1 (second and fourth control point) and w2 (third); the first and the last are 1
-    #: (k,): Distance of the second control point from the corner over that of the first; 2/3 in the paper.
-    ratio: Floats
     #: (k,), mm: Largest distance between both motions at a common parameter: at the tip, and at b = tip + H·axis. The
     #: paths themselves are at least as near (`report.corners.path_distances`). With an axis tolerance the latter is
     #: what the axis turns, at `Settings.axis_scale` from the tip.

@@ -38,8 +38,6 @@ class Settings:
     method: str = AUTO
     #: w1 and w2 of the five-point curve, in (0, 3]; rounded to the three decimals that controls accept.
     weights: tuple[float, float] = _setting((1.0, 1.0), 0.001, 3.0)
-    #: Second control point over first, in [0.5, 0.9]; the paper's 2/3 divides the leg so that knots need no care.
-    ratio: float = _setting(2.0 / 3.0, 0.5, 0.9)
     #: degrees: A corner that turns by more (in the six-dimensional sense) stays sharp.
     reversal_angle: float = _setting(170.0, 1.0, 180.0, "deg")
     #: degrees: A corner next to a segment whose axis turns by more stays sharp: the ruled motion is not a motion any

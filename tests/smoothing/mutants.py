@@ -57,7 +57,7 @@ MUTANTS = (
     Mutant(
         "(3): weights left out", CURVES, (("np.stack((one, w1, w2, w1, one)", "np.stack((one, one, w2, one, one)"),)
     ),
-    Mutant("(9): second control point", CURVES, (("points[:, 1] -= ratio[:, None]", "points[:, 1] -= 0.6"),)),
+    Mutant("(9): second control point", CURVES, (("points[:, 1] -= RATIO", "points[:, 1] -= 0.6"),)),
     Mutant("(10): error", PAPER, (("factor = 2.0 * float(nurbs", "factor = 1.9 * float(nurbs"),)),
     Mutant(
         "(14): more than half of a segment", PAPER, (("np.minimum(*tip_sizes) / 2.0", "np.minimum(*tip_sizes) / 1.8"),)

@@ -44,9 +44,8 @@ def simultaneous_deviation(smoothed: SmoothProgram, rows: Ints, u: Floats) -> tu
     program, corners, height = smoothed.program, smoothed.corners, smoothed.settings.axis_length
     tip_curve, axis_curve = nurbs.control_points(program, corners, rows, height)
     shares = nurbs.rational_basis(u, corners.weights[rows])
-    ratio = corners.ratio[rows][:, None]
-    first = shares[..., 0] + ratio * (shares[..., 1] - shares[..., 3])
-    second = shares[..., 4] + ratio * (shares[..., 3] - shares[..., 1])
+    first = shares[..., 0] + 2 / 3 * (shares[..., 1] - shares[..., 3])
+    second = shares[..., 4] + 2 / 3 * (shares[..., 3] - shares[..., 1])
     towards = np.where(u <= 0.5, corners.before[rows][:, None], corners.after[rows][:, None])
     trim = np.where(u <= 0.5, corners.trim_in[rows][:, None], corners.trim_out[rows][:, None])
     fraction = (np.where(u <= 0.5, first, second) * trim)[..., None]

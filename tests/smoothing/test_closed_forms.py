@@ -42,9 +42,8 @@ def test_curvature_and_deviation_of_a_plane_corner(turn):
 
 
 @pytest.mark.parametrize("weights", [(1.0, 1.0), (1.0, 0.4), (0.6, 1.7), (2.5, 0.3)])
-@pytest.mark.parametrize("ratio", [0.55, 2 / 3, 0.85])
-def test_deviation_factor_holds_for_free_weights_and_ratio(weights, ratio):
-    settings = Settings(tolerance=0.02, weights=weights, ratio=ratio)
+def test_deviation_factor_holds_for_free_weights(weights):
+    settings = Settings(tolerance=0.02, weights=weights)
     smoothed = smooth(plane_corner(70.0), settings)
     curve, _ = nurbs.control_points(smoothed.program, smoothed.corners, slice(None), 10.0)
     points = nurbs.evaluate(curve, smoothed.corners.weights, np.linspace(0, 1, 1001))[0]

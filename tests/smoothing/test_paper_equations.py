@@ -188,10 +188,9 @@ def random_curves(seed: int, count: int) -> tuple[Floats, Floats]:
     lever = HEIGHT * direction(random.normal(size=(count, 3)))
     ins, outs = random.normal(size=(2, count, 3)) * 0.5
     unlike = random.uniform(0.6, 1.4, size=(2, count, 1))
-    ratio = np.full(count, 2.0 / 3.0)
-    tips = nurbs.five_points(np.zeros_like(lever), ins, outs, ratio)
+    tips = nurbs.five_points(np.zeros_like(lever), ins, outs)
     turn = random.normal(size=(2, count, 3)) * 0.1
-    return tips, nurbs.five_points(lever, unlike[0] * ins + turn[0], unlike[1] * outs + turn[1], ratio)
+    return tips, nurbs.five_points(lever, unlike[0] * ins + turn[0], unlike[1] * outs + turn[1])
 
 
 @pytest.mark.parametrize("weights", WEIGHTS)

@@ -11,7 +11,7 @@ from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from cornersmooth.geometry import nurbs
-from cornersmooth.settings import BOUNDS, Settings
+from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from cornersmooth.smoothing.sampling import dense_rows
 from cornersmooth.smoothing.segments import PAPER_ERROR, lines_per_half, shape_factors
@@ -24,11 +24,9 @@ ANY_WEIGHTS = ((1.0, 1.0), (1.0, 0.3), (2.5, 0.3), (0.3, 2.5), (1.0, 3.0), (3.0,
 # ---------------------------------------------------------------- the promise
 
 
-@pytest.mark.parametrize(
-    ("weights", "ratio", "wobble"), covering_share(product(ANY_WEIGHTS, BOUNDS["ratio"], [0.1, 1.5]), 13)
-)
-def test_any_weights_keep_the_tolerance(weights, ratio, wobble):
-    settings = Settings(tolerance=0.1, axis_length=50.0, weights=weights, ratio=ratio)
+@pytest.mark.parametrize(("weights", "wobble"), covering_share(product(ANY_WEIGHTS, [0.1, 1.5]), 13))
+def test_any_weights_keep_the_tolerance(weights, wobble):
+    settings = Settings(tolerance=0.1, axis_length=50.0, weights=weights)
     smoothed = smooth(random_program(23, 600, wobble=wobble), settings)
     rows = np.flatnonzero(smoothed.corners.smoothed)
     tip, top = simultaneous_deviation(smoothed, rows, np.linspace(0, 1, 401))
@@ -54,21 +52,17 @@ def test_coarse_grids_keep_the_tolerance(program, weights, tolerance):
 
 
 @hypothesis_settings(deadline=None)
-@given(
-    st.floats(0.001, 3.0),
-    st.floats(0.001, 3.0),
-    st.floats(*BOUNDS["ratio"]),
-)
-def test_the_pose_of_the_original_motion_only_moves_forward(w1, w2, ratio):
+@given(st.floats(0.001, 3.0), st.floats(0.001, 3.0))
+def test_the_pose_of_the_original_motion_only_moves_forward(w1, w2):
     """σ falls from 1 to 0 on the first half, and the deviation β is a convex function of it: docs/method.md."""
     u = np.linspace(0.0, 0.5, 301)
-    coefficients = nurbs.leg_coefficients(u, np.array([w1, w2]), ratio)
+    coefficients = nurbs.leg_coefficients(u, np.array([w1, w2]))
     beta = coefficients[:, 2]
     sigma = -coefficients[:, 1] - beta
     assert sigma[0] == pytest.approx(1.0)
     assert sigma[-1] == pytest.approx(0.0, abs=1e-15)
     assert (np.diff(sigma) < 0.0).all()
-    largest = nurbs.deviation_factor(np.array([[w1, w2]]), np.array([ratio]))[0]
+    largest = nurbs.deviation_factor(np.array([[w1, w2]]))[0]
     assert beta[-1] == pytest.approx(largest)
     assert (beta <= largest * (1.0 - sigma) + 1e-12).all()
     (x, y), (x_next, y_next) = np.diff((sigma, beta), axis=1)[:, :-1], np.diff((sigma, beta), axis=1)[:, 1:]
@@ -79,14 +73,13 @@ def test_the_pose_of_the_original_motion_only_moves_forward(w1, w2, ratio):
 
 
 @pytest.mark.parametrize("weights", [*((1.0, w2) for w2 in (0.9, 0.6, 0.3, 0.05)), *ANY_WEIGHTS])
-@pytest.mark.parametrize("ratio", [0.5, 2 / 3, 0.9])
-def test_shape_factors_bound_the_error_of_lines(weights, ratio):
-    bend, turn = shape_factors(weights, ratio)
+def test_shape_factors_bound_the_error_of_lines(weights):
+    bend, turn = shape_factors(weights)
     for number in (1, 2, 3, 5, 7, 12, 40, 100):
         for exponent, allowed in ((2 / 3, 1.0), (1.0, 2.25)):
             ends = (np.arange(number + 1) / number) ** exponent
             s = ends[:-1, None] + np.diff(ends)[:, None] * np.linspace(0, 1, 50)
-            coefficients = nurbs.leg_coefficients(s / 2, np.array(weights), ratio)
+            coefficients = nurbs.leg_coefficients(s / 2, np.array(weights))
             beta = coefficients[..., 2]
             sigma = -coefficients[..., 1] - beta
             slope = (beta[:, -1:] - beta[:, :1]) / (sigma[:, -1:] - sigma[:, :1])
@@ -95,12 +88,10 @@ def test_shape_factors_bound_the_error_of_lines(weights, ratio):
         assert np.abs(np.diff(sigma[:, [0, -1]], axis=1)).max() <= turn / number * (1 + 1e-9)
 
 
-@pytest.mark.parametrize(
-    "options", [{"weights": (1.0, 0.65)}, {"weights": (2.5, 0.3)}, {"weights": (1.0, 3.0)}, {"ratio": 0.85}]
-)
-def test_lines_keep_the_chord_tolerance_and_pass_the_middle(options):
+@pytest.mark.parametrize("weights", [(1.0, 0.65), (2.5, 0.3), (1.0, 3.0)])
+def test_lines_keep_the_chord_tolerance_and_pass_the_middle(weights):
     """Distance of the curves, at dense parameters, from the lines that were made of them."""
-    settings = Settings(tolerance=0.2, chord_tolerance=0.001, **options)
+    settings = Settings(tolerance=0.2, chord_tolerance=0.001, weights=weights)
     smoothed = smooth(random_program(31, 300, wobble=0.05), settings)
     corners = smoothed.corners
     rows = np.flatnonzero(corners.smoothed)

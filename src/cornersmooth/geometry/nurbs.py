@@ -1,7 +1,7 @@
 """The five-point curve: a cubic NURBS on the knots {0, 0, 0, 0, ½, 1, 1, 1, 1} with weights (1, w1, w2, w1, 1).
 
 Paper equations (3), (4) and (9). Each half is a Bézier cubic, and the second one mirrors the first. Seen from the
-corner X, with the legs a from the first control point to X and b from X to the last, and ratio ρ of the inner ones:
+corner X, with the legs a from the first control point to X and b from X to the last, and inner ones at ρ = 2/3 of them:
 
     first half:   X − σ·a + β·(b − a),    σ = R0 + ρ·R1 − ρ·R3,   β = ρ·R3
     second half:  X + σ·b + β·(b − a),    σ, β at the mirrored parameter
@@ -12,14 +12,19 @@ parameter; β is largest at u = ½, where it is c = ρ·w1/(2(w1 + w2)) and σ =
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
 from cornersmooth.model import Bools, Corners, Floats, Ints, Program
 
+#: distance of the second control point from the corner over that of the first
+RATIO: Final = 2.0 / 3.0
 
-def deviation_factor(weights: Floats, ratio: Floats | float) -> Floats:
-    """(...,) the factor c of weights (..., 2) and ratios (...,): equations (10) to (12) without the sine."""
-    return ratio * weights[..., 0] / (2.0 * (weights[..., 0] + weights[..., 1]))
+
+def deviation_factor(weights: Floats) -> Floats:
+    """(...,) the factor c of weights (..., 2): equations (10) to (12) without the sine."""
+    return RATIO * weights[..., 0] / (2.0 * (weights[..., 0] + weights[..., 1]))
 
 
 def basis(u: Floats) -> Floats:
@@ -48,12 +53,11 @@ def rational_basis(u: Floats, weights: Floats) -> Floats:
     return weighted / sums
 
 
-def leg_coefficients(u: Floats, weights: Floats, ratio: Floats | float) -> Floats:
+def leg_coefficients(u: Floats, weights: Floats) -> Floats:
     """Coefficients (..., m, 3) of corner, incoming and outgoing leg in the points of curves at parameters (..., m)."""
     shares = rational_basis(u, weights)
-    ratio = np.asarray(ratio)[..., None]
-    incoming = -shares[..., 0] - ratio * shares[..., 1]
-    outgoing = shares[..., 4] + ratio * shares[..., 3]
+    incoming = -shares[..., 0] - RATIO * shares[..., 1]
+    outgoing = shares[..., 4] + RATIO * shares[..., 3]
     return np.stack((np.ones_like(incoming), incoming, outgoing), axis=-1)
 
 
@@ -72,7 +76,6 @@ def control_points(
     Those of corners that are not smoothed are all at the corner.
     """
     pose, before, after = corners.pose[rows], corners.before[rows], corners.after[rows]
-    ratio = corners.ratio[rows]
     tip, axis = program.tip, program.axis
     corner = tip[pose]
     turned = axis_length * axis[pose]
@@ -80,23 +83,22 @@ def control_points(
     axis_in = step_in + turned - axis_length * axis[before]
     axis_out = step_out + axis_length * axis[after] - turned
     tip_curve = five_points(
-        corner, step_in * corners.trim_in[rows][:, None], step_out * corners.trim_out[rows][:, None], ratio
+        corner, step_in * corners.trim_in[rows][:, None], step_out * corners.trim_out[rows][:, None]
     )
     axis_curve = five_points(
         corner + turned,
         axis_in * corners.axis_trim_in[rows][:, None],
         axis_out * corners.axis_trim_out[rows][:, None],
-        ratio,
     )
     return tip_curve, axis_curve
 
 
-def five_points(corner: Floats, leg_in: Floats, leg_out: Floats, ratio: Floats) -> Floats:
-    """Control points (g, 5, 3) of corners and legs in and out (g, 3) and ratios (g,): equations (5) to (9)."""
+def five_points(corner: Floats, leg_in: Floats, leg_out: Floats) -> Floats:
+    """Control points (g, 5, 3) of corners and legs in and out (g, 3): equations (5) to (9)."""
     points = np.repeat(corner[:, None, :], 5, axis=1)
     points[:, 0] -= leg_in
-    points[:, 1] -= ratio[:, None] * leg_in
-    points[:, 3] += ratio[:, None] * leg_out
+    points[:, 1] -= RATIO * leg_in
+    points[:, 3] += RATIO * leg_out
     points[:, 4] += leg_out
     return points
 

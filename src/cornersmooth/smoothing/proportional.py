@@ -35,7 +35,7 @@ BETWEEN_PROBES = 1e-3
 EXACT = 1e-10
 
 #: while the lever turns by less than this many times the deviation, relative to it, the deviation is largest at u = ½:
-#: half of what is proven, for all weights 1 at the paper's ratio and for every other shape
+#: half of what is proven, for all weights 1 and for all others
 _TILT_PAPER, _TILT_ANY = 1.5, 0.5
 
 
@@ -65,7 +65,7 @@ class Wanted:
         per_in, per_out = 1.0 / self.length_in[:, None], 1.0 / self.length_out[:, None]
         self.bend_tip = legs.tip_out * per_out - legs.tip_in * per_in  # (U⁺ − U⁻)_A
         self.bend_turn = legs.turn_out * per_out - legs.turn_in * per_in  # (U⁺ − U⁻)_B − (U⁺ − U⁻)_A
-        self.factor = float(nurbs.deviation_factor(np.array(settings.weights), settings.ratio))
+        self.factor = float(nurbs.deviation_factor(np.array(settings.weights)))
         # deviation over length: tip, axis point, axis point less tip
         bends = self.bend_tip, self.bend_tip + self.bend_turn, self.bend_turn
         self.per_tip, per_axis, self.per_turn = (self.factor * norm(bend) for bend in bends)
@@ -104,7 +104,7 @@ class Wanted:
     def probe(self, length: Floats, rows: Ints | slice = slice(None)) -> Floats:
         """Largest |b′−b| at common parameters over both halves, mm."""
         reach = length[:, None]
-        shares = nurbs.leg_coefficients(_PROBES, np.array(self.settings.weights), self.settings.ratio)
+        shares = nurbs.leg_coefficients(_PROBES, np.array(self.settings.weights))
         beta = shares[:, 2]
         sigma = -shares[:, 1] - beta
         lever = self.axis_length * self.legs.axis[rows][:, None, :]
@@ -129,13 +129,13 @@ def _largest_in_the_middle(asked: Wanted, length: Floats, turned: Floats) -> NDA
 
     The deviation where the original motion is at σ, as in `cornersmooth.geometry.nurbs`, is at most f(σ)·(E + G·σ),
     with E the deviation at u = ½, f = β/c, and G the lever's turn over the half times H|O′−O|. So E is the largest
-    while f·(1 + σ·G/E) ≤ 1. With all weights 1 at the ratio 2/3, f is (1−σ)³ and G may be up to 3E; with any other
+    while f·(1 + σ·G/E) ≤ 1. With all weights 1, f is (1−σ)³ and G may be up to 3E; with any other
     weights f is convex and falls from 1 to 0, so it is at most 1−σ and G may be up to E.
     """
     legs = asked.legs
     turn = np.maximum(norm(legs.turn_in) * (1.0 / asked.length_in), norm(legs.turn_out) * (1.0 / asked.length_out))
     turn *= length / asked.axis_length
-    paper = asked.settings.weights == (1.0, 1.0) and abs(asked.settings.ratio - 2.0 / 3.0) < EXACT
+    paper = asked.settings.weights == (1.0, 1.0)
     tilt = 2.0 * turn * turned
     return (tilt <= (_TILT_PAPER if paper else _TILT_ANY) * asked.middle(length)) & (turn < 0.5)
 
@@ -177,7 +177,7 @@ class Proportional(Construction):
     def points(self, smoothed: SmoothProgram, rows: Ints, u: Floats) -> tuple[Floats, Floats]:
         """Both curves at the same parameters."""
         corners, settings = smoothed.corners, smoothed.settings
-        shares = nurbs.leg_coefficients(np.concatenate(([0.0], u)), np.array(settings.weights), settings.ratio)
+        shares = nurbs.leg_coefficients(np.concatenate(([0.0], u)), np.array(settings.weights))
         pose, before, after = corners.pose[rows], corners.before[rows], corners.after[rows]
         trim_in, trim_out = corners.trim_in[rows, None], corners.trim_out[rows, None]
         legs = np.empty((2, len(rows), 3, 3))

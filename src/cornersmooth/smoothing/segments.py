@@ -22,7 +22,7 @@ from cornersmooth.vectors import norm, square
 #: exponent of the graded nodes s = (j/n)^(2/3)
 GRADED = 2.0 / 3.0
 
-#: β-error of one line per half with all weights 1 at the ratio 2/3, ``max((s − s³)/6)``; for n lines it is at most 1/n²
+#: β-error of one line per half with all weights 1, ``max((s − s³)/6)``; for n lines it is at most 1/n²
 #: of this on graded nodes, and 9/4 of that on even ones
 PAPER_ERROR = 1.0 / (9.0 * np.sqrt(3.0))
 
@@ -196,7 +196,7 @@ def lines_of(smoothed: SmoothProgram, rows: Ints) -> Ints:
         (tip_out + turn_out) * corners.axis_trim_out[rows][:, None]
         - (tip_in + turn_in) * corners.axis_trim_in[rows][:, None],
     )
-    more_bend, more_turn = shape_factors(settings.weights, settings.ratio)
+    more_bend, more_turn = shape_factors(settings.weights)
     bend = np.sqrt(np.maximum(square(bends[0]), square(bends[1]))) * more_bend
     by_chord = np.sqrt(bend / (_BEND_PER_CHORD * settings.chord))
     way = np.minimum(norm(tip_in) * corners.trim_in[rows], norm(tip_out) * corners.trim_out[rows])
@@ -221,26 +221,26 @@ def lines_of(smoothed: SmoothProgram, rows: Ints) -> Ints:
 
 
 @cache
-def shape_factors(weights: tuple[float, float], ratio: float) -> tuple[float, float]:
-    """Factors by which bend and turn of transitions count more for their weights and ratio.
+def shape_factors(weights: tuple[float, float]) -> tuple[float, float]:
+    """Factors by which bend and turn of transitions count more for their weights.
 
     The chord error of n lines is at most ``bend·PAPER_ERROR·|b − a|/n²``, 9/4 of it on even nodes; on even nodes σ (see
     `cornersmooth.geometry.nurbs`) changes by at most ``turn/n`` in a line.
     """
-    if weights[0] != 1.0 or weights[1] > 1.0 or abs(ratio - 2.0 / 3.0) > 1e-12:
-        return _measure(np.array(weights), ratio)
+    if weights[0] != 1.0 or weights[1] > 1.0:
+        return _measure(np.array(weights))
     # then both are at most 6c, c the deviation factor (tests/smoothing/test_weights.py)
-    factor = max(6.0 * float(nurbs.deviation_factor(np.array(weights), ratio)), 1.0)
+    factor = max(6.0 * float(nurbs.deviation_factor(np.array(weights))), 1.0)
     return factor, factor
 
 
-def _measure(weights: Floats, ratio: float) -> tuple[float, float]:
+def _measure(weights: Floats) -> tuple[float, float]:
     bend, turn = 0.0, 0.0
     for number in _NUMBERS:
         for exponent, allowed in ((GRADED, 1.0), (1.0, 2.25)):
             ends = (np.arange(number + 1) / number) ** exponent
             s = ends[:-1, None] + np.diff(ends)[:, None] * np.linspace(0.0, 1.0, _SAMPLES + 1)
-            coefficients = nurbs.leg_coefficients(0.5 * s, weights, ratio)
+            coefficients = nurbs.leg_coefficients(0.5 * s, weights)
             beta = coefficients[..., 2]
             sigma = -coefficients[..., 1] - beta
             slope = (beta[:, -1:] - beta[:, :1]) / (sigma[:, -1:] - sigma[:, :1])

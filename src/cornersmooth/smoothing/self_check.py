@@ -42,15 +42,15 @@ def motion_of(
     trims: tuple[Floats, ...],
     lever: Floats,
     parameters: tuple[Floats, Floats],
-    shape: tuple[Floats, float],
+    weights: Floats,
 ) -> Motion:
     """Transitions at parameters u (m,) and v (g, m).
 
     Legs (g, 3) are those of the curves, `trims` (g,) their parts of the segments: of the tip in and out, of the axis
-    point in and out. `shape` is weights (2,) and ratio.
+    point in and out. `weights` (2,).
     """
     (u, v), (tip_in, tip_out, axis_in, axis_out) = parameters, trims
-    of_tip, of_axis = (nurbs.leg_coefficients(at, *shape) for at in (u[None], v))
+    of_tip, of_axis = (nurbs.leg_coefficients(at, weights) for at in (u[None], v))
     at_tip, at_axis = of_tip[..., 1:].sum(axis=-1), of_axis[..., 1:].sum(axis=-1)  # σ, below 0 before the corner
     tip = of_tip[..., 1:] @ np.stack(tip_legs, axis=1)
     top = lever[:, None] + of_axis[..., 1:] @ np.stack(axis_legs, axis=1)

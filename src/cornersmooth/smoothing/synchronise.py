@@ -228,7 +228,6 @@ def synchronisation_report(
     axis_legs: tuple[Floats, Floats],
     lever: Floats,
     weights: Floats,
-    ratio: float,
     axis_length: float,
     u: Floats = REPORT_PARAMETERS,
 ) -> tuple[Floats, Floats, Floats, Floats, Floats]:
@@ -239,9 +238,8 @@ def synchronisation_report(
     there, mm; angles, rad, between the axis of the transition and that of the straight motion before it and after it,
     and between the axis at u = ½ and that at the corner.
     """
-    ratios = np.full(len(lever), ratio)
-    tip_curve = nurbs.five_points(np.zeros_like(lever), *tip_legs, ratios)
-    axis_curve = nurbs.five_points(lever, *axis_legs, ratios)
+    tip_curve = nurbs.five_points(np.zeros_like(lever), *tip_legs)
+    axis_curve = nurbs.five_points(lever, *axis_legs)
     v, residual = matching_parameters(tip_curve, axis_curve, weights, u, axis_length)
     half = len(u) // 2
     tops = nurbs.evaluate(axis_curve, weights, v[:, [0, half, -1]])

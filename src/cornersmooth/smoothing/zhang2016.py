@@ -82,8 +82,7 @@ class Zhang2016(Construction):
         tip, axis = (legs.tip_in, legs.tip_out), (legs.tip_in + legs.turn_in, legs.tip_out + legs.turn_out)
         (tip_sizes, tip_sine), (axis_sizes, axis_sine) = _turn(*tip), _turn(*axis)
         g = len(tip_sine)
-        shape = np.array(settings.weights), settings.ratio
-        factor = 2.0 * float(nurbs.deviation_factor(*shape))  # 2·w1/(3(w1+w2)) in the paper
+        factor = 2.0 * float(nurbs.deviation_factor(np.array(settings.weights)))  # 2·w1/(3(w1+w2)) in the paper
         spare = legs.spare(settings)
         by_tolerance = np.minimum(
             divide(settings.common_tolerance + spare, factor * tip_sine),
@@ -222,16 +221,16 @@ def _measured(
     tip_legs, axis_legs = (
         (trims[k][:, None] * both[0], trims[k + 1][:, None] * both[1]) for k, both in ((0, tips), (2, axes))
     )
-    shape = np.array(settings.weights), settings.ratio
+    weights = np.array(settings.weights)
     u = REPORT_PARAMETERS if settings.weights == (1.0, 1.0) and settings.axis_tolerance is None else _MORE_PARAMETERS
-    v, *report = synchronisation_report(tip_legs, axis_legs, original.lever, *shape, settings.axis_length, u)
+    v, *report = synchronisation_report(tip_legs, axis_legs, original.lever, weights, settings.axis_length, u)
     lines = settings.round_feed_changes
     at = np.broadcast_to(u, v.shape)  # controls run curves at common parameters
     if lines:  # which begin and end where straight motion does, equation (26), and in between are at v
         u, at = np.pad(u, 1, mode="edge"), np.pad(v, ((0, 0), (1, 1)), constant_values=((0, 0), (0.0, 1.0)))
-    motion = motion_of(tip_legs, axis_legs, tuple(trims), original.lever, (u, at), shape)
+    motion = motion_of(tip_legs, axis_legs, tuple(trims), original.lever, (u, at), weights)
     middle = len(u) // 2
-    factor, spare = float(nurbs.deviation_factor(*shape)), legs.spare(settings)[rows]
+    factor, spare = float(nurbs.deviation_factor(weights)), legs.spare(settings)[rows]
     errors = factor * norm(tip_legs[1] - tip_legs[0]), factor * norm(axis_legs[1] - axis_legs[0])
     own, both = bounded(motion, original, errors, settings.axis_length)
     passing = own + (settings.chord if lines else 0.0)
