@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,12 +12,17 @@ from cornersmooth import nc, smoothing
 from cornersmooth.errors import CornersmoothError
 from cornersmooth.feedrate import BlockLimits, Limits, direct, limiting, plan_text
 from cornersmooth.feedrate.linuxcnc import axis_limits, line_times, program_lines
+from cornersmooth.feedrate.machine_axes import follow
+from cornersmooth.feedrate.parts import time_of_parts
+from cornersmooth.feedrate.path import Path, build_path
+from cornersmooth.feedrate.written import text_path
 from cornersmooth.kinematics import Machine, endless, tool_axis, with_dynamics
 from cornersmooth.model import Floats, Ints, Move, Program
 from cornersmooth.nc import Form
 from cornersmooth.pipeline import Progress, read_back, stage_of
+from cornersmooth.processes import useful_processes
 from cornersmooth.report.verdict import Saving
-from cornersmooth.settings import BOUNDS, Settings
+from cornersmooth.settings import BOUNDS, TIMED_POSES, Settings
 
 #: name of the law of LinuxCNC's planner in the tables of controls
 LINUXCNC = "linuxcnc-2.9"
@@ -147,11 +153,39 @@ def planned_saving(
     if not np.isin(program.kind[1:], (Move.LINEAR, Move.ARC)).any():
         return None
     try:
+        text = written_text(program, settings, form)
+        if len(program) > TIMED_POSES and not _linuxcnc(form):
+            return _in_parts(timing, text, program, progress)
         before, against = timing.unsmoothed(program, progress)
-        written, limited = timing.written(written_text(program, settings, form), program, progress)
+        written, limited = timing.written(text, program, progress)
         return Saving(before, written, limited, against)
     except CornersmoothError:
         return None
+
+
+def _in_parts(timing: Timing, text: bytes, program: Program, progress: Progress | None) -> Saving:
+    """What smoothing saves of a long program, from plans of parts of both motions."""
+    limits, settings, machine, count = timing.limits, timing.settings, timing.machine, useful_processes()
+    unsmoothed = build_path(program, None, settings, limits)
+    written = text_path(read_back(text, timing.form, settings), limits, blocks=timing.blocks, settings=settings)
+    before, after = (
+        time_of_parts(part, limits, follow(axes, path), processes=count, progress=stage_of(progress, stage))
+        for path, part, axes, stage in (
+            (unsmoothed, unsmoothed, machine, "planning unsmoothed"),
+            (written, _between(written, program), endless(machine), "planning as written"),
+        )
+    )
+    error = 100.0 * math.hypot(before.error / before.seconds, after.error / after.seconds)
+    against = f"unsmoothed lines, both from plans of parts (within {2.0 * error:.1f} %)"
+    return Saving(before.seconds, after.seconds, after.limiting, against)
+
+
+def _between(path: Path, program: Program) -> Path:
+    """The part of the path of a text from the first to the last pose that the program goes to."""
+    begin, end = _from_to(program, path.program.tip, path.program.axis)
+    if begin < 0:
+        return path
+    return path.part(*np.searchsorted(path.move, [begin, end], side="right").tolist())
 
 
 def written_text(program: Program, settings: Settings, form: Form) -> bytes:

@@ -13,10 +13,12 @@ import pytest
 from cornersmooth.cl import read
 from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.feedrate import Limits, direct, plan, planner
+from cornersmooth.feedrate.grid import make_grid
 from cornersmooth.feedrate.intervals import path_limits
 from cornersmooth.feedrate.machine_axes import MachineAxes, follow
 from cornersmooth.feedrate.motion import poses, shares_at
 from cornersmooth.feedrate.path import Path, build_path
+from cornersmooth.feedrate.resolution import FINER
 from cornersmooth.feedrate.scurve import rest_to_rest
 from cornersmooth.feedrate.timelaw import TimeLaw
 from cornersmooth.kinematics import Dynamics, Machine, load_machine, machine_position, solutions, tool_axis
@@ -338,3 +340,32 @@ def test_a_tip_that_all_but_stands_is_not_divided_without_end() -> None:
     path = build_path(program, None, Settings(), Limits(), stop_everywhere=False)
     intervals = path_limits(path, Limits(), follow(machine, path))
     assert len(intervals.cap) < 200 * len(path)
+
+
+def test_a_slow_corner_is_slow_far_along_the_path() -> None:
+    """Cells there are as short as the last digits of the coordinate: a corner on their border counts for both."""
+    number = np.arange(60)
+    tip = np.stack((4000.0 + 0.3 * number, 0.1 * (number % 2), np.zeros(60)), axis=1)
+    lean = 0.3 + 0.1 * (number % 2)
+    axis = np.stack((np.sin(lean), np.zeros(60), np.cos(lean)), axis=1)
+    tip, axis = np.vstack(([0.0, 0.0, 0.0], tip)), np.vstack((axis[:1], axis))
+    law = direct(Program.from_poses(tip, axis, feed=6000.0), baseline="velocity_jump", machine=load_machine("head-ac"))
+    inner = slice(2, -1)
+    speeds = law.kinematics(law.times_at(law.edge))[1]
+    assert (law.path.junction_speed[inner] < 1.0).all()
+    assert (speeds[inner] <= 1.001 * law.path.junction_speed[inner]).all()
+
+
+def test_the_work_does_not_grow_with_the_distance_from_the_table() -> None:
+    """Where the linear axes leave the path little jerk its cells are long."""
+    number = np.arange(60)
+    turn = 0.05 * number
+    axis = np.stack((0.2 * np.sin(turn), 0.2 * np.cos(turn), np.ones(60)), axis=1)
+    cells = []
+    for far in (0.0, 1000.0, 10_000.0):
+        tip = np.stack((far + number, far + 2.0 * np.sin(0.2 * number), np.zeros(60)), axis=1)
+        program = Program.from_poses(tip, axis, feed=1200.0)
+        path = build_path(program, None, Settings(), Limits())
+        found = path_limits(path, Limits(), follow(load_machine("table-ac"), path))
+        cells.append(len(make_grid(found, np.arange(1), FINER).start))
+    assert cells[2] < 10 * cells[1] < 100 * cells[0], cells

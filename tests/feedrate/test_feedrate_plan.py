@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 
 import numpy as np
 import pytest
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate import Limits, TimeLaw, between, direct, plan, planner
-from cornersmooth.feedrate.grid import Resolution, make_grid
+from cornersmooth.feedrate.grid import make_grid
+from cornersmooth.feedrate.resolution import Resolution
 from cornersmooth.model import Arcs, Move, Program, Statement
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from oracle.share import how_many, share
 
 SPEED, JERK = 1.001, 1.005  # what the acceptance allows
+FINER_CELLS = Resolution(part=0.04, growth=0.03)
 METHODS = ("proportional", "zhang2016")
 
 
@@ -136,7 +137,7 @@ def test_windows_agree_with_the_whole(chain: Callable[[int], Program], monkeypat
 def test_finer_cells_gain_little(chain: Callable[[int], Program], monkeypatch: pytest.MonkeyPatch) -> None:
     smoothed = [smooth(chain(seed), Settings(tolerance=0.02)) for seed in range(6)]
     coarse = [plan(one).total for one in smoothed]
-    monkeypatch.setattr(planner, "make_grid", partial(make_grid, resolution=Resolution(part=0.04, growth=0.03)))
+    monkeypatch.setattr(planner, "make_grid", lambda limits, runs, _: make_grid(limits, runs, FINER_CELLS))
     assert coarse == pytest.approx([plan(one).total for one in smoothed], rel=0.01)
     assert coarse != [plan(one).total for one in smoothed]
 

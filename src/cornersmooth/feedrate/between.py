@@ -23,6 +23,7 @@ from scipy.ndimage import maximum_filter1d
 from cornersmooth.feedrate.grid import Grid
 from cornersmooth.feedrate.interior_point import COLD, GAP, MAX_STEPS, WARM, solve
 from cornersmooth.feedrate.intervals import Intervals
+from cornersmooth.feedrate.resolution import Resolution
 from cornersmooth.feedrate.scurve import stopping_distance
 from cornersmooth.feedrate.speed_problem import CRAWLING, PLACES, Batch, around, problem_of
 from cornersmooth.model import Floats, Ints
@@ -31,20 +32,25 @@ from cornersmooth.model import Floats, Ints
 WINDOW = 50_000
 #: quantities that are held in the first round, and cells around that count when they are chosen
 _HELD, _NEAR = 2, 5
-#: most rounds, and how much stricter than seen limits are made
-_ROUNDS, _STRICTER = 6, 1.003
+#: how much stricter than seen limits are made
+_STRICTER = 1.003
 #: share of the limits that plans keep at all places, and of it that rows keep: the rest is for what lies in between
 _USED = 0.998
-#: share of the limits that one term of a quantity's acceleration or jerk may use of the first profile, and its gap
-_EASE, _ROUGH = 0.5, 0.05
+#: share of the limits that one term of a quantity's acceleration or jerk may use of the first profile
+_EASE = 0.5
 #: Newton steps of one round: most take 15 to 30; where terms are huge and cancel, hundreds gain next to nothing
 _STEPS = 40
 #: cells on either side of one that is planned again at least
 _BESIDE = 8
 
 
-def fastest(grid: Grid, limits: Intervals, progress: Callable[[int, int], None] | None) -> tuple[Batch, Floats]:
-    """The problem of a grid, and coefficients (n,) of the fastest profiles that keep all limits."""
+def fastest(
+    grid: Grid, limits: Intervals, resolution: Resolution, progress: Callable[[int, int], None] | None
+) -> tuple[Batch, Floats]:
+    """The problem of a grid, and coefficients (n,) of the fastest profiles that keep all limits.
+
+    With no rounds they all but keep them.
+    """
     derivatives = limits.derivatives(grid.start, grid.width, PLACES)
     bounds = np.repeat(_USED * limits.quantities.bounds[..., None], len(grid.start), axis=2)
     grid = _from_rest(grid, derivatives, bounds)
@@ -55,9 +61,9 @@ def fastest(grid: Grid, limits: Intervals, progress: Callable[[int, int], None] 
         return batch, _within(c, batch.use(c), grid)
     batch = problem_of(_eased(grid, derivatives, bounds), derivatives[:, :0], bounds[:, :0])
     c = batch.start()
-    solve_runs(batch, grid, c, gap=_ROUGH, most=_STEPS)
+    solve_runs(batch, grid, c, gap=resolution.rough, most=_STEPS)
     most, stricter, first, last = _used(batch, c, grid, derivatives, bounds), np.ones(len(c)), grid.first, grid.last
-    for number in range(_ROUNDS):
+    for number in range(max(resolution.rounds, 1)):
         held = np.argsort(-maximum_filter1d(most, _NEAR, axis=1), axis=0)[: _HELD + number]
         own = (
             np.take_along_axis(part, held[index], axis=1)
@@ -66,8 +72,10 @@ def fastest(grid: Grid, limits: Intervals, progress: Callable[[int, int], None] 
         batch = problem_of(grid, next(own), _USED * next(own)).tightened(stricter)
         cells, part = batch.stretches(first, last)
         of_cells = c[cells]
-        solve_runs(part, grid.of(cells), of_cells, progress, most=_STEPS, begin_with=WARM)
+        solve_runs(part, grid.of(cells), of_cells, progress, gap=resolution.gap, most=_STEPS, begin_with=WARM)
         c[cells] = of_cells
+        if not resolution.rounds:
+            return batch, c
         used = _used(batch, c, grid, derivatives, bounds)
         share = np.maximum(used.max(axis=0), batch.use(c))
         beyond = np.flatnonzero(share > 1.0)

@@ -13,24 +13,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cornersmooth.feedrate.intervals import Intervals
+from cornersmooth.feedrate.resolution import Resolution
 from cornersmooth.model import Bools, Floats, Ints
 
 #: smallest size of a cell over the length of the path: smaller ones would be lost in the digits of the coordinate
 SMALLEST = 1e-12
-
-
-@dataclass(frozen=True)
-class Resolution:
-    """How fine the cells are."""
-
-    part: float = 0.07  #: length of a cell at a change of the speed limit, over v·√(v/J)
-    growth: float = 0.12  #: growth of the cells per length
-    end: float = 0.7  #: length of the cell next to a stop, over the way covered while the jerk is constant there
-    fewest: int = 40  #: cells in a run at least
-
-
-#: where more is limited than the way itself
-FINER = Resolution(part=0.06, growth=0.1)
+#: what a coordinate may be off by rounding, over the length of the path
+_LAST_DIGITS = 16.0 * np.finfo(np.float64).eps
 
 
 @dataclass(frozen=True)
@@ -60,7 +49,7 @@ class Grid:
         return replace(self, start=self.start[cells], width=self.width[cells], cap=self.cap[cells])
 
 
-def make_grid(limits: Intervals, runs: Ints, resolution: Resolution | None = None) -> Grid:
+def make_grid(limits: Intervals, runs: Ints, resolution: Resolution) -> Grid:
     """Cells for the given runs.
 
     Parameters
@@ -68,8 +57,6 @@ def make_grid(limits: Intervals, runs: Ints, resolution: Resolution | None = Non
     runs : (r,) int64
         Which runs, ascending.
     """
-    if resolution is None:
-        resolution = FINER if limits.aligned else Resolution()
     begin, end = limits.edge[limits.run[runs]], limits.edge[limits.run[runs + 1]]
     accel, jerk = limits.accel[runs], limits.jerk[runs]
     # intervals of all runs, and the bound of the one before
@@ -82,6 +69,9 @@ def make_grid(limits: Intervals, runs: Ints, resolution: Resolution | None = Non
     before[leads] = cap[leads]
     half_speed = cap**0.75 / (6.0 * np.sqrt(jerk[run]))
     change = cap != before
+    # a junction, which has no way, has the jerk of what is beside it
+    agile = limits.agile[interval]
+    agile = np.minimum(np.maximum(agile, np.concatenate((agile[:1], agile[:-1]))), jerk[run])
 
     # the cells next to the stops
     front, back = _end_cells(half_speed, run, low, change, begin, end, accel, jerk)
@@ -95,7 +85,7 @@ def make_grid(limits: Intervals, runs: Ints, resolution: Resolution | None = Non
     # knots where the size of the cells is given: where the limit changes, and next to the end cells
     slow = np.sqrt(np.minimum(cap, before))
     inside = np.ones(len(run), np.bool_) if limits.aligned else change
-    size = np.where(change, resolution.part * slow**1.5 / np.sqrt(jerk[run]), np.inf)[inside]
+    size = np.where(change, resolution.part * slow**1.5 / np.sqrt(agile), np.inf)[inside]
     inner = np.clip(low, (begin + front)[run], (end - back)[run])[inside]
     knot = np.concatenate((begin + front, inner, end - back))
     size = np.concatenate((resolution.growth * front, size, resolution.growth * back))
@@ -147,7 +137,8 @@ def _in_cells(limits: Intervals, grid: Grid, runs: Ints) -> Grid:
     """Cells with the lowest limit of all intervals that each meets."""
     owner = runs[grid.run]
     begin, end, stop = limits.run[owner], limits.run[owner + 1], grid.start + grid.width
-    slack = 1e-9 * (stop - grid.start)  # so that a junction on a border counts for both cells
+    # so that a junction on a border counts for both cells: by more than the last digits of the coordinate
+    slack = np.minimum(1e-9 * grid.width + _LAST_DIGITS * limits.edge[-1], grid.width / 4.0)
     low = np.clip(np.searchsorted(limits.edge, grid.start - slack, side="right") - 1, begin, end - 1)
     high = np.clip(np.searchsorted(limits.edge, stop + slack, side="left"), low + 1, end)
     met = np.stack((low, high), axis=1).ravel()

@@ -17,22 +17,18 @@ from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.machine_axes import MachineAxes
 from cornersmooth.feedrate.motion import curvature, taylor_along
 from cornersmooth.feedrate.path import Kind, Path, arc_series
+from cornersmooth.feedrate.resolution import FINER, Resolution
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.vectors import norm
 
-#: intervals of a curve to begin with, and of a line or arc
-INTERVALS, FEW = 4, 2
 #: the cone at the pole in which derivatives are cut off here, over the cone of the machine: smaller, to be safe
 WITHIN = 0.5
 #: a radius of curvature below this is a cusp and is passed with the speed for this radius, mm
 SMALLEST_RADIUS = 1e-6
 #: intervals looked at together
 _TOGETHER = 8192
-#: an interval is halved where the middle of a derivative misses the mean of its ends by more than this part of a limit
-_EVEN = 0.02
-#: and where the part of a limit of speed that is used at one speed varies so much
-_VARIED = 0.05
-#: and where the curvature, which limits the speed there, varies so much, down to intervals of those of curves alone
+#: an interval is halved where the curvature, which limits the speed there, varies so much, down to intervals of those
+#: of curves alone
 _BENT = 0.2
 #: most halvings, and most intervals of one element that are halved: where more are uneven halving does not help, as
 #: where the tip all but stands and its digits are lost (bounds of v² hold over whole intervals, however long they are)
@@ -103,6 +99,7 @@ class Intervals:
     #: (k + 1,): interval i lies between ``edge[i]`` and ``edge[i + 1]``; a junction has an interval without width
     edge: Floats
     cap: Floats  #: (k,): bound of v² in interval i
+    agile: Floats  #: (k,): jerk along the path that quantities let it have at most where it is even; inf for no limit
     element: Ints  #: (k,)
     #: (k,): ends, as `share` in `taylor_along`, and the share of the length before the middle of these
     low: Floats
@@ -142,7 +139,9 @@ class Intervals:
         return self.quantities.at(element, low + share * (high - low))[0]
 
 
-def path_limits(path: Path, limits: Limits, machine_axes: MachineAxes | None = None) -> Intervals:
+def path_limits(
+    path: Path, limits: Limits, machine_axes: MachineAxes | None = None, resolution: Resolution = FINER
+) -> Intervals:
     """Limits of speed, and what else is limited."""
     quantities = Quantities.of(path, limits, machine_axes)
     asked = _curved(path, limits.centripetal_accel) | quantities.counts.any(axis=0)
@@ -152,14 +151,14 @@ def path_limits(path: Path, limits: Limits, machine_axes: MachineAxes | None = N
     arc = np.flatnonzero((path.kind == Kind.ARC) & ~path.turning)
     kappa = curvature(arc_series(path.program, path.move[arc], 0.0))
     fastest[arc] = np.minimum(fastest[arc], limits.centripetal_accel / kappa)
-    parts = _divided(quantities, asked, fastest, limits.centripetal_accel)
-    for element, high, width, cap in (
-        (whole, 1.0, path.length[whole], fastest[whole]),
-        (joined, 0.0, 0.0, path.junction_speed[joined] ** 2),  # the junction before each element
+    parts = _divided(quantities, asked, fastest, limits.centripetal_accel, resolution)
+    for element, high, width, cap, agile in (
+        (whole, 1.0, path.length[whole], fastest[whole], np.inf),
+        (joined, 0.0, 0.0, path.junction_speed[joined] ** 2, 0.0),  # the junction before each element
     ):
-        parts.append(np.stack(np.broadcast_arrays(element, 0.0, high, width, 0.5, cap)))
+        parts.append(np.stack(np.broadcast_arrays(element, 0.0, high, width, 0.5, cap, agile)))
     found = np.concatenate(parts, axis=1)
-    number, low, high, width, middle, cap = found[:, np.lexsort((found[2], found[1], found[0]))]
+    number, low, high, width, middle, cap, agile = found[:, np.lexsort((found[2], found[1], found[0]))]
     element = number.astype(np.int64)
     # the length of an element was measured on other intervals
     width = width * path.length[element] / np.bincount(element, width, len(path))[element]
@@ -170,15 +169,17 @@ def path_limits(path: Path, limits: Limits, machine_axes: MachineAxes | None = N
     kinds = np.array(((limits.accel, limits.jerk), limits.rapid_limits[1:], limits.angular_limits[1:]))
     accel, jerk = kinds[np.where(path.turning[stops[:-1]], 2, path.rapid[stops[:-1]])].T
     run = np.append(first, len(element))[stops]
-    return Intervals(np.maximum.accumulate(edge), cap, element, low, high, middle, run, accel, jerk, quantities)
+    return Intervals(np.maximum.accumulate(edge), cap, agile, element, low, high, middle, run, accel, jerk, quantities)
 
 
-def _divided(quantities: Quantities, asked: Bools, fastest: Floats, centripetal: float) -> list[Floats]:
-    """Intervals of the elements that are asked for: element, low, high, width, middle, cap (6, p) of each."""
+def _divided(
+    quantities: Quantities, asked: Bools, fastest: Floats, centripetal: float, resolution: Resolution
+) -> list[Floats]:
+    """Intervals of the elements that are asked for: element, low, high, width, middle, cap, agile (7, p) of each."""
     path, start = quantities.path, []
     for bent in (False, True):
         element = np.flatnonzero(asked & (path.bent == bent))
-        borders = np.tile(np.linspace(0.0, 1.0, (INTERVALS if bent else FEW) + 1), (len(element), 1))
+        borders = np.tile(np.linspace(0.0, 1.0, (resolution.curve if bent else resolution.line) + 1), (len(element), 1))
         if bent and not len(quantities):
             borders = rational_curves.interval_borders(path.curves.half[path.row[element]])
         start.append((np.repeat(element, borders.shape[1] - 1), borders[:, :-1].ravel(), borders[:, 1:].ravel()))
@@ -190,9 +191,9 @@ def _divided(quantities: Quantities, asked: Bools, fastest: Floats, centripetal:
         for at in range(0, len(element), _TOGETHER):
             some = slice(at, at + _TOGETHER)
             own = element[some], low[some], high[some]
-            width, middle, cap, uneven = _look(quantities, *own, fastest[own[0]], centripetal)
+            *found, uneven = _look(quantities, *own, fastest[own[0]], centripetal, resolution)
             again = uneven & may[some]
-            done.append(np.stack((*own, width, middle, cap))[:, ~again])
+            done.append(np.stack((*own, *found))[:, ~again])
             closer.append([part[again] for part in own])
         if not closer:
             break
@@ -202,9 +203,15 @@ def _divided(quantities: Quantities, asked: Bools, fastest: Floats, centripetal:
 
 
 def _look(
-    quantities: Quantities, element: Ints, low: Floats, high: Floats, fastest: Floats, centripetal: float
-) -> tuple[Floats, Floats, Floats, Bools]:
-    """Width, share before the middle and bound of v² of intervals (p,), and whether a derivative bends in them."""
+    quantities: Quantities,
+    element: Ints,
+    low: Floats,
+    high: Floats,
+    fastest: Floats,
+    centripetal: float,
+    resolution: Resolution,
+) -> tuple[Floats, Floats, Floats, Floats, Bools]:
+    """Width, share before the middle, bound of v², `agile` of intervals (p,); whether a derivative bends in them."""
     path, bounds = quantities.path, quantities.bounds[:, :, None]
     shares = np.stack((low, 0.5 * (low + high), high), axis=1)
     lengths = np.diff(shares, axis=1) * path.length[element][:, None]
@@ -221,16 +228,17 @@ def _look(
     bends = (np.ptp(kappa, axis=1) > _BENT * most) & (cap < fastest) & (high - low > 1.0 / rational_curves.INTERVALS)
     cap = np.minimum(cap, fastest)
     if not len(quantities):
-        return width, middle, cap, np.zeros(len(width), np.bool_)
+        return width, middle, cap, np.full(len(width), np.inf), np.zeros(len(width), np.bool_)
     amounts, power = _largest(derivatives), 2.0 / np.arange(1, 4)[:, None, None]
     with np.errstate(divide="ignore"):
         steady = ((bounds / amounts) ** power).min(axis=1)  # of v², by each order alone
-    uneven = (np.ptp(np.abs(derivatives[0]), axis=-1) * np.sqrt(cap) > _VARIED * bounds[0]).any(axis=0)
+        agile = (bounds[2] / amounts[0]).min(axis=0)
+    uneven = (np.ptp(np.abs(derivatives[0]), axis=-1) * np.sqrt(cap) > resolution.varied * bounds[0]).any(axis=0)
     uneven |= bends & (cap < steady.min(axis=0))
     cap = np.minimum(cap, steady[0])
     off = np.abs(derivatives[..., 1] - derivatives[..., 0] * (1.0 - middle) - derivatives[..., 2] * middle)
     used = off * np.minimum(cap, steady.min(axis=0)) ** (1.0 / power) / bounds
-    return width, middle, cap, uneven | (used > _EVEN).any(axis=(0, 1))
+    return width, middle, cap, agile, uneven | (used > resolution.even).any(axis=(0, 1))
 
 
 def _curved(path: Path, most: float) -> Bools:

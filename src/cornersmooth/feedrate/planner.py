@@ -17,6 +17,7 @@ from cornersmooth.feedrate.intervals import Intervals, path_limits
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.machine_axes import MachineAxes, follow
 from cornersmooth.feedrate.path import Path, build_path
+from cornersmooth.feedrate.resolution import FINER, PLAIN, Resolution
 from cornersmooth.feedrate.speed_problem import around
 from cornersmooth.feedrate.timelaw import TimeLaw, crossing_time
 from cornersmooth.kinematics import Machine
@@ -117,14 +118,24 @@ def plan_path(
     progress: Progress | None = None,
 ) -> TimeLaw:
     """Plan the motion along any path."""
-    machine_axes = None if machine is None else follow(machine, path)
+    return plan_along(path, limits, None if machine is None else follow(machine, path), progress=progress)
+
+
+def plan_along(
+    path: Path,
+    limits: Limits,
+    machine_axes: MachineAxes | None,
+    resolution: Resolution | None = None,
+    progress: Progress | None = None,
+) -> TimeLaw:
+    """Plan the motion along a path, with the axes of a machine that follow it."""
     borders = [0, len(path)] if machine_axes is None else _portions(path)
     phases, junctions, edges = [], [path.junction_speed[:1]], [np.zeros(1)]
     for begin, stop in pairwise(borders):
         own = path.part(begin, stop)
         own_axes = None if machine_axes is None else replace(machine_axes, path=own)
         report = None if progress is None else partial(_report, progress, len(path), begin, stop)
-        own, found = _plan_part(own, limits, own_axes, report)
+        own, found = _plan_part(own, limits, own_axes, resolution, report)
         found[1] = found[1] + edges[-1][-1]
         edges.append(edges[-1][-1] + own.edge[1:])
         phases.append(found)
@@ -163,17 +174,18 @@ def _plan_part(
     path: Path,
     limits: Limits,
     machine_axes: MachineAxes | None,
+    resolution: Resolution | None,
     progress: Progress | None,
 ) -> tuple[Path, list[Floats]]:
     """Plan from a stop to a stop: the path with its speeds at junctions, and phases of the law."""
     if machine_axes is not None:
         path = replace(path, junction_speed=np.minimum(path.junction_speed, machine_axes.jump_speeds(limits.period)))
     path = replace(path, junction_speed=_not_crowded(path, limits.period))
-    found = path_limits(path, limits, machine_axes)
+    found = path_limits(path, limits, machine_axes, resolution or FINER)
     level = found.level
     parts = [_level_runs(found, np.flatnonzero(level))]
     if not level.all():
-        parts.append(_uneven_runs(found, np.flatnonzero(~level), progress))
+        parts.append(_uneven_runs(found, np.flatnonzero(~level), resolution, progress))
     run, *phases = (np.concatenate([part[i] for part in parts]) for i in range(7))
     order = np.argsort(run, kind="stable")
     order = order[phases[0][order] > 0.0]
@@ -205,10 +217,13 @@ def _level_runs(limits: Intervals, runs: Ints) -> tuple[Floats | Ints, ...]:
     )
 
 
-def _uneven_runs(limits: Intervals, runs: Ints, progress: Progress | None) -> tuple[Floats | Ints, ...]:
+def _uneven_runs(
+    limits: Intervals, runs: Ints, resolution: Resolution | None, progress: Progress | None
+) -> tuple[Floats | Ints, ...]:
     """Phases of runs whose speed limit changes on the way: one per cell."""
-    grid = make_grid(limits, runs)
-    batch, c = fastest(grid, limits, progress)
+    resolution = resolution or (FINER if limits.aligned else PLAIN)
+    grid = make_grid(limits, runs, resolution)
+    batch, c = fastest(grid, limits, resolution, progress)
     z, slope, bend = (batch.forms * around(c)).sum(axis=1)
     v, a = np.sqrt(z), 0.5 * slope  # at the start of each cell
     first, last = grid.first, grid.last

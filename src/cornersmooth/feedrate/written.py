@@ -273,11 +273,23 @@ def plan_text(
         Called with (work done, work in all).
     """
     limits = Limits() if limits is None else limits
+    path = text_path(nc, limits, name=name, blocks=blocks, settings=settings)
+    # limits of rotary axes are the text's affair: it may turn them back where the path does not show it
+    return plan_path(path, limits, machine=None if machine is None else endless(machine), progress=progress)
+
+
+def text_path(
+    nc: NcProgram,
+    limits: Limits,
+    *,
+    name: str = "<memory>",
+    blocks: BlockLimits | None = None,
+    settings: Settings | None = None,
+) -> Path:
+    """Give the path of an NC text with what its control makes of blocks; parameters are those of `plan_text`."""
     settings = Settings() if settings is None else settings
     motion = written_motion(nc, name, settings.axis_length)
     path = build_path(motion.program, None, settings, limits, curves=motion.curves)
     inside = motion.within[path.move] & ~path.turning & ~np.concatenate(([True], path.turning[:-1]))
     path = replace(path, junction_speed=np.where(np.append(inside, False), np.inf, path.junction_speed))
-    path = within_blocks(path, limits, BlockLimits() if blocks is None else blocks, motion.blocks)
-    # limits of rotary axes are the text's affair: it may turn them back where the path does not show it
-    return plan_path(path, limits, machine=None if machine is None else endless(machine), progress=progress)
+    return within_blocks(path, limits, BlockLimits() if blocks is None else blocks, motion.blocks)
