@@ -24,6 +24,9 @@ LARGEST: Final = 2 << 30
 _LARGEST_RATIO: Final = 200
 _ALWAYS: Final = 1 << 26
 
+#: bytes that are read at once: Python sets memory aside for all that it is asked for, and Windows takes that from others
+_PIECE: Final = 16 << 20
+
 #: DOS end of file, still written by old posts
 _CTRL_Z: Final = b"\x1a"
 
@@ -75,10 +78,13 @@ def read_bounded(file: _Reader, name: str, *, size_limit: bool = True, most: int
 
     Raises InputError CS199: it holds more than `most` bytes, and there is a limit of size.
     """
-    data = file.read(most + 1 if size_limit else -1)
-    if size_limit and len(data) > most:
+    pieces, size = [], 0
+    while piece := file.read(min(_PIECE, most + 1 - size) if size_limit else _PIECE):
+        pieces.append(piece)
+        size += len(piece)
+    if size_limit and size > most:
         raise error("CS199", name, None, limit=f"{most / 1e6:,.0f} MB")
-    return data
+    return pieces[0] if len(pieces) == 1 else b"".join(pieces)
 
 
 def clean(data: bytes, name: str, *, empty: str = "CS101", binary: str = "CS102") -> bytes:
