@@ -1,4 +1,4 @@
-"""Smooths the samples with the command line and shows what came out: some NC lines and the numbers of the reports.
+"""Smooths the samples with the command line and shows what came out: NC lines, numbers of the reports, time and gain.
 
 python samples/show.py [FOLDER]
 """
@@ -31,11 +31,12 @@ class Job:
     output: str
     options: tuple[str, ...]
     shown: str  #: how the first line to show starts
+    page: bool = False  #: whether a page of it is made
 
 
 JOBS = (
     Job("paper_table1.csv", "paper_table1.nc", ("-e", "0.078", "-f", "g6.2", "--feed", "500"), "G6.2"),
-    Job("impeller.cls", "impeller_nx.nc", ("-e", "0.01", "-H", "12"), "G1 "),
+    Job("impeller.cls", "impeller_nx.nc", ("-e", "0.01", "-H", "12", "--limits", "table-ac"), "G1 ", page=True),
     Job("impeller.aptsource", "impeller_catia.nc", ("-e", "0.01", "-H", "12"), "G1 "),
 )
 
@@ -56,6 +57,8 @@ def smooth(job: Job, folder: Path) -> dict[str, Any]:
     output = Path(os.path.relpath(folder, ROOT)) / job.output
     report = output.with_suffix(".json")
     files = [Path("samples") / job.sample, "-o", output, "--report", report]
+    if job.page:
+        files += ["--report", output.with_suffix(".html")]
     arguments = [*map(str, files), *job.options, "--force"]
     print(f"$ cornersmooth smooth {' '.join(arguments)}", flush=True)
     subprocess.run([*COMMAND, "smooth", *arguments], cwd=ROOT, check=True)
@@ -97,7 +100,20 @@ def main(folder: Path) -> int:
         print(excerpt(job, folder), "    ...", sep="\n", end="\n\n")
     print(table(reports))
     print(f"\nNC files and reports are in {os.path.relpath(folder)}")
+    print(*(gain(job, report, folder) for job, report in zip(JOBS, reports, strict=True) if job.page), sep="\n")
     return 0
+
+
+def gain(job: Job, report: dict[str, Any], folder: Path) -> str:
+    """Time of a sample on the example machine, what it gains, and where its page is."""
+    times = report["times"]
+    before, after = times["unsmoothed_s"], times["written_s"]
+    page = (folder / job.output).with_suffix(".html")
+    return (
+        f"samples/{job.sample} takes {after:.1f} s on the example machine {times['limits']}, "
+        f"unsmoothed {before:.1f} s ({100.0 * (after / before - 1.0):+.0f} %).\n"
+        f"See it in a browser: {os.path.relpath(page)}"
+    )
 
 
 if __name__ == "__main__":

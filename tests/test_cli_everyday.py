@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
+from importlib.resources import files
 from pathlib import Path
 
 import pytest
 
 from oracle.command import BAD_INPUT, DONE, SMALL, USAGE, run
+from oracle.json_schema import faults
 from oracle.messages import one_line
 
 
@@ -46,3 +49,35 @@ def test_the_wrong_kind_of_input_is_named_before_the_output(part: Path, command:
     assert result.returncode == BAD_INPUT
     assert f"'cornersmooth {other}'" in one_line(result.stderr)
     assert out.read_bytes() == b"old"
+
+
+@pytest.mark.parametrize(
+    ("words", "code"),
+    [
+        (("info", "missing.cls", "--json"), "CS100"),
+        (("time", "part.cls", "--limits", "nobody", "--json"), "CS250"),
+        (("info", "part.cls", "--json", "--tolerence", "1"), None),
+    ],
+)
+def test_an_error_is_an_object_too(part: Path, words: tuple[str, ...], code: str | None) -> None:
+    result = run(*words, cwd=part.parent)
+    found = json.loads(result.stdout)
+    schema = json.loads(files("cornersmooth.report").joinpath("error.schema.json").read_text())
+    assert not [*faults(found, schema, schema)]
+    assert (found["exit_code"], found["code"]) == (result.returncode, code)
+    assert found["what"] in one_line(result.stderr)
+
+
+@pytest.mark.parametrize(
+    "words", [("--axis-tolerance", "0"), ("--weights", "0,1"), ("--chord", "9"), ("--reversal-angle", "999")]
+)
+def test_what_is_out_of_bounds_is_named_as_it_is_typed(part: Path, words: tuple[str, ...]) -> None:
+    result = run("smooth", part, *words)
+    assert result.returncode == USAGE
+    assert f"{words[0]} is " in one_line(result.stderr) or f"'{words[0]}'" in one_line(result.stderr)
+
+
+def test_limits_of_a_plan_say_what_they_are_for() -> None:
+    said = " ".join(run("smooth", "--help").stdout.decode().split())
+    for name in ("accel MM/S2", "jerk MM/S3", "centripetal MM/S2", "period TIME"):
+        assert f"--{name} With --feed-from-plan: " in said

@@ -59,6 +59,7 @@ RUN_BY = {
     "python -m nc.run_chains 3000 3252": "test_sweeps_find_nothing",
     "python -m verify.sweep": "test_sweeps_find_nothing",
     "python -m verify.hole_programs 1400000 1402000": "test_sweeps_find_nothing",
+    "python -m smoothing.mutants": "tests/smoothing/test_paper_equations.py",
     "python -m verify.slices": "tests/verify/test_slices.py",
     "python -m verify.word_mutations 2": "tests/verify/test_word_mutations.py",
     "python -m verify.hole_mutations": "test_hole_mutations_are_scored",

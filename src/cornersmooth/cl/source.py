@@ -24,7 +24,7 @@ LARGEST: Final = 2 << 30
 _LARGEST_RATIO: Final = 200
 _ALWAYS: Final = 1 << 26
 
-#: bytes that are read at once: Python sets memory aside for all that it is asked for, and Windows takes that from others
+#: bytes that are read at once: Python sets memory aside for all that it is asked for, which Windows takes from others
 _PIECE: Final = 16 << 20
 
 #: DOS end of file, still written by old posts

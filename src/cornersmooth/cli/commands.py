@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from cornersmooth.cli.command import EXIT_CODES_OF_READERS, EXIT_CODES_OF_WRITERS, new_command
-from cornersmooth.cli.options import CURVES, FEED_OF_ALL, LIMITS, LINES, PLANNED, READING, WRITING
+from cornersmooth.cli.options import CURVES, FEED_OF_ALL, LIMITS, LINES, PLANNED, PLANNED_HELPS, READING, WRITING
 
 SMOOTH = new_command(
     "smooth",
@@ -31,6 +31,7 @@ SMOOTH = new_command(
       cat part.cls | cornersmooth smooth - -e 0.04 > part.nc
     """,
     epilog=f"{EXIT_CODES_OF_WRITERS} With several inputs: that of the worst.",
+    **{name: f"With --feed-from-plan: {text}" for name, text in PLANNED_HELPS.items()},
 )
 
 FILTER = new_command(

@@ -15,8 +15,8 @@ from cornersmooth import __version__
 from cornersmooth.cli import Shutdown
 from cornersmooth.cli.command import write_part
 from cornersmooth.cli.commands import COMMANDS, GROUPS
-from cornersmooth.cli.show import print_message
-from cornersmooth.errors import EXIT_INTERNAL, CornersmoothError, internal_error, message
+from cornersmooth.cli.show import print_message, say_json
+from cornersmooth.errors import EXIT_INTERNAL, CornersmoothError, SettingsError, internal_error, message
 from cornersmooth.output import ClosedPipe, reason
 
 EXIT_INTERRUPTED = 130
@@ -88,14 +88,16 @@ def run(args: list[str] | None, ending: Shutdown) -> int:
     except click.UsageError as wrong:
         where = f"{wrong.ctx.command_path} --help" if wrong.ctx else "cornersmooth --help"
         text = wrong.format_message().rstrip(".")
-        _say(message("error", text, hint="" if "; " in text else f"{where} shows the options"))
-        return 2
+        hint = "" if "; " in text else f"{where} shows the options"
+        _say(message("error", text, hint=hint))
+        what, _, more = text.partition("; ")
+        return _ended(args, 2, SettingsError("", what, hint or more))
     except click.ClickException as wrong:
         _say(message("error", wrong.format_message()))
-        return 2
+        return _ended(args, 2, SettingsError("", wrong.format_message()))
     except CornersmoothError as failure:
         _say(str(failure))
-        return failure.exit_code
+        return _ended(args, failure.exit_code, failure)
     except (ClosedPipe, BrokenPipeError, SystemExit):  # click and rich leave so where a pipe is closed, and else never
         _close_quietly()
         return EXIT_CLOSED_PIPE
@@ -106,6 +108,23 @@ def run(args: list[str] | None, ending: Shutdown) -> int:
             return _unwritten(failure)
         _say(internal_error(failure))
         return EXIT_INTERNAL
+
+
+def _ended(args: list[str] | None, code: int, failure: CornersmoothError) -> int:
+    """Give the error as an object too, where the output was to be one (report/error.schema.json); return the code."""
+    if "--json" in (sys.argv[1:] if args is None else args) and sys.stdout is not None:
+        say_json(
+            {
+                "schema": "cornersmooth-error/1",
+                "exit_code": code,
+                "code": failure.code or None,
+                "what": failure.what,
+                "hint": failure.hint or None,
+                "file": failure.file,
+                "line": failure.line,
+            }
+        )
+    return code
 
 
 def flushed(code: int) -> int:

@@ -367,7 +367,14 @@ class Options:
 
         self.check_axis()
         names = (item.name for item in fields(Settings) if hasattr(self, item.name))
-        return Settings(**{name: getattr(self, name) for name in names})
+        try:
+            return Settings(**{name: getattr(self, name) for name in names})
+        except SettingsError as wrong:  # it names fields
+            words = [
+                FLAGS.get(word, [word])[-1] if number == 0 or "_" in word else word
+                for number, word in enumerate(wrong.what.split(" "))
+            ]
+            raise SettingsError(wrong.code, " ".join(words), wrong.hint) from None
 
     def check_axis(self) -> None:
         """Refuse a length and a tolerance of the axis in one command: the one takes the place of the other."""
@@ -455,3 +462,9 @@ READING = "format dialect units arc_rule operation scale flip_axis between_passe
 WRITING = f"control machine {under('Control', 'Program', 'Holes and planes')}"
 #: the feed of commands that only plan
 FEED_OF_ALL = {"heading": "Limits", "help": "Feed of all feed moves instead of the programmed ones."}
+#: helps of the limits of a plan whose feeds are written
+PLANNED_HELPS = {
+    item.name: str(item.metadata["help"])[:1].lower() + str(item.metadata["help"])[1:]
+    for item in fields(Options)
+    if item.name in PLANNED.split()
+}
