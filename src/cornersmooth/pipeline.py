@@ -93,6 +93,7 @@ class Result:
             command=command,
             loosened=loosened,
             times=planned_times(saving, limits or form.machine),
+            machine=form.machine if form.rotary else None,
         )
 
 

@@ -203,12 +203,13 @@ SETUP = new_command(
 INFO = new_command(
     "info",
     "IN",
-    f"tolerance axis_length {READING} as_json",
+    f"tolerance axis_length machine {READING} as_json",
     """
     Say what the CL file IN holds: dialect, moves, lengths, turns, axis changes, arcs, statements, findings.
 
     IN is an APT/CL file or a table of points; - is standard input. -e and -H do not write anything: they tell how many
-    corners that tolerance would round, and what would limit them.
+    corners that tolerance would round, and what would limit them. --machine tells where its rotary axes accelerate
+    most.
 
     \b
     Examples:

@@ -9,6 +9,7 @@ from cornersmooth.cl import read
 from cornersmooth.cli.options import Options
 from cornersmooth.cli.show import say, say_line, told_finding
 from cornersmooth.report.info import describe
+from cornersmooth.report.rotary_marks import marks_text
 
 
 def run_info(given: Options) -> int:
@@ -26,7 +27,8 @@ def run_info(given: Options) -> int:
         ]
         say(given, told, lines)
         return 0
-    info = describe(read(data, name=name, **given.reading()), given.tolerance, given.axis_length)
+    program = read(data, name=name, **given.reading())
+    info = describe(program, given.tolerance, given.axis_length, given.load_machine())
     rows = [*_file(info), *_motion(info), *_axis(info), *_corners(info)]
     width = max(len(label) for label, _ in rows)
     say(given, info, (f"{label:<{width}}  {text}".rstrip() for label, text in rows), indent=width + 2)
@@ -89,6 +91,8 @@ def _axis(info: Record) -> Rows:
         "pure rotations": axis["rotations"],
         "repetitions": axis["repetitions"],
     }
+    for marks in axis["rotary_marks"]:
+        yield "rotary axis", marks_text(marks)
     if axis["step_deg"]["count"]:
         yield "", _counts({name: count for name, count in kinds.items() if count}) or "every segment moves and turns"
 

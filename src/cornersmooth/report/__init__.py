@@ -9,10 +9,12 @@ import numpy as np
 
 from cornersmooth.errors import Finding
 from cornersmooth.geometry.arcs import arc_radii
+from cornersmooth.kinematics import Machine
 from cornersmooth.model import Floats, Ints, Move, SmoothProgram, Status
 from cornersmooth.report.corners import Column, corner_table, counts_of, worst_corners
 from cornersmooth.report.csv_text import csv_text
 from cornersmooth.report.record import SCHEMA, NcFile, cl_file, findings_table, record, report_json
+from cornersmooth.report.rotary_marks import rotary_marks
 from cornersmooth.report.verdict import judge, sharp_corners
 from cornersmooth.smoothing.construction import construction_of
 from cornersmooth.vectors import dot, norm
@@ -36,6 +38,7 @@ def report(
     command: str = "",
     loosened: str = "",
     times: Mapping[str, Any] | None = None,
+    machine: Machine | None = None,
 ) -> dict[str, Any]:
     """Everything that the JSON report of ``smooth`` says; ``report.schema.json`` describes it.
 
@@ -55,6 +58,8 @@ def report(
         Of the CL file; empty where it is not known.
     command, loosened, times
         As `record` has them.
+    machine : Machine, optional
+        Whose rotary axes accelerate at places that are listed.
     """
     told = (*smoothed.findings, *findings)
     program, corners = smoothed.program, smoothed.corners
@@ -95,6 +100,8 @@ def report(
         times=times,
     )
     contents |= {"summary": summary, "worst": _records(smoothed, worst.rows, dense=dense), "sharp": listed}
+    if marks := rotary_marks(program, machine):
+        contents["rotary_marks"] = marks
     if verification is not None:
         contents["verification"] = verification.to_dict()
     return contents

@@ -12,8 +12,10 @@ import numpy as np
 from cornersmooth.cl.operations import Operation, find_operations
 from cornersmooth.geometry.arcs import arc_radii
 from cornersmooth.geometry.tool import tools_of
+from cornersmooth.kinematics import Machine
 from cornersmooth.model import Bools, Corners, FeedMode, Floats, Move, Program, Status
 from cornersmooth.report.corners import counts_of
+from cornersmooth.report.rotary_marks import rotary_marks
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import axis_step_findings
 from cornersmooth.smoothing.construction import construction_of
@@ -41,8 +43,11 @@ def spread(values: Floats) -> Record:
     return {"count": len(values), **dict(zip(("min", "p5", "p50", "p95", "max"), levels, strict=True))}
 
 
-def describe(program: Program, tolerance: float, axis_length: float) -> Record:
-    """Describe a program and what would limit the rounding of its corners at ε and H, mm; keys carry their unit."""
+def describe(program: Program, tolerance: float, axis_length: float, machine: Machine | None = None) -> Record:
+    """Describe a program and what would limit the rounding of its corners at ε and H, mm; keys carry their unit.
+
+    With a machine, where its rotary axes accelerate most.
+    """
     settings = Settings(tolerance=tolerance, axis_length=axis_length)
     segments = _Segments.of(program)
     operations = find_operations(program)
@@ -58,7 +63,7 @@ def describe(program: Program, tolerance: float, axis_length: float) -> Record:
         "operations": [_operation(program, segments, operation) for operation in operations],
         "tools": _tools(program, operations),
         "motion": _motion(program, segments),
-        "axis": _axis(program, segments),
+        "axis": _axis(program, segments) | {"rotary_marks": rotary_marks(program, machine)},
         "arcs": _arcs(program),
         "corners": _corners(program, settings),
         "findings": [asdict(one) for one in (*program.findings, *axis_step_findings(program, settings))],
