@@ -12,7 +12,7 @@ import pytest
 from cornersmooth.cl import read
 from cornersmooth.errors import InputError
 from cornersmooth.kinematics import load_machine
-from cornersmooth.nc import choose_form
+from cornersmooth.nc import Form, choose_form, parse_control
 from cornersmooth.pipeline import postprocess
 from cornersmooth.settings import Settings
 from cornersmooth.verify import verify
@@ -168,5 +168,26 @@ def test_the_first_tool_that_is_loaded_asks_for_no_stop() -> None:
     stream = io.BytesIO()
     result = postprocess(cl.encode(), stream, Settings(tolerance=0.01), form=choose_form("fanuc"), processes=1)
     assert "M1" not in stream.getvalue().decode().splitlines()
+    assert result.verification is not None
+    assert result.verification.problems == ()
+
+
+@pytest.mark.parametrize(
+    ("control", "staged", "change"), [("fanuc", "T3", "T1 M6"), ("heidenhain", "TOOL DEF 3", "TOOL CALL 1 Z")]
+)
+def test_the_next_tool_is_brought_near_where_the_table_says_so(control: str, staged: str, change: str) -> None:
+    def bare(form: Form, cl: str) -> list[str]:
+        return [re.sub(r"^\d+ ", "", line) for line in lines_of(form, cl)]
+
+    table = parse_control(f'like = "{control}"\n[words]\nstage_tool = true\n')
+    lines = bare(choose_form(table), CL)
+    assert lines[lines.index(change) + 1] == staged
+    assert sum(line == staged for line in lines) == 1  # the last tool has none behind it
+    assert staged not in bare(choose_form(control), CL)
+    selects = CL.replace("COOLNT/ON\n", "COOLNT/ON\nSELECT/TOOL,3\n", 1)
+    assert lines_of(choose_form(table), selects) == lines_of(choose_form(control), selects)
+    result = postprocess(
+        read(CL.encode(), name="part.cls"), io.BytesIO(), Settings(tolerance=0.05), form=choose_form(table)
+    )
     assert result.verification is not None
     assert result.verification.problems == ()

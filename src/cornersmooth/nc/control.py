@@ -93,6 +93,8 @@ class Words:
     #: the first of the tool.
     tool_change: Blocks = ()
     tool_select: Blocks = ()
+    #: whether `tool_select` brings the tool of the next change near after each change, where the CL file says none
+    stage_tool: bool = False
     spindle_speed: Blocks = ()  #: with ``{speed}`` and ``{direction}``, one of the next two
     clockwise: str = "M3"
     counterclockwise: str = "M4"

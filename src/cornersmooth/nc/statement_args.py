@@ -14,6 +14,12 @@ _LONGEST = 86_400_000
 #: cutting speeds in mm per minute
 _MM_PER_MINUTE = {"SMM": 1000.0, "SFM": 12.0 * 25.4}
 
+#: words of SPINDL whose number is no speed
+_LIMITS = ("RANGE", "MAXRPM")
+
+#: words of SPINDL about gears and limits of the speed
+GEARS = frozenset(("RANGE", "MAXRPM", "HIGH", "LOW", "MEDIUM"))
+
 
 def numbers_of(statement: Statement) -> list[float]:
     """Numbers of a statement in order."""
@@ -75,3 +81,19 @@ def revolutions(cutting_speed: float, unit: str, diameter: float) -> float | Non
     if not diameter > 0.0:
         return None
     return cutting_speed * _MM_PER_MINUTE[unit] / (math.pi * diameter)
+
+
+def spindle_args(statement: Statement) -> tuple[list[str], list[float]]:
+    """Words and numbers of SPINDL without gears and limits, which are the control's own affair."""
+    words, numbers = words_of(statement), numbers_of(statement)
+    for word in _LIMITS:
+        if word in words:
+            words = [other for other in words if other not in GEARS]
+            for number in number_after(statement, word):
+                numbers.remove(number)
+    return words, numbers
+
+
+def cutting_unit(words: list[str]) -> str:
+    """Unit of a cutting speed; empty where the number is one of revolutions."""
+    return next((unit for unit in ("SFM", "SMM") if unit in words), "")

@@ -19,10 +19,12 @@ from cornersmooth.nc.messages import Findings, refused
 from cornersmooth.nc.modals import Modals
 from cornersmooth.nc.program_frame import comment_lines
 from cornersmooth.nc.statement_args import (
+    GEARS,
+    cutting_unit,
     milliseconds,
-    number_after,
     numbers_of,
     revolutions,
+    spindle_args,
     spoken_text,
     whole_number,
     words_of,
@@ -31,17 +33,11 @@ from cornersmooth.nc.tools import TOOL_WORDS, ahead_of_tools, loaded_tool
 from cornersmooth.statements.asked import statements_not_understood
 from cornersmooth.text import format_number
 
-#: words of SPINDL whose number is no speed
-_LIMITS = ("RANGE", "MAXRPM")
-
 #: words whose text is for the machinist: comments without the word
 _TEXT_WORDS = frozenset("$$ PPRINT REMARK TPRINT LETTER DISPLY".split())
 
 #: words that say nothing beside what the NC text shows anyway
 _SILENT = frozenset({"END-OF-PATH", "FINI", "REWIND"})
-
-#: words of SPINDL about gears and limits of the speed
-_GEARS = frozenset(("RANGE", "MAXRPM", "HIGH", "LOW", "MEDIUM"))
 
 
 @dataclass
@@ -95,7 +91,7 @@ class StatementWriter:
         """Whether a statement that is understood has words that no block says: gears, lengths, holders."""
         words = set(words_of(statement))
         if statement.word == "SPINDL":
-            return bool(words & _GEARS)
+            return bool(words & GEARS)
         loads = statement.word in TOOL_WORDS and any(isinstance(value, str) for value in statement.args[1:])
         return loads and not words <= {"TOOL", "ADJUST", "OSETNO"}
 
@@ -140,40 +136,53 @@ class StatementWriter:
         return blocks
 
     def _tool_change(self, number: int, statement: Statement) -> list[str]:
-        """Blocks of a tool change; a speed in them is the first that the tool is given, or else what holds."""
-        blocks = self.words.tool_change
-        if not any("{speed}" in block for block in blocks):
-            return [block.format(tool=number) for block in blocks]
-        speed = self._first_speed(statement) or self.modals.speed
-        if not speed:
-            raise refused("CS354", self.program, statement.line, tool=number)
-        return [block.format(tool=number, speed=self._speed_text(speed)) for block in blocks]
+        """Blocks of a tool change; a speed in them is the first that the tool is given, or else what holds.
 
-    def _first_speed(self, load: Statement) -> float | None:
-        """First speed between a tool change and the next one, rev/min."""
+        Where the table says so, the tool of the next change is brought near, if the CL file selects none.
+        """
+        between, following = self._until_next_tool(statement)
+        after, staged = (None if following is None else loaded_tool(following)), self.words.tool_select
+        if not self.words.stage_tool or after is None or after[0] == number or any(s.word == "SELECT" for s in between):
+            staged = ()
+        speed = None
+        if any("{speed}" in block for block in self.words.tool_change):
+            speed = self._first_speed(between) or self.modals.speed
+            if not speed:
+                raise refused("CS354", self.program, statement.line, tool=number)
+        blocks = [block.format(tool=number, speed=self._speed_text(speed or 0.0)) for block in self.words.tool_change]
+        return blocks + [block.format(tool=after[0]) for block in staged if after is not None]
+
+    def _until_next_tool(self, load: Statement) -> tuple[tuple[Statement, ...], Statement | None]:
+        """Statements between a tool change and the next one, and that, if there is one."""
         statements = self.program.statements
-        begin = next(k for k, statement in enumerate(statements) if statement is load)
-        diameter, loading = self._diameter, {"TOOLNO"} if self.toolno_loads else TOOL_WORDS
+        begin = next(k for k, statement in enumerate(statements) if statement is load) + 1
+        loading, own = {"TOOLNO"} if self.toolno_loads else TOOL_WORDS, (None, loaded_tool(load))
+        for k, statement in enumerate(statements[begin:]):
+            if statement.word in loading and loaded_tool(statement) not in own:
+                return statements[begin : begin + k], statement
+        return statements[begin:], None
+
+    def _first_speed(self, between: tuple[Statement, ...]) -> float | None:
+        """First speed that some statements give, rev/min."""
+        diameter = self._diameter
         try:
-            for statement in statements[begin + 1 :]:
+            for statement in between:
                 if statement.word in ("CUTTER", "TLDATA"):
                     self.cutter(statement)
                 elif statement.word == "SPINDL" and (speed := self._speed_of(statement)):
                     return speed
-                elif statement.word in loading and loaded_tool(statement) not in (None, loaded_tool(load)):
-                    return None
             return None
         finally:
             self._diameter = diameter
 
     def _speed_of(self, statement: Statement) -> float | None:
         """Revolutions per minute that SPINDL gives; None for none."""
-        words, numbers = _spindle_args(statement)
+        words, numbers = spindle_args(statement)
         return self._turns(words, numbers[0]) if len(numbers) == 1 and numbers[0] > 0.0 else None
 
     def _turns(self, words: list[str], number: float) -> float | None:
         """Revolutions per minute, or what gives a cutting speed (SFM, SMM); None without the tool's diameter."""
-        unit = _cutting_unit(words)
+        unit = cutting_unit(words)
         speed = revolutions(number, unit, self._diameter) if unit else number
         return speed if speed is None or not unit else float(round(speed))
 
@@ -210,7 +219,7 @@ class StatementWriter:
 
     def spindle(self, statement: Statement) -> list[str] | None:
         """SPINDL in every order of its words."""
-        words, numbers = _spindle_args(statement)
+        words, numbers = spindle_args(statement)
         if not set(words) <= {"RPM", "CLW", "CCLW", "ON", "OFF", "SFM", "SMM", "LOCK", "ORIENT", "NOMORE"}:
             return None
         if "LOCK" in words or "ORIENT" in words:
@@ -226,7 +235,7 @@ class StatementWriter:
         speed = self._turns(words, numbers[0]) if numbers else None
         if numbers and speed is None:
             return None
-        if numbers and (cutting := _cutting_unit(words)):
+        if numbers and (cutting := cutting_unit(words)):
             self.findings.note("CS322", statement.line, unit=cutting)
         if "CLW" in words or "CCLW" in words:
             self._direction = "counterclockwise" if "CCLW" in words else "clockwise"
@@ -359,22 +368,6 @@ class StatementWriter:
         numbers = (format_number(value, decimals, trim=True) for value in numbers_of(statement))
         place = " ".join(letter + number for letter, number in zip("XYZ", numbers, strict=True))
         return self.comment(f"FROM {place}")
-
-
-def _spindle_args(statement: Statement) -> tuple[list[str], list[float]]:
-    """Words and numbers of SPINDL without gears and limits, which are the control's own affair."""
-    words, numbers = words_of(statement), numbers_of(statement)
-    for word in _LIMITS:
-        if word in words:
-            words = [other for other in words if other not in _GEARS]
-            for number in number_after(statement, word):
-                numbers.remove(number)
-    return words, numbers
-
-
-def _cutting_unit(words: list[str]) -> str:
-    """Unit of a cutting speed; empty where the number is one of revolutions."""
-    return next((unit for unit in ("SFM", "SMM") if unit in words), "")
 
 
 Handler = Callable[[StatementWriter, Statement], list[str] | None]
