@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
 from importlib.resources import files
 from pathlib import Path
 
 import pytest
 
-from oracle.command import BAD_INPUT, DONE, SMALL, USAGE, run
+from oracle.command import BAD_INPUT, DONE, SCRIPT, SMALL, USAGE, environment, run
 from oracle.json_schema import faults
 from oracle.messages import one_line
 
@@ -49,6 +51,25 @@ def test_the_wrong_kind_of_input_is_named_before_the_output(part: Path, command:
     assert result.returncode == BAD_INPUT
     assert f"'cornersmooth {other}'" in one_line(result.stderr)
     assert out.read_bytes() == b"old"
+
+
+def test_axis_of_linuxcnc_opens_a_cl_file(part: Path) -> None:
+    """Run the command of docs/linuxcnc.md as AXIS does: by a shell, with the file behind it."""
+    page = (Path(__file__).parents[1] / "docs" / "linuxcnc.md").read_text()
+    command = next(line.split(" = ")[1] for line in page.splitlines() if line.strip().startswith("cls = "))
+    around = environment(AXIS_PROGRESS_BAR="1", PATH=f"{SCRIPT.parent}{os.pathsep}{os.environ['PATH']}")
+
+    def opened() -> subprocess.CompletedProcess[bytes]:
+        return subprocess.run(["sh", "-c", f"{command} '{part}'"], env=around, capture_output=True, check=False)
+
+    result = opened()
+    assert result.returncode == DONE
+    assert result.stdout == run("smooth", part, *command.split()[2:]).stdout
+    assert b"FILTER_PROGRESS=100\n" in result.stderr
+    part.write_bytes(SMALL.replace(b"GOTO/10,10", b"GOTO/10,nan"))
+    result = opened()
+    assert (result.returncode, result.stdout) == (BAD_INPUT, b"")
+    assert b"part.cls:9: error" in result.stderr
 
 
 @pytest.mark.parametrize(

@@ -257,7 +257,7 @@ def test_the_method_and_what_it_could_not_do_are_said_in_one_line(tmp_path: Path
 
 @pytest.mark.parametrize(("options", "said"), [((), False), (("--lines", "dense"), False), (("--lines", "long"), True)])
 def test_long_lines_of_runs_are_warned_of_where_the_control_blends(options: tuple[str, ...], said: bool) -> None:
-    """Measured on LinuxCNC's controller: docs/linuxcnc.md."""
+    """Measured on LinuxCNC's controller: docs/dev/linuxcnc.md."""
     goto = "".join(f"GOTO/{x},{x % 2},0,0,0,1\n" for x in range(8))
     data = f"UNITS/MM\nLOADTL/1\nSPINDL/900,CLW\nFEDRAT/300,MMPM\n{goto}FINI\n".encode()
     words = ("--control", "linuxcnc", "--machine", "xyzac-trt", "--method", "global" if said or options else "auto")

@@ -198,7 +198,7 @@ def postprocess(
     processes : int, optional
         Processes to smooth and to verify with; by default as many as are useful. The result does not depend on it.
     progress : callable, optional
-        Called now and then with the stage, what is done and all there is to do.
+        Called now and then with the stage, what is done and all there is to do; 0 for that where it is not known.
 
     Raises
     ------
@@ -218,6 +218,7 @@ def postprocess(
     if verify and not back["control"]:
         unverified = "nothing was measured: the control is like none whose programs can be read"
     seconds: dict[str, float] = {}
+    _begin(progress, "reading")
     with _timed(seconds, "read"):
         program = (source if isinstance(source, Program) else read(source, **(reading or {}))).with_feed(feed)
     with _timed(seconds, "smooth"):
@@ -262,6 +263,7 @@ def postprocess(
         return_free_memory()
         verification = None
         if verifier is not None:
+            _begin(progress, "verifying")
             with _timed(seconds, "verify"):
                 verification, unverified = _verified(verifier, form, frame)
         findings = (*smoothed.findings, *_remarks(program, smoothed.settings), *written.findings)
@@ -381,6 +383,12 @@ def _verified(verifier: Verifier, form: Form, frame: Frame) -> tuple[Verificatio
             raise
         return None, f"{failure.what}, NC line {failure.line}"
     return found, found.unverified
+
+
+def _begin(progress: Progress | None, stage: str) -> None:
+    """Name a stage of which nobody knows how far it is."""
+    if progress is not None:
+        progress(stage, 0, 0)
 
 
 def stage_of(progress: Progress | None, stage: str) -> Callable[[int, int], None] | None:

@@ -1,4 +1,4 @@
-"""Writes the planned times into the table of docs/linuxcnc.md, beside those that the whole controller took.
+"""Writes the planned times into the table of docs/dev/linuxcnc.md, beside those that the whole controller took.
 
     python tests/nc/planned_column.py FOLDER
 
@@ -23,7 +23,7 @@ from cornersmooth.settings import Settings
 from nc.controller_table import CLOSE, LOOSE, ours, paths, unsmoothed
 from nc.linuxcnc_controller import MACHINE
 
-DOCUMENT = Path(__file__).parents[2] / "docs" / "linuxcnc.md"
+DOCUMENT = Path(__file__).parents[2] / "docs" / "dev" / "linuxcnc.md"
 #: of the linear axes of the controller that the table was made on (`linuxcnc_controller.STATED`)
 ACCELERATION = 1000.0
 #: of a row, with what stands outside

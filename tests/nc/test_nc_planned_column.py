@@ -1,4 +1,4 @@
-"""The times that the whole controller took, of docs/linuxcnc.md, against the planned ones."""
+"""The times that the whole controller took, of docs/dev/linuxcnc.md, against the planned ones."""
 
 from __future__ import annotations
 

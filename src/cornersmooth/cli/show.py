@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import sys
 import textwrap
@@ -50,7 +51,13 @@ def console(stream: TextIO | None = None) -> Console:
 
 @contextmanager
 def progress_bar(quiet: bool, *, rate: bool = False) -> Iterator[Progress | None]:
-    """Progress callback drawing a bar, or None where nobody would see it; `rate` adds pieces a second and time left."""
+    """Progress callback drawing a bar, or None where nobody would see it; `rate` adds pieces a second and time left.
+
+    LinuxCNC's AXIS reads lines in place of a bar (its manual, "G-code filters").
+    """
+    if not quiet and "AXIS_PROGRESS_BAR" in os.environ:
+        yield _progress_of_axis
+        return
     if quiet or not sys.stderr.isatty():
         yield None
         return
@@ -74,11 +81,19 @@ def progress_bar(quiet: bool, *, rate: bool = False) -> Iterator[Progress | None
 
         def advance(stage: str, done: int, total: int) -> None:
             if stage not in tasks:
-                tasks[stage] = bar.add_task(stage, total=total, rate="")
+                for begun in tasks.values():  # a stage that nobody knows the length of ends where the next begins
+                    bar.update(begun, total=bar.tasks[begun].total or 1, completed=bar.tasks[begun].total or 1)
+                tasks[stage] = bar.add_task(stage, total=total or None, rate="")
             took = time.monotonic() - begin
-            bar.update(tasks[stage], completed=done, total=total, rate=f"{done / took:.1f}/s" if took else "")
+            bar.update(tasks[stage], completed=done, total=total or None, rate=f"{done / took:.1f}/s" if took else "")
 
         yield advance
+
+
+def _progress_of_axis(stage: str, done: int, total: int) -> None:
+    """Print how much of a stage is done, as AXIS reads it."""
+    if total:
+        print_line(f"FILTER_PROGRESS={100 * done // total}")
 
 
 def show_findings(source: str, findings: Sequence[dict[str, Any]], verbose: int) -> None:

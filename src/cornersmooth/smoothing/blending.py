@@ -1,7 +1,7 @@
 """How far a control may round the corners of lines by itself so that what it executes keeps ε.
 
 LinuxCNC with G64 P slows down towards the end of a line and starts the next one meanwhile (tp.c, parabolic blends;
-compared with its controller in docs/linuxcnc.md): the line before has b₁·(1 − τ)² left while the next one has gone
+compared with its controller in docs/dev/linuxcnc.md): the line before has b₁·(1 − τ)² left while the next one has gone
 b₂·τ², τ from 0 to 1. b₁ is at most half of its line, and at most 4·P/|Δt| for a difference Δt of the unit tangents of
 the tip. b₂/b₁ is the ratio of the accelerations; b₂ is at most half of its line. P bounds the tip only, the axis point
 is what this module looks after.
