@@ -6,10 +6,12 @@ import csv
 import json
 import re
 import shlex
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from cornersmooth.comparing import Row, Table
 from oracle.command import run
 
 #: a winding cut of a tool that turns, from a rapid
@@ -66,6 +68,7 @@ def test_linuxcnc_by_its_own_law(part: Path) -> None:
     said = done.stdout.decode()
     assert "law of lines: planner linuxcnc-2.9" in said
     assert "unsmoothed lines under G64 P0.01" in said
+    assert re.search(r"^twice the tolerance would (save \d+ %|gain nothing)$", said, re.MULTILINE)
     (marked,) = (line for line in said.splitlines() if line.startswith("* cornersmooth "))
     assert "--lines long" in marked
     assert "--machine xyzac-trt" in marked
@@ -87,3 +90,31 @@ def test_limits_of_axes_are_asked_for(part: Path) -> None:
     done = run("compare", part)
     assert done.returncode == 2
     assert b"--limits" in done.stderr
+
+
+def test_what_gains_nothing_is_left(part: Path) -> None:
+    """A straight cut is as fast unsmoothed."""
+    straight = "".join(f"GOTO/{2.0 * k},0.0,0.0,0.0,0.0,1.0\n" for k in range(5))
+    part.write_text(PART.replace(CUT, straight))
+    given = ("--control", "siemens", "--limits", "table-ac")
+    done = run("compare", part, *given)
+    assert done.returncode == 0, done.stderr
+    assert "\nleave it: no program takes less time than the unsmoothed lines\n" in done.stdout.decode()
+    done = run("smooth", part, *given, "-o", part.with_suffix(".mpf"))
+    assert done.returncode == 0, done.stderr
+    assert "no time is gained, leave the program as it was" in done.stderr.decode()
+
+
+def table(unsmoothed: float, *seconds: float, wider: float) -> Table:
+    row = Row("g1", "vectors", "proportional", "fine", (), "PASSED", 10, 100)
+    rows = tuple(replace(row, seconds=one, saved=unsmoothed - one) for one in seconds)
+    return Table(unsmoothed, "", 1.0, "", rows, replace(row, seconds=wider))
+
+
+def test_gains_are_those_that_a_plan_can_tell() -> None:
+    assert table(10.0, 12.0, 9.0, wider=6.0).gains
+    assert not table(10.0, 12.0, 10.04, wider=9.9).gains
+    assert table(10.0, 12.0, 9.0, wider=6.0).wider_gain == pytest.approx(1.0 / 3.0)
+    assert table(10.0, 12.0, 9.0, wider=8.9).wider_gain == 0.0
+    failed = replace(table(10.0, 9.0, wider=6.0).rows[0], verdict="FAILED")
+    assert replace(table(10.0, 9.0, wider=6.0), wider=failed).wider_gain == 0.0

@@ -19,7 +19,7 @@ from cornersmooth.nc import Control, Form, choose_form
 from cornersmooth.pipeline import postprocess
 from cornersmooth.processes import can_fork, map_in_processes, useful_processes
 from cornersmooth.saving import Timing, without_holes
-from cornersmooth.settings import Settings
+from cornersmooth.settings import BOUNDS, Settings
 from cornersmooth.slices import some_poses
 from cornersmooth.verdict import Verdict
 
@@ -87,6 +87,7 @@ class Table:
     share: float  #: Part of the poses that was looked at
     law: str  #: By which lines are planned
     rows: tuple[Row, ...]
+    wider: Row | None = None  #: The best row with twice the tolerance, where that was asked for
 
     @property
     def best(self) -> int | None:
@@ -98,6 +99,20 @@ class Table:
         equal = (number for number in usable if (self.rows[number].seconds or 0.0) <= EQUAL * least)
         return min(equal, key=lambda number: self.rows[number].bytes)
 
+    @property
+    def gains(self) -> bool:
+        """Whether any program takes less time than the unsmoothed lines, in the digits that are said."""
+        best = None if self.best is None else self.rows[self.best].seconds
+        return best is not None and round(best, 1) < round(self.unsmoothed, 1)
+
+    @property
+    def wider_gain(self) -> float:
+        """Part of the time of the best row that twice the tolerance would save; 0 where no plan can tell."""
+        best, wider = None if self.best is None else self.rows[self.best].seconds, self.wider
+        if not best or wider is None or not wider.usable or wider.seconds is None or best < EQUAL * wider.seconds:
+            return 0.0
+        return 1.0 - wider.seconds / best
+
     def as_dict(self) -> dict[str, Any]:
         """Plain values."""
         rows = [asdict(row) | {"best": number == self.best} for number, row in enumerate(self.rows)]
@@ -107,8 +122,9 @@ class Table:
             "unsmoothed": self.against or "lines of the CL file",
             "share_of_poses": self.share,
             "law": self.law,
+            "gains": self.gains,
             "rows": rows,
-        }
+        } | ({} if self.wider is None else {"twice_tolerance": asdict(self.wider)})
 
 
 def candidates(control: Control, settings: Settings, machine: Machine | None) -> list[Candidate]:
@@ -151,6 +167,7 @@ def compare_programs(
     axes: Machine | None = None,
     blocks: BlockLimits | None = None,
     *,
+    wider: bool = False,
     processes: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Table:
@@ -160,6 +177,8 @@ def compare_programs(
     ----------
     axes : Machine, optional
         Whose limits, in place of those of the machines of the forms.
+    wider : bool
+        Whether the best row is made with twice its tolerance as well.
     processes : int, optional
         As many as are useful by default; the rows do not depend on it.
     progress : callable, optional
@@ -179,7 +198,13 @@ def compare_programs(
         return _row(part, candidate, unsmoothed, axes, blocks)
 
     rows = rows_of(tried, work, processes, progress)
-    return Table(unsmoothed, against, len(part) / max(len(program), 1), law_of_lines(timing), rows)
+    table = Table(unsmoothed, against, len(part) / max(len(program), 1), law_of_lines(timing), rows)
+    if not wider or table.best is None or tried[table.best].settings.tolerance > BOUNDS["tolerance"][1] / 2.0:
+        return table
+    best = tried[table.best]
+    return replace(
+        table, wider=work(replace(best, settings=best.settings.but(tolerance=2.0 * best.settings.tolerance)))
+    )
 
 
 def rows_of(

@@ -46,7 +46,7 @@ def run_compare(given: Options) -> int:
             program = read(data, name=name, **given.reading()).with_feed(given.feed)
             tried = candidates(control, settings, limits if machine is None else machine)
             blocks = BlockLimits(look_ahead=given.look_ahead)
-            table = compare_programs(program, tried, axes, blocks, progress=step)
+            table = compare_programs(program, tried, axes, blocks, wider=bool(given.verbose), progress=step)
     machine_named = given.limits if machine is None else given.machine
     made_by = ("filter", os.path.splitext(source)[1]) if is_program else ("smooth", control.layout.suffix)
     commands = [_command(given, row, machine_named, *made_by) for row in table.rows]
@@ -74,10 +74,17 @@ def _lines(table: Table, commands: list[str], verbose: bool) -> Iterator[str]:
         cells = "  ".join(f"{cell:<{width}}" for cell, width in zip(_cells(row), widths, strict=True))
         verdict = "" if row.usable else f"  {row.verdict}"
         yield f"{'* ' if number == best else '  '}{cells.rstrip()}{verdict}"
+    if not table.gains:
+        yield "leave it: no program takes less time than the unsmoothed lines"
     if best is not None:
         yield f"* {commands[best]}"
         if told := limits_text(table.rows[best].limits):
             yield f"  {told.removeprefix('; ')}"
+    if table.wider is not None:
+        gain = table.wider_gain
+        yield (
+            f"twice the tolerance would save {100.0 * gain:.0f} %" if gain else "twice the tolerance would gain nothing"
+        )
 
 
 def _words(row: Row) -> str:

@@ -59,6 +59,11 @@ class Saving:
     limits: tuple[tuple[str, float], ...] = ()
     against: str = ""  #: what the program as it was is, where that is not the path of the CL file
 
+    @property
+    def gains(self) -> bool:
+        """Whether the program as it is written takes less time, in the digits that are said."""
+        return round(self.written, 1) < round(self.direct, 1)
+
 
 @dataclass(frozen=True)
 class Judgement:
@@ -161,9 +166,9 @@ def time_text(saving: Saving, limits: str | None) -> str:
     share = f" ({100.0 * (saving.written / saving.direct - 1.0):+.0f} %)" if saving.direct else ""
     against = f" of {saving.against}" if saving.against else ""
     where = f" on {limits}" if limits else ""
-    return f"time{where} {saving.written:.1f} s instead of {saving.direct:.1f} s{against}{share}" + limits_text(
-        saving.limits
-    )
+    told = "" if saving.gains else "; no time is gained, leave the program as it was"
+    text = f"time{where} {saving.written:.1f} s instead of {saving.direct:.1f} s{against}{share}{told}"
+    return text + limits_text(saving.limits)
 
 
 def method_text(summary: Mapping[str, Any]) -> str:
