@@ -149,25 +149,6 @@ class Splines:
         """(m, 4, d) Bézier points of the parts low..high of spans, from control points (controls, d)."""
         return self.bernstein(span, low, high) @ control[self.taps(span)]
 
-    def hulls(self, control: Floats, span: Ints) -> Floats:
-        """(4, m, d) Bézier points of whole spans, from control points (controls, d): knots inserted one by one."""
-        k, point = self.around(span).T[..., None], control[self.taps(span).T]
-        low, high = k[2], k[3]
-
-        def between(one: Floats, other: Floats, begin: Floats, end: Floats, at: Floats) -> Floats:
-            return one + (at - begin) / (end - begin) * (other - one)
-
-        second, third = (between(point[1], point[2], k[1], k[4], at) for at in (low, high))
-        first = between(between(point[0], point[1], k[0], high, low), second, k[1], high, low)
-        last = between(third, between(point[2], point[3], low, k[5], high), low, k[4], high)
-        return np.stack((first, second, third, last))
-
-    def on_knots(self, finer: Splines, control: Floats) -> Floats:
-        """Control points (c, d) of the same curves on knots that contain these: knot insertion by blossoms."""
-        run, place = spread(finer.count + 2)
-        local = np.clip(place - 1, 0, finer.count[run] - 2)  # a span that the control point belongs to
-        return self.blossom(self.span_at(run, finer.knot[finer.first[run] + local]), finer.inner_knots, control)
-
     def blossom(self, span: Ints, arguments: Floats, control: Floats) -> Floats:
         """(m, d) blossoms of the spans' cubics at three arguments (m, 3) each, from control points (controls, d)."""
         k = self.around(span)
