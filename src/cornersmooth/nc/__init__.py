@@ -198,13 +198,11 @@ def write(
         )
         for rows, ticks in chunks if len(program) < _MANY else _one_ahead(chunks):
             script.run(rows, ticks)
-            for lines in script.take():
-                text.write(lines)
+            script.hand_on(text)
             if progress is not None and len(rows.move):
                 progress(int(rows.move[-1]) + 1, len(program))
         script.finish()
-        for lines in script.take():
-            text.write(lines)
+        script.hand_on(text)
     findings.add_all(of_rows.all())
     return Written(blocks.written, findings.all())
 

@@ -47,7 +47,7 @@ class Motion:
     last: Ints | None = None  #: what was written last, before a tool change too
     last_at: Coordinates | None = None  #: and in which coordinates
     warnings: MotionWarnings = field(init=False)
-    text: list[bytes] = field(default_factory=list)  #: that is not taken yet
+    text: list[bytes] = field(default_factory=list)  #: that is not handed on yet
     repeated: int = 0  #: rows that move nothing
     return_to: int = NOWHERE  #: first pose after a tool change, until it is reached
     _begun: int = -1  #: last move after a hole or a FROM that has been begun

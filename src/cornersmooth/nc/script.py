@@ -16,6 +16,7 @@ from cornersmooth.nc.coordinates import Coordinates
 from cornersmooth.nc.holes import Holes
 from cornersmooth.nc.motion import Motion
 from cornersmooth.nc.planes import Planes
+from cornersmooth.nc.program_frame import Stream
 from cornersmooth.nc.statement_args import with_starts
 from cornersmooth.nc.statement_writer import StatementWriter
 from cornersmooth.slices import some_rows
@@ -41,10 +42,11 @@ class Script:
     def __post_init__(self) -> None:
         self._in_order = with_starts(self.motion.program)
 
-    def take(self) -> list[bytes]:
-        """Text that was written since it was taken last."""
-        text, self.motion.text = self.motion.text, []
-        return text
+    def hand_on(self, stream: Stream) -> None:
+        """Write to a stream what was written since it was handed on last."""
+        text, self.motion.text = self.motion.text[::-1], []
+        while text:  # what is written is held no longer
+            stream.write(text.pop())
 
     def run(self, rows: Rows, ticks: Ints) -> None:
         """Write a block of rows, with their numbers in ticks, and the statements before and between them."""
