@@ -141,7 +141,7 @@ def test_summaries_have_a_row_for_each_file(tree: Path, tmp_path: Path) -> None:
     out, text, table = tmp_path / "nc", tmp_path / "s.json", tmp_path / "s.csv"
     lines(tree, "-d", out, "--summary", text, code=BAD_INPUT)
     found = json.loads(text.read_text())
-    none = dict.fromkeys(("INCOMPLETE", "NOT VERIFIED", "FAILED", "skipped", "not done"), 0)
+    none = dict.fromkeys(("INCOMPLETE", "NOT VERIFIED", "NOT SMOOTHED", "FAILED", "skipped", "not done"), 0)
     assert found["counts"] == {"PASSED": 3, "error": 1} | none
     failed, first = found["files"][:2]
     assert (failed["status"], failed["exit_code"], failed["corners"]) == ("error", BAD_INPUT, None)

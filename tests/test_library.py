@@ -130,8 +130,6 @@ def test_points_on_the_smoothed_path():
     np.testing.assert_array_equal(points.kind, program.kind[points.pose])
     assert (np.diff(points.pose) >= 0).all()
     np.testing.assert_allclose(points.tip[-1], program.tip[-1])
-    none = cornersmooth.from_poses(np.zeros((0, 3)), np.zeros((0, 3)))
-    assert len(cornersmooth.sample(cornersmooth.smooth(none))) == 0
 
 
 def test_one_call_does_what_the_command_does(tmp_path, capsys):
@@ -143,7 +141,7 @@ def test_one_call_does_what_the_command_does(tmp_path, capsys):
         SAMPLE, ours, Settings(tolerance=0.02), form=form, progress=lambda stage, done, total: stages.add(stage)
     )
     assert ours.read_bytes() == out.read_bytes()
-    assert stages == {"smoothing", "writing"}
+    assert stages == {"reading", "smoothing", "writing", "verifying"}
     assert set(result.seconds) == {"read", "smooth", "write", "verify"}
     assert (result.path, result.unverified) == (str(ours), "")
     assert result.report()["verification"]["passed"]
@@ -234,3 +232,22 @@ def test_a_module_can_be_run():
         [sys.executable, "-m", "cornersmooth", "--version"], capture_output=True, text=True, check=True
     )
     assert done.stdout.startswith("cornersmooth")
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda: Settings(tolerance="0.01"),
+        lambda: Settings(weights=("a", 1.0)),
+        lambda: cornersmooth.from_poses([[0, 0, 0], [1, 0, 0]], [[0, 0, 1]]),
+        lambda: cornersmooth.from_poses([[0, 0]], [[0, 0, 1]]),
+        lambda: cornersmooth.from_poses([["a", 0, 0]], [[0, 0, 1]]),
+        lambda: cornersmooth.from_poses([], []),
+        lambda: cornersmooth.from_poses([[0, 0, 0]], [[0, 0, 1]], feed=[1.0, 2.0]),
+        lambda: cornersmooth.smooth(np.zeros((3, 6)), Settings()),
+    ],
+)
+def test_wrong_types_and_lengths_are_errors_of_the_library(call):
+    with pytest.raises(CornersmoothError) as caught:
+        call()
+    assert caught.value.hint

@@ -183,13 +183,14 @@ class Program:
         Raises
         ------
         InputError
-            CS167: a number that is not finite, an axis of length zero, or a feed that is not positive.
-        ValueError
-            Arrays whose shapes do not fit.
+            CS167: arrays of no poses, or that do not have a row of three numbers for each; a number that is not
+            finite, an axis of length zero, or a feed that is not positive.
         """
-        tip = np.array(tip, dtype=np.float64).reshape(-1, 3)
-        axis = np.array(axis, dtype=np.float64).reshape(-1, 3)
+        tip, axis = _rows_of_three("tip", tip), _rows_of_three("axis", axis)
         n = len(tip)
+        if len(axis) != n or np.shape(feed) not in ((), (n,)):
+            lengths = f"there are {n} tips, {len(axis)} axes and {np.size(feed)} feeds"
+            raise InputError("CS167", lengths, "give as many of each, or one feed for all")
         feed = np.broadcast_to(np.asarray(feed, np.float64), (n,)).copy()
         _refuse(~np.isfinite(tip).all(axis=1), "tip", tip, "give finite numbers, in mm")
         largest = np.abs(axis).max(axis=1, initial=0.0)
@@ -259,6 +260,17 @@ class Program:
         first = np.flatnonzero(linear & ~np.concatenate(([False], inner[:-1]))) - 1
         last = np.flatnonzero(linear & ~inner)
         return np.stack((first, last), axis=1).astype(np.int64)
+
+
+def _rows_of_three(what: str, values: Any) -> Floats:
+    """Array (n, 3) of what a user gives."""
+    try:
+        array = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        array = np.empty(0)
+    if array.size == 0 or array.shape[-1] != 3:
+        raise InputError("CS167", f"{what} has the shape {array.shape}", "give one row of three numbers for each pose")
+    return array.reshape(-1, 3)
 
 
 def _refuse(wrong: Bools | np.bool_, what: str, values: Floats, hint: str) -> None:

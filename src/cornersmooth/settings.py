@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, fields, replace
+from numbers import Real
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -83,6 +84,11 @@ class Settings:
         if self.method != AUTO and not self._allows(self.method):
             names = " and ".join(METHODS[self.method].prescribed)
             raise SettingsError("CS207", f"the method {self.method} has its own {names}", f"leave out {names}")
+        for name in BOUNDS:
+            value = getattr(self, name)
+            for number in value if isinstance(value, tuple) else (value,):
+                if not (number is None or isinstance(number, Real)) or isinstance(number, bool):
+                    raise SettingsError("CS202", f"{name} is {number!r}", "give a number")
         object.__setattr__(self, "weights", tuple(round(float(w), WEIGHT_DECIMALS) for w in self.weights))
         for name, (low, high) in BOUNDS.items():
             value = getattr(self, name)

@@ -187,7 +187,7 @@ SETUP = new_command(
     \b
     Examples:
       cornersmooth setup part.cls --limits mill.toml
-      cornersmooth setup part.cls --limits mill.toml --control siemens -f bspline
+      cornersmooth setup part.cls --limits mill.toml --control siemens
       cornersmooth setup part.cls --limits table-ac --tilt 20 --json
     """,
     epilog=EXIT_CODES_OF_READERS,
