@@ -12,6 +12,7 @@ import pytest
 import cornersmooth as cs
 from cornersmooth.control.listing import listing
 from cornersmooth.control.program import Act, Text
+from cornersmooth.control.rows import Rows
 from cornersmooth.control.state import State
 from cornersmooth.control.table import UNKNOWN, Row, table_of
 from cornersmooth.control.unread import execute
@@ -156,6 +157,44 @@ def test_modal_words_that_keep_their_letters() -> None:
     assert after("linuxcnc", "G64 P0.03 Q0.01", "G4 P1.5").rounding == "G64 P0.03 Q0.01"
     assert after("haas", "G154 P2", "X5.", "G154 P2").place["X"] == 5.0
     assert math.isnan(after("haas", "G154 P2", "X5.", "G154 P3").place["X"])
+
+
+def smoothed_frames(control: str, *lines: str) -> tuple[str, ...] | None:
+    """Frames at the end of a program."""
+    stream = ProgramReader(control, None).stream(Text.of("".join(f"{line}\n" for line in lines).encode()))
+    return [item.after(1) if isinstance(item, Rows) else item.after for item in stream][-1].frames
+
+
+@pytest.mark.parametrize(
+    ("control", "lines", "frames"),
+    [
+        # a call leaves off what the program names nowhere
+        ("fanuc", ["M98 P5", "X1."], ()),
+        ("fanuc", ["IF [#1 EQ 1] GOTO 5", "X1."], ()),
+        ("fanuc", ["M98 P5", "X1.", "G69"], ()),
+        ("fanuc", ["M98 P5", "G0 X1.", "G50"], ()),
+        ("fanuc", ["G68 R30.", "G69", "M98 P5"], None),
+        ("fanuc", ["G68 R30.", "M98 P5"], None),
+        ("fanuc", ["G54.2 P1"], ("G54.2",)),
+        ("fanuc", ["G54.2 P1", "G54.2 P0"], ()),
+        ("fanuc", ["M98 P5", "G1 X1. (G 068 IS ON)"], None),
+        ("fanuc", ["M98 P5", "G69", "M98 P6"], None),
+        # a word that is in no table may be a frame itself
+        ("fanuc", ["G7.1 C10.", "X1."], None),
+        ("haas", ["G101 X0.", "X1."], None),
+        ("fanuc", ["G#1 X1."], None),
+        ("siemens", ["TRACYL(40)", "X1"], None),
+        ("siemens", ["MCALL CYCLE81(1,2)", "X1"], None),
+        ("siemens", ["L100", "X1"], ()),
+        ("siemens", ["TOROT", "TOROTOF"], ()),
+        ("heidenhain", ["CALL LBL 5", "L X+1"], ()),
+        ("heidenhain", ["CALL LBL 5", "PLANE RESET STAY"], ()),
+        ("heidenhain", ["PLANE RESET STAY", "CALL LBL 5"], None),
+        ("heidenhain", ["WHO KNOWS", "L X+1"], None),
+    ],
+)
+def test_frames_that_are_known(control: str, lines: list[str], frames: tuple[str, ...] | None) -> None:
+    assert smoothed_frames(control, *lines) == frames
 
 
 def test_a_skipped_block_leaves_what_both_ways_have() -> None:

@@ -13,6 +13,7 @@ from typing import Final
 from cornersmooth.control.program import Act, Stream
 from cornersmooth.control.rows import Rows
 from cornersmooth.control.state import State
+from cornersmooth.control.table import FRAME
 
 #: columns of a block
 _WIDE: Final = 40
@@ -45,9 +46,8 @@ def _motion(rows: Rows, row: int) -> Iterator[str]:
 
 def _changes(before: State, after: State) -> Iterator[str]:
     """What a block has changed."""
-    lost = [name for name, value in after.groups.items() if value is None]
-    if len(lost) == len(after.groups):
-        yield "all unknown"
+    if {value for name, value in after.groups.items() if not name.startswith(FRAME)} == {None}:
+        yield "all unknown" if after.frames is None else "all unknown but frames"
         return
     for name, value in after.groups.items():
         if value != before.groups[name]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from cornersmooth.control.rows import Rows, execute_rows
 from cornersmooth.control.state import State
+from cornersmooth.control.table import FRAME
 from cornersmooth.control.unread import execute
 from cornersmooth.model import Bools, Ints
 from cornersmooth.nc_reader.block_tables import CHUNK
@@ -80,13 +81,18 @@ class Stream:
     """
 
     def __init__(self, text: Text, lexer: Lexer, state: State, *, weak_feed: bool = False) -> None:
-        self.text, self._lexer, self._state, self._weak_feed = text, lexer, state, weak_feed
+        self.text, self._lexer, self._weak_feed = text, lexer, weak_feed
         self._chunks = list(self._read())
         #: lines that are no plain motion blocks, with their numbers from 0
         self.others = [
             (first + k, lines.line(k)) for first, lines, bulk in self._chunks for k in np.flatnonzero(~bulk).tolist()
         ]
         self._targets = _targets(text, [line for _, line in self.others])
+        lines = b"\n".join(line for _, line in self.others).decode("latin-1").upper()
+        named = {group for group, words in state.table.frame_words.items() if words.search(lines)}
+        self._state = replace(
+            state, unnamed=frozenset(group for group in state.groups if group.startswith(FRAME)) - named
+        )
 
     def __iter__(self) -> Iterator[Rows | Act]:
         """Execute the program; each item has the state before it, and after it. Nothing changes them any more."""

@@ -52,6 +52,8 @@ class State:
     place: dict[str, float] = field(default_factory=dict)
     feed: float = math.nan  #: as written
     said: frozenset[str] = frozenset()  #: groups that words of the program have set, whatever became of them
+    #: frames that no word of the program names: what it calls leaves them off, for nothing would end them
+    unnamed: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         if not self.groups:
@@ -66,7 +68,7 @@ class State:
 
     def copy(self) -> State:
         """Return the same state, to be changed on its own."""
-        return State(self.table, self.axes, dict(self.groups), dict(self.place), self.feed, self.said)
+        return State(self.table, self.axes, dict(self.groups), dict(self.place), self.feed, self.said, self.unnamed)
 
     @property
     def unit(self) -> float:
@@ -90,10 +92,12 @@ class State:
         """Take the places of some axes, or of all, as unknown."""
         self.place |= dict.fromkeys(set(self.axes if letters is None else letters) & self.place.keys(), math.nan)
 
-    def lose_all(self) -> None:
-        """Take all as unknown."""
+    def lose_all(self, *, frames: bool = False) -> None:
+        """Take all as unknown; frames that the program does not name only if it is so wanted."""
         self.lose_place()
-        self.groups, self.feed = dict.fromkeys(self.groups), math.nan
+        self.unnamed = frozenset() if frames else self.unnamed
+        self.groups = {name: value if name in self.unnamed else None for name, value in self.groups.items()}
+        self.feed = math.nan
 
     def or_not(self, other: State) -> None:
         """Take as unknown what another state, which may hold instead, has not the same."""
@@ -122,8 +126,8 @@ class State:
         beside = self.table.arguments.get(self.groups["motion"] or "", frozenset[str]())
         beside = beside.union(*(row.beside for row in rows))
         does |= {effect for name, row in zip(named, rows, strict=True) if name not in beside for effect in row.does}
-        if "anything" in does:
-            self.lose_all()
+        if does & {"anything", "unknown"}:
+            self.lose_all(frames="unknown" in does)
             return False
         if "dwell" in does:
             return False

@@ -8,7 +8,7 @@ WORDS
     Words with `` | `` between them, as the control's lexer names them: ``G1``, ``M6``, ``T``, ``TRAORI``, a whole block
     of Klartext. ``PLANE *`` stands for all that begin so, ``/.../`` for all that a regular expression matches. Words
     that are named themselves come first, then rows in order. ``ROT alone`` is a word that has no other beside it,
-    ``G10 R`` one that has that letter.
+    ``G10 R`` one that has that letter, ``G54.2 P0`` that word.
 EFFECTS
     ``GROUP=VALUE`` sets a modal group. The value ``.`` is the word itself, ``?`` is not known. All others: `LOSES`.
 LETTERS
@@ -23,9 +23,10 @@ What a change of a group does beside is the same for all controls, and is in `st
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import cache, cached_property, lru_cache
+from itertools import chain
 from typing import Final
 
 from cornersmooth.nc_reader.word_tables import means_of, word_table
@@ -53,7 +54,8 @@ LOSES: Final[Mapping[str, str]] = {
     "place": "the machine may be anywhere; places of the block are not those of the part",
     "machine": "the axes of the block go to places of the machine, all axes where it names none",
     "tool": "as `place`, and whether tip control is still on",
-    "anything": "all",
+    "anything": "all, but for frames that the program does not name: jumps and calls leave these as they are",
+    "unknown": "all",
 }
 
 #: what a word of `[means]` does by its kind, where it is not the group of the kind
@@ -98,7 +100,7 @@ def _is_value(group: str, value: str) -> bool:
 
 
 #: what a word without a row does
-UNKNOWN: Final = Row(does=frozenset(("anything",)))
+UNKNOWN: Final = Row(does=frozenset(("unknown",)))
 
 
 @dataclass(frozen=True)
@@ -112,9 +114,14 @@ class Table:
     #: letters that belong to a motion while it holds
     arguments: Mapping[str, frozenset[str]]
 
-    def row(self, name: str, letters: Collection[str] = (), *, alone: bool = False) -> Row:
-        """What a word does in a block with some letters; `alone` where it has no other word."""
-        for key in (f"{name} alone",) * alone + tuple(f"{name} {letter}" for letter in letters):
+    def row(self, name: str, beside: Mapping[str, float] | None = None, *, alone: bool = False) -> Row:
+        """What a word does in a block with some letters and their numbers; `alone` where it has no other word."""
+        numbers = (beside or {}).items()
+        others = (
+            (f"{name} {letter}{value:g}" for letter, value in numbers),
+            (f"{name} {letter}" for letter, _ in numbers),
+        )
+        for key in chain((f"{name} alone",) * alone, *others) if name in self._with_others else ():
             if key in self.named:
                 return Row.of(name, self.named[key])
         if name in self.named:
@@ -122,6 +129,28 @@ class Table:
         found = (text for pattern, text in self.patterns if pattern.fullmatch(name))
         text = next(found, None)
         return UNKNOWN if text is None else Row.of(name, text)
+
+    @cached_property
+    def _with_others(self) -> frozenset[str]:
+        """Words that rows name beside others."""
+        return frozenset(name.split(" ")[0] for name in self.named if " " in name)
+
+    @cached_property
+    def frame_words(self) -> Mapping[str, re.Pattern[str]]:
+        """What stands in each line that names a frame, in capitals, by its group."""
+        parts: dict[str, list[str]] = {}
+        rows = [(_sign(name.split(" ")[0].removesuffix("()")), text) for name, text in self.named.items()]
+        for sign, text in (*rows, *((pattern.pattern, text) for pattern, text in self.patterns)):
+            for group, _ in Row.of("", text).sets:
+                if group.startswith(FRAME):
+                    parts.setdefault(group, []).append(sign)
+        return {group: re.compile("|".join(signs)) for group, signs in parts.items()}
+
+
+def _sign(name: str) -> str:
+    """Pattern of a word in a line, however it is spelt."""
+    number = re.fullmatch(r"([GM])([\d.]+)", name)
+    return rf"{number[1]}[ \t]*0*{re.escape(number[2])}(?![\d.]*[1-9])" if number else re.escape(name)
 
 
 @cache

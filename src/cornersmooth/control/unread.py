@@ -22,6 +22,8 @@ _WORKED_OUT: Final = re.compile(
 )
 #: words that change no group, whatever their number
 _NUMBERS: Final = frozenset("XYZABCFSQRP")
+#: jumps, loops and labels, which are no words
+_FLOW: Final = re.compile(r"(IF|ELSE|WHILE|DO|END|GOTO|FOR|LOOP|REPEAT|UNTIL|CASE|O\s*[\d<])|[A-Z_]\w*:")
 _HEAD: Final = re.compile(r"/?\d?\s*(N?\d+\s+|N\d+)?\s*")
 _KLARTEXT_PATH: Final = re.compile(r"LN? ")
 _KLARTEXT_WORDS: Final = re.compile(r"\b(?:M\d+|R[0LR])\b")
@@ -54,7 +56,7 @@ def _execute(state: State, plain: str, lexer: Lexer) -> str:
         state.groups["motion"], state.feed = None, math.nan
         return "words that are not known"
     if line is None or {"G", "M"} & lost or (line.words and line.words[0].name == "block"):
-        state.lose_all()
+        state.lose_all(frames=not _FLOW.match(plain))
         return ""
     state.execute(line)
     state.lose_place(None if lost - _NUMBERS - {*state.axes} else lost)
