@@ -60,9 +60,9 @@ def test_a_path_that_ends_where_its_from_is():
     assert found.written == pytest.approx(found.direct, abs=0.05)
 
 
-@pytest.mark.parametrize(("control", "name"), [("siemens", None), ("heidenhain", None), ("fanuc", "g6.2")])
-def test_every_control(program, control, name):
-    form = choose_form(control, name, machine=MACHINE)
+@pytest.mark.parametrize("control", ["siemens", "heidenhain", "fanuc"])
+def test_every_control(program, control):
+    form = choose_form(control, machine=MACHINE)
     found = planned_saving(program, fitted(form), form, Limits())
     assert 0.0 < found.written < found.direct
 

@@ -71,14 +71,14 @@ def test_what_is_beyond_the_travel_is_said_with_its_line():
     check_travel(load_machine("table-ac"), 1e6 * tip, angles, np.array([7, 8, 9]))
 
 
-@pytest.mark.parametrize(("form", "tcp"), [("g1", True), ("g1", False), ("g6.2", True)])
-def test_travel_is_checked_with_and_without_tip_control(form, tcp):
+@pytest.mark.parametrize("tcp", [True, False])
+def test_travel_is_checked_with_and_without_tip_control(tcp):
     machine = load_machine(SAMPLES / "trunnion-ac.toml")
     x = np.arange(0.0, 30.0, 2.0)
     lean = np.radians(1.0 * np.arange(len(x)))
     axis = np.stack((0 * x, -np.sin(lean), np.cos(lean)), axis=1)
     tip = np.stack((x, np.where(np.arange(len(x)) % 2, 1.0, 0.0), 0 * x), axis=1)
-    form = choose_form("fanuc", form, machine=machine, tcp=tcp)
+    form = choose_form("fanuc", machine=machine, tcp=tcp)
     inside = Program.from_poses(tip, axis, feed=1000.0)
     assert postprocess(inside, io.BytesIO(), Settings(), form=form).verification.passed
     beyond = Program.from_poses(tip + [300.0, 0.0, 0.0], axis, feed=1000.0, line=np.arange(101, 101 + len(x)))
