@@ -60,13 +60,16 @@ def is_drilled(holes: list[Hole], i: int, group: list[Element], before: Element)
         return False
     if i and holes[i - 1][0] != x and not entered and heights[0] < RETRACT + min(holes[i - 1][1] - z, 0.0):
         return False
+    fed = next(k for k, (code, *_) in enumerate(group) if code == "G1")
+    if (heights[fed - 1] if fed else before[2] - z) > CLEARANCE:  # feeding begins there at the latest
+        return False
     last = np.inf
     for (code, *_), height in zip(group, heights, strict=True):
         if code == "G1":
             if height < last and (height > RETRACT or drilled == DEPTH or 0.0 < -height <= drilled):
                 return False
             drilled, free = max(drilled, -height), min(free, height)
-        elif height < free:
+        elif height < free or (height < last and 0.0 < drilled <= -height):  # a rapid onto the bottom
             return False
         last = height
     leaves = RETRACT if i + 1 < len(holes) and holes[i + 1][0] != x else 0.0
