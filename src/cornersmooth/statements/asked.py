@@ -334,7 +334,7 @@ def asked(
         asking.take(statement, place)
     asking.idle_from(len(program.kind))
     line = max((item.line for item in program.statements if item.word in ("FINI", "END")), default=0)
-    tokens = sorted([*dwells, *asking.tokens], key=lambda token: token.place) if dwells else asking.tokens
+    tokens = sorted([*dwells, *asking.tokens], key=lambda token: (token.place, token.line)) if dwells else asking.tokens
     return [*tokens, Token("end", "", end, line)]
 
 

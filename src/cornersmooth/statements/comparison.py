@@ -14,7 +14,7 @@ from itertools import pairwise, takewhile, zip_longest
 
 from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.nc_reader.word_tables import Means
-from cornersmooth.statements.tokens import Token
+from cornersmooth.statements.tokens import PAUSES, Token
 
 #: codes and names of kinds
 _NAMES = {
@@ -120,7 +120,51 @@ def compare(
             # what is missing has no line: named is that of the last word before it
             before = (other.line for other in reversed(found) if other.place <= wanted.place + room)
             problems.append(Problem(code, wanted.line, next(before, 0) if token is None else token.line, text))
-    return problems
+    return problems + list(_at_pauses(asked_for, found, away))
+
+
+def _at_pauses(asked_for: list[Token], found: list[Token], away: _Away) -> Iterator[Problem]:
+    """States that are others where the program waits than where the CL file does.
+
+    Where it stops, spindle and coolant may be off although the CL file leaves them on: they go on before any motion.
+    """
+    pauses, done = list(_holding(found, dict.fromkeys(_STOPPED, "OFF"))), dict.fromkeys(PAUSES, 0)
+    for wanted, theirs in _holding(asked_for, {}):
+        kind = wanted.kind
+        alike = (
+            k
+            for k, (token, _) in enumerate(pauses[done[kind] :], done[kind])
+            if token.kind == kind and token.value == wanted.value and not away(wanted.place, token)
+        )
+        place = next(alike, None)
+        if place is None:  # it is missing, which is said
+            continue
+        token, ours = pauses[place]
+        done[kind] = place + 1
+        for state, value in theirs.items():
+            here = ours.get(state, value)
+            off = kind == "stop" and state in _STOPPED and here == "OFF"
+            if (
+                here != value
+                and not off
+                and (state != "speed" or "OFF" not in (theirs.get("spindle", "OFF"), ours.get("spindle", "OFF")))
+            ):
+                code, name = _NAMES[state]
+                pause = _NAMES[kind][1].format(token.value)
+                text = f"{name.format(here)} holds at {pause}, where the CL file has {name.format(value)}"
+                yield Problem(code, wanted.line, token.line, text)
+
+
+def _holding(tokens: list[Token], changed: dict[str, float | str]) -> Iterator[tuple[Token, dict[str, float | str]]]:
+    """Pauses with the states that hold there; `changed`: those of spindle and coolant after a tool change, if known."""
+    held: dict[str, float | str] = dict.fromkeys(_ENDED, "OFF")
+    for token in tokens:
+        if token.kind in PAUSES:
+            yield token, held.copy()
+        elif token.kind in (*_ENDED, "speed", "tool"):
+            held[token.kind] = token.value
+            if token.kind == "tool":
+                held = {kind: value for kind, value in held.items() if kind not in _STOPPED} | changed
 
 
 def _counting(found: list[Token], means: Means) -> Callable[[Token], bool]:
