@@ -52,6 +52,7 @@ class WordRule:
     after: re.Pattern[str] | None = None  #: a word that must have been said since the last time
     behind: re.Pattern[str] | None = None  #: the block before
     then: re.Pattern[str] | None = None  #: the next block
+    plane: int = 0  #: the G word of planes that must be in force where it is taken
     before: str = ""  #: ``"arc"``: the next motion must be one, but for the word that held at first
 
     # its state: where the tool moves, that must be what it was at the first motion

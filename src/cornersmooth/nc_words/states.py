@@ -179,8 +179,17 @@ class WordStates:
             self._place(line, word, rule)
         for word, rule in ruled:
             self._set(line, word, rule, ruled)
+        self._check_plane(line, ruled)
         if any(rule.changes_tool for _, rule in ruled):
             self._lost_since(line, [f"{' '.join(words)} under {word}" for word in self._running()])
+
+    def _check_plane(self, line: int, ruled: Ruled) -> None:
+        """Complain of words that are taken in another plane than theirs, and of that while the tool is compensated."""
+        plane, side = self._held.get("plane"), self._held.get("cutter compensation")
+        held = [] if side is None else [(side.text, side.rule)]
+        for word, rule in dict.fromkeys([*ruled, *held]) if plane is not None else ():
+            if rule.plane and plane is not None and plane.text != f"G{rule.plane}":
+                self.wrong(NOT_LISTED, line, f"{word} under {plane.text}, where G{rule.plane} must be in force")
 
     def _place(self, line: int, word: str, rule: WordRule) -> None:
         """Complain of a word that is not in its place, as things are before its block."""

@@ -47,7 +47,7 @@ class Batches:
     """Makes batches of the elements of a text, as they come, counted in all of it; `events`, `retracts` grow along."""
 
     def __init__(self, task: Task, events: Sequence[Event], retracts: Sequence[int]) -> None:
-        self.task, self._events, self._retracts = task, events, retracts
+        self.task, self._events, self.retracts = task, events, retracts
         self.problems: list[Problem] = []
         #: stops that are reached, three numbers for each: the element, and the CL path lengths where it is and where it
         #: begins
@@ -74,7 +74,7 @@ class Batches:
         original = self.task.original
         ahead = self._ahead = Ahead(nc for nc in chunks if len(nc))
         if ahead.has(0) and len(original.pose):
-            along = AlongTool(ahead, self._retracts, self._events)
+            along = AlongTool(ahead, self.retracts, self._events)
             stops = Stops(self.task, ahead, ToolChanges(original.program, self._events), along)
             self.rewinds, self.still = along.rewinds, along.still
             self.holes, self.dwells = stops.elements, stops.dwells

@@ -23,7 +23,7 @@ from cornersmooth.nc_reader.rotary import sagitta
 from cornersmooth.nc_reader.source import Source, readable_twice
 from cornersmooth.nc_words.check import WordCheck
 from cornersmooth.nc_words.machine_positions import MachinePositions
-from cornersmooth.nc_words.states import GONE_ON
+from cornersmooth.nc_words.states import FRAME, GONE_ON
 from cornersmooth.processes import Helper, can_fork, map_in_processes
 from cornersmooth.settings import BOUNDS
 from cornersmooth.statements.asked import not_understood_text
@@ -273,7 +273,10 @@ class Verifier:
         if not self._skip_cycles:
             problems += batches.left_out
         if self._words and batches.elements:  # without any motion nothing has a place
-            of_statements, at_home, unsaid = places.problems(findings, nc.means, self._own_kinds, self._clamps)
+            up = self._options.dialect.retracts and FRAME not in self._trusted
+            of_statements, at_home, unsaid = places.problems(
+                findings, nc.means, self._own_kinds, self._clamps, retracts=up
+            )
             problems = [one for one in problems if one.text != GONE_ON or one.nc_line not in at_home] + of_statements
         if nc.coarse:  # a pose missed within the tolerance where digits are too few for it is not verified
             limit = task.tolerance

@@ -94,12 +94,14 @@ class WordPlaces:
         means: Means,
         own: frozenset[str],
         clamps: Set[float],
+        *,
+        retracts: bool,
     ) -> tuple[list[Problem], set[int], str]:
         """What words say wrongly, the NC lines of those where the CL file has GOHOME, and what no word can say.
 
         Of all batches it is known what was `found`, of the control what its words mean (see `NcProgram`). The user says
         some kinds of statements in words of his `own`. M words that clamp a rotary axis or let it turn stand where the
-        machine wants them, not where AUXFUN has them.
+        machine wants them, not where AUXFUN has them. GOHOME asks for a retract, where the program can have `retracts`.
         """
         batches, path, original = self._batches, self._task.path, self._task.original
         still = batches.still
@@ -126,8 +128,14 @@ class WordPlaces:
         of = [replace(one, element=one.element - 1) if one.element - 1 in still else one for one in self._events]
         ours = said(of, here, means)
         wrong = compare(theirs, ours, self.margin, means, path.way_apart, own)
-        said_there = zip(statements, program.statements, strict=True)
-        homes = [at for at, statement in said_there if statement.word == "GOHOME"]
+        homes = {at: one for at, one in zip(statements, program.statements, strict=True) if one.word == "GOHOME"}
+        up = [self._of(Event(element, 0, "", math.nan)) for element in batches.retracts] if homes else []
+        for home, statement in homes.items() if retracts else ():
+            room = [self.margin + place.room for place in up]
+            there = (-near <= home - at.at <= at.reach + near for at, near in zip(up, room, strict=True))
+            if not statement.args and not any(there):
+                text = "GOHOME of the CL file is missing: the tool does not go up to a retract"
+                wrong.append(Problem("CS532", statement.line, 0, text))
         at_home = {
             event.line
             for event, place in zip(self._events, here, strict=True)
