@@ -132,8 +132,8 @@ class WordPlaces:
         up = [self._of(Event(element, 0, "", math.nan)) for element in batches.retracts] if homes else []
         for home, statement in homes.items() if retracts else ():
             room = [self.margin + place.room for place in up]
-            there = (-near <= home - at.at <= at.reach + near for at, near in zip(up, room, strict=True))
-            if not statement.args and not any(there):
+            found_there = (-near <= home - at.at <= at.reach + near for at, near in zip(up, room, strict=True))
+            if not statement.args and not any(found_there):
                 text = "GOHOME of the CL file is missing: the tool does not go up to a retract"
                 wrong.append(Problem("CS532", statement.line, 0, text))
         at_home = {
