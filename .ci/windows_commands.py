@@ -104,20 +104,25 @@ def run_all(folder: str, result: str) -> None:
     """Run all commands one after the other in a folder, by this Python, and write what became of them."""
     found: list[Found] = []
     for command in COMMANDS:
-        with subprocess.Popen(
-            [sys.executable, "-c", CODE, *command.words.split()],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            cwd=folder,
-        ) as process:
-            try:
-                out, said = process.communicate(command.data, PATIENCE)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                out, said = b"", b"no end"
-        found.append((process.returncode, out.decode("latin-1"), said.decode("latin-1")))
+        found.append(run_one(command, folder) or run_one(command, folder) or (-1, "", "no end, twice"))
         Path(result).write_text(json.dumps(found))
+
+
+def run_one(command: Command, folder: str) -> Found | None:
+    """Run a command; None where it does not end, which a process of wine does now and then before it begins."""
+    with subprocess.Popen(
+        [sys.executable, "-c", CODE, *command.words.split()],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        cwd=folder,
+    ) as process:
+        try:
+            out, said = process.communicate(command.data, PATIENCE)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            return None
+    return process.returncode, out.decode("latin-1"), said.decode("latin-1")
 
 
 def files(folder: Path) -> dict[str, bytes]:
