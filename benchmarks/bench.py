@@ -24,7 +24,6 @@ from statistics import median
 CASES = {
     "fanuc g1": ("--control", "fanuc", "-f", "g1"),
     "fanuc g6.2": ("--control", "fanuc", "-f", "g6.2", "--method", "proportional"),
-    "fanuc g6.2 table-ac": ("--control", "fanuc", "-f", "g6.2", "--method", "proportional", "--machine", "table-ac"),
     "siemens bspline": ("--control", "siemens", "-f", "bspline"),
     "heidenhain g1": ("--control", "heidenhain", "-f", "g1"),
     "linuxcnc xyzac-trt": ("--control", "linuxcnc", "--machine", "xyzac-trt"),
