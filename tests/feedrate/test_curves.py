@@ -24,7 +24,6 @@ def corner(turn: float, leg_in: float, leg_out: float, weights: tuple[float, flo
         np.zeros((1, 3)),
         np.array([[leg_in, 0.0, 0.0]]),
         leg_out * np.array([[np.cos(angle), np.sin(angle), 0.0]]),
-        np.array([2.0 / 3.0]),
     )
     return np.repeat(points, 2, axis=0), np.repeat(np.array([weights]), 2, axis=0)
 
