@@ -36,8 +36,10 @@ def test_every_row_is_a_program_and_the_best_is_marked_with_its_command(part: Pa
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
     rows = found["rows"]
-    # g1: vectors and rotary words, two methods, three densities; bspline, poly: vectors and both methods
-    assert len(rows) == 2 * 2 * 3 + 2 + 2
+    # g1: vectors and rotary words, two methods, three densities; bspline, poly: vectors and both methods; the paper's
+    # method once in each form
+    assert len(rows) == 2 * 2 * 3 + 2 + 2 + 3
+    assert [row["form"] for row in rows if row["method"] == "zhang2016"] == ["g1", "bspline", "poly"]
     assert {row["verdict"] for row in rows} == {"PASSED"}
     assert all(row["tip"] <= 0.02 and row["axis_point"] <= 0.02 for row in rows)
     assert all(row["seconds"] + row["saved"] == pytest.approx(found["unsmoothed_seconds"]) for row in rows)

@@ -13,7 +13,7 @@ from cornersmooth import nc
 from cornersmooth.errors import CornersmoothError, SettingsError
 from cornersmooth.feedrate import BlockLimits
 from cornersmooth.kinematics import Machine, with_dynamics
-from cornersmooth.methods import CURVES_METHOD, DEFAULT_METHOD
+from cornersmooth.methods import CURVES_METHOD, DEFAULT_METHOD, PAPERS_METHOD
 from cornersmooth.model import Move, Program
 from cornersmooth.nc import Control, Form, choose_form
 from cornersmooth.pipeline import postprocess
@@ -139,8 +139,9 @@ def candidates(control: Control, settings: Settings, machine: Machine | None) ->
             rotary = ("--machine", words.name) if words is not None and form.rotary else ()
             if words is not None and not rotary:
                 continue
-            for method in (DEFAULT_METHOD, CURVES_METHOD):
-                for lines, changes, more in _densities(form):
+            # the paper's, for comparison: no rotary words follow its curves, and one density of lines is enough
+            for method in (DEFAULT_METHOD, CURVES_METHOD, *(() if rotary else (PAPERS_METHOD,))):
+                for lines, changes, more in [*_densities(form)][: 1 if method == PAPERS_METHOD else None]:
                     options = ("-f", name, *rotary, "--method", method, *more)
                     found.append(Candidate(form, settings.but(method=method, **changes), lines, options))
     return found

@@ -56,3 +56,6 @@ AUTO = "auto"
 
 #: of lines, and of curves
 DEFAULT_METHOD, CURVES_METHOD = "proportional", "global"
+
+#: as published
+PAPERS_METHOD = "zhang2016"

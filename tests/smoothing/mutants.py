@@ -1,3 +1,4 @@
+# ruff: noqa: E501
 """Faults of the paper's method that `test_paper_equations` must find: ``python -m smoothing.mutants [NUMBER ...]``.
 
 Each is one or two changed places of the source. A copy of the package gets them, and the tests are run on it.
@@ -26,109 +27,36 @@ class Mutant(NamedTuple):
     what: str
     file: str
     changes: tuple[tuple[str, str], ...]
+    tests: str  # those that are run on it, as pytest's -k takes them
 
 
+# fmt: off
 MUTANTS = (
-    Mutant("(20)-(22): v = u", ROOTS, (("    return v, missing\n", "    return 0.0 * v + u, missing\n"),)),
-    Mutant(
-        "(26): the joint has the axis of v(1)",
-        PAPER,
-        (("        tops[:, -1] = axis_curve[:, -1]", "        tops[:, -1] = tops[:, -1]"),),
-    ),
-    Mutant(
-        "(27): linear in place of the great circle",
-        PAPER,
-        (
-            (
-                "turned = np.sin((1.0 - share) * angle) * one + np.sin(share * angle) * other",
-                "turned = (1.0 - share) * one + share * other",
-            ),
-        ),
-    ),
-    Mutant(
-        "(21): the grid alone",
-        ROOTS,
-        (
-            ("_NEAR, _NEAR_STEPS, _SHORT = 1.0 / 16.0, 6, 1e-7", "_NEAR, _NEAR_STEPS, _SHORT = -1.0, 6, 1e-7"),
-            ("found = _zero(ends, start, wanted)", "found = np.clip(start, *ends)"),
-        ),
-    ),
-    Mutant("(4): another basis", CURVES, (("            0.25 * s**3,\n", "            0.2 * s**3,\n"),)),
-    Mutant(
-        "(3): weights left out", CURVES, (("np.stack((one, w1, w2, w1, one)", "np.stack((one, one, w2, one, one)"),)
-    ),
-    Mutant("(9): second control point", CURVES, (("points[:, 1] -= RATIO", "points[:, 1] -= 0.6"),)),
-    Mutant("(10): error", PAPER, (("factor = 2.0 * float(nurbs", "factor = 1.9 * float(nurbs"),)),
-    Mutant(
-        "(14): more than half of a segment", PAPER, (("np.minimum(*tip_sizes) / 2.0", "np.minimum(*tip_sizes) / 1.8"),)
-    ),
-    Mutant(
-        "(15), (16): the larger of both lengths",
-        PAPER,
-        (("by_tolerance = np.minimum(\n", "by_tolerance = np.maximum(\n"),),
-    ),
-    Mutant(
-        "(16): 1.1 of the tolerance",
-        PAPER,
-        (("divide(settings.common_tolerance +", "divide(1.1 * settings.common_tolerance +"),),
-    ),
-    Mutant("(19): sine of the whole turn", PAPER, (("unit(leg_in)) / 2.0, 0.0)", "unit(leg_in)), 0.0)"),)),
-    Mutant(
-        "v runs backwards",
-        ROOTS,
-        (
-            (
-                "        low_limit = v[:, j]\n        target = low_limit + step",
-                "        low_limit, target = 0.0 * v[:, j], v[:, j] + step",
-            ),
-        ),
-    ),
-    Mutant(
-        "the root nearest to the last one", ROOTS, (("target = low_limit + step", "target = low_limit + 0.0 * step"),)
-    ),
-    Mutant(
-        "v in another knot interval",
-        ROOTS,
-        (("float(u[j] >= 0.5) / 2.0, (1.0 + float(u[j] > 0.5)) / 2.0", "0.0, 1.0"),),
-    ),
-    Mutant("without a root, any v", ROOTS, (("sign * first), np.where(root", "0.0 * first - 1.0), np.where(root"),)),
-    Mutant(
-        "(22): the tip at v, too",
-        PAPER,
-        (
-            (
-                "tips = nurbs.evaluate(tip_curve[which], weights, u[:, None])",
-                "tips = nurbs.evaluate(tip_curve[which], weights, at[:, None])",
-            ),
-        ),
-    ),
-    Mutant(
-        "(24): shares of the whole segment",
-        PAPER,
-        (("fraction: Floats = low + share * (high - low)", "fraction: Floats = share * high"),),
-    ),
-    Mutant(
-        "(26): ends of the whole segment",
-        PAPER,
-        (("(high, segments.axis_exit[pose, None])", "(high, 1.0 + 0.0 * high)"),),
-    ),
-    Mutant(
-        "least residual in place of the largest",
-        ROOTS,
-        (("return v, residual.max(axis=1)", "return v, residual.min(axis=1)"),),
-    ),
-    Mutant("the motion is not measured", PAPER, (("over = share > 1.0 + EXACT", "over = share > 1e9"),)),
-    Mutant(
-        "0.99 of the size in place of what just keeps ε",
-        PAPER,
-        (("size[rows] *= (1.0 - _JUST)", "size[rows] *= 0.97 * (1.0 - _JUST)"),),
-    ),
-    Mutant(
-        "the rest of segments is not looked at",
-        PAPER,
-        (("found.append(part[share.max(axis=1) > 1.0])", "found.append(part[:0])"),),
-    ),
+    Mutant('(20)-(22): v = u', ROOTS, (('    return v, missing\n', '    return 0.0 * v + u, missing\n'),), '20 or 22'),
+    Mutant('(26): the joint has the axis of v(1)', PAPER, (('        tops[:, -1] = axis_curve[:, -1]', '        tops[:, -1] = tops[:, -1]'),), '26'),
+    Mutant('(27): linear in place of the great circle', PAPER, (('turned = np.sin((1.0 - share) * angle) * one + np.sin(share * angle) * other', 'turned = (1.0 - share) * one + share * other'),), '24'),
+    Mutant('(21): the grid alone', ROOTS, (('_NEAR, _NEAR_STEPS, _SHORT = 1.0 / 16.0, 6, 1e-7', '_NEAR, _NEAR_STEPS, _SHORT = -1.0, 6, 1e-7'), ('found = _zero(ends, start, wanted)', 'found = np.clip(start, *ends)'),), '20'),
+    Mutant('(4): another basis', CURVES, (('            0.25 * s**3,\n', '            0.2 * s**3,\n'),), '3_and_4'),
+    Mutant('(3): weights left out', CURVES, (('np.stack((one, w1, w2, w1, one)', 'np.stack((one, one, w2, one, one)'),), '3_and_4'),
+    Mutant('(9): second control point', CURVES, (('points[:, 1] -= RATIO', 'points[:, 1] -= 0.6'),), '5_to_9'),
+    Mutant('(10): error', PAPER, (('factor = 2.0 * float(nurbs', 'factor = 1.9 * float(nurbs'),), '10'),
+    Mutant('(14): more than half of a segment', PAPER, (('np.minimum(*tip_sizes) / 2.0', 'np.minimum(*tip_sizes) / 1.8'),), '11 or 13'),
+    Mutant('(15), (16): the larger of both lengths', PAPER, (('by_tolerance = np.minimum(\n', 'by_tolerance = np.maximum(\n'),), '11'),
+    Mutant('(16): 1.1 of the tolerance', PAPER, (('divide(settings.common_tolerance +', 'divide(1.1 * settings.common_tolerance +'),), '11'),
+    Mutant('(19): sine of the whole turn', PAPER, (('unit(leg_in)) / 2.0, 0.0)', 'unit(leg_in)), 0.0)'),), '11'),
+    Mutant('v runs backwards', ROOTS, (('        low_limit = v[:, j]\n        target = low_limit + step', '        low_limit, target = 0.0 * v[:, j], v[:, j] + step'),), '20'),
+    Mutant('the root nearest to the last one', ROOTS, (('target = low_limit + step', 'target = low_limit + 0.0 * step'),), '20'),
+    Mutant('v in another knot interval', ROOTS, (('float(u[j] >= 0.5) / 2.0, (1.0 + float(u[j] > 0.5)) / 2.0', '0.0, 1.0'),), '20'),
+    Mutant('without a root, any v', ROOTS, (('sign * first), np.where(root', '0.0 * first - 1.0), np.where(root'),), '20'),
+    Mutant('(22): the tip at v, too', PAPER, (('tips = nurbs.evaluate(tip_curve[which], weights, u[:, None])', 'tips = nurbs.evaluate(tip_curve[which], weights, at[:, None])'),), '22'),
+    Mutant('(24): shares of the whole segment', PAPER, (('fraction: Floats = low + share * (high - low)', 'fraction: Floats = share * high'),), '24'),
+    Mutant('(26): ends of the whole segment', PAPER, (('(high, segments.axis_exit[pose, None])', '(high, 1.0 + 0.0 * high)'),), '24'),
+    Mutant('least residual in place of the largest', ROOTS, (('return v, residual.max(axis=1)', 'return v, residual.min(axis=1)'),), '23'),
+    Mutant('the motion is not measured', PAPER, (('over = share > 1.0 + EXACT', 'over = share > 1e9'),), 'keeps_the_tolerance'),
+    Mutant('0.99 of the size in place of what just keeps ε', PAPER, (('size[rows] *= (1.0 - _JUST)', 'size[rows] *= 0.97 * (1.0 - _JUST)'),), 'eq_16 or construction'),
+    Mutant('the rest of segments is not looked at', PAPER, (('found.append(part[share.max(axis=1) > 1.0])', 'found.append(part[:0])'),), 'left_of'),
 )
+# fmt: on
 
 
 def mutated(mutant: Mutant) -> str:
@@ -155,7 +83,7 @@ def falls(mutant: Mutant) -> bool:
             "-q",
             "-x",
             "-k",
-            "not mutants",
+            f"({mutant.tests}) and not mutants",
             "-p",
             "no:cacheprovider",
             "smoothing/test_paper_equations.py",

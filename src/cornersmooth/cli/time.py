@@ -25,7 +25,7 @@ from cornersmooth.nc import fit_settings
 from cornersmooth.nc_reader import read_nc
 from cornersmooth.pipeline import read_back
 from cornersmooth.provenance import read_provenance
-from cornersmooth.report.verdict import times_text
+from cornersmooth.report.verdict import limits_of, times_text
 from cornersmooth.saving import Timing, without_holes, written_text
 
 _TITLES = {
@@ -140,7 +140,8 @@ def _tell_feeds(program: Program, feed: float | None) -> None:
 def _tables(compared: Comparison, verbose: bool) -> Iterator[str]:
     """Times and savings; with `verbose` what was reached, and the places that lose most."""
     settings, saving = compared.settings, compared.saving_percent
-    yield times_text(compared.seconds, ["as_written"], limiting(compared.laws["as_written"]))
+    told = times_text(compared.seconds, ["as_written"], limiting(compared.laws["as_written"]))
+    yield f"{told}; {limits_of(None if compared.machine is None else compared.machine.name)}"
     own = settings.axis_tolerance
     second = f"axis point at {settings.axis_length:g} mm" if own is None else f"tool axis {own:g} deg"
     yield f"tolerance {settings.tolerance:g} mm, {second}"

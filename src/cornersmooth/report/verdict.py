@@ -168,7 +168,12 @@ def time_text(saving: Saving, limits: str | None) -> str:
     where = f" on {limits}" if limits else ""
     told = "" if saving.gains else "; no time is gained, leave the program as it was"
     text = f"time{where} {saving.written:.1f} s instead of {saving.direct:.1f} s{against}{share}{told}"
-    return text + limits_text(saving.limits)
+    return text + limits_text(saving.limits) + ("" if limits else f"; {limits_of(None)}")
+
+
+def limits_of(machine: str | None) -> str:
+    """Say whose limits a time keeps: the same program is far more of a gain where those of the axes count, too."""
+    return "limits of the tip alone, --limits MACHINE adds the axes" if machine is None else f"limits of {machine}"
 
 
 def method_text(summary: Mapping[str, Any]) -> str:
