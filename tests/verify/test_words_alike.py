@@ -183,6 +183,14 @@ def test_functions_that_were_asked_for_are_not(control: str, name: str, tmp_path
     assert judged(tmp_path, control, "SHA256", "SHA256", cl=FIVE, more=("--with", name)).startswith("PASSED:")
 
 
+def test_smoothness_of_haas_without_a_number_is_to_check(tmp_path: Path) -> None:
+    asked = ("--with", "g187")
+    assert judged(tmp_path, "haas", "SHA256", "SHA256", cl=PLAIN, more=asked).startswith("PASSED:")
+    found = judged(tmp_path, "haas", r"G187 P3 E[\d.]+", "G187 P1", cl=PLAIN, more=asked)
+    assert found.startswith("PASSED, 1 to check")
+    assert judged(tmp_path, "haas", r"E[\d.]+$", "E0.3", cl=PLAIN, more=asked).startswith("FAILED")
+
+
 @pytest.mark.parametrize(
     ("control", "offset", "other"),
     [("fanuc", "G54", "G55"), ("linuxcnc", "G54", "G59.1"), ("siemens", "G54", "G505"), ("haas", "G54", "G154 P3")],

@@ -198,7 +198,8 @@ class WordCheck:
             if shared and (length := shared.groupdict().get("length")):
                 # LinuxCNC: without Q lines are merged within P, too
                 self.rounding = max(self.rounding, float(length) * (1.0 + ("G64" in words and "Q0" not in words)))
-            if rule.extra and any_of(rule.extra, words) and not self._intended(" ".join(words)):
+            # a block that counts as a whole says nothing of by how much
+            if rule.extra and any_of(rule.extra, words) and (rule.alone or not self._intended(" ".join(words))):
                 self.trusted.append((number, " ".join(words)))
 
     def _intended(self, block: str) -> bool:
