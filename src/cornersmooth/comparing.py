@@ -137,7 +137,7 @@ def candidates(control: Control, settings: Settings, machine: Machine | None) ->
             except SettingsError:
                 continue
             rotary = ("--machine", words.name) if words is not None and form.rotary else ()
-            if words is not None and not rotary:
+            if words is not None and words.names and not rotary:
                 continue
             # the paper's, for comparison: no rotary words follow its curves, and one density of lines is enough
             for method in (DEFAULT_METHOD, CURVES_METHOD, *(() if rotary else (PAPERS_METHOD,))):

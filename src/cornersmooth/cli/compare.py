@@ -25,29 +25,30 @@ _OWN = frozenset(("as_json", "csv", "verbose", "quiet", "force", "machine", "lim
 
 def run_compare(given: Options) -> int:
     """Do the work of the command; return its exit code."""
-    from cornersmooth.cli.filter import axes_of, how_read
+    from cornersmooth.cli.filter import axes_of, how_read, options_for
     from cornersmooth.filter.program import compare_filtered
 
     source = given.source
     check_inputs(source)
     if given.csv:
         check_path(given.csv, [source], force=given.force)
+    data, name, is_program = given.read()
+    named, given = given.machine, options_for(data, name, given) if is_program else given
     machine, limits = given.load_machine(), given.load_limits()
     axes = axes_of(given)
     control, settings = given.load_control(), given.settings()
-    data, name, is_program = given.read()
     with told_of(name), progress_bar(given.quiet) as progress:
         step = None if progress is None else lambda done, total: progress("programs", done, total)
         if is_program:  # it has one kind of words, and lines
-            rotary, tried = machine is not None, candidates(control, settings, machine)
-            tried = [one for one in tried if one.form.rotary == rotary and not one.form.curves]
+            tried = candidates(control, settings, machine)
+            tried = [one for one in tried if one.form.machine == machine and not one.form.curves]
             table = compare_filtered(data, tried, axes, **how_read(given), progress=step)
         else:
             program = read(data, name=name, **given.reading()).with_feed(given.feed)
             tried = candidates(control, settings, limits if machine is None else machine)
             blocks = BlockLimits(look_ahead=given.look_ahead)
             table = compare_programs(program, tried, axes, blocks, wider=bool(given.verbose), progress=step)
-    machine_named = given.limits if machine is None else given.machine
+    machine_named = named or given.limits
     made_by = ("filter", os.path.splitext(source)[1]) if is_program else ("smooth", control.layout.suffix)
     commands = [_command(given, row, machine_named, *made_by) for row in table.rows]
     if given.csv:

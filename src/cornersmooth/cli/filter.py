@@ -42,13 +42,13 @@ from cornersmooth.control.program import Text
 from cornersmooth.errors import CornersmoothError, SettingsError
 from cornersmooth.filter import Filtered, filter_program, verify_programs
 from cornersmooth.filter.checking import measure
-from cornersmooth.filter.program import read_program, refuse_cl_file
+from cornersmooth.filter.program import THREE_AXES, read_program, refuse_cl_file
 from cornersmooth.filter.runs import FILTERED, ProgramReader
 from cornersmooth.filter.times import time_as_it_is
 from cornersmooth.kinematics import Machine
 from cornersmooth.nc import Form
 from cornersmooth.nc_reader import Problem
-from cornersmooth.nc_reader.recognition import recognise_control
+from cornersmooth.nc_reader.recognition import is_cl_file, names_rotary_axes, needs_its_control, recognise_control
 from cornersmooth.output import FAILED, make_folder, open_output
 from cornersmooth.provenance import HEAD
 from cornersmooth.report import NcFile, report_json
@@ -67,7 +67,7 @@ _SHOWN, _WRONG_SHOWN = 10, 20
 
 def run_filter(given: Options) -> int:
     """Do the work of the command; return its exit code."""
-    form, settings = filter_form_of(given), given.settings()
+    settings = given.settings()
     check_endings("report", given.reports, ".json or .html")
     jobs = find_inputs(given, PATTERNS)
     if given.as_json and (len(jobs) != 1 or jobs[0].target == STANDARD):
@@ -84,7 +84,7 @@ def run_filter(given: Options) -> int:
     worst, words = 0, Counter[str]()
     for job in jobs:
         try:
-            verdict = _filter(job, form, settings, given)
+            verdict = _filter(job, settings, given)
             worst, words = max(worst, int(_bad(verdict, given))), words + Counter((verdict,))
         except CornersmoothError as error:
             if len(jobs) == 1:
@@ -106,10 +106,11 @@ def _pages(reports: Iterable[str]) -> bool:
     return any(suffix_of(path) == ".html" for path in reports)
 
 
-def _filter(job: Input, form: Form, settings: Settings, given: Options) -> Verdict:
+def _filter(job: Input, settings: Settings, given: Options) -> Verdict:
     """Filter one program; return the verdict."""
     data, name = read_input(job.source)
-    axes = given.load_limits()
+    given = options_for(data, name, given)
+    form, axes = filter_form_of(given), given.load_limits()
     with told_of(name):
         found = filter_program(
             data,
@@ -160,6 +161,7 @@ def _filter(job: Input, form: Form, settings: Settings, given: Options) -> Verdi
 def verify_with_program(source: str, old: bytes, given: Options) -> int:
     """Compare an NC program with what was made of it; return the exit code of ``verify``."""
     new, name = read_input(given.text)
+    given = options_for(old, source, given)
     settings, form = given.settings(), filter_form_of(given)
     found = verify_programs(
         old, new, form, settings, **how_read(given), paths=_pages(given.reports), processes=useful_processes()
@@ -285,6 +287,26 @@ def _judgement(found: Filtered, tolerance: float) -> Judgement:
     return Judgement(found.verdict, 0, 0, unverified, what)
 
 
+def options_for(data: bytes, name: str, given: Options) -> Options:
+    """Options for a program: the control that it looks like where none is named, no machine where nothing turns.
+
+    Raises SettingsError CS267: no control is named, and FANUC would take the program for something else.
+    """
+    from cornersmooth.cli.verify import recognised
+
+    if is_cl_file(data[:HEAD]):  # who reads it will say so
+        return given
+    head = recognised(given, data[:HEAD])
+    if head.remark:
+        warn(head.remark, name)
+    default = click.get_current_context().get_parameter_source("control") == click.core.ParameterSource.DEFAULT
+    if default and not recognise_control(data[:HEAD]) and needs_its_control(data[:HEAD]):
+        what = f"{name} does not say its control, and has numbers without a point or comments behind a semicolon"
+        raise SettingsError("CS267", what, "name it: --control linuxcnc (for grbl and Mach, too), siemens or another")
+    alone = not head.given.machine and not names_rotary_axes(data)
+    return replace(head.given, machine=THREE_AXES) if alone else head.given
+
+
 def filter_form_of(given: Options) -> Form:
     """Form of the control that blocks are read and written in.
 
@@ -312,6 +334,7 @@ def axes_of(given: Options) -> Machine:
 
 def time_of_program(data: bytes, name: str, given: Options) -> int:
     """Say the time of a program as it is and smoothed, or beside another one; return the exit code of ``time``."""
+    given = options_for(data, name, given)
     form, settings, axes = filter_form_of(given), given.settings(), axes_of(given)
     how = {**how_read(given), "axes": axes, "processes": useful_processes()}
     with told_of(name):

@@ -183,7 +183,7 @@ def _take_over(given: Options, nc: bytes | str | os.PathLike[str], source: bytes
     head = read_head(nc)
     made = read_provenance(head)
     if made is None:
-        return _recognised(given, head)
+        return recognised(given, head)
     words: dict[str, tuple[str, Any]] = {"tolerance": ("E", made.tolerance), "axis_length": ("H", made.axis_length)}
     if not typed("axis_length"):
         words["axis_tolerance"] = ("AXIS", made.axis_tolerance)
@@ -235,7 +235,7 @@ def _loose(before: Options, given: Options, taken: set[str]) -> Iterator[str]:
         yield "that no work offset is selected is the program's own word: name it with --work-offset none"
 
 
-def _recognised(given: Options, head: bytes) -> _Head:
+def recognised(given: Options, head: bytes) -> _Head:
     """Take the control that a program looks like, where none was named, and say so."""
     looks = recognise_control(head)
     source = click.get_current_context().get_parameter_source("control")

@@ -31,7 +31,7 @@ PRESET: Final = "preset"
 _UNITS: Final = {"mm": 1.0, "inch": 25.4}
 
 #: what a change of a group does beside
-_CHANGES: Final = {"units": ("length", "feed"), "feed": ("feed",), "offset": ("shift",)}
+_CHANGES: Final = {"units": ("length", "feed"), "feed": ("feed",), "offset": ("shift",), "tip": ("length",)}
 
 #: motions that cut
 CUTS: Final = ("line", "arc")
@@ -165,8 +165,9 @@ class State:
 
     def _go(self, given: Mapping[str, float], axes: Iterable[str], does: set[str]) -> None:
         """Take the places of a block."""
-        if does & {"length", "shift"}:
-            self.lose_place(None if "shift" in does else "XYZ")
+        if does & {"length", "shift", "axis"}:
+            alone = self.groups["plane"] == "G17" and "length" not in does
+            self.lose_place(None if "shift" in does else "Z" if alone else "XYZ")
         named, distance = set(axes), self.groups["distance"]
         for letter in named:
             added = self.place[letter] if distance == "incremental" and letter not in VECTOR else 0.0

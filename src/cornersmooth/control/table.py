@@ -49,6 +49,7 @@ GROUPS: Final[Mapping[str, str]] = {
 LOSES: Final[Mapping[str, str]] = {
     "nothing": "",
     "dwell": "",  # and the other words of the block are no motion
+    "axis": "as `length`, along the axis of the tool alone where the plane says which that is",
     "length": "XYZ count anew, those of the block already",
     "shift": "all axes count anew, those of the block already",
     "place": "the machine may be anywhere; places of the block are not those of the part",

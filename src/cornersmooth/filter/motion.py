@@ -115,7 +115,7 @@ def _start(job: Job, run: Run, form: Form, before: str) -> bytes:
     lines = [_block(job, run, run.start, form, rapid=True)]
     if 2 in words and mode != before:
         lines.append(words[2 if mode == "inverse" else 0].encode())
-    feed = b" F%.5f" % state.feed if mode != "inverse" and not math.isnan(state.feed) else b""
+    feed = b" F%.9f" % state.feed if mode != "inverse" and not math.isnan(state.feed) else b""
     if state.groups["motion"] == "line" or feed:  # a whole block, though nothing moves: it is read with those around it
         lines.append(_block(job, run, run.start, form, rapid=False) + feed)
     return b"".join(line + b"\n" for line in lines)

@@ -29,6 +29,9 @@ from cornersmooth.saving import Timing
 from cornersmooth.settings import Settings
 from cornersmooth.verdict import Verdict
 
+#: the machine of a program that names no rotary axis
+THREE_AXES: Final = Machine("three axes", ())
+
 #: how many times more cuts than poses of CL files are looked at where times need no plan
 _BY_LAW: Final = 10
 

@@ -212,7 +212,7 @@ def why_not(state: State, wanted: str) -> str:
         return "tool tip control is on, and --no-tcp says that it is not"
     if wanted in (ANGLES, VECTOR) and tip not in (wanted, "both"):
         return (
-            "tool tip control is off"
+            "tool tip control is off" + ": for rotary words name the machine" * (wanted == VECTOR)
             if tip == NONE
             else f"tool tip control is for {_TOLD[tip]}, not for {_TOLD[wanted]}"
         )

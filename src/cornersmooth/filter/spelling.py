@@ -81,6 +81,7 @@ class Spelling:
         tip, other = self.tip or table.digits.mm, self.other or table.digits.angle
         inch, vector = self.tip or table.digits.inch, max(other, table.digits.vector)
         digits = replace(table.digits, mm=tip, inch=inch, angle=other, vector=vector, vector_length=1)
+        digits = replace(digits, feed=max(digits.feed, self.feed))
         layout = replace(table.layout, block_number="", longest_block=0)
         lines = table.lines if rounding else replace(table.lines, rounding="")
         bare = replace(table, program=program, digits=digits, layout=layout, lines=lines)

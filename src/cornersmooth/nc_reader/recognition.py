@@ -35,6 +35,33 @@ def is_cl_file(head: bytes) -> bool:
     return _OTHER.search(head) is not None
 
 
+#: words of rotary axes and tool vectors, and those that only programs with them have
+_TURNS: Final = re.compile(
+    rb"(?i)(?<![A-Z_,#<])[ABC]\d?[ \t]*(?:=[ \t]*(?:[AID]C|AC[PN])\b|=?[ \t]*[-+]?[ \t]*[\d.#\[])"
+    rb"|(?<![A-Z])T[XYZ][-+]?[\d.]|\b(?:TRAORI|FUNCTION TCPM|M128|M428|G43\.[45]|G234|PLANE|CYCLE800|G68\.[234])"
+)
+_ASIDE: Final = re.compile(rb"\([^()\n]*\)|;.*|\"[^\"\n]*\"|\b(BEGIN|END) PGM.*")
+#: numbers of axes without a point, and comments of those who need none; what no FANUC would run as it is meant
+_NO_POINT: Final = re.compile(rb"(?i)(?<![A-Z])[XYZ][ \t]*[-+]?\d*[1-9]\d*(?![\d.])")
+_BRACKETS: Final = re.compile(rb"\([^()\n]*\)")
+_SEMICOLON: Final = re.compile(rb";[ \t]*[^\s]")
+
+
+def names_rotary_axes(data: bytes) -> bool:
+    """Whether an NC program has words of rotary axes, of tool vectors, or of tilted planes."""
+    for match in _TURNS.finditer(data):
+        start = data.rfind(b"\n", 0, match.start()) + 1
+        end = data.find(b"\n", start)
+        if _TURNS.search(_ASIDE.sub(b"", data[start : len(data) if end < 0 else end])):
+            return True
+    return False
+
+
+def needs_its_control(head: bytes) -> bool:
+    """Whether a program of which nothing else tells has numbers or comments that FANUC takes for something else."""
+    return bool(_SEMICOLON.search(_BRACKETS.sub(b"", head)) or _NO_POINT.search(_ASIDE.sub(b"", head)))
+
+
 def recognise_control(head: bytes) -> str:
     """Control that the beginning of a text is written for; empty where nothing tells.
 

@@ -1,0 +1,163 @@
+"""Programs that name no rotary axis and no tool vector need no machine; the control is recognised, or asked for."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from cornersmooth.nc_reader.recognition import names_rotary_axes, needs_its_control
+from filter.foreign import by_words, difference
+from oracle.command import DONE, USAGE, run
+
+EPS = 0.01
+THREE_AXES = Path(__file__).parents[2] / "samples" / "machines" / "three-axis.toml"
+PASS = [(round(0.9 * k, 3), round(0.7 * ((k * 7) % 5), 3), -1 - round(0.1 * ((k * 3) % 4), 3)) for k in range(1, 21)]
+CUTS = "".join(f"X{x:.3f} Y{y:.3f} Z{z:.3f}\n" for x, y, z in PASS)
+FANUC = (
+    "%\nO0011\n(RELIEF A5 BALL, B2)\nG21 G90 G94 G17 G40 G49 G80\nT4 M6\nG54 G0 X0. Y0. S12000 M3\nG43 H4 Z20. M8\n"
+    "G1 Z-1. F350.\n{}G0 Z20. M9\nM5\nG91 G28 Z0.\nG90\nM30\n%\n"
+)
+SIEMENS = (
+    "; A1\nG17 G90 G94 G710\nT1 M6\nCYCLE832(0.01,_FINISH,1)\nG54\nG0 X0 Y0 Z20 S900 M3\nG1 Z-1 F350\n{}G0 Z20\nM30\n"
+)
+KLARTEXT = (
+    "0 BEGIN PGM A1 MM\n1 TOOL CALL 3 Z S3000\n2 L Z+50 R0 FMAX M3\n3 CYCL DEF 1.0 PECKING\n4 CYCL DEF 1.1 SET UP2\n"
+    "5 CYCL DEF 1.2 DEPTH-9\n6 CYCL DEF 1.3 PECKG3\n7 CYCL DEF 1.4 DWELL0\n8 CYCL DEF 1.5 F150\n"
+    "9 L X+20 Y+20 R0 FMAX M99\n10 L Z+50 R0 FMAX\n11 TOOL CALL 5 Z S9000\n12 L X+0 Y+0 R0 FMAX M3\n13 L Z+2 R0 FMAX\n14 L Z-1 R0 F300\n"
+    + "".join(f"{k + 15} L X{x:+.3f} Y{y:+.3f} Z{z:+.3f}\n" for k, (x, y, z) in enumerate(PASS))
+    + "45 L Z+50 R0 FMAX M5\n46 M30\n47 END PGM A1 MM\n"
+)
+PROGRAMS = {
+    "fanuc": FANUC.format(CUTS),
+    "haas": FANUC.format(CUTS),
+    "mitsubishi": FANUC.format(CUTS),
+    "siemens": SIEMENS.format(CUTS),
+    "heidenhain": KLARTEXT,
+    "linuxcnc": "G21 G90 G94 G17\nG0 X0 Y0 Z20\nG1 Z-1 F350\n" + CUTS + "G0 Z20\nM2\n",
+}
+
+
+def filtered(folder: Path, text: str, *options: object) -> tuple[str, bytes]:
+    """First line of what ``filter`` says, and the program."""
+    (folder / "part.nc").write_text(text)
+    made = run("filter", "part.nc", "-e", EPS, *options, "-o", "new.nc", "--force", cwd=folder)
+    assert made.returncode == DONE, made.stderr
+    told = [line for line in made.stderr.decode().splitlines() if "warning" not in line]
+    return told[0] + told[1], (folder / "new.nc").read_bytes()
+
+
+@pytest.mark.parametrize("control", PROGRAMS)
+def test_no_machine_is_needed(control: str, tmp_path: Path) -> None:
+    text = PROGRAMS[control]
+    told, new = filtered(tmp_path, text, "--control", control)
+    assert told.startswith("PASSED")
+    assert int(re.search(r"(\d+) of \d+ cuts smoothed", told)[1]) >= len(PASS)  # type: ignore[index]
+    assert difference(by_words(text.encode()), by_words(new), EPS) == ""
+    on = ("--control", control, "-e", EPS)
+    assert run("verify", "part.nc", "new.nc", *on, cwd=tmp_path).stdout.startswith(b"PASSED")
+    timed = run("time", "part.nc", *on, "--limits", THREE_AXES, cwd=tmp_path)
+    assert timed.returncode == DONE
+    assert b"cuts differ" in timed.stdout
+
+
+@pytest.mark.parametrize("control", ["fanuc", "linuxcnc", "heidenhain"])
+@pytest.mark.parametrize("option", ["--machine", "--limits"])
+def test_ways_to_smooth_it_are_compared(control: str, option: str, tmp_path: Path) -> None:
+    (tmp_path / "part.nc").write_text(PROGRAMS[control])
+    found = run("compare", "part.nc", "--control", control, option, THREE_AXES, cwd=tmp_path)
+    assert found.returncode == DONE, found.stderr
+    assert b"* cornersmooth filter part.nc" in found.stdout
+
+
+@pytest.mark.parametrize("control", ["siemens", "heidenhain"])
+def test_the_control_is_recognised(control: str, tmp_path: Path) -> None:
+    told, new = filtered(tmp_path, PROGRAMS[control])
+    assert told.startswith(f"PASSED  new.nc  {control} ")
+    assert new == filtered(tmp_path, PROGRAMS[control], "--control", control)[1]
+
+
+@pytest.mark.parametrize(
+    ("text", "needed"),
+    [
+        ("G21\nG90\nG0 X0 Y0\nZ10\nG1 Z-1 F333\nX0 Y3 F1000\nX0.5 Y3.596\nX1 Y4\n", True),
+        ("G21 ; units\nG90 ; absolute\nG0 X0. Y0.\nG1 Z-1. F333.\nX1. Y4.\nX2. Y3.\n", True),
+        ("G21;\nG90 (A; B X5);\nG0 X0 Y0. Z0;\nG1 Z-1. F333;\nX1. Y4.;\nX2. Y3.;\n", False),
+    ],
+)
+def test_the_control_is_asked_for_where_it_would_be_a_guess(text: str, needed: bool, tmp_path: Path) -> None:
+    assert needs_its_control(text.encode()) is needed
+    (tmp_path / "part.nc").write_text(text + "G0 Z10.\nM30\n")
+    made = run("filter", "part.nc", "-o", "new.nc", cwd=tmp_path)
+    assert made.returncode == (USAGE if needed else DONE)
+    assert (b"error[CS267]: part.nc does not say its control" in made.stderr) is needed
+    assert run("filter", "part.nc", "--control", "linuxcnc", "-o", "b.nc", cwd=tmp_path).returncode == DONE
+
+
+@pytest.mark.parametrize(
+    ("line", "turns"),
+    [
+        ("G1 X1. A5.", True),
+        ("G1 X1. A-.5", True),
+        ("C #5", True),
+        ("X1 C=DC(30)", True),
+        ("A3=0 B3=0 C3=1", True),
+        ("LN X+1 TX+0.1 TY+0 TZ+1", True),
+        ("L X+1 A+20", True),
+        ("TRAORI", True),
+        ("G43.4 H1", True),
+        ("PLANE SPATIAL SPA+0 SPB+0 SPC+0 STAY", True),
+        ("(A5 B6)", False),
+        ("G1 X1. ,C0.5", False),
+        ("CC X+10 Y+5", False),
+        ("C X+10 Y+5 DR-", False),
+        ("CYCLE82(5,0,1,-5)", False),
+        ('MSG("A5 C20")', False),
+        ("X=AC(5)", False),
+        ("0 BEGIN PGM A1 MM", False),
+        ("#<_a5>=3", False),
+        ("G2 X1. I0.5 J0.", False),
+    ],
+)
+def test_words_of_rotary_axes_and_vectors_are_seen(line: str, turns: bool) -> None:
+    assert names_rotary_axes(f"G0 X1.\n{line}\nM30\n".encode()) is turns
+
+
+@pytest.mark.parametrize(
+    ("block", "smoothed"),
+    [
+        ("G43 H4 Z20.", True),
+        ("G43 H4\nZ20.", True),
+        ("G44 H4 Z20.", True),
+        ("G49\nZ20.", True),
+        ("G18 G43 H4 Z20.\nG17", False),
+        ("G43 H4 Z20.\nG43.4 H4 Z20.", False),
+        ("G55 Z20.", False),
+        ("T5 M6\nZ20.", False),
+    ],
+)
+def test_the_length_of_the_tool_loses_its_axis_alone(block: str, smoothed: bool, tmp_path: Path) -> None:
+    cuts = "".join(f"Y{0.7 * k:.3f} Z{-1 - 0.1 * (k % 3):.3f}\n" for k in range(1, 12))  # X is never said again
+    text = f"%\nO1\nG21 G90 G94 G17 G40 G49 G80\nG54 G0 X3. Y0.\n{block}\nG1 Z-1. F350.\n{cuts}G0 Z20.\nM30\n%\n"
+    told, new = filtered(tmp_path, text, "--machine", THREE_AXES)
+    assert (new != text.encode()) is smoothed
+    assert told.startswith("PASSED" if smoothed else "NOT SMOOTHED")
+
+
+def test_feeds_keep_the_digits_of_the_program(tmp_path: Path) -> None:
+    cuts = "".join(f"X{x:.3f} Y{y:.3f} F{1.07 + 0.01313 * k:.5f}\n" for k, (x, y, _) in enumerate(PASS))
+    told, new = filtered(tmp_path, SIEMENS.format(cuts), "--control", "siemens")
+    assert told.startswith("PASSED")
+    assert b"F1.08313" in new
+
+
+def test_a_modal_cycle_of_klartext_is_called_by_every_block(tmp_path: Path) -> None:
+    text = KLARTEXT.replace("13 L Z+2 R0 FMAX", "13 M89")
+    assert filtered(tmp_path, text, "--control", "heidenhain")[0].startswith("NOT SMOOTHED")
+
+
+def test_rotary_words_without_a_machine_say_what_is_missing(tmp_path: Path) -> None:
+    (tmp_path / "part.nc").write_text(PROGRAMS["fanuc"].replace("G1 Z-1.", "G1 A5. Z-1."))
+    made = run("filter", "part.nc", "-o", "new.nc", cwd=tmp_path)
+    assert b"for rotary words name the machine" in made.stderr
