@@ -301,7 +301,7 @@ def options_for(data: bytes, name: str, given: Options) -> Options:
         warn(head.remark, name)
     default = click.get_current_context().get_parameter_source("control") == click.core.ParameterSource.DEFAULT
     if default and not recognise_control(data[:HEAD]) and needs_its_control(data[:HEAD]):
-        what = f"{name} does not say its control, and has numbers without a point or comments behind a semicolon"
+        what = f"{name} does not say its control, and has numbers without a point or comments after a semicolon"
         raise SettingsError("CS267", what, "name it: --control linuxcnc (for grbl and Mach, too), siemens or another")
     alone = not head.given.machine and not names_rotary_axes(data)
     return replace(head.given, machine=THREE_AXES) if alone else head.given
