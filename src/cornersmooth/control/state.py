@@ -166,7 +166,7 @@ class State:
     def _go(self, given: Mapping[str, float], axes: Iterable[str], does: set[str]) -> None:
         """Take the places of a block."""
         if does & {"length", "shift", "axis"}:
-            alone = self.groups["plane"] == "G17" and "length" not in does
+            alone = self.groups.get("plane") == "G17" and "length" not in does
             self.lose_place(None if "shift" in does else "Z" if alone else "XYZ")
         named, distance = set(axes), self.groups["distance"]
         for letter in named:

@@ -206,7 +206,7 @@ def why_not(state: State, wanted: str) -> str:
     groups, frames, tip = state.groups, state.frames, state.groups["tip"]
     if frames:
         return f"places of the part are turned, scaled or called by a macro ({', '.join(sorted(frames))})"
-    if tip is None:
+    if tip is None and wanted != ANY:
         return "it is not known whether tool tip control is on"
     if wanted == NONE and tip != NONE:
         return "tool tip control is on, and --no-tcp says that it is not"
@@ -214,7 +214,7 @@ def why_not(state: State, wanted: str) -> str:
         return (
             "tool tip control is off" + ": for rotary words name the machine" * (wanted == VECTOR)
             if tip == NONE
-            else f"tool tip control is for {_TOLD[tip]}, not for {_TOLD[wanted]}"
+            else f"tool tip control is for {_TOLD[str(tip)]}, not for {_TOLD[wanted]}"
         )
     even = all(groups.get(group, PRESET) in _EVEN.get(wanted, ()) for group in ("orientation", "coordinates"))
     if not even and wanted in (ANGLES, VECTOR):
