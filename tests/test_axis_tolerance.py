@@ -183,7 +183,9 @@ def test_the_command_line_says_it_everywhere(tmp_path: Path) -> None:
     made = run("smooth", SAMPLE, "-o", out, "--report", report, "--axis-tolerance", "0.4", *options)
     assert made.returncode == 0, made.stderr.decode()
     assert made.stderr.decode().startswith("PASSED, 1 to check  ")
-    assert "\n        within 0.01 mm and 0.4 deg everywhere\n" in made.stderr.decode()
+    # what CYCLE832 allows adds to ε
+    within = "within 0.01 mm and 0.4 deg everywhere, 0.011 mm with what the control rounds itself"
+    assert f"\n        {within}\n" in made.stderr.decode()
     text = out.read_text()
     assert " AXIS=0.4 " in text
     assert "CYCLE832(0.00100,_ORI_FINISH,0.04000)" in text
@@ -200,7 +202,9 @@ def test_the_command_line_says_it_everywhere(tmp_path: Path) -> None:
     found = run("verify", SAMPLE, out, "--axis-tolerance", "0.1", "--report", tmp_path / "v.json")
     assert found.returncode == 1
     assert "the tool axis is off by" in found.stderr.decode()
-    first = json.loads((tmp_path / "v.json").read_text())["verification"]["problems"][0]
+    problems = json.loads((tmp_path / "v.json").read_text())["verification"]["problems"]
+    assert problems[0]["code"] == "CS571"  # CYCLE832 lets the control turn the tool by more than a tenth of it
+    first = next(one for one in problems if one["code"] != "CS571")
     assert first["code"] == "CS527"
     assert 0.1 < first["amount_deg"] <= 0.4
     both = run("smooth", SAMPLE, "-o", tmp_path / "p.nc", "--axis-tolerance", "0.4", "-H", "20")
