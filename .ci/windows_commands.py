@@ -68,7 +68,7 @@ COMMANDS = (
     Command("machines table-ac"),
     Command("explain CS404"),
     Command("completion bash"),
-    Command("info part.cls", output="at -e 0.02"),
+    Command("info part.cls", output="at 0.02 mm"),
     Command("config part.cls --json", same=False),
     Command("smooth part.cls -o part.nc"),
     Command("smooth part.cls -o part.nc", 4),
@@ -134,10 +134,16 @@ def files(folder: Path) -> dict[str, bytes]:
 def wrong(command: Command, windows: Found, linux: Found) -> str:
     """What is wrong with a command; empty for nothing."""
     code, out, said = windows
+    expected = linux[1]
     told = out if command.data else out.replace("\r\n", "\n")
     if not code == linux[0] == command.code:
         return f"exit codes {code} and {linux[0]} on Linux, in place of {command.code}: {said}"
-    if command.same and told != linux[1]:
+    if "--json" in command.words and command.same:  # escaped is what a code page has not; last digits are numpy's
+        told, expected = (
+            json.dumps(json.loads(one.encode("latin-1"), parse_float=lambda text: f"{float(text):.9g}"))
+            for one in (told, expected)
+        )
+    if command.same and told != expected:
         return f"standard output differs from that on Linux: {told!r}"
     if command.output not in told:
         return f"standard output has no {command.output!r}"
