@@ -197,6 +197,12 @@ def test_frames_that_are_known(control: str, lines: list[str], frames: tuple[str
     assert smoothed_frames(control, *lines) == frames
 
 
+@pytest.mark.parametrize("block", ["G94", "G93", "G21 G90 G94"])
+def test_a_word_of_the_kind_of_feed_loses_the_feed(block: str) -> None:
+    assert math.isnan(after("linuxcnc", block).feed)
+    assert after("linuxcnc", f"{block} F50.").feed == 50.0
+
+
 def test_a_skipped_block_leaves_what_both_ways_have() -> None:
     state = after("fanuc", "/G0 G91 X5. M8")
     assert (state.groups["motion"], state.groups["distance"], state.groups["coolant"]) == (None, None, None)

@@ -155,7 +155,8 @@ class State:
             if group in ("offset", "path") and value is not None:
                 own = (word.text.replace(" ", "") for word in words if word.name in row.beside)
                 value = " ".join((value, *own))
-            if self.groups.get(group) != value or value is None:
+            # LinuxCNC takes the feed as zero behind any word of its kind, the same one included
+            if self.groups.get(group) != value or value is None or group == "feed":
                 does |= set(_CHANGES.get(group, ()))
             if group.startswith(FRAME):
                 does.add("place")
