@@ -101,3 +101,11 @@ def test_what_goes_off_at_a_stop_alone_need_not_be_said() -> None:
     stop = max(k for k, line in enumerate(lines) if line == "M0")
     assert lines[stop + 1] == "S1000 M3"
     assert codes(case, lines) == set()
+
+
+def test_a_stop_of_the_post_before_a_tool_change_is_none_of_the_cl_file() -> None:
+    """Both stand at one place of the path."""
+    part = read(CL.replace(b"LOAD/TOOL,5,ADJUST,5\n", b"LOAD/TOOL,5,ADJUST,5\nOPSTOP\n"), name="part.cls")
+    text = written(part, CASES[0].choose(), Settings(tolerance=0.02))[0]
+    assert text.count("M1\n") == 2
+    assert verify(part, text.encode(), tolerance=0.02).problems == ()

@@ -131,28 +131,35 @@ def _at_pauses(asked_for: list[Token], found: list[Token], away: _Away) -> Itera
     pauses, done = list(_holding(found, dict.fromkeys(_STOPPED, "OFF"))), dict.fromkeys(PAUSES, 0)
     for wanted, theirs in _holding(asked_for, {}):
         kind = wanted.kind
-        alike = (
-            k
-            for k, (token, _) in enumerate(pauses[done[kind] :], done[kind])
+        alike = [
+            (k, token, _others(kind, theirs, ours))
+            for k, (token, ours) in enumerate(pauses[done[kind] :], done[kind])
             if token.kind == kind and token.value == wanted.value and not away(wanted.place, token)
-        )
-        place = next(alike, None)
-        if place is None:  # it is missing, which is said
+        ]
+        if not alike:  # it is missing, which is said
             continue
-        token, ours = pauses[place]
+        # a stop that posts write before a tool change may stand beside one of the CL file
+        place, token, others = min(alike, key=lambda one: (len(one[2]) > 0, one[1].optional, one[0]))
         done[kind] = place + 1
-        for state, value in theirs.items():
-            here = ours.get(state, value)
-            off = kind == "stop" and state in _STOPPED and here == "OFF"
-            if (
-                here != value
-                and not off
-                and (state != "speed" or "OFF" not in (theirs.get("spindle", "OFF"), ours.get("spindle", "OFF")))
-            ):
-                code, name = _NAMES[state]
-                pause = _NAMES[kind][1].format(token.value)
-                text = f"{name.format(here)} holds at {pause}, where the CL file has {name.format(value)}"
-                yield Problem(code, wanted.line, token.line, text)
+        for state, here, value in others:
+            code, name = _NAMES[state]
+            pause = _NAMES[kind][1].format(token.value)
+            text = f"{name.format(here)} holds at {pause}, where the CL file has {name.format(value)}"
+            yield Problem(code, wanted.line, token.line, text)
+
+
+def _others(
+    kind: str, theirs: dict[str, float | str], ours: dict[str, float | str]
+) -> list[tuple[str, float | str, float | str]]:
+    """States of the program that are not those of the CL file at a pause of a kind, and what they should be."""
+    found = []
+    for state, value in theirs.items():
+        here = ours.get(state, value)
+        off = kind == "stop" and state in _STOPPED and here == "OFF"
+        off |= state == "speed" and "OFF" in (theirs.get("spindle", "OFF"), ours.get("spindle", "OFF"))
+        if here != value and not off:
+            found.append((state, here, value))
+    return found
 
 
 def _holding(tokens: list[Token], changed: dict[str, float | str]) -> Iterator[tuple[Token, dict[str, float | str]]]:
