@@ -19,4 +19,5 @@ def look_away(monkeypatch: pytest.MonkeyPatch) -> None:
         return report, np.zeros_like(share)
 
     monkeypatch.setattr(zhang2016, "_measured", unmeasured)
-    monkeypatch.setattr(zhang2016, "straying_remainders", lambda smoothed: np.zeros(0, np.int64))
+    for name in ("straying_lines", "straying_remainders"):
+        monkeypatch.setattr(zhang2016, name, lambda smoothed: np.zeros(0, np.int64))

@@ -23,7 +23,8 @@ from cornersmooth.smoothing.construction import (
     refuse_turns,
 )
 from cornersmooth.smoothing.proportional import EXACT
-from cornersmooth.smoothing.segments import Segments, segments_of
+from cornersmooth.smoothing.sampling import nodes
+from cornersmooth.smoothing.segments import Segments, lines_of, segments_of
 from cornersmooth.smoothing.self_check import TOGETHER, Motion, Original, bounded, most_taken, motion_of, taken
 from cornersmooth.smoothing.synchronise import REPORT_PARAMETERS, matching_parameters, synchronisation_report
 from cornersmooth.vectors import angle_between, dot, norm, unit
@@ -57,7 +58,7 @@ class Zhang2016(Construction):
         """Smooth a whole program; corners beside segments whose rest strays get smaller, or stay sharp."""
         smoothed = super().smooth(program, settings, progress, processes)
         corners = smoothed.corners
-        rows = straying_remainders(smoothed)
+        rows = np.union1d(straying_lines(smoothed), straying_remainders(smoothed))
         for number in range(_TIMES):
             if not len(rows):
                 break
@@ -66,7 +67,7 @@ class Zhang2016(Construction):
             part = self.sized(legs, settings, np.zeros(len(rows)) if number == _TIMES - 1 else size)
             part.status[part.status == Status.TOO_SHORT] = Status.STRAYS
             put(corners, rows, part, legs.shift)
-            rows = straying_remainders(smoothed)
+            rows = np.union1d(straying_lines(smoothed), straying_remainders(smoothed))
         return smoothed
 
     def place(self, legs: Legs, settings: Settings) -> Placed:
@@ -241,6 +242,31 @@ def _measured(
     some, there = Motion(*(part[doubtful] for part in motion)), original.some(doubtful)
     share[doubtful] = most_taken(some, there, spare[doubtful], settings, middle, passing[doubtful] if lines else None)
     return tuple(report), share
+
+
+def straying_lines(smoothed: SmoothProgram) -> Ints:
+    """Rows of corners whose transitions stray at the ends of their lines: v follows on from one end to the next."""
+    program, corners, settings = smoothed.program, smoothed.corners, smoothed.settings
+    rows = np.flatnonzero(corners.smoothed)
+    if not settings.round_feed_changes or not len(rows):
+        return rows[:0]
+    weights, height = np.array(settings.weights), settings.axis_length
+    number = lines_of(smoothed, rows)
+    found = [rows[:0]]
+    for count in np.unique(number):
+        own, u = rows[number == count], nodes(int(count))
+        legs = legs_at(program, height, corners.pose[own], corners.before[own], corners.after[own])
+        tips, turns = (legs.tip_in, legs.tip_out), (legs.turn_in, legs.turn_out)
+        curves = nurbs.control_points(program, corners, own, height)
+        v, _ = matching_parameters(*curves, weights, u, height)
+        u, v = np.append(0.0, u), np.pad(v, ((0, 0), (1, 0)))
+        v[:, -1] = 1.0
+        tip_legs, axis_legs = ((one[:, 2] - one[:, 0], one[:, 4] - one[:, 2]) for one in curves)
+        trims = corners.trim_in[own], corners.trim_out[own], corners.axis_trim_in[own], corners.axis_trim_out[own]
+        original = Original(tips, turns, height * legs.axis)
+        motion = motion_of(tip_legs, axis_legs, trims, original.lever, (u, v), weights)
+        found.append(own[taken(motion, original, legs.spare(settings), settings).max(axis=1) > 1.0 + 1e-6])
+    return np.concatenate(found)
 
 
 def straying_remainders(smoothed: SmoothProgram) -> Ints:
