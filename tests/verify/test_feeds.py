@@ -25,7 +25,7 @@ CASES = (
     Case("siemens", "g1"),
     Case("siemens", "bspline"),
     Case("heidenhain", "g1"),
-    Case("heidenhain", "spl", "table-bc"),
+    Case("heidenhain", "g1", "table-bc"),
     Case("linuxcnc", "g1", "xyzac-trt"),
     Case("mitsubishi", "g1"),
 )

@@ -268,7 +268,10 @@ class Verifier:
             text = f"the program is in {nc.units}, the CL file in {program.units}"
             problems.append(Problem("CS505", 0, 1, text))
         unsaid = ""
-        problems += batches.problems + findings.feeds.problems + problems_of(findings.violations)
+        # where the motion leaves the CL path, no place tells which feed is right
+        off = {violation.nc_line for violation in findings.violations}
+        feeds = [problem for problem in findings.feeds.problems if problem.nc_line not in off]
+        problems += batches.problems + feeds + problems_of(findings.violations)
         problems += half_turns(program)
         if not self._skip_cycles:
             problems += batches.left_out
