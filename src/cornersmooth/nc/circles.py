@@ -71,15 +71,17 @@ def plan_circles(program: Program, settings: Settings, form: Form, planes: Plane
     digits = form.table.digits
     vectors = to_ticks(digits.vector_length * program.axis, digits.vector)
     modes = [(upright[arcs.pose], form.upright), (tilted, form.plane)]
-    flat, circular = (
-        np.full(len(tilted), value) for value in (bool(form.mode.motion.arc_directions), form.mode.circles)
+    flat, circular, in_xy = (
+        np.full(len(tilted), value)
+        for value in (bool(form.mode.motion.arc_directions), form.mode.circles, form.mode.circles_in_xy)
     )
     for here, mode in modes:
         if mode is not None:
             flat[here], circular[here] = bool(mode.motion.arc_directions), mode.circles
+            in_xy[here] = mode.circles_in_xy
     fits = (
         circular
-        & (~flat | (plane == 0))
+        & (~(flat | in_xy) | (plane == 0))
         & (np.abs(height) > 1.0 - _UPRIGHT)
         & (radius < _LARGEST_RADIUS)
         & (ticks > 0)

@@ -196,6 +196,8 @@ class Mode:
     off: Blocks = ()
     motion: Motion = Motion()
     circles: bool = False  #: whether arcs may be written as circular blocks, without the words of the orientation
+    #: whether only those of G17 may: the length of the tool acts across the plane
+    circles_in_xy: bool = False
     #: whether blocks in which only rotary axes turn are written with inverse time: F would be degrees per minute
     timed_turns: bool = False
     #: within_on, within_off: blocks that stand within these: the latter before the retract

@@ -19,6 +19,7 @@ import numpy as np
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program
 from cornersmooth.nc.block_rows import BlockRows
 from cornersmooth.nc.blocks import feed_digits, feed_ticks
+from cornersmooth.nc.circles import FIRST_PLANE
 from cornersmooth.nc.control import Blocks
 from cornersmooth.nc.coordinates import Coordinates
 from cornersmooth.nc.cycle_blocks import hole_feeds, kind_of
@@ -106,6 +107,7 @@ class Holes:
             motion.findings.note_each("CS348", lines)
         motion.warnings.of_cut(int(poses[0]), turning=motion.modals.turning)
         mode = int(hole_feeds(cycle, program, poses[:1])[1][0])
+        motion.say(motion.modals.set(plane=FIRST_PLANE))  # a cycle drills across the plane
         made = cycle_blocks(cycle, kind, motion.at, program, poses, (travel, clearance), motion.modals.speed or 0.0)
         for k, (before, goes, blocks, over) in enumerate(made):
             if goes:

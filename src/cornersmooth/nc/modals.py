@@ -182,7 +182,7 @@ class Modals:
         if self._used and another and not self.halted:
             steps = (*steps, *self.form.table.program.between_tools)
         self._moved = self._used = False
-        return [*self._back(), *self._expand(steps)]
+        return [*self._back(), *self.set(plane=FIRST_PLANE), *self._expand(steps)]
 
     def go_home(self, *, along: bool = True) -> list[str]:
         """Blocks that bring the tool to the height of the retract with spindle and coolant on.
