@@ -130,7 +130,7 @@ def test_time_says_what_is_saved_and_what_limits() -> None:
     assert " saves " in said[0]
     assert " of the direct path (" in said[0]
     assert "; limited by " in said[0]
-    assert said[0].endswith(" of the cutting time")
+    assert said[0].endswith(" of the cutting time; limits of the tip alone, --limits MACHINE adds the axes")
     assert "saves % of" in said[2]
     assert said[3].split() == ["exact", "stop", "velocity", "jump"]
 

@@ -55,6 +55,7 @@ RUN_BY = {
     "python tests/batch_runs.py": "test_batch_runs_times_a_batch",
     "python -m nc.test_nc_golden": "tests/nc/test_nc_golden.py",
     "python -m nc.sweep": "test_sweeps_find_nothing",
+    "python -m nc.all_texts FILE": "test_texts_are_as_before",
     "python -m nc.run_chains": "test_sweeps_find_nothing",
     "python -m nc.run_chains 3000 3252": "test_sweeps_find_nothing",
     "python -m verify.sweep": "test_sweeps_find_nothing",
@@ -222,6 +223,21 @@ def test_sweeps_find_nothing(
     monkeypatch.setattr(sys, "argv", ["sweep", *words])
     assert not importlib.import_module(name).main()
     assert re.search(r"'(judged|chains)': \d|(: |^)passed \d", capsys.readouterr().out)
+
+
+def test_texts_are_as_before(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another hash is found; of the golden texts of one control, as all take a minute."""
+    texts, file = importlib.import_module("nc.all_texts"), tmp_path / "texts.json"
+    monkeypatch.setattr(sys, "argv", ["all_texts", str(file), "--only", "haas"])
+    monkeypatch.setattr(texts, "jobs", lambda found=list(texts.jobs())[:60]: found)
+    assert [texts.main(), texts.main()] == [0, 0]
+    before = json.loads(file.read_text())
+    before[next(iter(before))][0] = "another"
+    file.write_text(json.dumps(before))
+    assert texts.main() == 1
+    assert f"{len(before) - 1} of {len(before)} as before" in capsys.readouterr().out
 
 
 def test_hole_mutations_are_scored(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:

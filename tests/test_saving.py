@@ -73,9 +73,7 @@ def test_what_nobody_runs_gets_no_time(program):
     assert planned_saving(without, fitted(form), form, Limits()) is None
     assert planned_saving(without, fitted(form), form, Limits(feed=900.0)) is not None
     rapids = Program.from_poses(program.tip, program.axis, kind=np.full(len(program), Move.RAPID))
-    empty = Program.from_poses(np.zeros((0, 3)), np.zeros((0, 3)))
     assert planned_saving(rapids, fitted(form), form, Limits()) is None
-    assert planned_saving(empty, fitted(form), form, Limits()) is None
     without_axes = choose_form()
     assert planned_saving(program, fitted(without_axes), without_axes, Limits()) is None
 

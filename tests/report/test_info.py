@@ -95,10 +95,9 @@ def test_kind_of_axis_motion(axis: list[tuple[float, float, float]], kind: list[
     assert describe(Program.from_poses(tip, axis, kind=np.array(kind)), 0.01, 10)["axis"]["kind"] == expected
 
 
-@pytest.mark.parametrize("poses", [0, 1])
-def test_next_to_nothing_can_be_described(poses: int):
-    info = describe(Program.from_poses(np.zeros((poses, 3)), np.tile(UP, (poses, 1))), 0.01, 10)
-    assert info["poses"] == poses
+def test_next_to_nothing_can_be_described():
+    info = describe(Program.from_poses(np.zeros((1, 3)), np.tile(UP, (1, 1))), 0.01, 10)
+    assert info["poses"] == 1
     assert info["motion"]["segment_length_mm"] == {"count": 0, **dict.fromkeys(("min", "p5", "p50", "p95", "max"))}
     json.loads(report_json(info))
 

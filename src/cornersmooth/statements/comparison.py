@@ -131,11 +131,15 @@ def _at_pauses(asked_for: list[Token], found: list[Token], away: _Away) -> Itera
     pauses, done = list(_holding(found, dict.fromkeys(_STOPPED, "OFF"))), dict.fromkeys(PAUSES, 0)
     for wanted, theirs in _holding(asked_for, {}):
         kind = wanted.kind
-        alike = [
-            (k, token, _others(kind, theirs, ours))
-            for k, (token, ours) in enumerate(pauses[done[kind] :], done[kind])
-            if token.kind == kind and token.value == wanted.value and not away(wanted.place, token)
-        ]
+        alike: list[tuple[int, Token, list[tuple[str, float | str, float | str]]]] = []
+        for k in range(done[kind], len(pauses)):
+            token, ours = pauses[k]
+            if token.kind != kind or token.value != wanted.value:
+                continue
+            if not away(wanted.place, token):
+                alike.append((k, token, _others(kind, theirs, ours)))
+            elif alike:  # all that follow are farther on
+                break
         if not alike:  # it is missing, which is said
             continue
         # a stop that posts write before a tool change may stand beside one of the CL file
