@@ -266,8 +266,8 @@ def test_second_table_of_the_paper_is_measured_in_the_text(tolerance, tip, axis_
     stream = io.BytesIO()
     cornersmooth.write(cornersmooth.smooth(program, settings), stream, control="fanuc", form="g6.2")
     found = verify(program, stream.getvalue(), tolerance=tolerance, axis_length=10.0)
-    # four printed decimals, and half a step of the written numbers. At 0.078 the paper's axis point leaves the tolerance
-    # by 5e-6 mm at the first corner: that corner gets the size that just keeps it
+    # four printed decimals, and half a step of the written numbers. At 0.078 the paper's axis point leaves the
+    # tolerance by 5e-6 mm at the first corner: that corner gets the size that just keeps it
     assert found.pose_tip[1:3] == pytest.approx(tip, abs=1.2e-4)
     assert found.pose_axis_point[1:3] == pytest.approx(axis_point, abs=1.2e-4)
 

@@ -129,7 +129,7 @@ class WordPlaces:
         ours = said(of, here, means)
         wrong = compare(theirs, ours, self.margin, means, path.way_apart, own)
         homes = {at: one for at, one in zip(statements, program.statements, strict=True) if one.word == "GOHOME"}
-        up = [self._of(Event(element, 0, "", math.nan)) for element in batches.retracts] if homes else []
+        up = [self._retract(element, length) for element in batches.retracts] if homes else []
         for home, statement in homes.items() if retracts else ():
             room = [self.margin + place.room for place in up]
             found_there = (-near <= home - at.at <= at.reach + near for at, near in zip(up, room, strict=True))
@@ -160,6 +160,14 @@ class WordPlaces:
         following = next(k for k in count(event.element) if k not in self._still)
         reach = max(self._begins.get(following, -math.inf) - at, 0.0)
         return Place(at, self._rooms.get(before, 0.0), reach, self._others.get(before, ()))
+
+    def _retract(self, element: int, end: float) -> Place:
+        """Place of a retract; after a run whose end is not located, up to what is located next."""
+        place, known = self._of(Event(element, 0, "", math.nan)), bisect_right(self._ended, element - 1)
+        if element - 1 in self._ends:
+            return place
+        following = self._ends[self._ended[known]] if known < len(self._ended) else end
+        return place._replace(reach=max(place.reach, following - place.at))
 
     def _of_holes(self, moves: Floats) -> list[Token]:
         """What the cycles of holes ask for: to wait at the bottom, and to tap."""
