@@ -53,7 +53,7 @@ MUTANTS = (
     Mutant('(26): ends of the whole segment', PAPER, (('(high, segments.axis_exit[pose, None])', '(high, 1.0 + 0.0 * high)'),), '24'),
     Mutant('least residual in place of the largest', ROOTS, (('return v, residual.max(axis=1)', 'return v, residual.min(axis=1)'),), '23'),
     Mutant('the motion is not measured', PAPER, (('over = share > 1.0 + EXACT', 'over = share > 1e9'),), 'keeps_the_tolerance'),
-    Mutant('0.99 of the size in place of what just keeps ε', PAPER, (('size[rows] *= (1.0 - _JUST)', 'size[rows] *= 0.97 * (1.0 - _JUST)'),), 'eq_16 or construction'),
+    Mutant('0.99 of the size in place of what just keeps ε', PAPER, (('keeping = (1.0 - _JUST) / share', 'keeping = 0.97 * (1.0 - _JUST) / share'),), 'eq_16 or construction'),
     Mutant('the rest of segments is not looked at', PAPER, (('found.append(part[share.max(axis=1) > 1.0])', 'found.append(part[:0])'),), 'left_of'),
 )
 # fmt: on

@@ -15,7 +15,7 @@ import numpy as np
 
 from cornersmooth.geometry import nurbs
 from cornersmooth.model import Floats, Ints
-from cornersmooth.vectors import angle_between, square
+from cornersmooth.vectors import angle_between
 
 #: parameters of the tip curve at which residual and jumps are reported
 REPORT_PARAMETERS = np.linspace(0.0, 1.0, 9)
@@ -31,6 +31,9 @@ _NO_EXCESS, _NO_STEP, _STEPS = 1e-13, 1e-12, 60
 #: how far from where it is expected a root is looked for without the grid, and in how many steps of Newton
 _NEAR, _NEAR_STEPS, _SHORT = 1.0 / 16.0, 6, 1e-7
 
+#: shares of the control points in weight, σ and β of the first half
+_OF_SHARES = np.array([[1.0, 1, 1, 1, 1], [1, nurbs.RATIO, 0, -nurbs.RATIO, 0], [0, 0, 0, nurbs.RATIO, 0]])
+
 #: Bézier points of the first half of the five-point curve, and the powers of their cubic
 _HALF = np.array([[4.0, 0, 0, 0, 0], [0, 4, 0, 0, 0], [0, 2, 2, 0, 0], [0, 1, 2, 1, 0]]) / 4.0
 _POWERS = np.array([[1.0, 0, 0, 0], [-3, 3, 0, 0], [3, -6, 3, 0], [-1, 3, -3, 1]]) @ _HALF
@@ -38,23 +41,16 @@ _POWERS = np.array([[1.0, 0, 0, 0], [-3, 3, 0, 0], [3, -6, 3, 0], [-1, 3, -3, 1]
 
 @dataclass(frozen=True)
 class _Excess:
-    """``|Q(v) − P| − H`` of g axis-point curves and points P, with its derivatives by v."""
+    """``(|Q(v) − P|² − H²) / 2H`` of g corners and points P in one half of v: zero where ``|Q(v) − P|`` is H.
 
-    powers: Floats  # (4, 4, 2 g): coordinates times weight, weight; of both halves, the second from its end
-    tip: Floats  # (3, g)
+    With σ and β as in `cornersmooth.geometry.nurbs`, Q(v) is σ·l + β·d from the corner, so this is a form in σ and β.
+    """
+
+    terms: Floats  # (6, g): of 1, σ, β, σ², σβ and β²
+    powers: Floats  # (3, 4): weight, and σ and β times weight, in powers of s
+    paper: bool  # all weights are 1: then σ is 1 − s, and β is s³/6
+    second: bool  # half, in which s runs from the end of the curve to its middle
     axis_length: float
-
-    def some(self, rows: Ints) -> Floats:
-        """Powers of some curves."""
-        return self.powers[:, :, np.concatenate((rows, rows + self.powers.shape[2] // 2))]
-
-    @classmethod
-    def of(cls, axis_curve: Floats, weights: Floats, axis_length: float) -> _Excess:
-        """Those of curves (g, 5, 3) about the origin."""
-        w = nurbs.full_weights(weights)[:, None]
-        points = np.concatenate((w * axis_curve, np.broadcast_to(w, (*axis_curve.shape[:2], 1))), axis=2)
-        both = np.concatenate((points, points[:, ::-1]))
-        return cls(np.einsum("kp,gpc->kcg", _POWERS, both, optimize=True), np.zeros((3, len(axis_curve))), axis_length)
 
     def __call__(self, v: Floats, rows: Ints) -> tuple[Floats, Floats]:
         """Equation (21) as a length, mm, and its derivative, at parameters (k,) of the curves of rows."""
@@ -64,24 +60,46 @@ class _Excess:
         """First and second derivative."""
         return self._derivatives(v, rows, bends=True)[1:]
 
+    def on(self, grid: Floats, rows: Ints) -> Floats:
+        """(k, m) the excess of rows at common parameters (m,)."""
+        s = 2.0 * (1.0 - grid if self.second else grid)
+        weight, sigma, beta = self.powers @ s ** np.arange(4)[:, None]
+        sigma, beta = sigma / weight, beta / weight
+        return self.terms[:, rows].T @ np.stack((sigma**0, sigma, beta, sigma**2, sigma * beta, beta**2))
+
+    def missing(self, v: Floats, rows: Ints) -> Floats:
+        """(k,) ``||Q(v) − P| − H|``, mm."""
+        squared = self.axis_length * (self.axis_length + 2.0 * self(v, rows)[0])
+        return np.abs(np.sqrt(np.maximum(squared, 0.0)) - self.axis_length)
+
     def _derivatives(self, v: Floats, rows: Ints, *, bends: bool) -> tuple[Floats, Floats, Floats]:
-        second = v > 0.5
-        c0, c1, c2, c3 = np.take(self.powers, rows + second * (self.powers.shape[2] // 2), axis=2)
-        s = np.where(second, 1.0 - v, v)
-        s += s
-        c3s = c3 * s
-        value, slope = ((c3s + c2) * s + c1) * s + c0, (3.0 * c3s + 2.0 * c2) * s + c1
-        point, weight = value[:3] / value[3], value[3]
-        away = point - self.tip[:, rows]
-        rate = (slope[:3] - point * slope[3]) / weight
-        length = np.sqrt(np.maximum(_dot(away, away), np.finfo(np.float64).tiny))
-        first = _dot(away, rate) / length
-        change = first
+        one, c_s, c_b, c_ss, c_sb, c_bb = np.take(self.terms, rows, axis=1)
+        s, turned = (2.0 - 2.0 * v, -2.0) if self.second else (2.0 * v, 2.0)
+        (sigma, d_sigma, s2), (beta, d_beta, b2) = self._shares(s)
+        mixed = c_sb * beta
+        by_sigma, by_beta = c_s + mixed + 2.0 * c_ss * sigma, c_b + c_sb * sigma + 2.0 * c_bb * beta
+        value = one + sigma * (c_s + mixed + c_ss * sigma) + beta * (c_b + c_bb * beta)
+        slope = by_sigma * d_sigma + by_beta * d_beta
+        bend = slope
         if bends:
-            bend = 6.0 * c3s + 2.0 * c2
-            turn = (bend[:3] - point * bend[3] - 2.0 * slope[3] * rate) / weight
-            change = 4.0 * (_dot(rate, rate) + _dot(away, turn) - first * first) / length
-        return length - self.axis_length, np.where(second, -2.0, 2.0) * first, change
+            bend = by_sigma * s2 + by_beta * b2
+            bend += 2.0 * (c_ss * d_sigma**2 + c_sb * d_sigma * d_beta + c_bb * d_beta**2)
+        return value, turned * slope, 4.0 * bend
+
+    def _shares(self, s: Floats) -> tuple[tuple[Floats, Floats | float, Floats | float], tuple[Floats, Floats, Floats]]:
+        """Values and first two derivatives by s of σ and β."""
+        if self.paper:
+            of_beta = nurbs.RATIO / 4.0 * s
+            return (1.0 - s, -1.0, 0.0), (of_beta * s * s, 3.0 * of_beta * s, 6.0 * of_beta)
+        (w, w1, w2), *both = (
+            (((p3 * s + p2) * s + p1) * s + p0, (3.0 * p3 * s + 2.0 * p2) * s + p1, 6.0 * p3 * s + 2.0 * p2)
+            for p0, p1, p2, p3 in self.powers
+        )
+        values = [value / w for value, *_ in both]
+        rates = [(rate - value * w1) / w for value, (_, rate, _) in zip(values, both, strict=True)]
+        bends = [(n[2] - value * w2 - 2.0 * rate * w1) / w for value, rate, n in zip(values, rates, both, strict=True)]
+        sigma, beta = zip(values, rates, bends, strict=True)
+        return sigma, beta
 
 
 def _dot(one: Floats, other: Floats) -> Floats:
@@ -96,29 +114,32 @@ def matching_parameters(
     Equations (20) and (21).
     Control points (g, 5, 3) are those of P and Q; weights (2,) are those of all, u (m,) ascends.
     """
-    centre = axis_curve[:, 2:3]
-    tips = nurbs.evaluate(tip_curve - centre, weights, u)
-    grid = nurbs.evaluate(axis_curve - centre, weights, _GRID)
-    every, of_grid = _Excess.of(axis_curve - centre, weights, axis_length), square(grid)
-    v, missing = np.zeros((2, len(tip_curve), len(u)))
-    low_limit, target = np.zeros(len(v)), np.full(len(v), u[0])
+    lever = np.ascontiguousarray((axis_curve[:, 2] - tip_curve[:, 2]).T)
+    tip_legs, axis_legs = (
+        [np.ascontiguousarray((curve[:, k + 2] - curve[:, k]).T) for k in (0, 2)] for curve in (tip_curve, axis_curve)
+    )
+    bend = axis_legs[1] - axis_legs[0]
+    forms = [(leg, _dot(leg, leg), 2.0 * _dot(leg, bend), _dot(bend, bend)) for leg in (-axis_legs[0], axis_legs[1])]
+    powers, paper = (nurbs.full_weights(weights) * _OF_SHARES) @ _POWERS.T, bool((weights == 1.0).all())
+    v, missing = np.zeros((2, len(u), len(tip_curve))).transpose(0, 2, 1)
+    every = np.arange(len(tip_curve))
+    low_limit, target, shares = np.zeros(len(v)), np.full(len(v), u[0]), nurbs.leg_coefficients(u, weights)
     for j, step in enumerate(np.diff(u, append=u[-1])):
         # the paper solves (21) in the knot interval of u, n = 3 or 4: so both are ½ together
         low, high = float(u[j] >= 0.5) / 2.0, (1.0 + float(u[j] > 0.5)) / 2.0
         low_limit, target = np.maximum(low_limit, low), np.clip(target, low, high)
-        excess = replace(every, tip=np.ascontiguousarray(tips[:, j].T))
-        if low == high:
-            v[:, j] = low
-            missing[:, j] = np.abs(excess(v[:, j], np.arange(len(v)))[0])
-        else:
-            v[:, j] = _near(low_limit, high, target, excess)
-        rows = np.flatnonzero(np.isnan(v[:, j]))
+        away, second = lever - shares[j, 1] * tip_legs[0] - shares[j, 2] * tip_legs[1], bool(u[j] > 0.5)
+        leg, *form = forms[second]
+        terms = _dot(away, away) - axis_length**2, 2.0 * _dot(leg, away), 2.0 * _dot(bend, away), *form
+        excess = _Excess(np.stack(terms) / (2.0 * axis_length), powers, paper, second, axis_length)
+        v[:, j] = low if low == high else _near(low_limit, high, target, excess)
+        rows = every if low == high else np.flatnonzero(np.isnan(v[:, j]))
         if len(rows):
-            tip, own = tips[rows, j], slice(*np.searchsorted(_GRID, (low, high + _NO_STEP)))
-            square_off = of_grid[rows, own] + square(tip)[:, None] - 2.0 * (grid[rows, own] @ tip[..., None])[..., 0]
-            here = replace(excess, powers=every.some(rows), tip=excess.tip[:, rows])
-            values = np.sqrt(square_off) - axis_length
-            v[rows, j], missing[rows, j] = _follow(_GRID[own], values, low_limit[rows], target[rows], here)
+            if low < high:
+                own = _GRID[slice(*np.searchsorted(_GRID, (low, high + _NO_STEP)))]
+                here = replace(excess, terms=excess.terms[:, rows])
+                v[rows, j] = _follow(own, excess.on(own, rows), low_limit[rows], target[rows], here)
+            missing[rows, j] = excess.missing(v[rows, j], rows)
         low_limit = v[:, j]
         target = low_limit + step
     return v, missing
@@ -145,10 +166,10 @@ def _near(low_limit: Floats, high: float, target: Floats, excess: _Excess) -> Fl
     return found
 
 
-def _follow(grid: Floats, values: Floats, low_limit: Floats, target: Floats, excess: _Excess) -> tuple[Floats, Floats]:
+def _follow(grid: Floats, values: Floats, low_limit: Floats, target: Floats, excess: _Excess) -> Floats:
     """One step of the branch: the root at or above `low_limit` nearest to `target`, else the smallest excess.
 
-    `values` (g, m) are the excess on the grid (m,). Gives the parameters, and what is missing there.
+    `values` (g, m) are the excess on the grid (m,).
     """
     # the cell that holds the limit counts from the limit on
     each = np.arange(len(values))
@@ -193,7 +214,7 @@ def _follow(grid: Floats, values: Floats, low_limit: Floats, target: Floats, exc
     found = np.where(kept, low_limit, found)
     missing = np.abs(excess(found, each)[0])
     worse = ~has_root & (np.abs(values[each, best]) < missing)
-    return np.where(worse, parameters[each, best], found), np.where(worse, np.abs(values[each, best]), missing)
+    return np.where(worse, parameters[each, best], found)
 
 
 def _zero(ends: tuple[Floats, Floats], start: Floats, wanted: _Wanted) -> Floats:

@@ -36,6 +36,7 @@ EXTRA = ("sync_residual", "jump_in", "jump_out", "size")
 #: rounds of making transitions smaller until they keep the tolerance; parts of a segment at which what transitions
 #: leave of it is looked at; by what both its transitions become smaller where it strays, and how often
 _ROUNDS: Final = 30
+_LEAST_POWER: Final = 0.1
 _PARTS: Final = np.array([0.25, 0.5, 0.75])
 _SMALLER: Final = 0.7
 _TIMES: Final = 12
@@ -57,8 +58,8 @@ class Zhang2016(Construction):
     ) -> SmoothProgram:
         """Smooth a whole program; corners beside segments whose rest strays get smaller, or stay sharp."""
         smoothed = super().smooth(program, settings, progress, processes)
-        corners = smoothed.corners
-        rows = np.union1d(straying_lines(smoothed), straying_remainders(smoothed))
+        corners, every = smoothed.corners, np.arange(len(smoothed.corners))
+        rows = np.union1d(straying_lines(smoothed, every), straying_remainders(smoothed))
         for number in range(_TIMES):
             if not len(rows):
                 break
@@ -67,7 +68,7 @@ class Zhang2016(Construction):
             part = self.sized(legs, settings, np.zeros(len(rows)) if number == _TIMES - 1 else size)
             part.status[part.status == Status.TOO_SHORT] = Status.STRAYS
             put(corners, rows, part, legs.shift)
-            rows = np.union1d(straying_lines(smoothed), straying_remainders(smoothed))
+            rows = np.union1d(straying_lines(smoothed, rows), straying_remainders(smoothed))
         return smoothed
 
     def place(self, legs: Legs, settings: Settings) -> Placed:
@@ -100,14 +101,18 @@ class Zhang2016(Construction):
         # the size: the length (15) of both curves where their segments have room for it
         size = np.minimum(np.minimum(by_tolerance, np.maximum(*halves)), most)
         rows = np.flatnonzero(status == Status.SMOOTHED)
-        found = np.zeros((4, g))
+        found, last, step, power = np.zeros((4, g)), np.ones(g), np.ones(g), np.ones(g)
         for number in range(_ROUNDS):
             found[:, rows], share = _measured(legs, settings, rows, *(np.minimum(half, size)[rows] for half in halves))
             over = share > 1.0 + EXACT
-            rows = rows[over]
+            rows, share = rows[over], share[over]
             if not len(rows):
                 break
-            size[rows] *= (1.0 - _JUST) / share[over] if number < _ROUNDS // 2 else 0.5
+            if number:  # the share goes with a power of the size: a secant of the logarithms
+                power[rows] = np.clip(np.log(last[rows] / share) / -np.log(step[rows]), _LEAST_POWER, 1.0)
+            keeping = (1.0 - _JUST) / share
+            last[rows], step[rows] = share, np.maximum(keeping ** (1.0 / power[rows]), np.minimum(keeping, 0.5))
+            size[rows] *= step[rows] if number < _ROUNDS // 2 else 0.5
         status[rows] = Status.STRAYS
         tip_length, axis_length = np.minimum(halves[0], size), np.minimum(halves[1], size)
         short = np.maximum(tip_length, axis_length) <= 4.0 * settings.tip_resolution
@@ -226,7 +231,7 @@ def _measured(
     u = REPORT_PARAMETERS if settings.weights == (1.0, 1.0) and settings.axis_tolerance is None else _MORE_PARAMETERS
     v, *report = synchronisation_report(tip_legs, axis_legs, original.lever, weights, settings.axis_length, u)
     lines = settings.round_feed_changes
-    at = np.broadcast_to(u, v.shape)  # controls run curves at common parameters
+    at = u[None]  # controls run curves at common parameters
     if lines:  # which begin and end where straight motion does, equation (26), and in between are at v
         u, at = np.pad(u, 1, mode="edge"), np.pad(v, ((0, 0), (1, 1)), constant_values=((0, 0), (0.0, 1.0)))
     motion = motion_of(tip_legs, axis_legs, tuple(trims), original.lever, (u, at), weights)
@@ -235,26 +240,32 @@ def _measured(
     errors = factor * norm(tip_legs[1] - tip_legs[0]), factor * norm(axis_legs[1] - axis_legs[0])
     own, both = bounded(motion, original, errors, settings.axis_length)
     passing = own + (settings.chord if lines else 0.0)
-    share = np.maximum(passing, both / TOGETHER) / (settings.common_tolerance + spare)
-    if settings.axis_tolerance is not None:
-        share[:] = np.inf
+    share = _bound(passing, both, spare, settings)
     doubtful = np.flatnonzero(share > 1.0)
     some, there = Motion(*(part[doubtful] for part in motion)), original.some(doubtful)
     share[doubtful] = most_taken(some, there, spare[doubtful], settings, middle, passing[doubtful] if lines else None)
     return tuple(report), share
 
 
-def straying_lines(smoothed: SmoothProgram) -> Ints:
-    """Rows of corners whose transitions stray at the ends of their lines: v follows on from one end to the next."""
+def _bound(own: Floats, both: Floats, spare: Floats, settings: Settings) -> Floats:
+    """(g,) bound of what transitions take of the tolerances, from those of `bounded`; none for one of the axis."""
+    share: Floats = np.maximum(own, both / TOGETHER) / (settings.common_tolerance + spare)
+    return share if settings.axis_tolerance is None else np.full_like(share, np.inf)
+
+
+def straying_lines(smoothed: SmoothProgram, rows: Ints) -> Ints:
+    """Rows whose transitions stray at the ends of their lines: v follows on from one end to the next."""
     program, corners, settings = smoothed.program, smoothed.corners, smoothed.settings
-    rows = np.flatnonzero(corners.smoothed)
+    rows = rows[corners.smoothed[rows]]
     if not settings.round_feed_changes or not len(rows):
         return rows[:0]
     weights, height = np.array(settings.weights), settings.axis_length
     number = lines_of(smoothed, rows)
     found = [rows[:0]]
-    for count in np.unique(number):
-        own, u = rows[number == count], nodes(int(count))
+    order = np.argsort(number, kind="stable")
+    cuts = np.union1d(np.flatnonzero(np.diff(number[order])) + 1, np.arange(BATCH, len(rows), BATCH))
+    for part in np.split(order, cuts):
+        own, u = rows[part], nodes(int(number[part[0]]))
         legs = legs_at(program, height, corners.pose[own], corners.before[own], corners.after[own])
         tips, turns = (legs.tip_in, legs.tip_out), (legs.turn_in, legs.turn_out)
         curves = nurbs.control_points(program, corners, own, height)
@@ -265,7 +276,11 @@ def straying_lines(smoothed: SmoothProgram) -> Ints:
         trims = corners.trim_in[own], corners.trim_out[own], corners.axis_trim_in[own], corners.axis_trim_out[own]
         original = Original(tips, turns, height * legs.axis)
         motion = motion_of(tip_legs, axis_legs, trims, original.lever, (u, v), weights)
-        found.append(own[taken(motion, original, legs.spare(settings), settings).max(axis=1) > 1.0 + 1e-6])
+        spare, factor = legs.spare(settings), float(nurbs.deviation_factor(weights))
+        errors = factor * norm(tip_legs[1] - tip_legs[0]), factor * norm(axis_legs[1] - axis_legs[0])
+        doubtful = np.flatnonzero(_bound(*bounded(motion, original, errors, height), spare, settings) > 1.0)
+        some = Motion(*(values[doubtful] for values in motion)), original.some(doubtful), spare[doubtful]
+        found.append(own[doubtful[taken(*some, settings).max(axis=1) > 1.0 + 1e-6]])
     return np.concatenate(found)
 
 
