@@ -68,7 +68,7 @@ class Zhang2016(Construction):
             part = self.sized(legs, settings, np.zeros(len(rows)) if number == _TIMES - 1 else size)
             part.status[part.status == Status.TOO_SHORT] = Status.STRAYS
             put(corners, rows, part, legs.shift)
-            rows = np.union1d(straying_lines(smoothed, rows), straying_remainders(smoothed))
+            rows = np.union1d(straying_lines(smoothed, rows), straying_remainders(smoothed, rows))
         return smoothed
 
     def place(self, legs: Legs, settings: Settings) -> Placed:
@@ -269,9 +269,8 @@ def straying_lines(smoothed: SmoothProgram, rows: Ints) -> Ints:
         legs = legs_at(program, height, corners.pose[own], corners.before[own], corners.after[own])
         tips, turns = (legs.tip_in, legs.tip_out), (legs.turn_in, legs.turn_out)
         curves = nurbs.control_points(program, corners, own, height)
-        v, _ = matching_parameters(*curves, weights, u, height)
-        u, v = np.append(0.0, u), np.pad(v, ((0, 0), (1, 0)))
-        v[:, -1] = 1.0
+        v, _ = matching_parameters(*curves, weights, u[:-1], height)
+        u, v = np.append(0.0, u), np.pad(v, ((0, 0), (1, 1)), constant_values=((0, 0), (0.0, 1.0)))
         tip_legs, axis_legs = ((one[:, 2] - one[:, 0], one[:, 4] - one[:, 2]) for one in curves)
         trims = corners.trim_in[own], corners.trim_out[own], corners.axis_trim_in[own], corners.axis_trim_out[own]
         original = Original(tips, turns, height * legs.axis)
@@ -284,15 +283,17 @@ def straying_lines(smoothed: SmoothProgram, rows: Ints) -> Ints:
     return np.concatenate(found)
 
 
-def straying_remainders(smoothed: SmoothProgram) -> Ints:
-    """Rows of corners beside segments of which the transitions leave what strays.
+def straying_remainders(smoothed: SmoothProgram, rows: Ints | slice = slice(None)) -> Ints:
+    """Rows of corners beside segments of which the transitions leave what strays; only segments beside `rows` count.
 
     There tip and axis are out of step by what the two were cut unlike.
     """
     program, settings = smoothed.program, smoothed.settings
     segments = segments_of(smoothed, dense=False)
     unlike = (segments.entry != segments.axis_entry) | (segments.exit != segments.axis_exit)
-    pose = np.flatnonzero(unlike & segments.has_line & (segments.start >= 0))
+    beside = np.zeros(len(program), np.bool_)
+    beside[smoothed.corners.pose[rows]] = True
+    pose = np.flatnonzero(unlike & segments.has_line & (segments.start >= 0) & (beside | beside[segments.start]))
     found = [pose[:0]]
     for part in np.split(pose, np.arange(BATCH, len(pose), BATCH)):
         start = segments.start[part]
