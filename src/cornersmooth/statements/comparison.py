@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_left
 from collections import deque
-from collections.abc import Callable, Iterator, Set
+from collections.abc import Callable, Iterator, Sequence, Set
 from itertools import pairwise, takewhile, zip_longest
 
 from cornersmooth.nc_reader.elements import Problem
@@ -51,6 +51,9 @@ _WORDED = (*_ENDED, "offset", "register")
 #: states that a tool change stops, to go on behind it
 _STOPPED = ("spindle", "coolant")
 
+#: kind of what is no token of either file: a hole, at which states are compared
+_HOLE = "hole"
+
 #: kinds of which only changes count
 _STATES = ("tool", "offset", "spindle", "speed", "coolant", "compensation")
 
@@ -75,6 +78,7 @@ def compare(
     means: Means,
     apart: Callable[[float, float], float],
     own: Set[str],
+    holes: Sequence[tuple[int, int]] = (),
 ) -> list[Problem]:
     """Compare the two, kind by kind.
 
@@ -88,6 +92,8 @@ def compare(
         How far, in mm, two places along the path are apart that differ by more than the room.
     own : set of str
         Kinds that the user says in words of his own, which are no tokens; of most there must be no others.
+    holes : sequence of (int, int)
+        CL line of each hole, and the element of the program with which the tool leaves it.
     """
 
     def away(place: float, ours: Token) -> bool:
@@ -120,7 +126,7 @@ def compare(
             # what is missing has no line: named is that of the last word before it
             before = (other.line for other in reversed(found) if other.place <= wanted.place + room)
             problems.append(Problem(code, wanted.line, next(before, 0) if token is None else token.line, text))
-    return problems + list(_at_pauses(asked_for, found, away))
+    return [*problems, *_at_pauses(asked_for, found, away), *_in_holes(asked_for, found, holes)]
 
 
 def _at_pauses(asked_for: list[Token], found: list[Token], away: _Away) -> Iterator[Problem]:
@@ -152,6 +158,22 @@ def _at_pauses(asked_for: list[Token], found: list[Token], away: _Away) -> Itera
             yield Problem(code, wanted.line, token.line, text)
 
 
+def _in_holes(asked_for: list[Token], found: list[Token], holes: Sequence[tuple[int, int]]) -> Iterator[Problem]:
+    """States that are others where the tool leaves a hole than the CL file has there: a hole has no path length."""
+    cl_holes = [Token(_HOLE, k, 0.0, line) for k, (line, _) in enumerate(holes)]
+    nc_holes = [Token(_HOLE, k, 0.0, 0, element=element) for k, (_, element) in enumerate(holes)]
+    cl_states = _holding(sorted([*asked_for, *cl_holes], key=lambda token: token.line), {})
+    nc_states = _holding(sorted([*found, *nc_holes], key=lambda token: token.element), dict.fromkeys(_STOPPED, "OFF"))
+    of_nc = {token.value: held for token, held in nc_states if token.kind == _HOLE}
+    for hole, held in cl_states:
+        for state, here, value in _others(_HOLE, held, of_nc[hole.value]) if hole.kind == _HOLE else ():
+            code, name = _NAMES[state]
+            element = holes[int(hole.value)][1]
+            lines = (token.line for token in reversed(found) if token.kind == state and token.element <= element)
+            text = f"{name.format(here)} holds in a hole, where the CL file has {name.format(value)}"
+            yield Problem(code, hole.line, next(lines, 0), text)
+
+
 def _others(
     kind: str, theirs: dict[str, float | str], ours: dict[str, float | str]
 ) -> list[tuple[str, float | str, float | str]]:
@@ -170,7 +192,7 @@ def _holding(tokens: list[Token], changed: dict[str, float | str]) -> Iterator[t
     """Pauses with the states that hold there; `changed`: those of spindle and coolant after a tool change, if known."""
     held: dict[str, float | str] = dict.fromkeys(_ENDED, "OFF")
     for token in tokens:
-        if token.kind in PAUSES:
+        if token.kind in (*PAUSES, _HOLE):
             yield token, held.copy()
         elif token.kind in (*_ENDED, "speed", "tool"):
             held[token.kind] = token.value

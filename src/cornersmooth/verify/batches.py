@@ -55,6 +55,7 @@ class Batches:
         #: as of `Stops`
         self.holes = array("q")
         self.dwells: list[tuple[int, float]] = []
+        self.leaving: list[tuple[int, int]] = []
         self.taps: list[int] = []
         self.left_out: list[Problem] = []
         #: as of `AlongTool`
@@ -77,7 +78,7 @@ class Batches:
             along = AlongTool(ahead, self.retracts, self._events)
             stops = Stops(self.task, ahead, ToolChanges(original.program, self._events), along)
             self.rewinds, self.still = along.rewinds, along.still
-            self.holes, self.dwells = stops.elements, stops.dwells
+            self.holes, self.dwells, self.leaving = stops.elements, stops.dwells, stops.leaving
             self.taps, self.left_out = stops.taps, stops.left_out
             for part in stops.parts():
                 yield from self._take(part)

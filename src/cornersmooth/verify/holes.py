@@ -229,6 +229,8 @@ class HoleLines:
                 drilled, free = max(drilled, -here), min(free, here)
             elif here < above and drilled > self.room and here + drilled < gap:
                 say("CS563", k, "a rapid goes down onto the bottom of a hole, or short of it")
+            elif deep and here < above and here < -self.room:
+                say("CS563", k, "a rapid goes down into a hole that is drilled")
             elif here < free - self.room:
                 where = "into the uncut hole" if free <= 0.0 else "below the height where the feed begins (RAPTO)"
                 say("CS563", k, f"a rapid goes {free - here:.4f} mm {where}", free - here)

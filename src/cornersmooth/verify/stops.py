@@ -95,6 +95,8 @@ class Stops:
         self.elements = array("q")
         #: moves of the holes at whose bottom the tool waits, and for how many ms
         self.dwells: list[tuple[int, float]] = []
+        #: moves of the holes, and the element with which the tool leaves each
+        self.leaving: list[tuple[int, int]] = []
         #: moves of the holes to be tapped in which something is fed
         self.taps: list[int] = []
         #: CS561 for holes that the program leaves out and may leave out if asked
@@ -434,6 +436,8 @@ class Stops:
         cycle = self._cycles[move]
         group = [one for one in range(trace.begin, end) if lines.over(move, one)]
         fed = any(lines.feeds(one) for one in group)
+        if inside := [one for one in group if lines.height(move, one) < -lines.room]:
+            self.leaving.append((move, inside[-1] + 1))
         for one in group:  # of several in one hole the first: what follows may leave nothing in the program
             if one > (self.elements[-3] if self.elements else -1) and not lines.stands(one):
                 last = k

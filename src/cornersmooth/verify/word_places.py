@@ -127,7 +127,8 @@ class WordPlaces:
         # behind a rapid that leads nowhere they belong with those before it
         of = [replace(one, element=one.element - 1) if one.element - 1 in still else one for one in self._events]
         ours = said(of, here, means)
-        wrong = compare(theirs, ours, self.margin, means, path.way_apart, own)
+        drilled = [(int(program.line[original.pose[at]]), element) for at, element in batches.leaving]
+        wrong = compare(theirs, ours, self.margin, means, path.way_apart, own, drilled)
         homes = {at: one for at, one in zip(statements, program.statements, strict=True) if one.word == "GOHOME"}
         up = [self._retract(element, length) for element in batches.retracts] if homes else []
         for home, statement in homes.items() if retracts else ():
