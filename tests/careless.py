@@ -20,4 +20,4 @@ def look_away(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(zhang2016, "_measured", unmeasured)
     for name in ("straying_lines", "straying_remainders"):
-        monkeypatch.setattr(zhang2016, name, lambda smoothed: np.zeros(0, np.int64))
+        monkeypatch.setattr(zhang2016, name, lambda *_given: np.zeros(0, np.int64))
