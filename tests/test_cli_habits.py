@@ -147,17 +147,17 @@ def test_time_takes_a_feed_where_the_file_has_none(tmp_path: Path) -> None:
 
 
 def test_what_is_missing_is_installed_as_the_package_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    monkeypatch.delitem(sys.modules, "cornersmooth.cli.cluster", raising=False)
     part = tmp_path / "part.cls"
     part.write_bytes(SMALL)
-    assert run("smooth", part, "-o", tmp_path / "part.nc").returncode == DONE
-    words = ("surface", part, tmp_path / "part.nc", "--tool", "10,5", "--report", tmp_path / "part.png")
+    words = ("smooth", part, "-d", tmp_path / "out", "--scheduler", "tcp://localhost:1")
     root = SAMPLES.parent
-    assert f"install it with: pip install -e '{root}[plot]'" in run(*words, cwd=tmp_path).stderr.decode()
-    assert "install it with: pip install -e '.[plot]'" in run(*words, cwd=root).stderr.decode()
+    assert f"install it with: pip install -e '{root}[cluster]'" in run(*words, cwd=tmp_path).stderr.decode()
+    assert "install it with: pip install -e '.[cluster]'" in run(*words, cwd=root).stderr.decode()
     elsewhere = tmp_path / "site-packages" / "cornersmooth" / "errors.py"
     monkeypatch.setattr(errors, "__file__", str(elsewhere))
-    assert "install it with: pip install 'cornersmooth[plot]'" in run(*words, cwd=tmp_path).stderr.decode()
+    assert "install it with: pip install 'cornersmooth[cluster]'" in run(*words, cwd=tmp_path).stderr.decode()
 
 
 @pytest.mark.parametrize("size", [1, 7, 1000])

@@ -24,7 +24,6 @@ ALLOWED = (
     "cornersmooth.errors",
     "cornersmooth.processes",  # who does the work, not how
     "cornersmooth.settings",
-    "cornersmooth.copied_signature",  # what `help` shows
     "cornersmooth.text",
     "cornersmooth.verdict",  # a word, not a measure
     "cornersmooth.kinematics.machine",  # what a machine is; its kinematics are the verification's own

@@ -13,15 +13,16 @@ import secrets
 import socket
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
-
-from distributed import Client
+from typing import TYPE_CHECKING, Any
 
 from cornersmooth import __version__
 from cornersmooth.cli.files import STANDARD
 from cornersmooth.cli.job import Job, Outcome, run_job
 from cornersmooth.errors import SettingsError, install_hint, message
 from cornersmooth.output import make_folder, remove_leftovers, temporary_name
+
+if TYPE_CHECKING:
+    from distributed import Client
 
 #: seconds to wait for the scheduler to answer
 _PATIENCE = 15

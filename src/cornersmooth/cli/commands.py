@@ -113,8 +113,7 @@ SURFACE = new_command(
     """,
     epilog="Exit codes: 0 the surface is within the tolerance; 1 it is not; 2 wrong usage or configuration; 3 an input "
     "cannot be read or is not valid; 4 output cannot be written.",
-    reports="Write what was found: .json, .csv for a row per point, .html, or a map: .png, .svg, .pdf. May be "
-    "repeated.",
+    reports="Write what was found: .json, .csv for a row per point, .html for a page to look at. May be repeated.",
 )
 
 COMPARE = new_command(

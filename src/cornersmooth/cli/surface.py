@@ -16,7 +16,7 @@ from cornersmooth.geometry.tool import Tool, tools_of
 from cornersmooth.model import Program
 from cornersmooth.nc_reader import read_nc
 from cornersmooth.report import report_json
-from cornersmooth.report.surface import draw_surface, surface_csv, surface_lines
+from cornersmooth.report.surface import surface_csv, surface_lines
 from cornersmooth.surface import SurfaceMap, measure_surface
 from cornersmooth.verdict import Verdict
 from cornersmooth.verify import verify
@@ -28,7 +28,7 @@ def run_surface(given: Options) -> int:
     if source == text == STANDARD:
         raise click.UsageError("only one of the inputs can be standard input")
     check_inputs(source, text)
-    check_reports(given.reports, ".json, .csv, .html, .png, .svg, .pdf", [source, text], force=given.force)
+    check_reports(given.reports, ".json, .csv or .html", [source, text], force=given.force)
     how = given.reading_back()
     data, name = read_input(source, size_limit=not given.no_size_limit)
     program = read(data, name=name, **given.reading())
@@ -74,12 +74,10 @@ def _report(
         yield report_json(found.as_dict())
     elif form == ".csv":
         yield from surface_csv(found)
-    elif form == ".html":
+    else:
         from cornersmooth.page import verified_page
 
         how = {"tolerance": given.tolerance, "axis_length": given.axis_length, **given.reading_back()}
         checked = verify(program, written, **how)
         name, control = written if isinstance(written, str) else "", given.load_control().name
         yield verified_page(program, nc, checked, name=name, control=control, source=source, surface=found)
-    else:
-        yield draw_surface(found, form[1:])

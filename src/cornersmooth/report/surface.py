@@ -1,17 +1,14 @@
-"""The machined surface as text, JSON, CSV and picture."""
+"""The machined surface as text and CSV."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from io import BytesIO
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.errors import SettingsError, install_hint
 from cornersmooth.report.csv_text import csv_text
-from cornersmooth.report.thinning import thinned
 from cornersmooth.surface import PassDifference, SurfaceMap
 
 #: columns of the table, and how they are written; lengths are mm
@@ -25,12 +22,6 @@ _COLUMNS = {
 
 #: width of the longest bar of the histogram on a terminal, and its classes
 _BAR, _CLASSES = 40, 20
-
-#: from overcut to undercut, as on the page; grey between, so that the surface shows on white
-_COLOURS = ("#a63603", "#d9540d", "#f08a3c", "#eebb88", "#c9c9c9", "#9ecae1", "#5fa8d3", "#2f7fbb", "#08519c")
-
-#: points drawn
-_POINTS = 30_000
 
 
 def surface_csv(surface: SurfaceMap) -> Iterator[str]:
@@ -84,45 +75,3 @@ def _histogram(surface: SurfaceMap) -> Iterator[str]:
     for count, low, high in zip(counts.astype(int).tolist(), edges[:-1].tolist(), edges[1:].tolist(), strict=True):
         bar = "#" * -(-count * _BAR // most)
         yield f"{low:>10.5f} to {high:>9.5f} mm {count:>8}  {bar}".rstrip()
-
-
-def draw_surface(surface: SurfaceMap, form: str) -> bytes:
-    """Picture as ``png``, ``svg`` or ``pdf``: map of the surface above, histogram below; same input, same bytes.
-
-    Overcut is orange, undercut blue. CS262: matplotlib is missing, which only the extra ``cornersmooth[plot]``
-    installs.
-    """
-    try:
-        import matplotlib as mpl
-        from matplotlib.colors import LinearSegmentedColormap
-        from matplotlib.figure import Figure
-    except ImportError as missing:
-        raise SettingsError("CS262", "pictures need matplotlib", install_hint("plot")) from missing
-    figure: Any = Figure(figsize=(8.0, 9.0), layout="constrained")
-    known = np.flatnonzero(surface.known)
-    off, point = surface.off[known], surface.points.point[known]
-    span = surface.span
-    rows = thinned(point, np.abs(off), np.zeros(len(off), np.bool_), _POINTS)
-    colours = LinearSegmentedColormap.from_list("overcut", _COLOURS)
-    above, below = figure.subfigures(2, 1, height_ratios=(2.0, 1.0))
-    view: Any = above.add_subplot(projection="3d")
-    drawn = view.scatter(*point[rows].T, c=off[rows], s=3.0, cmap=colours, vmin=-span, vmax=span)
-    view.set_aspect("equal")
-    for name in "xyz":
-        getattr(view, f"set_{name}label")(f"{name}, mm")
-    above.colorbar(drawn, ax=view, shrink=0.6, label="overcut (−) and undercut (+), mm")
-    graph: Any = below.subplots()
-    edges, counts = surface.histogram()
-    sides = np.where(edges[:-1] + edges[1:] < 0.0, _COLOURS[1], _COLOURS[-2])
-    graph.bar(edges[:-1], counts, width=np.diff(edges), align="edge", color=sides.tolist())
-    for limit in (-surface.tolerance, surface.tolerance):
-        graph.axvline(limit, color="black", linestyle="--", linewidth=0.8)
-    graph.set_xlabel("overcut (−) and undercut (+), mm")
-    graph.set_ylabel("points")
-    graph.set_yscale("log")
-    graph.grid(visible=True, linewidth=0.3)
-    stream = BytesIO()
-    metadata: dict[str, Any] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(form, {})
-    with mpl.rc_context({"svg.hashsalt": "cornersmooth"}):  # no date, and names of parts that stay
-        figure.savefig(stream, format=form, dpi=120, metadata=metadata)
-    return stream.getvalue()

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
-from cornersmooth.copied_signature import taking_what
 from cornersmooth.errors import SettingsError
 from cornersmooth.model import Program
 from cornersmooth.nc_reader.elements import Element, Elements, Event, NcProgram, Problem
@@ -305,10 +304,9 @@ class Verifier:
         return KINDS & set(self._trusted)
 
 
-@taking_what(Verifier)
-def verify(*args: Any, **how: Any) -> Verification:
-    """Measure an NC text, that is whole, against the CL program it was made from; all as `Verifier`."""
-    with Verifier(*args, **how) as verifier:
+def verify(program: Program, nc: NcProgram | bytes | str | os.PathLike[str], **how: Any) -> Verification:
+    """Measure an NC text, that is whole, against the CL program it was made from; `how` and errors as in `Verifier`."""
+    with Verifier(program, nc, **how) as verifier:
         return verifier.result()
 
 
