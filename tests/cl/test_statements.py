@@ -402,7 +402,7 @@ def test_cutcom_spans_are_kept() -> None:
     span = "CUTCOM/LEFT,XYPLAN\nGOTO/1,0,0\nGOTO/2,0,0\nCUTCOM/OFF\n"
     text = f"GOTO/0,0,0\n{span}GOTO/3,0,0\nCUTCOM/ON,LENGTH,7\nGOTO/4,0,0\n"
     result = program(text)
-    assert result.keep.tolist() == [0, Keep.CUTTER_COMPENSATION, Keep.CUTTER_COMPENSATION, 0, 0]
+    assert result.keep.tolist() == [0, *[Keep.CUTTER_COMPENSATION] * 3, 0]
     assert codes(result) == {"CS138": 1}
 
 

@@ -270,6 +270,10 @@ def _program(state: ReaderState, asked: Units | None) -> Program:
     arcs, straight, kept, arc_findings = arc_geometry.resolve(state.arcs, tip, kind, state.file, state.arc_rule)
     kind[straight] = Move.LINEAR
     keep = state.exact.spread(state.n).astype(np.uint8)
+    for first in (np.flatnonzero((keep[:-1] == Keep.CUTTER_COMPENSATION) & (keep[1:] == Keep.NO)) + 1).tolist():
+        rapid = ~np.isin(kind[first:], (Move.LINEAR, Move.ARC))  # ends it, as the first feed in the plane does
+        ends = int(np.argmax(np.append(rapid | (tip[first:, :2] != tip[first - 1 : -1, :2]).any(axis=1), True)))
+        keep[first : first + ends + 1][~rapid[: ends + 1]] = Keep.CUTTER_COMPENSATION
     keep[kept] = keep[kept - 1] = Keep.CONTRADICTION
     turned = np.abs(axis[arcs.pose] - axis[arcs.pose - 1]).max(axis=1, initial=0) > AXIS_NOISE
     along = [finding("CS147", int(line[arcs.pose[turned]][0]), int(turned.sum()))] if turned.any() else []

@@ -30,6 +30,7 @@ from cornersmooth.statements.comparison import KINDS
 from cornersmooth.statements.work_offsets import spellings, work_offset_of
 from cornersmooth.verify.batches import Batches
 from cornersmooth.verify.cl_motion import half_turns
+from cornersmooth.verify.compensated import Compensated
 from cornersmooth.verify.continuity import measure_continuity
 from cornersmooth.verify.decision import Batch
 from cornersmooth.verify.deviation import check_breaks, measure_original, measure_written
@@ -234,7 +235,7 @@ class Verifier:
         poses = np.empty((4, len(program)))
         if self._slower:
             chunks = (part.at_most() for part in chunks)
-        chunks = _watch_feeds(chunks, findings)
+        chunks = Compensated(task, events, findings).watch(_watch_feeds(chunks, findings))
 
         def items() -> Iterator[tuple[Batch | None, dict[str, Where], int]]:
             poses[:3], poses[3] = np.nan, 0.0  # not before other processes are forked, which would keep them
