@@ -28,7 +28,7 @@ check: $(STAMP)  ## lint, format and types
 	$(BIN)/mypy
 
 docs: $(STAMP)  ## the reference of the library, as pages in build/docs
-	$(BIN)/python docs/make_reference.py
+	$(BIN)/python tools/make_reference.py
 
 packages: $(STAMP)  ## wheel and sdist, installed in every Python that is here
 	.ci/packages

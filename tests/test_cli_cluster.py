@@ -17,10 +17,11 @@ from pathlib import Path
 
 import pytest
 
-from cornersmooth import Settings, __version__, choose_form, output
+from cornersmooth import Settings, __version__, choose_form
 from cornersmooth.cli.job import Job
 from cornersmooth.cli.options import Options
 from cornersmooth.nc import Frame
+from cornersmooth.system import output
 from interruptions import cl_text
 from oracle.command import DONE, SCRIPT, USAGE, command, environment, run, wait_for
 from oracle.messages import one_line

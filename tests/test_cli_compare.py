@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from cornersmooth.comparing import Row, Table
+from cornersmooth.times.comparing import Row, Table
 from oracle.command import run
 
 #: a winding cut of a tool that turns, from a rapid
@@ -77,7 +77,7 @@ def test_linuxcnc_by_its_own_law(part: Path) -> None:
 
 
 def test_a_share_of_a_long_part_is_stated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cornersmooth.comparing.MOST_POSES", 10)
+    monkeypatch.setattr("cornersmooth.times.comparing.MOST_POSES", 10)
     part = tmp_path / "long.cls"
     runs = "".join(f"RAPID\nGOTO/0.0,0.0,{20 + k}.0,0.0,0.0,1.0\n{CUT}" for k in range(5))
     part.write_text(PART.replace(CUT, runs))

@@ -21,7 +21,7 @@ DOCS = Path(__file__).resolve().parent.parent / "docs"
 
 @pytest.fixture(scope="module")
 def maker() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("make_codes", DOCS / "make_codes.py")
+    spec = importlib.util.spec_from_file_location("make_codes", DOCS.parent / "tools" / "make_codes.py")
     assert spec
     assert spec.loader
     module = importlib.util.module_from_spec(spec)
@@ -47,8 +47,8 @@ def test_every_code_that_anything_speaks_of_is_in_the_table() -> None:
 
 
 def test_the_table_is_what_the_source_says(maker: ModuleType) -> None:
-    assert (DOCS / "codes.md").read_text(encoding="utf-8") == maker.page(), "run: python docs/make_codes.py"
-    assert maker.TABLE.read_text(encoding="utf-8") == maker.table(), "run: python docs/make_codes.py"
+    assert (DOCS / "codes.md").read_text(encoding="utf-8") == maker.page(), "run: python tools/make_codes.py"
+    assert maker.TABLE.read_text(encoding="utf-8") == maker.table(), "run: python tools/make_codes.py"
 
 
 def test_every_code_is_explained_in_80_columns() -> None:

@@ -35,8 +35,8 @@ STORIES = ("library.md", "gallery.md")
 
 
 def load(name: str) -> ModuleType:
-    """A script of the folder docs."""
-    spec = importlib.util.spec_from_file_location(name, ROOT / "docs" / f"{name}.py")
+    """A script of the folder tools."""
+    spec = importlib.util.spec_from_file_location(name, ROOT / "tools" / f"{name}.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -206,7 +206,7 @@ def test_the_job_of_an_array_does_its_share(shop: Path) -> None:
 
 
 def test_the_figures_of_the_readme_are_those_that_come_out() -> None:
-    """The sample alone, and a twentieth for what changes: `python docs/make_numbers.py FOLDER` makes all of it."""
+    """The sample alone, and a twentieth for what changes: `python tools/make_numbers.py FOLDER` makes all of it."""
     numbers, text = load("make_numbers"), (ROOT / "README.md").read_text()
     shown = {name: numbers.place(name).search(text)[0] for name in ("output", "lines", "numbers", "wrong")}
     output, lines, program = numbers.first_program()

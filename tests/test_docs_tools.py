@@ -46,11 +46,10 @@ RUN_BY = {
         "tests/filter/test_filter_on_a_controller.py"
     ),
     "pip install .": ".ci/packages",
-    "pip install 'cornersmooth[plot]'": "test_extras_that_are_named_exist",
-    "python docs/make_codes.py": "tests/test_codes.py",
-    "python docs/make_words.py": "tests/verify/test_word_mutations.py",
-    "python docs/run_examples.py docs/gallery.md docs": "tests/test_docs.py",
-    "python docs/make_savings.py FOLDER": "test_savings_are_printed_as_a_table",
+    "python tools/make_codes.py": "tests/test_codes.py",
+    "python tools/make_words.py": "tests/verify/test_word_mutations.py",
+    "python tools/run_examples.py docs/gallery.md docs": "tests/test_docs.py",
+    "python tools/make_savings.py FOLDER": "test_savings_are_printed_as_a_table",
     "python tests/nc/planned_column.py FOLDER": "tests/nc/test_nc_planned_column.py",
     "python tests/batch_runs.py": "test_batch_runs_times_a_batch",
     "python -m nc.test_nc_golden": "tests/nc/test_nc_golden.py",
@@ -96,7 +95,7 @@ def checkout(tmp_path: Path) -> Path:
     """A copy of what `make` needs; the environment is that of the tests."""
     for name in ("Makefile", "pyproject.toml"):
         shutil.copy(ROOT / name, tmp_path)
-    for name in ("docs", "benchmarks"):
+    for name in ("tools", "benchmarks"):
         (tmp_path / name).mkdir()
         for script in (ROOT / name).glob("*.py"):
             shutil.copy(script, tmp_path / name)
@@ -180,6 +179,11 @@ def load(path: Path) -> ModuleType:
 
 def test_extras_that_are_named_exist() -> None:
     named = {extra for page in PAGES for extra in re.findall(r"cornersmooth\[(\w+)\]", page.read_text())}
+    named |= {
+        extra
+        for module in (ROOT / "src").rglob("*.py")
+        for extra in re.findall(r'install_hint\("(\w+)"\)', module.read_text())
+    }
     assert named
     assert named <= set(importlib.metadata.metadata("cornersmooth").get_all("Provides-Extra") or ())
 
@@ -187,7 +191,7 @@ def test_extras_that_are_named_exist() -> None:
 def test_savings_are_printed_as_a_table(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    savings = load(ROOT / "docs" / "make_savings.py")
+    savings = load(ROOT / "tools" / "make_savings.py")
     (tmp_path / "small.cls").write_bytes(SMALL)
     monkeypatch.setattr(savings, "FILES", ("small.cls",))
     monkeypatch.setattr(savings, "SAMPLE", tmp_path / "small.cls")

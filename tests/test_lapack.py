@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.linalg.lapack
 
-from cornersmooth import lapack
+from cornersmooth.system import lapack
 
 
 def test_solves_as_scipy_does() -> None:

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from cornersmooth import output, processes
 from cornersmooth.cli import shop
 from cornersmooth.errors import OutputError
+from cornersmooth.system import output, processes
 from oracle.command import BAD_OUTPUT, DONE, OLD, SMALL, run
 from oracle.messages import one_line
 

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 import cornersmooth
+from cornersmooth.arrays.vectors import unit
 from cornersmooth.feedrate import Limits, direct
 from cornersmooth.kinematics import load_machine
 from cornersmooth.kinematics.machine import Dynamics
 from cornersmooth.model import Move, Program, Statement
 from cornersmooth.nc import choose_form, fit_settings
-from cornersmooth.saving import planned_saving
-from cornersmooth.vectors import unit
+from cornersmooth.times.saving import planned_saving
 
 
 def winding(count: int) -> Program:

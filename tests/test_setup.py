@@ -15,7 +15,7 @@ import cornersmooth as cs
 from cornersmooth.errors import InputError
 from cornersmooth.feedrate import Limits, plan_text
 from cornersmooth.kinematics import Machine, load_machine, parse_machine
-from cornersmooth.setup import Setup, find_setups
+from cornersmooth.times.setup import Setup, find_setups
 from oracle.command import BAD_INPUT, DONE, USAGE, run
 from oracle.files import beginning
 

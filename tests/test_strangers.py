@@ -15,7 +15,7 @@ import pytest
 from cornersmooth import read
 from cornersmooth.cl import source
 from cornersmooth.errors import InputError
-from cornersmooth.output import _machine
+from cornersmooth.system.output import _machine
 from oracle.command import SMALL, run
 
 unix = pytest.mark.skipif(sys.platform == "win32", reason="pipes in folders are of Unix")

@@ -38,11 +38,11 @@ if TYPE_CHECKING:
     from cornersmooth.kinematics import load_machine
     from cornersmooth.model import Corners, Program, SmoothProgram, Statement
     from cornersmooth.nc import Frame, choose_form, fit_settings, load_control, write
-    from cornersmooth.path_points import PathPoints, sample
     from cornersmooth.pipeline import Result, postprocess, smooth
     from cornersmooth.report import report
     from cornersmooth.report.corners import corner_table
     from cornersmooth.settings import Settings
+    from cornersmooth.smoothing.path_points import PathPoints, sample
     from cornersmooth.verify import Verification, verify
 
     from_poses = Program.from_poses
@@ -60,7 +60,7 @@ _HOME = {
         "kinematics": "load_machine",
         "model": "Corners Program SmoothProgram Statement from_poses",
         "nc": "Frame choose_form fit_settings load_control write",
-        "path_points": "PathPoints sample",
+        "smoothing.path_points": "PathPoints sample",
         "pipeline": "Result postprocess smooth",
         "report": "report",
         "report.corners": "corner_table",

@@ -17,14 +17,12 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from cornersmooth.arrays import Bools as Bools
+from cornersmooth.arrays import Floats as Floats
+from cornersmooth.arrays import Ints as Ints
+from cornersmooth.arrays import Numbers as Numbers
 from cornersmooth.errors import Finding, InputError
 from cornersmooth.settings import Settings
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
-#: numbers of rows and poses where millions are held: half the memory
-Numbers = NDArray[np.int32]
 
 Units = Literal["mm", "inch"]
 

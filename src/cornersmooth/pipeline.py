@@ -19,19 +19,19 @@ import numpy as np
 from cornersmooth import __version__, nc, smoothing
 from cornersmooth.cl import read
 from cornersmooth.errors import Finding, InputError, SettingsError, VerdictError
-from cornersmooth.memory import return_free_memory
 from cornersmooth.methods import AUTO, CURVES_METHOD, DEFAULT_METHOD
 from cornersmooth.model import Move, Program, SmoothProgram
 from cornersmooth.nc import Form, Frame, Written
 from cornersmooth.nc.program_frame import blend_word
 from cornersmooth.nc_reader import CONTROLS, NcProgram, read_nc
 from cornersmooth.nc_reader.elements import Element
-from cornersmooth.output import FAILED, Target, check_output, open_output, path_of
 from cornersmooth.provenance import Provenance
 from cornersmooth.report import NcFile, report
 from cornersmooth.report.record import planned_times, sha256_of
 from cornersmooth.report.verdict import Judgement, Saving, judge, trusted_blocks
 from cornersmooth.settings import Settings
+from cornersmooth.system.memory import return_free_memory
+from cornersmooth.system.output import FAILED, Target, check_output, open_output, path_of
 from cornersmooth.verdict import Verdict
 from cornersmooth.verify import Verification, Verifier, useful_processes
 
@@ -199,7 +199,7 @@ def postprocess(
     force : bool or None
         Whether an existing file may be replaced; None for not, but it may stay if it is the same.
     mark : mapping of str to str, optional
-        Kept with the file where the file system can (`cornersmooth.output.read_mark`), with the verdict.
+        Kept with the file where the file system can (`cornersmooth.system.output.read_mark`), with the verdict.
     processes : int, optional
         Processes to smooth and to verify with; by default as many as are useful. The result does not depend on it.
     progress : callable, optional

@@ -5,15 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, fields, replace
 from numbers import Real
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
+from cornersmooth.arrays import Floats
 from cornersmooth.errors import SettingsError
 from cornersmooth.methods import AUTO, CURVES_METHOD, DEFAULT_METHOD, METHODS
-
-if TYPE_CHECKING:
-    from cornersmooth.model import Floats
 
 Lines = Literal["dense", "long"]
 

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from cornersmooth.arrays.vectors import norm
 from cornersmooth.feedrate import Limits, plan, rational_curves, taylor
 from cornersmooth.feedrate.motion import poses, taylor_along
 from cornersmooth.feedrate.path import Path, build_path
@@ -14,7 +15,6 @@ from cornersmooth.feedrate.timelaw import TimeLaw
 from cornersmooth.model import Arcs, Floats, Ints, Move, Program
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
-from cornersmooth.vectors import norm
 
 STEP = 2e-4  # s
 

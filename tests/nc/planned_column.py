@@ -18,8 +18,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from cornersmooth.kinematics import load_machine
 from cornersmooth.model import Program
 from cornersmooth.nc import choose_form
-from cornersmooth.saving import Timing
 from cornersmooth.settings import Settings
+from cornersmooth.times.saving import Timing
 from nc.controller_table import CLOSE, LOOSE, ours, paths, unsmoothed
 from nc.linuxcnc_controller import MACHINE
 

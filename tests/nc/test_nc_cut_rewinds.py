@@ -18,9 +18,9 @@ from cornersmooth.kinematics import Dynamics, Machine, load_machine
 from cornersmooth.nc import Frame, choose_form, fit_settings, write
 from cornersmooth.nc_reader import read_nc, reader
 from cornersmooth.rotary import rewound_angles
-from cornersmooth.saving import planned_saving
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
+from cornersmooth.times.saving import planned_saving
 from cornersmooth.verify import verify
 from oracle.share import share
 from page.making import page_of

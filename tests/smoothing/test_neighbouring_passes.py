@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from cornersmooth import Program, Settings, SmoothProgram, read
+from cornersmooth.arrays.vectors import unit
 from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.model import Floats
 from cornersmooth.smoothing import smooth
-from cornersmooth.vectors import unit
 from oracle.chains import random_chains
 
 #: passes, poses of each, and distance of passes, mm

@@ -15,6 +15,7 @@ from scipy.interpolate import BSpline
 from scipy.optimize import NonlinearConstraint, minimize
 
 from cornersmooth import Limits, Program, Settings, postprocess, read, smooth
+from cornersmooth.arrays.vectors import unit
 from cornersmooth.feedrate import plan_text
 from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.kinematics import load_machine
@@ -28,7 +29,6 @@ from cornersmooth.smoothing.runs.interior import COLD, Task, smoothest
 from cornersmooth.smoothing.runs.polylines import Pieces, Polylines, Samples
 from cornersmooth.smoothing.runs.rows import largest_curvature
 from cornersmooth.smoothing.runs.solving import RunCurves, solve_runs
-from cornersmooth.vectors import unit
 from oracle.share import covering_share, how_many
 from smoothing.runs_oracle import deviation, random_runs, spline_of, through
 

@@ -22,7 +22,7 @@ ALLOWED = (
     "cornersmooth.control",
     "cornersmooth.model",
     "cornersmooth.errors",
-    "cornersmooth.processes",  # who does the work, not how
+    "cornersmooth.system.processes",  # who does the work, not how
     "cornersmooth.settings",
     "cornersmooth.text",
     "cornersmooth.verdict",  # a word, not a measure

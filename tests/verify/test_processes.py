@@ -12,12 +12,12 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from cornersmooth import processes as crews
 from cornersmooth.model import Move, Program
 from cornersmooth.nc import choose_form, fit_settings, write
 from cornersmooth.nc_reader import read_nc
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
+from cornersmooth.system import processes as crews
 from cornersmooth.verify import batches, verifier, verify
 
 from .writing import wavy

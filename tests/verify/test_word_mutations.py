@@ -176,9 +176,9 @@ def test_a_cycle_is_a_motion_of_the_tool() -> None:
 
 
 def test_the_tables_in_the_docs_are_those_of_the_lists() -> None:
-    spec = importlib.util.spec_from_file_location("make_words", DOCS / "make_words.py")
+    spec = importlib.util.spec_from_file_location("make_words", DOCS.parent / "tools" / "make_words.py")
     assert spec
     assert spec.loader
     maker = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(maker)
-    assert (DOCS / "dev" / "words.md").read_text(encoding="utf-8") == maker.page(), "run: python docs/make_words.py"
+    assert (DOCS / "dev" / "words.md").read_text(encoding="utf-8") == maker.page(), "run: python tools/make_words.py"

@@ -15,12 +15,12 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from cornersmooth.arrays.vectors import dot, norm
 from cornersmooth.cl.grammar import Record
 from cornersmooth.cl.messages import error, finding
 from cornersmooth.cl.poses import check_range
 from cornersmooth.errors import Finding
 from cornersmooth.model import Arcs, Bools, Floats, Ints, Move
-from cornersmooth.vectors import dot, norm
 
 ArcRule = Literal["left", "right", "tangent"]
 RULES: Final[tuple[ArcRule, ...]] = ("left", "right", "tangent")

@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cornersmooth.arrays.slices import some_poses
 from cornersmooth.errors import Finding, InputError, SettingsError
 from cornersmooth.model import Move, Program, Statement
-from cornersmooth.slices import some_poses
 from cornersmooth.statements.asked import Asking
 
 _LOADS = ("LOADTL", "LOAD", "TURRET", "TOOLNO")

@@ -13,11 +13,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from cornersmooth.arrays.vectors import norm
 from cornersmooth.cl.bulk import FARTHEST, Chunk
 from cornersmooth.cl.messages import error, finding
 from cornersmooth.errors import Finding
 from cornersmooth.model import Floats, Ints, Keep, Move
-from cornersmooth.vectors import norm
 
 Vector = tuple[float, float, float]
 

@@ -71,7 +71,7 @@ def _kill_children() -> None:
 
 
 def _remove_unfinished() -> None:
-    output = sys.modules.get("cornersmooth.output")
+    output = sys.modules.get("cornersmooth.system.output")
     if output is not None:
         output.remove_unfinished()
 

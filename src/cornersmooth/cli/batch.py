@@ -22,9 +22,9 @@ from cornersmooth.cli import Shutdown
 from cornersmooth.cli.files import suffix_of, write_report
 from cornersmooth.cli.job import STATUSES, Job, Outcome, run_job
 from cornersmooth.errors import message
-from cornersmooth.output import remove_leftovers, remove_unfinished
-from cornersmooth.processes import Helper, first_ready
 from cornersmooth.report.record import report_json
+from cornersmooth.system.output import remove_leftovers, remove_unfinished
+from cornersmooth.system.processes import Helper, first_ready
 from cornersmooth.verdict import Verdict
 
 #: exit code of a process that SIGKILL has ended

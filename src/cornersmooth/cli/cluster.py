@@ -19,7 +19,7 @@ from cornersmooth import __version__
 from cornersmooth.cli.files import STANDARD
 from cornersmooth.cli.job import Job, Outcome, run_job
 from cornersmooth.errors import SettingsError, install_hint, message
-from cornersmooth.output import make_folder, remove_leftovers, temporary_name
+from cornersmooth.system.output import make_folder, remove_leftovers, temporary_name
 
 if TYPE_CHECKING:
     from distributed import Client

@@ -14,10 +14,10 @@ from cornersmooth.cl import read
 from cornersmooth.cli.files import check_inputs, check_path, told_of, write_report
 from cornersmooth.cli.options import Options
 from cornersmooth.cli.show import progress_bar, say
-from cornersmooth.comparing import Row, Table, candidates, compare_programs
 from cornersmooth.errors import command_text
 from cornersmooth.feedrate import BlockLimits
 from cornersmooth.report.verdict import limits_text
+from cornersmooth.times.comparing import Row, Table, candidates, compare_programs
 
 #: options of this command that `smooth` has not, or that would write
 _OWN = frozenset(("as_json", "csv", "verbose", "quiet", "force", "machine", "limits", "source", "look_ahead"))

@@ -13,8 +13,8 @@ from typing import BinaryIO
 
 import click
 
-from cornersmooth import output
 from cornersmooth.errors import CornersmoothError, InputError, OutputError
+from cornersmooth.system import output
 
 STANDARD = "-"
 

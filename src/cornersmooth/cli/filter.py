@@ -36,7 +36,6 @@ from cornersmooth.cli.show import (
     say_line,
     warn,
 )
-from cornersmooth.comparing import limits_machine
 from cornersmooth.control.listing import listing
 from cornersmooth.control.program import Text
 from cornersmooth.errors import CornersmoothError, SettingsError
@@ -49,12 +48,13 @@ from cornersmooth.kinematics import Machine
 from cornersmooth.nc import Form
 from cornersmooth.nc_reader import Problem
 from cornersmooth.nc_reader.recognition import is_cl_file, names_rotary_axes, needs_its_control, recognise_control
-from cornersmooth.output import FAILED, make_folder, open_output
 from cornersmooth.provenance import HEAD
 from cornersmooth.report import NcFile, report_json
 from cornersmooth.report.record import Kind, planned_times, record, sha256_of
 from cornersmooth.report.verdict import Judgement, Saving
 from cornersmooth.settings import Settings
+from cornersmooth.system.output import FAILED, make_folder, open_output
+from cornersmooth.times.comparing import limits_machine
 from cornersmooth.verdict import Verdict
 from cornersmooth.verify import useful_processes
 

@@ -17,7 +17,7 @@ from cornersmooth.cli.command import write_part
 from cornersmooth.cli.commands import COMMANDS, GROUPS
 from cornersmooth.cli.show import print_message, say_json
 from cornersmooth.errors import EXIT_INTERNAL, CornersmoothError, SettingsError, internal_error, message
-from cornersmooth.output import ClosedPipe, reason
+from cornersmooth.system.output import ClosedPipe, reason
 
 EXIT_INTERRUPTED = 130
 

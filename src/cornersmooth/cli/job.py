@@ -16,13 +16,13 @@ from cornersmooth.cli.options import Options
 from cornersmooth.cli.show import more
 from cornersmooth.errors import EXIT_INTERNAL, CornersmoothError, VerdictError, internal_error, message, printable
 from cornersmooth.kinematics import Machine
-from cornersmooth.memory import return_large_arrays
 from cornersmooth.nc import Form, Frame
-from cornersmooth.output import ClosedPipe, make_folder, read_mark
 from cornersmooth.pipeline import Progress, Result, postprocess
 from cornersmooth.report import corners_csv, report_json
 from cornersmooth.report.verdict import Saving
 from cornersmooth.settings import TIMED_POSES, Settings
+from cornersmooth.system.memory import return_large_arrays
+from cornersmooth.system.output import ClosedPipe, make_folder, read_mark
 from cornersmooth.verdict import Verdict
 
 if TYPE_CHECKING:
@@ -240,7 +240,7 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> dict[
         outcome.saving = saving or outcome.saving
     good = result.verdict in (Verdict.PASSED, Verdict.INCOMPLETE)
     if good and timed and not outcome.saving and (given.time or not (given.quiet or job.batch)):
-        from cornersmooth.saving import planned_saving
+        from cornersmooth.times.saving import planned_saving
 
         outcome.saving = planned_saving(
             result.program, result.smoothed.settings, result.form, axes=job.axes, progress=progress

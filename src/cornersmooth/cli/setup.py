@@ -10,8 +10,8 @@ from cornersmooth.cli.options import Options
 from cornersmooth.cli.show import progress_bar, say
 from cornersmooth.model import Floats
 from cornersmooth.nc import choose_form
-from cornersmooth.processes import useful_processes
-from cornersmooth.setup import Rating, Setups, find_setups
+from cornersmooth.system.processes import useful_processes
+from cornersmooth.times.setup import Rating, Setups, find_setups
 
 #: savings of less are none, %
 _WORTH = 0.1

@@ -36,7 +36,7 @@ import click
 from cornersmooth.cli.options import FLAGS
 from cornersmooth.cli.show import warn
 from cornersmooth.errors import SettingsError, command_text
-from cornersmooth.output import reason
+from cornersmooth.system.output import reason
 
 FILE = "cornersmooth.toml"
 _PREFIX = "CORNERSMOOTH_"

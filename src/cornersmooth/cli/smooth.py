@@ -29,7 +29,7 @@ from cornersmooth.cli.show import (
 )
 from cornersmooth.errors import printable
 from cornersmooth.nc import Frame, fit_settings
-from cornersmooth.output import make_folder
+from cornersmooth.system.output import make_folder
 from cornersmooth.verdict import Verdict
 
 #: files named in a warning

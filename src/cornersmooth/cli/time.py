@@ -12,7 +12,6 @@ from cornersmooth.cl import read
 from cornersmooth.cli.files import check_inputs, check_path, check_reports, read_head, write_report
 from cornersmooth.cli.options import Options
 from cornersmooth.cli.show import print_message, progress_bar, say
-from cornersmooth.comparing import law_of_lines
 from cornersmooth.errors import message
 from cornersmooth.feedrate import BlockLimits, Comparison, axis_peaks, compare, limiting, plan_text
 from cornersmooth.feedrate.compare import slowest, stops, turning_seconds
@@ -26,7 +25,8 @@ from cornersmooth.nc_reader import read_nc
 from cornersmooth.pipeline import read_back
 from cornersmooth.provenance import read_provenance
 from cornersmooth.report.verdict import limits_of, times_text
-from cornersmooth.saving import Timing, without_holes, written_text
+from cornersmooth.times.comparing import law_of_lines
+from cornersmooth.times.saving import Timing, without_holes, written_text
 
 _TITLES = {
     "direct_exact_stop": "direct, exact stop",

@@ -26,7 +26,6 @@ from cornersmooth.cli.shop import command_line, loosened
 from cornersmooth.cli.show import more, print_line, print_message, say_json, say_line, show_findings, warn
 from cornersmooth.errors import SettingsError
 from cornersmooth.kinematics import machine_names
-from cornersmooth.memory import return_large_arrays
 from cornersmooth.nc import control_names, own_words
 from cornersmooth.nc_reader import NcProgram, Problem, read_nc
 from cornersmooth.nc_reader.recognition import recognise_control
@@ -37,6 +36,7 @@ from cornersmooth.report.record import cl_file, record, sha256_of
 from cornersmooth.report.verdict import judge, trusted_blocks
 from cornersmooth.report.verification import along_lines, histogram_lines, verification_csv
 from cornersmooth.settings import UNITS
+from cornersmooth.system.memory import return_large_arrays
 from cornersmooth.verdict import Verdict
 from cornersmooth.verify import Verification, Where, useful_processes, verify
 from cornersmooth.verify.task import APART, length_of

@@ -12,6 +12,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import norm
 from cornersmooth.feedrate.rational_curves import (
     STANDSTILL,
     WHOLE,
@@ -28,7 +29,6 @@ from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.model import Bools, Corners, Floats, Ints, Program, Runs
 from cornersmooth.smoothing.runs.polylines import Pieces
 from cornersmooth.smoothing.runs.rows import polylines_of
-from cornersmooth.vectors import norm
 
 #: speed of the tip over that of the axis point below which the tip stands
 _STANDING = 3e-4

@@ -32,8 +32,8 @@ from __future__ import annotations
 import numpy as np
 
 from cornersmooth.feedrate.speed_problem import Batch, ahead, around, behind
-from cornersmooth.lapack import dpbtrf, dpbtrs
 from cornersmooth.model import Floats
+from cornersmooth.system.lapack import dpbtrf, dpbtrs
 
 #: the remaining duality gap over the time, at which the profile is taken
 GAP = 2e-4

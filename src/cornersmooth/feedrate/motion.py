@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import norm
 from cornersmooth.feedrate import taylor
 from cornersmooth.feedrate.path import Kind, Path, arc_series
 from cornersmooth.feedrate.rational_curves import parameters_at, taylor_series
 from cornersmooth.model import Floats, Ints
 from cornersmooth.smoothing.construction import construction_of
-from cornersmooth.vectors import norm
 
 _NO_SPEED = np.finfo(np.float64).tiny
 

@@ -20,7 +20,7 @@ from cornersmooth.feedrate.reached import limiting
 from cornersmooth.feedrate.resolution import FINER, Resolution
 from cornersmooth.feedrate.scurve import stopping_distance
 from cornersmooth.model import Ints
-from cornersmooth.processes import map_in_processes
+from cornersmooth.system.processes import map_in_processes
 
 #: coarse cells, and one round
 ROUGHLY = Resolution(0.2, 0.8, fewest=10, curve=2, line=1, even=0.1, varied=0.25, rounds=0, gap=5e-3, rough=0.2)

@@ -14,6 +14,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from cornersmooth.arrays.vectors import angle_between, dot, norm, unit
 from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate.curves import Curves
 from cornersmooth.feedrate.limits import Limits
@@ -21,7 +22,6 @@ from cornersmooth.feedrate.rational_curves import STANDSTILL, WHOLE, end_tangent
 from cornersmooth.model import Bools, Corners, FeedMode, Floats, Ints, Move, Program, Runs, Status
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.construction import find_neighbours
-from cornersmooth.vectors import angle_between, dot, norm, unit
 
 #: angles below this are no motion of the axis, rad
 NO_TURN = 1e-9

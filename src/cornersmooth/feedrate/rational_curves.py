@@ -10,9 +10,9 @@ from math import comb
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import norm, unit
 from cornersmooth.geometry import nurbs
 from cornersmooth.model import Floats, Ints
-from cornersmooth.vectors import norm, unit
 
 #: tip lengths up to this are no motion of the tip, mm
 STANDSTILL = 1e-7

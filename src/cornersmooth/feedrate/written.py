@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import norm, unit
 from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate import scurve
 from cornersmooth.feedrate.curves import Curves
@@ -20,7 +21,6 @@ from cornersmooth.model import Arcs, Bools, FeedMode, Floats, Ints, Move, Progra
 from cornersmooth.nc_reader.curves import groups
 from cornersmooth.nc_reader.elements import Element, Event, NcProgram
 from cornersmooth.settings import Settings
-from cornersmooth.vectors import norm, unit
 
 #: what a motion block does, as a move
 _MOVES = {Element.RAPID: Move.RAPID, Element.LINE: Move.LINEAR, Element.ARC: Move.ARC, Element.CURVE: Move.LINEAR}

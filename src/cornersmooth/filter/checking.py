@@ -10,6 +10,7 @@ from typing import Final
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import unit
 from cornersmooth.control.state import State
 from cornersmooth.errors import CornersmoothError
 from cornersmooth.filter.motion import Job, Stretch, motion, motion_of_runs, program_of
@@ -19,7 +20,6 @@ from cornersmooth.nc_reader import NcProgram, Problem
 from cornersmooth.nc_reader.block_tables import CHUNK
 from cornersmooth.nc_reader.rotary import LINE_SHARE
 from cornersmooth.settings import Settings
-from cornersmooth.vectors import unit
 from cornersmooth.verify import Verification, verify
 
 #: numbers that are the same, and parts of directions, in six digits

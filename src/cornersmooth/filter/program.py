@@ -10,7 +10,6 @@ from typing import Final
 
 import numpy as np
 
-from cornersmooth.comparing import MOST_POSES, Candidate, Row, Table, law_of_lines, rows_of
 from cornersmooth.errors import CornersmoothError, InputError, SettingsError
 from cornersmooth.filter.checking import Checked, Place, check, pair, places
 from cornersmooth.filter.motion import Job
@@ -19,14 +18,15 @@ from cornersmooth.filter.spelling import SAMPLE, Spelling
 from cornersmooth.filter.times import by_own_law, no_runs, planned_times, time_as_it_is
 from cornersmooth.filter.writing import smoothed
 from cornersmooth.kinematics import Machine
-from cornersmooth.memory import return_free_memory
 from cornersmooth.nc import fit_settings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc_reader import NcProgram
 from cornersmooth.nc_reader.recognition import is_cl_file
 from cornersmooth.provenance import HEAD
-from cornersmooth.saving import Timing
 from cornersmooth.settings import Settings
+from cornersmooth.system.memory import return_free_memory
+from cornersmooth.times.comparing import MOST_POSES, Candidate, Row, Table, law_of_lines, rows_of
+from cornersmooth.times.saving import Timing
 from cornersmooth.verdict import Verdict
 
 #: the machine of a program that names no rotary axis

@@ -14,7 +14,7 @@ from cornersmooth.filter.motion import Job, motion_of_runs
 from cornersmooth.filter.runs import Reading
 from cornersmooth.kinematics import Machine
 from cornersmooth.nc_reader import NcProgram
-from cornersmooth.saving import LINUXCNC
+from cornersmooth.times.saving import LINUXCNC
 
 
 def planned_times(job: Job, old: Reading, new: Reading, where: Sequence[Place], axes: Machine) -> tuple[float, float]:

@@ -11,10 +11,10 @@ import math
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import dot, norm
 from cornersmooth.geometry.ragged import spread
 from cornersmooth.model import Floats, Ints, Program
 from cornersmooth.settings import Settings
-from cornersmooth.vectors import dot, norm
 
 #: share of the tolerance that a chord may take where `Settings.chord` would allow more: the rest is for arithmetic
 _MOST_OF_TOLERANCE = 0.9

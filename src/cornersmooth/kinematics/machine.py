@@ -10,9 +10,9 @@ from typing import Annotated, Final, Literal
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import unit as unit_vector
 from cornersmooth.errors import SettingsError
 from cornersmooth.model import Floats
-from cornersmooth.vectors import unit as unit_vector
 
 #: addresses of the linear axes
 LINEAR = ("X", "Y", "Z")

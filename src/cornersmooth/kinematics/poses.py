@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import dot, norm
 from cornersmooth.kinematics.machine import PARALLEL, Machine
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.vectors import dot, norm
 
 #: A machine has a pole where k can lie along a₁; sides that differ by less (rad) meet there up to rounding.
 POLE_MATCH = 1e-9

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import norm
 from cornersmooth.geometry.arcs import arc_points, arc_radii, divided
 from cornersmooth.model import Bools, Floats, Ints, Keep, Program
 from cornersmooth.nc.form import Form
@@ -20,7 +21,6 @@ from cornersmooth.nc.planes import Planes
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.sampling import Rows
 from cornersmooth.text import to_ticks
-from cornersmooth.vectors import norm
 
 #: largest turn of one circular block: in R form a control cannot tell which way to go near 180 degrees
 _LARGEST_SWEEP = math.radians(120.0)

@@ -12,13 +12,13 @@ from functools import cached_property
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import unit
 from cornersmooth.kinematics import machine_position, tool_axis
 from cornersmooth.model import MM_PER_UNIT, Bools, Floats, Ints, Units
 from cornersmooth.nc.control import Motion
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.planes import Plane
 from cornersmooth.text import RowFormat, to_ticks
-from cornersmooth.vectors import unit
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from cornersmooth.arrays.slices import some_rows
 from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.geometry.ragged import ranges
 from cornersmooth.model import Bools, Floats, Ints
@@ -15,7 +16,6 @@ from cornersmooth.nc.block_rows import BlockRows
 from cornersmooth.nc.circles import Circles
 from cornersmooth.nc.coordinates import Coordinates
 from cornersmooth.nc.messages import Findings
-from cornersmooth.slices import some_rows
 from cornersmooth.text import RowFormat, format_number, to_ticks
 
 #: texts, and which of them each of some rows has

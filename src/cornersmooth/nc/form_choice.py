@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import norm
 from cornersmooth.errors import SettingsError
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import Move, Program
@@ -17,7 +18,6 @@ from cornersmooth.nc.form import ROTARY_SHARE, Form
 from cornersmooth.nc.tools import loaded_tool
 from cornersmooth.settings import Settings
 from cornersmooth.tables import closest
-from cornersmooth.vectors import norm
 
 #: mm along the tool that a cut is left by, at least: less is not clear of it
 LEAST_REWIND: Final = 1.0

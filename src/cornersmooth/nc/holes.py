@@ -16,6 +16,7 @@ from functools import cached_property
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import dot
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program
 from cornersmooth.nc.block_rows import BlockRows
 from cornersmooth.nc.blocks import feed_digits, feed_ticks
@@ -28,7 +29,6 @@ from cornersmooth.nc.motion import NOWHERE, Motion
 from cornersmooth.nc.statement_writer import StatementWriter
 from cornersmooth.smoothing.sampling import Rows
 from cornersmooth.text import format_number
-from cornersmooth.vectors import dot
 
 #: mm left above the last depth before feeding goes on, and moved up to break a chip
 PECK_GAP = 0.5

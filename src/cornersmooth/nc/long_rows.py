@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import unit
 from cornersmooth.kinematics import tip_position, tool_axis
 from cornersmooth.methods import METHODS
 from cornersmooth.model import Bools, Floats, Ints, SmoothProgram
@@ -16,7 +17,6 @@ from cornersmooth.settings import Settings
 from cornersmooth.smoothing.blending import largest_blends
 from cornersmooth.smoothing.long_lines import LineLimits, Vertices, fewest_lines, segments_of_rows, vertices
 from cornersmooth.smoothing.sampling import Rows, all_dense_rows
-from cornersmooth.vectors import unit
 
 #: rows handed on at a time: many long lines are tested at once
 LONG_CHUNK = 1 << 17

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from cornersmooth.arrays.slices import some_rows
 from cornersmooth.kinematics.poses import continued
 from cornersmooth.kinematics.position import nose_position
 from cornersmooth.model import Bools, Floats, Ints, Move, Program
@@ -23,7 +24,6 @@ from cornersmooth.nc.messages import Findings, refused
 from cornersmooth.nc.modals import Modals
 from cornersmooth.nc.rewinds import retracts_before
 from cornersmooth.nc.warnings import MotionWarnings
-from cornersmooth.slices import some_rows
 from cornersmooth.smoothing.sampling import Rows
 
 #: a pose that no program has

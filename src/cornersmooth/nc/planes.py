@@ -18,6 +18,7 @@ from typing import Final
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import norm
 from cornersmooth.errors import InputError
 from cornersmooth.geometry.arcs import arc_points, divided
 from cornersmooth.kinematics import Machine, machine_position, solutions, tool_axis
@@ -28,7 +29,6 @@ from cornersmooth.nc.messages import Findings
 from cornersmooth.nc.tools import ToolTravel, tool_starts
 from cornersmooth.settings import Settings
 from cornersmooth.text import format_number
-from cornersmooth.vectors import norm
 
 #: tool axes that differ by less are one, and all of a run are so near to its first
 _SAME: Final = 1e-7

@@ -11,12 +11,12 @@ from typing import Final
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import dot
 from cornersmooth.kinematics import Machine, tool_axis
 from cornersmooth.model import Bools, Floats, Ints, Program
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.messages import Findings
 from cornersmooth.nc.tools import tool_starts
-from cornersmooth.vectors import dot
 
 #: degrees by which the way of the tool axis may be longer than the shortest one
 LONGEST_DETOUR: Final = 30.0

@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cornersmooth.arrays.slices import some_rows
+from cornersmooth.arrays.vectors import norm
 from cornersmooth.kinematics import Machine, inverse_time, machine_position, tool_axis
 from cornersmooth.methods import METHODS
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program, SmoothProgram
@@ -17,10 +19,8 @@ from cornersmooth.nc.rotary_words import RotaryWay, machine_of
 from cornersmooth.nc.tools import ToolTravel
 from cornersmooth.rotary import FilledPath, fill, insertions, rapid_moves
 from cornersmooth.settings import Settings
-from cornersmooth.slices import some_rows
 from cornersmooth.smoothing.long_lines import LineLimits, Vertices, fewest_lines, segments_of_rows, vertices
 from cornersmooth.smoothing.sampling import Rows
-from cornersmooth.vectors import norm
 
 #: dense rows handed on at a time
 _CHUNK = 1 << 15

@@ -11,6 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from cornersmooth.arrays.slices import some_rows
 from cornersmooth.model import Bools, Ints, Move, Statement
 from cornersmooth.nc.coordinates import Coordinates
 from cornersmooth.nc.holes import Holes
@@ -19,7 +20,6 @@ from cornersmooth.nc.planes import Planes
 from cornersmooth.nc.program_frame import Stream
 from cornersmooth.nc.statement_args import with_starts
 from cornersmooth.nc.statement_writer import StatementWriter
-from cornersmooth.slices import some_rows
 from cornersmooth.smoothing.sampling import Rows
 
 

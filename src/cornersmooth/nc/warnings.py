@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import dot
 from cornersmooth.methods import CURVES_METHOD, DEFAULT_METHOD
 from cornersmooth.model import FeedMode, Floats, Ints, Move, Program, SmoothProgram
 from cornersmooth.nc.block_rows import BlockRows
@@ -17,7 +18,6 @@ from cornersmooth.nc.form import Form
 from cornersmooth.nc.messages import Findings
 from cornersmooth.rotary import rapid_moves
 from cornersmooth.settings import FLIP_ANGLE
-from cornersmooth.vectors import dot
 
 #: cosine of the angle from hole to hole beyond which the tool turns between them
 _TURNED: Final = float(np.cos(np.radians(1.0)))

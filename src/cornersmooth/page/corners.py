@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from cornersmooth.arrays.slices import some_rows
+from cornersmooth.arrays.vectors import angle_between
 from cornersmooth.model import Bools, Floats, Ints, LimitedBy, Program, SmoothProgram, Status
 from cornersmooth.report.corners import corner_table
-from cornersmooth.slices import some_rows
 from cornersmooth.smoothing.sharp import other_corners, sharp_rows
-from cornersmooth.vectors import angle_between
 from cornersmooth.verify import Verification
 
 #: rounded corners that are listed, beside all sharp ones and all out of tolerance

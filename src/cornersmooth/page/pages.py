@@ -20,8 +20,8 @@ from cornersmooth.nc_reader import NcProgram
 from cornersmooth.page.scene import Story, Subject, page
 from cornersmooth.report.surface import passes_text
 from cornersmooth.report.verdict import Judgement, Saving, first_line, judge, times_text, trusted_blocks
-from cornersmooth.saving import planned_saving
 from cornersmooth.settings import Settings
+from cornersmooth.times.saving import planned_saving
 from cornersmooth.verdict import Verdict
 from cornersmooth.verify import Verification
 

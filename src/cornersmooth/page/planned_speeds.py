@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import norm
 from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.feedrate import Limits, TimeLaw, direct, plan_text
 from cornersmooth.feedrate.written import written_motion
@@ -16,7 +17,6 @@ from cornersmooth.nc_reader import NcProgram
 from cornersmooth.report.paths import OriginalPath, WrittenPath
 from cornersmooth.rotary import rapid_moves, rotary_angles
 from cornersmooth.settings import Settings
-from cornersmooth.vectors import norm
 
 #: moves up to which a motion is planned: some 10 s of work
 MOST_MOVES = 100_000

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import dot, norm
 from cornersmooth.errors import Finding
 from cornersmooth.geometry.arcs import arc_radii
 from cornersmooth.kinematics import Machine
@@ -17,7 +18,6 @@ from cornersmooth.report.record import SCHEMA, NcFile, cl_file, findings_table, 
 from cornersmooth.report.rotary_marks import rotary_marks
 from cornersmooth.report.verdict import judge, sharp_corners
 from cornersmooth.smoothing.construction import construction_of
-from cornersmooth.vectors import dot, norm
 
 if TYPE_CHECKING:
     from cornersmooth.verify import Verification

@@ -7,13 +7,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cornersmooth.arrays.vectors import angle_between, dot, norm, square, unit
 from cornersmooth.geometry import nurbs
 from cornersmooth.methods import METHODS
 from cornersmooth.model import Corners, Floats, Ints, LimitedBy, SmoothProgram, Status, Trait
 from cornersmooth.smoothing.construction import RUN_CURVATURE, construction_of, legs_at
 from cornersmooth.smoothing.sampling import nodes
 from cornersmooth.smoothing.segments import lines_of
-from cornersmooth.vectors import angle_between, dot, norm, square, unit
 
 Column = NDArray[Any]
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cornersmooth.arrays.slices import joined_rows, some_rows
 from cornersmooth.model import Floats, Ints, Program
 from cornersmooth.nc_reader.elements import NcProgram
 from cornersmooth.nc_reader.tool import written_at
-from cornersmooth.slices import joined_rows, some_rows
 from cornersmooth.verify.batches import Batches
 from cornersmooth.verify.deviation import Gap, of_original
 from cornersmooth.verify.match import Match

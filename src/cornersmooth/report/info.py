@@ -9,6 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import angle_between, dot, norm
 from cornersmooth.cl.operations import Operation, find_operations
 from cornersmooth.geometry.arcs import arc_radii
 from cornersmooth.geometry.tool import tools_of
@@ -19,7 +20,6 @@ from cornersmooth.report.rotary_marks import rotary_marks
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import axis_step_findings
 from cornersmooth.smoothing.construction import construction_of
-from cornersmooth.vectors import angle_between, dot, norm
 
 SCHEMA: Final = "cornersmooth-info/2"
 

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import angle_between, dot, norm
 from cornersmooth.geometry.arcs import poses_and_arcs
 from cornersmooth.model import Bools, Floats, Ints, Move, Program
 from cornersmooth.nc_reader import NcProgram
 from cornersmooth.nc_reader.elements import Element
 from cornersmooth.nc_reader.tool import written_at
 from cornersmooth.report.deviation_profile import deviation_along
-from cornersmooth.vectors import angle_between, dot, norm
 
 #: points on every line and on every curve or arc: so many in all, between the least and the most of each
 _POINTS = 6000

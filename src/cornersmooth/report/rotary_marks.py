@@ -6,11 +6,11 @@ from typing import Any, Final
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import norm
 from cornersmooth.errors import InputError
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import Move, Program
 from cornersmooth.rotary import rapid_moves, rotary_angles
-from cornersmooth.vectors import norm
 
 #: places that are listed for each axis
 _LISTED: Final = 3

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import norm
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.vectors import norm
 
 
 def thinned(points: Floats, weight: Floats, must: Bools, most: int) -> Ints:

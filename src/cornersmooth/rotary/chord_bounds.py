@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import dot, norm
 from cornersmooth.kinematics.machine import Machine
 from cornersmooth.model import Floats
-from cornersmooth.vectors import dot, norm
 
 
 def axis_bend(machine: Machine, turn: Floats, start: Floats, end: Floats, slack: Floats) -> Floats:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import dot, unit
 from cornersmooth.geometry.ragged import spread
 from cornersmooth.kinematics.machine import Machine
 from cornersmooth.kinematics.poses import angle_between, continued, solutions, tool_axis, wrap
@@ -21,7 +22,6 @@ from cornersmooth.kinematics.position import machine_position, tip_position
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.rotary.axis_findings import limit_error
 from cornersmooth.rotary.chord_bounds import axis_bend, ruled_bend, tip_bend
-from cornersmooth.vectors import dot, unit
 
 #: Rounds of division.
 ROUNDS = 28

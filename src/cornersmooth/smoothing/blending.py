@@ -13,10 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cornersmooth.arrays.slices import some_rows
+from cornersmooth.arrays.vectors import norm
 from cornersmooth.model import Floats, Ints
-from cornersmooth.slices import some_rows
 from cornersmooth.smoothing.long_lines import LineLimits, Vertices
-from cornersmooth.vectors import norm
 
 #: bends of corners are no smaller, so that no blend divided by one is too large a number
 _LEAST_BEND = 1e-300

@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cornersmooth.arrays.vectors import norm
 from cornersmooth.geometry.ragged import ranges
 from cornersmooth.methods import AUTO, DEFAULT_METHOD, METHODS
 from cornersmooth.model import Bools, Corners, FeedMode, Floats, Ints, Move, Program, SmoothProgram, Status
 from cornersmooth.settings import Settings
-from cornersmooth.vectors import norm
 
 if TYPE_CHECKING:
     from cornersmooth.smoothing.segments import Segments

@@ -10,10 +10,10 @@ from typing import Final
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import norm, unit
 from cornersmooth.geometry.ragged import ranges, starts
 from cornersmooth.model import Bools, Floats, Program
 from cornersmooth.settings import Settings
-from cornersmooth.vectors import norm, unit
 
 #: part of the tolerance within which poses may be one corner, and how much farther away all other poses must be
 _SHARE: Final = 0.5

@@ -6,18 +6,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cornersmooth.arrays.slices import joined_rows, some_runs
+from cornersmooth.arrays.vectors import angle_between
 from cornersmooth.errors import Finding
 from cornersmooth.geometry.ragged import batches, ranges, spread, starts
 from cornersmooth.model import Bools, Corners, Floats, Ints, LimitedBy, Program, Runs, SmoothProgram, Status, Trait
-from cornersmooth.processes import map_in_processes
 from cornersmooth.settings import Settings
-from cornersmooth.slices import joined_rows, some_runs
 from cornersmooth.smoothing.construction import RUN_CURVATURE, Progress, find_neighbours, place_corners, with_rows
 from cornersmooth.smoothing.proportional import Proportional
 from cornersmooth.smoothing.runs.polylines import Polylines
 from cornersmooth.smoothing.runs.rows import TURNING
 from cornersmooth.smoothing.runs.solving import STEP, measured, solve_runs
-from cornersmooth.vectors import angle_between
+from cornersmooth.system.processes import map_in_processes
 
 #: poses of runs that are solved together, about
 GROUP = 2500

@@ -15,9 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import dot, norm, square
 from cornersmooth.geometry.ragged import spread, starts
 from cornersmooth.model import Bools, Floats, Ints, Move, SmoothProgram, Status, Trait
-from cornersmooth.vectors import dot, norm, square
 
 #: rows after which a line ends in any case; so many parts are worked on side by side
 LANE = 512

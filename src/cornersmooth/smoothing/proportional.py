@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from cornersmooth.arrays.vectors import dot, norm, square, unit
 from cornersmooth.geometry import nurbs
 from cornersmooth.model import Floats, Ints, LimitedBy, SmoothProgram, Status
 from cornersmooth.settings import Settings
@@ -20,7 +21,6 @@ from cornersmooth.smoothing.construction import (
     half_cosine,
     refuse_turns,
 )
-from cornersmooth.vectors import dot, norm, square, unit
 
 if TYPE_CHECKING:
     from cornersmooth.smoothing.segments import Segments

@@ -12,15 +12,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from cornersmooth.arrays.slices import joined_rows, some_rows
+from cornersmooth.arrays.vectors import unit
 from cornersmooth.geometry import nurbs
 from cornersmooth.geometry.arcs import arc_lines, arc_points, divided
 from cornersmooth.geometry.ragged import ranges, starts
 from cornersmooth.model import Bools, Floats, Ints, Numbers, SmoothProgram
-from cornersmooth.slices import joined_rows, some_rows
 from cornersmooth.smoothing.construction import construction_of
 from cornersmooth.smoothing.runs.rows import NO_ROWS, SectionRows, run_lines, section_rows, some_at_once
 from cornersmooth.smoothing.segments import Segments, inner_points, lines_per_half, segments_of
-from cornersmooth.vectors import unit
 
 
 @dataclass(frozen=True)

@@ -12,12 +12,12 @@ from functools import cache
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import norm, square
 from cornersmooth.geometry import nurbs
 from cornersmooth.methods import METHODS
 from cornersmooth.model import Bools, Floats, Ints, Move, Numbers, SmoothProgram, Status
 from cornersmooth.settings import FLIP_ANGLE, STANDING, Settings
 from cornersmooth.smoothing.construction import construction_of, legs_at
-from cornersmooth.vectors import norm, square
 
 #: exponent of the graded nodes s = (j/n)^(2/3)
 GRADED = 2.0 / 3.0

@@ -12,10 +12,10 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import norm, square, unit
 from cornersmooth.geometry import nurbs
 from cornersmooth.model import Floats, Ints
 from cornersmooth.settings import Settings
-from cornersmooth.vectors import norm, square, unit
 
 #: how far tip and axis point may be from a common pose, in what is allowed for each: nearly what verification allows
 TOGETHER: Final = 1.8

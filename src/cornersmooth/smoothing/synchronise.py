@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import angle_between
 from cornersmooth.geometry import nurbs
 from cornersmooth.model import Floats, Ints
-from cornersmooth.vectors import angle_between
 
 #: parameters of the tip curve at which residual and jumps are reported
 REPORT_PARAMETERS = np.linspace(0.0, 1.0, 9)

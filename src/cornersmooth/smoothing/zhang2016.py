@@ -7,6 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import angle_between, dot, norm, unit
 from cornersmooth.geometry import nurbs
 from cornersmooth.model import Corners, Floats, Ints, LimitedBy, Program, SmoothProgram, Status
 from cornersmooth.settings import Settings
@@ -27,7 +28,6 @@ from cornersmooth.smoothing.sampling import nodes
 from cornersmooth.smoothing.segments import Segments, lines_of, segments_of
 from cornersmooth.smoothing.self_check import TOGETHER, Motion, Original, bounded, most_taken, motion_of, taken
 from cornersmooth.smoothing.synchronise import REPORT_PARAMETERS, matching_parameters, synchronisation_report
-from cornersmooth.vectors import angle_between, dot, norm, unit
 
 #: what `Corners.extra` holds: the largest ``||Q−P|−H|`` that the synchronisation leaves (mm), the jumps of the axis at
 #: both ends of the transition (rad), and the length (15) of a curve whose segments have room for it (mm)

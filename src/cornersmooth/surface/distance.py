@@ -11,10 +11,10 @@ from collections.abc import Callable
 import numpy as np
 from scipy.spatial import cKDTree
 
+from cornersmooth.arrays.vectors import dot, norm
 from cornersmooth.geometry.tool import Tool
 from cornersmooth.model import Floats, Ints
 from cornersmooth.surface.motion import Parts, RuledMotion
-from cornersmooth.vectors import dot, norm
 
 #: pairs of point and part that are looked at together
 _TOGETHER = 1_000_000

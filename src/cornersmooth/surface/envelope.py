@@ -15,10 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import dot, norm
 from cornersmooth.geometry.tool import Tool
 from cornersmooth.model import Floats, Ints
 from cornersmooth.surface.motion import RuledMotion
-from cornersmooth.vectors import dot, norm
 
 #: a step that is shorter, mm, has no direction
 _NO_WAY = 1e-12

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from cornersmooth.arrays.slices import some_rows
 from cornersmooth.errors import SettingsError
 from cornersmooth.geometry.tool import Tool
 from cornersmooth.model import Bools, Floats, Program
 from cornersmooth.nc_reader import NcProgram
-from cornersmooth.slices import some_rows
 from cornersmooth.surface.distance import distance_to_motion
 from cornersmooth.surface.envelope import EnvelopePoints, envelope_points
 from cornersmooth.surface.motion import original_cuts, written_cuts

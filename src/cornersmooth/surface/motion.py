@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import norm, unit
 from cornersmooth.geometry.arcs import divided, poses_and_arcs
 from cornersmooth.geometry.ragged import spread
 from cornersmooth.model import Bools, Floats, Ints, Move, Program
 from cornersmooth.nc_reader import NcProgram
 from cornersmooth.nc_reader.elements import Element
 from cornersmooth.nc_reader.tool import directions, written_at
-from cornersmooth.vectors import norm, unit
 
 #: largest turn of an arc within one segment, rad: off the arc by its radius times 3e-7
 _ARC_STEP = 1.5e-3

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from cornersmooth.arrays.vectors import dot, norm, square, unit
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.surface.motion import RuledMotion
-from cornersmooth.vectors import dot, norm, square, unit
 
 #: ends of segments near a place that are looked at
 _NEAREST = 48

@@ -28,7 +28,7 @@ A *place* is a segment of the CL path and a fraction of it. A *stop* is the end 
 A *stretch* is the run of feed moves between two stops. The *bend* of a step is how far the motion may leave its chord.
 """
 
-from cornersmooth.processes import useful_processes
+from cornersmooth.system.processes import useful_processes
 from cornersmooth.verify.findings import Where
 from cornersmooth.verify.result import Verification
 from cornersmooth.verify.verifier import Verifier, verify

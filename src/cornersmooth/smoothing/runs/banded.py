@@ -11,8 +11,8 @@ from scipy.sparse import csc_array, csr_array
 
 from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.geometry.ragged import ranges, spread, starts
-from cornersmooth.lapack import dpbsv
 from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.system.lapack import dpbsv
 
 #: control points that stay at each end: with them position, first and second derivative
 HELD = 3

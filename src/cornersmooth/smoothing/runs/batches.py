@@ -16,15 +16,15 @@ from functools import cached_property
 
 import numpy as np
 
+from cornersmooth.arrays.slices import some_rows
+from cornersmooth.arrays.vectors import dot, norm
 from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.geometry.ragged import ranges, spread, starts
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.slices import some_rows
 from cornersmooth.smoothing.runs.banded import TAPS, Gather, Windows
 from cornersmooth.smoothing.runs.fitting import holding_poses
 from cornersmooth.smoothing.runs.interior import COLD, WARM, Task, smoothest
 from cornersmooth.smoothing.runs.polylines import Pieces, Polylines, Samples
-from cornersmooth.vectors import dot, norm
 
 #: share of the tolerance that the samples may use
 SHARE = 0.97

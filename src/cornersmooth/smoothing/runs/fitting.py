@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from cornersmooth.arrays.slices import some_rows
 from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.geometry.ragged import ranges, spread
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.slices import some_rows
 from cornersmooth.smoothing.runs.banded import Gather, Windows, applied, solve_scalar
 from cornersmooth.smoothing.runs.polylines import Pieces, Polylines, Samples
 

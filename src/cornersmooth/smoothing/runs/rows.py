@@ -16,14 +16,14 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from cornersmooth.arrays.slices import some_runs
+from cornersmooth.arrays.vectors import angle_between, norm, unit
 from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.geometry.ragged import batches, search, spread, starts
 from cornersmooth.model import Floats, Ints, Numbers, Program, Runs
 from cornersmooth.settings import STANDING, Settings
-from cornersmooth.slices import some_runs
 from cornersmooth.smoothing.runs.polylines import Pieces, Polylines
 from cornersmooth.smoothing.segments import turn_limit
-from cornersmooth.vectors import angle_between, norm, unit
 
 #: share of ε that turning the axis inside a line may take; `global_runs` leaves it free
 TURNING = 0.02

@@ -17,16 +17,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import angle_between, norm
 from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.geometry.ragged import batches, spread, starts
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.processes import map_in_processes
 from cornersmooth.smoothing.runs.banded import Windows
 from cornersmooth.smoothing.runs.batches import Problem, solve_windows
 from cornersmooth.smoothing.runs.fitting import fit
 from cornersmooth.smoothing.runs.polylines import Pieces, Polylines
 from cornersmooth.smoothing.runs.rows import largest_curvature, points_at
-from cornersmooth.vectors import angle_between, norm
+from cornersmooth.system.processes import map_in_processes
 
 #: spans of a window that are its own, and spans beside them that settle down to what the neighbour finds
 CORE, BESIDE = 192, 24

@@ -30,10 +30,10 @@ from cornersmooth.kinematics.machine import PARALLEL
 from cornersmooth.model import Floats, Move, Program
 from cornersmooth.nc import Form
 from cornersmooth.pipeline import smooth
-from cornersmooth.processes import map_in_processes
 from cornersmooth.rotary import rapid_moves, rotary_angles
-from cornersmooth.saving import Timing, without_holes
 from cornersmooth.settings import Settings
+from cornersmooth.system.processes import map_in_processes
+from cornersmooth.times.saving import Timing, without_holes
 
 #: degrees between the setups that are estimated first, and around the best of them
 COARSE, FINE = 15.0, 5.0

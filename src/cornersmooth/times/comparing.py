@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from cornersmooth import nc
+from cornersmooth.arrays.slices import some_poses
 from cornersmooth.errors import CornersmoothError, SettingsError
 from cornersmooth.feedrate import BlockLimits
 from cornersmooth.kinematics import Machine, with_dynamics
@@ -17,10 +18,9 @@ from cornersmooth.methods import CURVES_METHOD, DEFAULT_METHOD, PAPERS_METHOD
 from cornersmooth.model import Move, Program
 from cornersmooth.nc import Control, Form, choose_form
 from cornersmooth.pipeline import postprocess
-from cornersmooth.processes import can_fork, map_in_processes, useful_processes
-from cornersmooth.saving import Timing, without_holes
 from cornersmooth.settings import BOUNDS, Settings
-from cornersmooth.slices import some_poses
+from cornersmooth.system.processes import can_fork, map_in_processes, useful_processes
+from cornersmooth.times.saving import Timing, without_holes
 from cornersmooth.verdict import Verdict
 
 #: poses of a part that are looked at; of longer ones whole runs from the middle

@@ -1,6 +1,6 @@
 """Draws docs/dev/example1.svg and prints its table: the paper's Example 1, measured in the written NURBS text.
 
-python docs/make_example1.py
+python tools/make_example1.py
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from cornersmooth import Settings, choose_form, read, smooth, write
 from cornersmooth.nc_reader import read_nc
 from cornersmooth.report.deviation_profile import Distribution, deviation_along
 
-HERE = Path(__file__).resolve().parent
+ROOT = Path(__file__).resolve().parent.parent
 TOLERANCES = (0.078, 0.15)
 WIDTH, HEIGHT, LEFT, TOP = 620.0, 190.0, 70.0, 40.0
 LENGTH, MOST = 12.2, 0.16  # mm along the path, mm of deviation
@@ -25,7 +25,7 @@ BLUE, RED, GREY = "#1463b8", "#c8402f", "#9aa3ad"
 
 def measure(tolerance: float) -> Distribution:
     """Deviation of the paper's method along its example."""
-    path = HERE.parent / "samples" / "paper_table1.csv"
+    path = ROOT / "samples" / "paper_table1.csv"
     program = read(path)
     form = choose_form("fanuc", "g6.2")
     smoothed = smooth(program, Settings(tolerance=tolerance, method="zhang2016"), form=form)
@@ -86,7 +86,7 @@ def main() -> None:
             x = LEFT + WIDTH * way / LENGTH
             parts.append(f'<text x="{x:.1f}" y="{top + HEIGHT + 18:.1f}" text-anchor="middle">{way}</text>')
         sys.stdout.write(table(found, tolerance) + "\n")
-    (HERE / "dev" / "example1.svg").write_text("\n".join([*parts, "</svg>"]) + "\n", encoding="utf-8")
+    (ROOT / "docs" / "dev" / "example1.svg").write_text("\n".join([*parts, "</svg>"]) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

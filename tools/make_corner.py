@@ -1,6 +1,6 @@
 """Draws docs/corner.svg: one rounded corner, computed by the library.
 
-python docs/make_corner.py
+python tools/make_corner.py
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy as np
 from cornersmooth import Program, Settings, smooth
 from cornersmooth.geometry import nurbs
 
-HERE = Path(__file__).resolve().parent
+ROOT = Path(__file__).resolve().parent.parent
 TOLERANCE, HEIGHT = 0.6, 4.0
 SCALE = 92.0
 
@@ -84,4 +84,4 @@ def draw() -> str:
 
 
 if __name__ == "__main__":
-    (HERE / "corner.svg").write_text(draw(), encoding="utf-8")
+    (ROOT / "docs" / "corner.svg").write_text(draw(), encoding="utf-8")

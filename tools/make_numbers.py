@@ -1,6 +1,6 @@
 """Writes the figures, outputs and tables of README.md, and draws docs/speeds.svg.
 
-python docs/make_numbers.py FOLDER
+python tools/make_numbers.py FOLDER
 
 Rows are those that ``cornersmooth compare FILE --control fanuc --limits table-ac --feed 1800`` prints for tool vectors.
 The folder holds the parts that are not among the samples; the picture shows the first poses of one of them.
@@ -19,15 +19,15 @@ import numpy as np
 
 import cornersmooth
 from cornersmooth import Program, Settings
+from cornersmooth.arrays.slices import some_poses
 from cornersmooth.cli import run
-from cornersmooth.comparing import Row, Table, candidates, compare_programs
 from cornersmooth.feedrate import BlockLimits, Limits, direct, plan_text
 from cornersmooth.kinematics import load_machine
 from cornersmooth.model import Floats
 from cornersmooth.nc import choose_form, fit_settings, load_control
 from cornersmooth.pipeline import read_back
-from cornersmooth.saving import written_text
-from cornersmooth.slices import some_poses
+from cornersmooth.times.comparing import Row, Table, candidates, compare_programs
+from cornersmooth.times.saving import written_text
 
 ROOT = Path(__file__).resolve().parent.parent
 SAMPLES = ROOT / "samples"

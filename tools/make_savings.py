@@ -1,6 +1,6 @@
 """Planned times of paths as they are, as ideal curves and as written: the table of docs/feedrate.md.
 
-    python docs/make_savings.py FOLDER
+    python tools/make_savings.py FOLDER
 
 FOLDER holds the real CL files of the tests. All rows are planned by one law: the limits of `time` for the tip (feed
 1800 mm/min where the file has none, 1000 mm/s², 5000 mm/s³, 2 ms), and those of the five axes of `table-ac`.

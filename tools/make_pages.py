@@ -1,6 +1,6 @@
 """The figures of the paper (10, 11, 14, 16) as pages, made from the samples.
 
-python docs/make_pages.py [FOLDER]
+python tools/make_pages.py [FOLDER]
 
 Figures 10 and 11 show the deviation of Table 1 at two tolerances, 14 the speed on an impeller blade
 with direct and smoothed motion, 16 the errors of the machined surface.

@@ -1,6 +1,6 @@
 """Writes the tables of words into docs/dev/words.md, as the lists of `verify` have them.
 
-python docs/make_words.py
+python tools/make_words.py
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-HERE = Path(__file__).resolve().parent
-LISTS = HERE.parent / "src" / "cornersmooth" / "nc_reader" / "word_lists"
-PAGE = HERE / "dev" / "words.md"
+ROOT = Path(__file__).resolve().parent.parent
+LISTS = ROOT / "src" / "cornersmooth" / "nc_reader" / "word_lists"
+PAGE = ROOT / "docs" / "dev" / "words.md"
 BEGIN, END = "<!-- made by make_words.py -->\n", "<!-- end -->\n"
 
 

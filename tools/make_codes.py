@@ -1,6 +1,6 @@
 """Writes docs/codes.md and cli/codes.toml: every code with its messages and hints, as the source has them.
 
-python docs/make_codes.py
+python tools/make_codes.py
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from pathlib import Path
 from cornersmooth.cli.lookup import PARTS
 from cornersmooth.errors import Finding
 
-HERE = Path(__file__).resolve().parent
-SOURCE = HERE.parent / "src" / "cornersmooth"
+ROOT = Path(__file__).resolve().parent.parent
+SOURCE = ROOT / "src" / "cornersmooth"
 TABLE = SOURCE / "cli" / "codes.toml"
 CODE = re.compile(r"CS\d{3}")
 SEVERITIES = ("note", "warning", "error")
@@ -25,7 +25,7 @@ SEVERITIES = ("note", "warning", "error")
 HEAD = """# Codes
 
 Errors, warnings and notes carry a code that does not change; reports name it. This table is made from the source code
-(`python docs/make_codes.py`). `…` is filled in.
+(`python tools/make_codes.py`). `…` is filled in.
 
 An *error* ends the command, with exit code 2 for settings, 3 for input, 4 for output. A *problem* is a fault of a
 program that verification finds (exit code 1). After *warnings* and *notes* the work goes on.
@@ -245,9 +245,9 @@ def table() -> str:
         if row not in rows.setdefault(entry.code, []):
             rows[entry.code].append(row)
     lines = [f"{code} = {json.dumps(found, ensure_ascii=False)}" for code, found in rows.items()]
-    return "\n".join(["# made by docs/make_codes.py: kind, message, what to do", *lines, ""])
+    return "\n".join(["# made by tools/make_codes.py: kind, message, what to do", *lines, ""])
 
 
 if __name__ == "__main__":
-    (HERE / "codes.md").write_text(page(), encoding="utf-8")
+    (ROOT / "docs" / "codes.md").write_text(page(), encoding="utf-8")
     TABLE.write_text(table(), encoding="utf-8")

@@ -1,6 +1,6 @@
 """Writes the reference of the library from its docstrings, as pages for a browser; any warning is an error.
 
-python docs/make_reference.py [FOLDER]
+python tools/make_reference.py [FOLDER]
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Runs the examples of a page one after the other and brings what they print up to date.
 
-python docs/run_examples.py PAGE [FOLDER]
+python tools/run_examples.py PAGE [FOLDER]
 
 Examples are fenced as ``python``, with what they print behind them, fenced as ``text``, or as ``sh``: commands of
 cornersmooth, a line each. They run in a folder in which ``part.cls`` is the sample ``impeller.cls``, if there is no

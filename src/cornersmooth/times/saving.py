@@ -20,9 +20,9 @@ from cornersmooth.kinematics import Machine, endless, tool_axis, with_dynamics
 from cornersmooth.model import Floats, Ints, Move, Program
 from cornersmooth.nc import Form
 from cornersmooth.pipeline import Progress, read_back, stage_of
-from cornersmooth.processes import useful_processes
 from cornersmooth.report.verdict import Saving
 from cornersmooth.settings import BOUNDS, TIMED_POSES, Settings
+from cornersmooth.system.processes import useful_processes
 
 #: name of the law of LinuxCNC's planner in the tables of controls
 LINUXCNC = "linuxcnc-2.9"

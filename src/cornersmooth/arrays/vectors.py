@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cornersmooth.model import Floats
+from cornersmooth.arrays import Floats
 
 
 def dot(one: Floats, other: Floats) -> Floats:

@@ -1,7 +1,7 @@
 """Figures and picture of docs/global.md: planned times of real paths, as curves and as written text.
 
-python docs/make_global.py FOLDER              tables for the files of FOLDER that are there, and samples/impeller.cls
-python docs/make_global.py --picture CLFILE    docs/global.svg: curvature and jerk of the axes along the path
+python tools/make_global.py FOLDER              tables for the files of FOLDER that are there, and samples/impeller.cls
+python tools/make_global.py --picture CLFILE    docs/global.svg: curvature and jerk of the axes along the path
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from cornersmooth.kinematics.machine_tables import machine_table, parse_machine
 from cornersmooth.nc import choose_form
 from cornersmooth.nc_reader import read_nc
 
-HERE = Path(__file__).resolve().parent
+ROOT = Path(__file__).resolve().parent.parent
 PATHS = {
     "HECC zigzag": "hecc_point_zigzag.csv",
-    "samples/impeller.cls": str(HERE.parent / "samples" / "impeller.cls"),
+    "samples/impeller.cls": str(ROOT / "samples" / "impeller.cls"),
     "HUST blade": "hust_5x_impeller_yelun.cls",
     "HECC flank": "hecc_flank_nx.cls",
     "fan": "hust_5x_toolpath_fan.txt",
@@ -193,7 +193,7 @@ def picture(file: Path) -> str:
 def main() -> None:
     """Do what the command line asks for."""
     if len(sys.argv) == 3 and sys.argv[1] == "--picture":
-        (HERE / "global.svg").write_text(picture(Path(sys.argv[2])), encoding="utf-8")
+        (ROOT / "docs" / "global.svg").write_text(picture(Path(sys.argv[2])), encoding="utf-8")
     elif len(sys.argv) == 2:
         folder = Path(sys.argv[1])
         for tolerance in (0.01, 0.04):
