@@ -12,6 +12,7 @@ from types import ModuleType
 
 import pytest
 
+from cornersmooth.cli.commands import COMMANDS
 from cornersmooth.cli.lookup import _one, codes
 from oracle.command import run
 from writing import faults, plain, sentences, words
@@ -65,10 +66,26 @@ def test_every_code_is_explained_in_80_columns() -> None:
             assert all(words(one) <= 20 for one in sentences(plain(text)))
 
 
-def test_causes_are_of_codes_that_there_are() -> None:
+def test_every_code_has_a_cause_and_what_to_do() -> None:
     causes = tomllib.loads((DOCS.parent / "src" / "cornersmooth" / "cli" / "causes.toml").read_text(encoding="utf-8"))
-    assert set(causes) <= set(codes())
-    assert all(set(one) == {"cause", "remedy"} for one in causes.values())
+    assert set(causes) == set(codes())
+    assert list(causes) == sorted(causes)
+    for one in causes.values():
+        assert set(one) == {"cause", "remedy"}
+        assert all(text.endswith(".") and words(text) > 2 for text in one.values())
+
+
+def test_options_that_causes_name_are_there() -> None:
+    """Each option is one of some command, and each command that is named has the option beside it."""
+    causes = tomllib.loads((DOCS.parent / "src" / "cornersmooth" / "cli" / "causes.toml").read_text(encoding="utf-8"))
+    texts = [text for one in causes.values() for text in one.values()]
+    known = {option for command in COMMANDS.values() for parameter in command.params for option in parameter.opts}
+    named = {option for text in texts for option in re.findall(r"(?<![\w-])--?[a-zA-Z][a-z-]*", text)}
+    assert len(named) > 20
+    assert named <= known
+    commands = {name for text in texts for name in re.findall(r"[`']cornersmooth (\w+)", text)}
+    assert len(commands) > 4
+    assert commands <= set(COMMANDS)
 
 
 def test_explain_takes_a_code_as_it_is_printed() -> None:

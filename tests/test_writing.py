@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from pathlib import Path
 
@@ -20,7 +21,7 @@ def prose(page: Path) -> list[tuple[str, bool]]:
     parts = [
         (piece, cell)
         for part, cell in paragraphs(page.read_text())
-        for piece in (part.split("; ") if page.name == "codes.md" else [part])
+        for piece in (re.split("; |<br>", part) if page.name == "codes.md" else [part])
     ]
     return [(one, cell) for part, cell in parts for one in sentences(part)]
 

@@ -1,5 +1,7 @@
 """Writes docs/codes.md and cli/codes.toml: every code with its messages and hints, as the source has them.
 
+The cause of each and what to do are written by hand, in cli/causes.toml.
+
 python tools/make_codes.py
 """
 
@@ -8,6 +10,7 @@ from __future__ import annotations
 import ast
 import json
 import re
+import tomllib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -19,18 +22,18 @@ from cornersmooth.errors import Finding
 ROOT = Path(__file__).resolve().parent.parent
 SOURCE = ROOT / "src" / "cornersmooth"
 TABLE = SOURCE / "cli" / "codes.toml"
+CAUSES = SOURCE / "cli" / "causes.toml"
 CODE = re.compile(r"CS\d{3}")
 SEVERITIES = ("note", "warning", "error")
 
 HEAD = """# Codes
 
-Errors, warnings and notes carry a code that does not change; reports name it. This table is made from the source code
-(`python tools/make_codes.py`). `…` is filled in.
+Errors, warnings and notes carry a code that does not change; reports name it. `cornersmooth explain CS337` prints a row
+of this table, with the hint of each message. `…` is filled in. The table is made by `python tools/make_codes.py`.
 
 An *error* ends the command, with exit code 2 for settings, 3 for input, 4 for output. A *problem* is a fault of a
 program that verification finds (exit code 1). After *warnings* and *notes* the work goes on.
 A warning *to check* bears on the metal. The verdict counts it: `PASSED, 3 to check`.
-`cornersmooth explain CS337` prints the cause of a message and what to do.
 CS551 to CS559 and CS566 are about one word each: missing, not asked for, another one, or in another place.
 """
 #: arguments by which a code is given to a method that is called with its texts
@@ -212,27 +215,26 @@ def codes_in_source() -> set[str]:
 
 
 def page() -> str:
-    """Text of docs/codes.md."""
-    rows: dict[tuple[str, str, str, str], list[str]] = {}
+    """Text of docs/codes.md: a row for each code."""
+    causes = tomllib.loads(CAUSES.read_text(encoding="utf-8"))
+    rows: dict[str, list[Entry]] = {}
     for entry in entries():
-        rows.setdefault((entry.code, entry.kind, entry.text, entry.hint), []).append(f"`{entry.package}`")
+        rows.setdefault(entry.code, []).append(entry)
     lines = [HEAD]
     for digit, title in PARTS.items():
         lines += [
             f"## CS{digit}xx: {title}",
             "",
-            "| code | kind | message | what to do | from |",
+            "| code | kind | message | why | what to do |",
             "|---|---|---|---|---|",
         ]
-        lines += [
-            "| "
-            + " | ".join(
-                part.replace("|", r"\|") for part in (code, kind + checked(code, kind), text, hint, ", ".join(packages))
-            )
-            + " |"
-            for (code, kind, text, hint), packages in rows.items()
-            if code[2] == digit
-        ]
+        for code, found in rows.items():
+            if code[2] == digit:
+                kinds = dict.fromkeys(entry.kind + checked(code, entry.kind) for entry in found)
+                messages = dict.fromkeys(entry.text for entry in found)
+                why = causes.get(code, {})
+                cells = (code, " or ".join(kinds), "<br>".join(messages), why.get("cause", ""), why.get("remedy", ""))
+                lines.append("| " + " | ".join(cell.replace("|", r"\|") for cell in cells) + " |")
         lines.append("")
     return "\n".join(lines)
 
