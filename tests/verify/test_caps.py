@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from cornersmooth.cl import read
-from cornersmooth.nc_reader.reading import DIGITS_SAMPLE, Steps
+from cornersmooth.nc_reader.options import DIGITS_SAMPLE, Steps
 from cornersmooth.verdict import Verdict
 from cornersmooth.verify import verify
 from oracle.command import run

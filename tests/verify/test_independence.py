@@ -53,3 +53,16 @@ def test_the_reader_does_not_know_who_judges():
     for path in MODULES:
         if "verify" not in path.parts:
             assert [name for name in imported(path) if name.startswith("cornersmooth.verify")] == [], path.name
+
+
+def test_no_file_imports_itself_by_way_of_others():
+    """Only `verify` as a package gives out what its modules have."""
+    names = {".".join(path.with_suffix("").parts[path.parts.index("cornersmooth") :]): path for path in MODULES}
+    names = {name.removesuffix(".__init__"): path for name, path in names.items()}
+    needs = {
+        name: {one if one in names else one.rpartition(".")[0] for one in imported(path)} & names.keys() - {name}
+        for name, path in names.items()
+    }
+    while free := {name for name, others in needs.items() if not others & needs.keys()}:
+        needs = {name: others for name, others in needs.items() if name not in free}
+    assert not needs

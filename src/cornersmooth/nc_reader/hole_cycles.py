@@ -7,13 +7,13 @@ the bottom, and out again. Everything that is measured of holes is measured on t
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
-from cornersmooth.nc_reader.words import Line
-
-if TYPE_CHECKING:
-    from cornersmooth.nc_reader.reader import Reader
+from cornersmooth.nc_reader.acts import Acts, Beside, Modes, Move, Wrong
+from cornersmooth.nc_reader.execution import Modal
+from cornersmooth.nc_reader.words import Line, refused
 
 #: share of a peck that the tool stays above the last depth when it comes back
 _ABOVE: Final = 0.05
@@ -42,8 +42,8 @@ class HoleCycle:
     pitch: float | None = None  #: of a tap, per revolution
 
 
-def drill(cycle: HoleCycle, x: float, y: float, line: Line, state: Reader) -> None:
-    """Carry out a cycle at a place.
+def drill(cycle: HoleCycle, x: float, y: float, line: Line, before: Modal, clamped: Mapping[str, bool]) -> Acts:
+    """Give out the moves of a cycle at a place; `before` holds in front of it.
 
     Raises
     ------
@@ -51,34 +51,33 @@ def drill(cycle: HoleCycle, x: float, y: float, line: Line, state: Reader) -> No
         CS503 where the height at which it begins is not known, or its heights make no hole.
     """
     if not cycle.bottom <= cycle.clearance <= cycle.travel + _ROUNDING:
-        state.refuse(line, "a cycle whose heights are not one below another", "give them in their order")
+        raise refused(line, "a cycle whose heights are not one below another", "give them in their order")
     if cycle.step and (cycle.clearance - cycle.bottom) / cycle.step > _MOST_PECKS:
-        state.refuse(line, "a cycle of more pecks than anybody wants", "give a larger step")
-    free = [axis for axis, clamped in state.memory.clamped.items() if not clamped]
+        raise refused(line, f"more than {_MOST_PECKS:,} pecks in one hole", "give a larger step")
+    free = [axis for axis, held in clamped.items() if not held]
     if free:
-        state.wrong("CS538", line, f"a hole cycle while {' and '.join(free)} is not clamped")
-    before = state.modal
+        yield Wrong("CS538", f"a hole cycle while {' and '.join(free)} is not clamped")
     # all moves up to the next event are carried out together
-    state.move(line, {"G": 0.0, "X": x, "Y": y}, later=True)
-    state.move(line, {"G": 0.0, "Z": cycle.clearance}, later=True)
+    yield Move({"G": 0.0, "X": x, "Y": y}, later=True)
+    yield Move({"G": 0.0, "Z": cycle.clearance}, later=True)
     if cycle.pitch is not None:
-        state.event(line, "G", 84.0)
-        state.change(line, per_revolution=True)
+        yield Beside("G", 84.0)
+        yield Modes({"per_revolution": True})
     feed = {} if cycle.feed is None else {"F": cycle.feed}
     done = cycle.clearance if cycle.from_clearance else cycle.top
     while cycle.step and done - cycle.step > cycle.bottom + _ROUNDING:
         done -= cycle.step
-        state.move(line, {"G": 1.0, "Z": done, **feed}, later=True)
+        yield Move({"G": 1.0, "Z": done, **feed}, later=True)
         above = done + _ABOVE * cycle.step
         for height in (above,) if cycle.chip else (cycle.clearance, above):
-            state.move(line, {"G": 0.0, "Z": min(height, cycle.clearance)}, later=True)
-    state.move(line, {"G": 1.0, "Z": cycle.bottom, **feed}, later=True)
+            yield Move({"G": 0.0, "Z": min(height, cycle.clearance)}, later=True)
+    yield Move({"G": 1.0, "Z": cycle.bottom, **feed}, later=True)
     if cycle.dwell:
-        state.event(line, "G", 4.0, f"{cycle.dwell:.10g}")
+        yield Beside("G", 4.0, f"{cycle.dwell:.10g}")
     if cycle.feed_out or cycle.pitch is not None:
-        state.move(line, {"G": 1.0, "Z": cycle.clearance}, later=True)
-    state.move(line, {"G": 0.0, "Z": cycle.travel})
-    state.change(line, code=math.nan, feed=before.feed, per_revolution=before.per_revolution)
+        yield Move({"G": 1.0, "Z": cycle.clearance}, later=True)
+    yield Move({"G": 0.0, "Z": cycle.travel})
+    yield Modes({"code": math.nan, "feed": before.feed, "per_revolution": before.per_revolution})
 
 
 def numbers(text: str) -> list[float | None]:

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from cornersmooth.model import Bools, Ints
-from cornersmooth.nc_reader.dialects.base import BY_WORD, Memory
+from cornersmooth.nc_reader.dialects.base import Dialect
 from cornersmooth.nc_reader.elements import Element, Elements, Problem
-from cornersmooth.nc_reader.words import NURBS, Table
+from cornersmooth.nc_reader.modal_state import ModalState
+from cornersmooth.nc_reader.words import BY_WORD, NURBS, Table
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine
-    from cornersmooth.nc_reader.reader import Reader
 
 #: code of words that want another state of the control
 CONTROL_WORDS: Final = "CS506"
@@ -39,17 +39,20 @@ def first_wrong(code: str, wrong: Bools, line: Ints, text: str) -> list[Problem]
     return Problem.at(code, wrong, line, text, most=1)
 
 
-def control_problems(table: Table, state: Reader, code: float, approach: Set[int]) -> Iterator[Problem]:
+def control_problems(
+    table: Table, state: ModalState, dialect: Dialect, code: float, approach: Set[int], unlooked: list[tuple[int, str]]
+) -> Iterator[Problem]:
     """What of a run of motion blocks the control would not take for what it is; `code` is the G word before the run.
 
     On the way down from a retract, in lines `approach`, rotary axes turn before the control is told of the tip.
+    `unlooked` takes what is not known.
     """
     if state.rotary is not None:
         kind, letters = ("angles" if state.rotary.tip_control else "machine"), set(state.rotary.names)
     else:
         kind, letters = ("point", set("UVW")) if state.modal.points else ("vector", set("IJ"))
-    dialect, motion = state.dialect, table.column("G")
-    if dialect.curves_need and not state.memory.high_speed:
+    motion = table.column("G")
+    if dialect.curves_need and not state.high_speed:
         text = f"a curve where {dialect.curves_need} must be in force"
         yield from first_wrong(CONTROL_WORDS, motion == NURBS, table.line, text)
     wanted = dialect.controls.get(kind)
@@ -60,13 +63,13 @@ def control_problems(table: Table, state: Reader, code: float, approach: Set[int
         text = f"{_KINDS[kind]} under {state.tip_control or 'no tool tip control'}, where {need} must be in force"
         wrong = list(first_wrong(CONTROL_WORDS, ~np.isin(line, list(approach)), line, text))
         if state.tip_control in dialect.unsure.get(kind, ()):
-            state.unlooked += [(problem.nc_line, problem.text) for problem in wrong]
+            unlooked += [(problem.nc_line, problem.text) for problem in wrong]
         else:
             yield from wrong
 
 
 def axis_problems(
-    table: Table, run: Elements, machine: Machine, way: str, memory: Memory, step: float
+    table: Table, run: Elements, machine: Machine, way: str, state: ModalState, step: float
 ) -> Iterator[Problem]:
     """What is wrong with the rotary words of a run: beyond the limits of their axes, or words of modulo axes.
 
@@ -84,7 +87,7 @@ def axis_problems(
         elif way == BY_WORD:
             text = f"{name} with {BY_WORD}(), which is for modulo axes"
             yield from first_wrong(CONTROL_WORDS, told, table.line, text)
-        elif way and axis.modulo and not memory.shorter_way:
+        elif way and axis.modulo and not state.shorter_way:
             text = f"{name} without {way} in force, which sends it the shorter way"
             yield from first_wrong(CONTROL_WORDS, given, table.line, text)
         if axis.limits is not None:
@@ -104,31 +107,31 @@ def turn_problems(run: Elements, before: Sequence[float], machine: Machine) -> I
             yield from first_wrong("CS526", turn > MOST_TURN, run.line, text)
 
 
-def take_clamp(word: float, machine: Machine, memory: Memory) -> bool:
+def take_clamp(word: float, machine: Machine, state: ModalState) -> bool:
     """Note an M word that clamps a rotary axis or lets it turn; return whether it is one."""
     for axis in machine.axes:
         for said, clamped in zip(axis.clamp or (), (True, False), strict=False):
             if float(said[1:]) == word:
-                memory.clamped[axis.name] = clamped
+                state.clamped[axis.name] = clamped
                 return True
     return False
 
 
-def clamp_problems(run: Elements, before: Sequence[float], machine: Machine, memory: Memory) -> Iterator[Problem]:
+def clamp_problems(run: Elements, before: Sequence[float], machine: Machine, state: ModalState) -> Iterator[Problem]:
     """Which rotary axes turn in a run although they are clamped, or nobody has said that they are not."""
     for column, axis in enumerate(machine.axes):
-        if axis.clamp is not None and memory.clamped[axis.name]:
+        if axis.clamp is not None and state.clamped[axis.name]:
             angles = np.append(before[column], run.second[:, column])
             turned = (angles[1:] != angles[:-1]) & ~np.isnan(angles[1:])
             yield from first_wrong("CS538", turned, run.line, f"{axis.name} turns without {axis.clamp[1]} before it")
 
 
-def kinematics_problems(run: Elements, machine: Machine, memory: Memory, *, tip_control: bool) -> Iterator[Problem]:
+def kinematics_problems(run: Elements, machine: Machine, state: ModalState, *, tip_control: bool) -> Iterator[Problem]:
     """What is wrong with a run where the machine's file says what switches tip control of its kinematics.
 
     Without `tip_control` the words are those of the machine's axes; with both rotary axes at zero that is the same.
     """
-    on = memory.keeps_tip
+    on = state.keeps_tip
     if machine.tip_control and on is not tip_control:
         here, other = machine.tip_control if tip_control else machine.tip_control[::-1]
         before = "before any word of tip control" if on is None else f"under {other}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final, NoReturn
 
@@ -12,10 +12,11 @@ import numpy as np
 
 from cornersmooth.errors import InputError
 from cornersmooth.model import MM_PER_UNIT, Floats, Units
+from cornersmooth.nc_reader.acts import Act, Beside, Modes, Move, Tilt, ToMachine, TurnToPlane, Unknown, Wrong
 from cornersmooth.nc_reader.block_tables import Readable, read_lines
-from cornersmooth.nc_reader.dialects.base import Memory
 from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem, Second, settle
 from cornersmooth.nc_reader.execution import Modal, execute
+from cornersmooth.nc_reader.modal_state import ModalState
 from cornersmooth.nc_reader.needed_states import (
     axis_problems,
     clamp_problems,
@@ -31,7 +32,7 @@ from cornersmooth.nc_reader.rotary import MOST_LINES
 from cornersmooth.nc_reader.words import MOTION_CODES, Line, Table, joined_tables, table_of
 
 if TYPE_CHECKING:
-    from cornersmooth.nc_reader.reading import ReadingOptions, Steps
+    from cornersmooth.nc_reader.options import ReadingOptions, Steps
 
 #: share of the tolerance, at the axis point, that a tool without words for its axis may lean
 FIXED_SHARE: Final = 0.1
@@ -54,11 +55,10 @@ class Reader:
 
     def __init__(self, name: str | None, options: ReadingOptions, steps: Steps, lever: float | None = None) -> None:
         self.name, self.options, self.dialect, self.steps = name, options, options.dialect, steps
-        self.rotary = options.rotary(steps)
-        self.modal = Modal(rotary=self.rotary.names if self.rotary is not None else "")
-        self.tip_control = ""
-        clamps = self.rotary.machine.axes if self.rotary is not None else ()
-        self.memory = Memory(clamped={axis.name: True for axis in clamps if axis.clamp is not None})
+        rotary = options.rotary(steps)
+        clamps = rotary.machine.axes if rotary is not None else ()
+        clamped = {axis.name: True for axis in clamps if axis.clamp is not None}
+        self.state = ModalState(Modal(rotary="" if rotary is None else rotary.names), rotary, clamped=clamped)
         self._tool = -1.0  # that has been chosen
         self._left_at: Floats | None = None  # where a tool of another length has left
         self.waiting: list[Table | tuple[int, dict[str, float]]] = []
@@ -92,7 +92,7 @@ class Reader:
         """Take the digits of some lines where they are finer than those before."""
         finer = self.steps.finer(self.options.steps(lines))
         if finer != self.steps:
-            self.steps, self.rotary = finer, self.options.rotary(finer)
+            self.steps, self.state.rotary = finer, self.options.rotary(finer)
 
     def chunks(self, items: Iterable[Table | Line]) -> Iterator[Elements]:
         """Take runs of motion blocks and other lines, and give out the path elements as they come."""
@@ -104,7 +104,7 @@ class Reader:
             if self.placed and self.elements - self.given_out >= GIVEN_OUT:
                 yield self._collected()
         self.flush()
-        free = [name for name, clamped in self.memory.clamped.items() if not clamped]
+        free = [name for name, clamped in self.state.clamped.items() if not clamped]
         self.problems += [Problem("CS538", 0, 0, f"{name} is not clamped at the end") for name in free]
         self.retracts.end(turned=False)
         self._settle()
@@ -129,7 +129,11 @@ class Reader:
             self.waiting.append((line.number, row))
         elif line.words:
             self.flush()
-            self.dialect.words(line, self)
+            try:
+                for act in self.dialect.acts(line, self.state):
+                    self._carry_out(line, act)
+            except InputError as error:
+                raise InputError(error.code, error.what, error.hint, file=self.name, line=error.line) from None
             self.events += [replace(event, element=self.elements) for event in self.late]
             self.late = []
 
@@ -139,41 +143,41 @@ class Reader:
             return
         factor = MM_PER_UNIT[self.units]
         for table in joined_tables(self.waiting, sys.maxsize if self.retracts.open else FEW_ROWS):
-            before = self.modal
-            if self.memory.incremental:
+            before = self.state.modal
+            if self.state.incremental:
                 hint = "write G90 after a position of the machine"
                 raise InputError(
                     "CS503", "motion in incremental words (G91)", hint, file=self.name, line=int(table.line[0])
                 )
-            run, self.modal = execute(table, before, self.problems)
-            if self.rotary is not None:
-                self.problems += clamp_problems(run, before.second, self.rotary.machine, self.memory)
+            run, self.state.modal = execute(table, before, self.problems)
+            if self.state.rotary is not None:
+                self.problems += clamp_problems(run, before.second, self.state.rotary.machine, self.state)
             approach: frozenset[int] = frozenset()
             if self.retracts.coming:
                 whole, run = run, self.retracts.arrive(run, self._words(before), free=self._turns_alone)
                 approach = frozenset(whole.line.tolist()).difference(run.line.tolist())
                 if not len(run.kind):
                     continue
-                if self.rotary is not None and len(run.kind) < len(whole.kind):  # on the way back axes turn, too
+                if self.state.rotary is not None and len(run.kind) < len(whole.kind):  # on the way back axes turn, too
                     before = before.but(second=tuple(whole.second[-len(run.kind) - 1].tolist()))
             if self.plane is not None:
                 self._in_plane(table, run, self.plane, factor, before)
                 continue
-            self._tell_once(control_problems(table, self, before.code, approach))
-            if self.modal.points and not before.points:
+            self._tell_once(control_problems(table, self.state, self.dialect, before.code, approach, self.unlooked))
+            if self.state.modal.points and not before.points:
                 self._know_points(run)
             run = self._in_mm(run, factor, before)
-            if self.rotary is not None:
+            if self.state.rotary is not None:
                 start = before.but(tip=tuple(factor * value for value in before.tip))
-                rotary = replace(self.rotary, tip_step=factor * self.rotary.tip_step)
+                rotary = replace(self.state.rotary, tip_step=factor * self.state.rotary.tip_step)
                 machine, way = rotary.machine, self.dialect.shorter_way
                 if machine.names and len(run.curves):
                     line = int(run.line[run.curves.element[0]])
                     raise InputError("CS503", "a curve in rotary words", "write it as lines", file=self.name, line=line)
-                self.problems += axis_problems(table, run, machine, way, self.memory, rotary.angle_step)
+                self.problems += axis_problems(table, run, machine, way, self.state, rotary.angle_step)
                 if self.dialect.switches:
                     tip_control = rotary.tip_control
-                    self._tell_once(kinematics_problems(run, machine, self.memory, tip_control=tip_control))
+                    self._tell_once(kinematics_problems(run, machine, self.state, tip_control=tip_control))
                 run = replace(run, second=rotary.unwrapped(run.second, before.second))
                 self.problems += turn_problems(run, before.second, machine)
                 self._check_turned(run, before)
@@ -189,7 +193,7 @@ class Reader:
                 lines, count = np.unique(run.line, return_counts=True)
                 turned = "the way of a block that turns very far"
                 self.unlooked += [(line, turned) for line in lines[count >= MOST_LINES].tolist()]
-                levers = self.rotary.levers(run.tip)
+                levers = self.state.rotary.levers(run.tip)
                 self.lever = max(self.lever, float(levers.max(initial=0.0, where=~np.isnan(levers))))
             self._add(run)
         self.waiting = []
@@ -198,7 +202,7 @@ class Reader:
         """Return a run in millimetres."""
         unit = factor * (self.dialect.inch_feed if before.inch and not before.per_revolution else 1.0)
         unit = 1.0 if before.inverse_time else unit
-        points = self.modal.points
+        points = self.state.modal.points
         if factor != 1.0:  # a factor of one leaves the numbers untouched
             run.curves.point[:, : 6 if points else 3] *= factor
             run = replace(
@@ -213,42 +217,42 @@ class Reader:
 
     def _in_plane(self, table: Table, run: Elements, plane: TiltedPlane, factor: float, before: Modal) -> None:
         """Take over a run in a tilted plane."""
-        axis_words = self.rotary.names if self.rotary is not None else "IJKUVW"
-        self._tell_once(plane.problems(table, run, self.tip_control, axis_words))
+        axis_words = self.state.rotary.names if self.state.rotary is not None else "IJKUVW"
+        self._tell_once(plane.problems(table, run, self.state.tip_control, axis_words))
         self._add(plane.in_part(self._in_mm(run, factor, before), factor), plane)
 
-    def tilt(self, line: Line, plane: TiltedPlane) -> None:
+    def _tilt(self, line: Line, plane: TiltedPlane) -> None:
         """Switch a tilted plane on."""
         if self.plane is not None:
-            self.wrong("CS506", line, "a tilted plane within another")
-        if self.tip_control:
-            self.wrong("CS506", line, f"a tilted plane under {self.tip_control}")
+            self._wrong("CS506", line, "a tilted plane within another")
+        if self.state.tip_control:
+            self._wrong("CS506", line, f"a tilted plane under {self.state.tip_control}")
         self._above(line, "a tilted plane where the tool is not retracted")
         self.plane, self._told, self._left_turned = plane, set(), False
         self.retracts.end(turned=True)
-        self.retracts.leave(self.elements, self._words(self.modal))
-        self.modal = self.modal.but(tip=(math.nan,) * 3)
+        self.retracts.leave(self.elements, self._words(self.state.modal))
+        self.state.modal = self.state.modal.but(tip=(math.nan,) * 3)
         if plane.turned:
             self._turn(line)
 
-    def turn_to_plane(self, line: Line) -> None:
+    def _turn_to_plane(self, line: Line) -> None:
         """Turn the rotary axes to the tilted plane that is on."""
         if self.plane is None or self.plane.turned:
-            self.wrong("CS506", line, "the tool is turned to a tilted plane, and none waits for it")
+            self._wrong("CS506", line, "the tool is turned to a tilted plane, and none waits for it")
             return
         self._above(line, "the tool is turned to a tilted plane where it is not retracted")
         self.plane = replace(self.plane, turned=True)
         self._turn(line)
 
-    def level(self, line: Line) -> None:
+    def _level(self, line: Line) -> None:
         """Switch the tilted plane off, where one is on."""
         if self.plane is None:
             return
-        if self.tip_control:
-            self.wrong("CS506", line, f"the end of a tilted plane under {self.tip_control}")
+        if self.state.tip_control:
+            self._wrong("CS506", line, f"the end of a tilted plane under {self.state.tip_control}")
         self._above(line, "a tilted plane ends where the tool is not retracted")
         self.retracts.end(turned=True)
-        self.modal, self.plane = self.plane.left(self.modal, rotary=self.rotary is not None), None
+        self.state.modal, self.plane = self.plane.left(self.state.modal, rotary=self.state.rotary is not None), None
         self._left_turned = True
 
     def _check_turned(self, run: Elements, before: Modal) -> None:
@@ -256,8 +260,8 @@ class Reader:
 
         Before their first words they count as at zero; the first may not turn a tool that has come down.
         """
-        assert self.rotary is not None
-        unsaid = np.isnan(np.vstack((before.second, run.second))[:, : len(self.rotary.names)])
+        assert self.state.rotary is not None
+        unsaid = np.isnan(np.vstack((before.second, run.second))[:, : len(self.state.rotary.names)])
         if self._left_turned:
             self._left_turned = False
             text = "motion after a tilted plane, and no word says where the rotary axes are"
@@ -270,13 +274,13 @@ class Reader:
     def _above(self, line: Line, text: str) -> None:
         """Complain where the tool is not above a retract."""
         if not self.retracts.open:
-            self.wrong(NOT_ABOVE, line, text)
+            self._wrong(NOT_ABOVE, line, text)
 
     def _turn(self, line: Line) -> None:
         """Complain of rotary axes that are held where a plane turns them."""
-        for name, clamped in self.memory.clamped.items():
+        for name, clamped in self.state.clamped.items():
             if clamped:
-                self.wrong("CS538", line, f"{name} turns to a tilted plane while it is clamped")
+                self._wrong("CS538", line, f"{name} turns to a tilted plane while it is clamped")
 
     @property
     def _code(self) -> float:
@@ -286,7 +290,7 @@ class Reader:
             known = words[~np.isnan(words)]
             if len(known):
                 return float(known[-1])
-        return self.modal.code
+        return self.state.modal.code
 
     def _words(self, modal: Modal) -> Floats:
         """(6,) words of tip and second triple that hold; without any word of a vector the tool is upright."""
@@ -296,15 +300,15 @@ class Reader:
     @property
     def _turns_alone(self) -> bool:
         """Whether rotary words turn their axes, and the tip stays behind."""
-        alone = self.tip_control in self.dialect.controls.get("machine", ("",))
-        return self.rotary is not None and alone and not self.memory.keeps_tip
+        alone = self.state.tip_control in self.dialect.controls.get("machine", ("",))
+        return self.state.rotary is not None and alone and not self.state.keeps_tip
 
     def _take_tool(self) -> None:
         """Go on with the length of another tool."""
-        assert self.rotary is not None
-        before, last = self.rotary.machine, self.ready[-1].tip[-1] if self.ready else self._last
+        assert self.state.rotary is not None
+        before, last = self.state.rotary.machine, self.ready[-1].tip[-1] if self.ready else self._last
         machine = before.with_tool(int(self._tool))
-        self.rotary = replace(self.rotary, machine=machine)
+        self.state.rotary = replace(self.state.rotary, machine=machine)
         if machine.tool_length != before.tool_length:
             self._left_at = last
 
@@ -319,21 +323,21 @@ class Reader:
         """Take over the elements of a run, in a tilted plane or in none."""
         if not len(run.kind):
             return
-        second_is: Second = "point" if self.modal.points else "vector"
+        second_is: Second = "point" if self.state.modal.points else "vector"
         scale = MM_PER_UNIT[self.units]
-        length = self.modal.vector_length if math.isfinite(self.modal.vector_length) else 1.0
+        length = self.state.modal.vector_length if math.isfinite(self.state.modal.vector_length) else 1.0
         steps = (self.steps.tip * scale, self.steps.second * (scale if second_is == "point" else 1.0 / length))
-        if self.rotary is not None:
+        if self.state.rotary is not None:
             lever = self.lever if self._given_lever is None else self._given_lever
-            steps = replace(self.rotary, tip_step=steps[0]).steps(lever)
+            steps = replace(self.state.rotary, tip_step=steps[0]).steps(lever)
         widest = self._widest(second_is)
         self.coarse = (self.coarse or int(run.line[0])) if steps[0] > widest[0] else 0
         steps = min(steps[0], widest[0]), min(steps[1], widest[1])
-        if self.rotary is not None:
+        if self.state.rotary is not None:
             left_at, self._left_at = self._left_at, None
             if left_at is not None and np.linalg.norm(run.tip[0] - left_at) <= steps[0]:
                 run.tip[0] = left_at  # another tool is put to where the one before has left
-        rotary = self.rotary is not None
+        rotary = self.state.rotary is not None
         elements = replace(run, second_is=second_is, tip_step=steps[0], second_step=steps[1], rotary=rotary)
         if plane is not None:
             room = min(plane.room, self._widest("vector")[1] / 2.0)
@@ -368,7 +372,7 @@ class Reader:
     @property
     def nothing(self) -> Elements:
         """No elements at all."""
-        none, _ = execute(table_of([(0, {"G": 0.0})]), self.modal, [])
+        none, _ = execute(table_of([(0, {"G": 0.0})]), self.state.modal, [])
         return replace(none, tip_step=self.steps.tip, second_step=self.steps.second)
 
     def _collected(self) -> Elements:
@@ -377,8 +381,8 @@ class Reader:
         self.ready, self.given_out = [], self.elements
         self._last = found.tip[-1].copy()
         room = np.zeros(len(found))
-        if self.rotary is not None:
-            room = self.rotary.pole_room(found.second)
+        if self.state.rotary is not None:
+            room = self.state.rotary.pole_room(found.second)
         elif found.second_is == "vector" and not self.steps.second:  # no word says anything of the tool axis
             room += FIXED_SHARE * self.options.tolerance / self.options.axis_length
         return replace(found, second_room=np.where(found.tip_room > 0.0, found.second_room, room))
@@ -386,54 +390,75 @@ class Reader:
     @property
     def units(self) -> Units:
         """Units in force."""
-        return "inch" if self.modal.inch else "mm"
+        return "inch" if self.state.modal.inch else "mm"
 
-    def event(self, line: Line, letter: str, value: float, text: str = "") -> None:
-        """Say a word that stands beside the motion."""
+    def _carry_out(self, line: Line, act: Act) -> None:
+        """Carry out what a line does."""
+        match act:
+            case Move():
+                self._move(line, act.columns, later=act.later)
+            case Modes():
+                self._change(line, act.values)
+            case Beside():
+                self._beside(line, act.letter, act.value, act.text)
+            case Tilt(None):
+                self._level(line)
+            case Tilt(TiltedPlane() as plane):
+                self._tilt(line, plane)
+            case TurnToPlane():
+                self._turn_to_plane(line)
+            case ToMachine():
+                self._leave(act.axes)
+            case Wrong():
+                self._wrong(act.code, line, act.text)
+            case Unknown():
+                self.unlooked.append((line.number, act.text))
+
+    def _beside(self, line: Line, letter: str, value: float, text: str) -> None:
+        """Take a word that stands beside the motion."""
         self.flush()
         if letter == "T":
             self._tool = value
         elif letter == "S":
-            self.memory.speed = value
-        elif (letter, value) == ("M", 6.0) and self.rotary is not None:
+            self.state.speed = value
+        elif (letter, value) == ("M", 6.0) and self.state.rotary is not None:
             self._take_tool()
-        if letter == "M" and self.rotary is not None and take_clamp(value, self.rotary.machine, self.memory):
+        if letter == "M" and self.state.rotary is not None and take_clamp(value, self.state.rotary.machine, self.state):
             return
         event = Event(self.elements, line.number, letter, value, text)
         (self.late if self.dialect.after_motion(letter, value) else self.events).append(event)
 
-    def move(self, line: Line, row: dict[str, float], *, later: bool = False) -> None:
+    def _move(self, line: Line, row: Mapping[str, float], *, later: bool) -> None:
         """Execute a single motion block, `later` with those behind it; one without position only changes what holds."""
-        if set(row) & self.dialect.lexer.places or set(row) & set("XYZIJKUVW"):
-            self.waiting.append((line.number, row))
+        if row.keys() & self.dialect.lexer.places or row.keys() & set("XYZIJKUVW"):
+            self.waiting.append((line.number, dict(row)))
             if not later:
                 self.flush()
         elif row.keys() & {"G", "F"}:
-            self.modal = self.modal.but(code=row.get("G", self.modal.code), feed=row.get("F", self.modal.feed))
+            self.state.modal = self.state.modal.but(
+                code=row.get("G", self.state.modal.code), feed=row.get("F", self.state.modal.feed)
+            )
 
-    def change(self, line: Line, **modes: Any) -> None:
+    def _change(self, line: Line, modes: Mapping[str, Any]) -> None:
         """Change what holds from block to block."""
         self.flush()
-        if self.elements and modes.get("inch", self.modal.inch) != self.modal.inch:
-            self.wrong("CS504", line, "units are changed in the middle of the path")
-        if modes.get("inverse_time") and self.rotary is None:
-            self.refuse(line, "inverse time feed (G93) without rotary words", "name the machine with --machine")
-        self.modal = self.modal.but(**modes)
+        if self.elements and modes.get("inch", self.state.modal.inch) != self.state.modal.inch:
+            self._wrong("CS504", line, "units are changed in the middle of the path")
+        if modes.get("inverse_time") and self.state.rotary is None:
+            what = "inverse time feed (G93) without rotary words"
+            raise InputError("CS503", what, "name the machine with --machine", file=self.name, line=line.number)
+        self.state.modal = self.state.modal.but(**modes)
 
-    def leave(self, axes: str) -> None:
+    def _leave(self, axes: str) -> None:
         """Say that axes go to positions of the machine."""
-        self.retracts.leave(self.elements, self._words(self.modal))
+        self.retracts.leave(self.elements, self._words(self.state.modal))
         gone = "XYZ" if self.plane is not None else axes
-        tip = tuple(math.nan if axis in gone else at for axis, at in zip("XYZ", self.modal.tip, strict=True))
-        self.modal = self.modal.but(tip=tip)
+        tip = tuple(math.nan if axis in gone else at for axis, at in zip("XYZ", self.state.modal.tip, strict=True))
+        self.state.modal = self.state.modal.but(tip=tip)
 
-    def wrong(self, code: str, line: Line, text: str) -> None:
+    def _wrong(self, code: str, line: Line, text: str) -> None:
         """Note what breaks the rules of the control."""
         self.problems.append(Problem(code, 0, line.number, text))
-
-    def refuse(self, line: Line, what: str, hint: str) -> NoReturn:
-        """Give up: words that make it impossible to tell where the tool is."""
-        raise InputError("CS503", what, hint, file=self.name, line=line.number)
 
     def _tell_once(self, problems: Iterable[Problem]) -> None:
         """Note problems whose texts have not been told."""

@@ -2,93 +2,19 @@
 
 from __future__ import annotations
 
-import math
 import os
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
-from cornersmooth.errors import SettingsError
-from cornersmooth.nc_reader.dialects import CONTROLS, Dialect, dialect_of
+from cornersmooth.nc_reader.dialects import CONTROLS
 from cornersmooth.nc_reader.elements import Elements, NcProgram
+from cornersmooth.nc_reader.options import DIGITS_SAMPLE, ReadingOptions
 from cornersmooth.nc_reader.reader import Reader
-from cornersmooth.nc_reader.rotary import Rotary
 from cornersmooth.nc_reader.source import Source, readable_twice
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine
 
 __all__ = ["CONTROLS", "read_nc"]
-
-#: decimals are looked for in so many bytes before the first block is read, and then in all that is read
-DIGITS_SAMPLE: Final = 1 << 16
-
-#: share of the tolerance that the rounding of one number, half a step of its last digit, accounts for at most: a
-#: control reads ``I0.`` as 0 exactly, however few digits a program shows
-DIGITS_SHARE: Final = 0.5
-
-
-@dataclass(frozen=True)
-class Steps:
-    """What the last printed digit is worth."""
-
-    tip: float  #: in units of the text
-    second: float  #: of the second triple; 0 without any
-
-    def finer(self, other: Steps) -> Steps:
-        """Give the finer of two of the same text."""
-        seconds = [second for second in (self.second, other.second) if second]
-        return Steps(min(self.tip, other.tip), min(seconds, default=0.0))
-
-
-@dataclass(frozen=True)
-class ReadingOptions:
-    """How a text is to be understood."""
-
-    control: str
-    dialect: Dialect
-    machine: Machine | None
-    tcp: bool
-    #: mm: as in `read_nc`
-    tolerance: float
-    axis_length: float
-
-    @classmethod
-    def of(
-        cls, control: str, machine: Machine | None, *, tcp: bool, tolerance: float, axis_length: float
-    ) -> ReadingOptions:
-        """Choose it.
-
-        Raises
-        ------
-        SettingsError
-            CS204 for an unknown control, CS215 for positions of a machine that is not named.
-        """
-        without = machine is not None and not machine.names
-        if without:
-            machine = None
-        dialect = dialect_of(control, "".join(machine.names) if machine is not None else "")
-        if machine is None and not tcp and not without:
-            raise SettingsError("CS215", "machine positions need a machine", "name it with --machine")
-        return cls(control, dialect, machine, tcp, tolerance, axis_length)
-
-    def steps(self, sample: bytes) -> Steps:
-        """Printed digits of a piece of a text, as its control's format shows them."""
-        tip, second = self.dialect.decimals(sample)
-        return Steps(10.0**-tip, 0.0 if second is None else 10.0**-second)
-
-    @property
-    def widest(self) -> tuple[float, float]:
-        """Largest steps of tip (mm) and of a vector of length 1 that are accounted for."""
-        widest = 2.0 * DIGITS_SHARE * self.tolerance
-        return widest, widest / self.axis_length
-
-    def rotary(self, steps: Steps) -> Rotary | None:
-        """What resolves rotary words; None without a machine."""
-        if self.machine is None:
-            return None
-        tip, turn = self.widest
-        angle = min(steps.second or 1.0, math.degrees(turn))
-        return Rotary(self.machine, self.tcp, self.tolerance, self.axis_length, min(steps.tip, tip), angle)
 
 
 def read_nc(

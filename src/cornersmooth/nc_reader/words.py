@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
+from cornersmooth.errors import InputError
 from cornersmooth.model import Floats, Ints
 
 #: code of FANUC's curves, and what stands for those of controls that say it in words
@@ -19,6 +20,9 @@ NURBS, BSPLINE, POLY, SPL = 6.2, 901.0, 902.0, 903.0
 
 #: G words of group 01 that a run may contain
 MOTION_CODES = (0.0, 1.0, 2.0, 3.0, NURBS)
+
+#: word around the number of a modulo axis that sends it the shorter way; a column of tables with the axis behind it
+BY_WORD: Final = "DC"
 
 
 class Word(NamedTuple):
@@ -105,6 +109,11 @@ class Line:
     block_number: Word | None = None
     skipped: bool = False  #: whether a slash stands before the block: the operator chooses whether it is executed
     tape: bool = False  #: whether it is a bare ``%``
+
+
+def refused(line: Line, what: str, hint: str) -> InputError:
+    """Error for words that make it impossible to tell where the tool is."""
+    return InputError("CS503", what, hint, line=line.number)
 
 
 def table_of(rows: list[tuple[int, dict[str, float]]]) -> Table:

@@ -2,43 +2,16 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable, Mapping, Set
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any
 
+from cornersmooth.errors import InputError
+from cornersmooth.nc_reader.acts import Acts, Beside, Modes
 from cornersmooth.nc_reader.lexer import Lexer
+from cornersmooth.nc_reader.modal_state import ModalState
 from cornersmooth.nc_reader.word_tables import means_of, word_table
-from cornersmooth.nc_reader.words import Columns, Line
-
-if TYPE_CHECKING:
-    from cornersmooth.nc_reader.hole_cycles import HoleCycle
-    from cornersmooth.nc_reader.reader import Reader
-
-
-#: word around the number of a modulo axis that sends it the shorter way; a column of tables with the axis behind it
-BY_WORD = "DC"
-
-
-@dataclass
-class Memory:
-    """What words have said that no other state of the reader holds, from line to line."""
-
-    incremental: bool = False  #: G91 is in force, in which no motion is read
-    high_speed: bool = False  #: look ahead of the kind that some controls ask for with curves is on
-    clamped: dict[str, bool] = field(default_factory=dict)  #: rotary axes with a clamp: held, or words let them turn
-    keeps_tip: bool | None = None  #: whether the kinematics do, where the machine's file says what switches that
-    shorter_way: bool = False  #: whether rotary axes go it
-    speed: float = math.nan  #: of the spindle
-    rigid: bool = False  #: M29 asks the spindle to turn with the feed
-    height: float | None = None  #: at which a run of modal cycles began (G98), in units of the program
-    cycle: HoleCycle | None = None  #: that a block defines for others to call
-    centre: dict[str, float] = field(default_factory=dict)  #: of circles to come
-    #: how the tool axis is interpolated, and in which coordinates
-    orientation: str = ""
-    axis_frame: str = ""
-
+from cornersmooth.nc_reader.words import Columns, Line, refused
 
 #: how the values of a table `[grammar]` are read, where not as they are
 _READ: Mapping[str, Callable[[Any], Any]] = {
@@ -104,38 +77,44 @@ class Dialect:
         columns = self.lexer.motion(line)
         return None if columns is None else values(columns)
 
-    def words(self, line: Line, state: Reader) -> None:
-        """Interpret a line that is no motion block."""
+    def acts(self, line: Line, state: ModalState) -> Acts:
+        """Give out what a line that is no motion block does; each act is carried out before the next is asked for.
+
+        Raises
+        ------
+        InputError
+            CS503 for words that make it impossible to tell where the tool is.
+        """
         raise NotImplementedError
 
-    def mode(self, code: float, line: Line, state: Reader) -> None:
+    def mode(self, code: float, line: Line, state: ModalState) -> Acts:
         """Take a G word outside group 01 that changes what holds from block to block."""
         if code in (17.0, 18.0, 19.0):
-            state.change(line, plane=int(code))
+            yield Modes({"plane": int(code)})
         elif code in self.inches | self.millimetres:
-            state.change(line, inch=code in self.inches)
+            yield Modes({"inch": code in self.inches})
         elif code in (93.0, 94.0, 95.0):
-            state.change(line, per_revolution=code == 95.0, inverse_time=code == 93.0)
+            yield Modes({"per_revolution": code == 95.0, "inverse_time": code == 93.0})
         elif code in (40.0, 41.0, 42.0):
-            state.event(line, "G", code, f"G{code:g}")
+            yield Beside("G", code, f"G{code:g}")
         elif code not in self.always_silent | self.silent:
             hint = "only absolute milling with tool vectors, axis points or rotary words is read"
-            state.refuse(line, f"G{code:g} is not understood", hint)
+            raise refused(line, f"G{code:g} is not understood", hint)
 
-    def machine_axes(self, line: Line, state: Reader, beside: Set[tuple[str, float]]) -> str:
+    def machine_axes(self, line: Line, beside: Set[tuple[str, float]]) -> str:
         """Axes that a block sends to positions of the machine; refuses words beside them but for some."""
         axes = ("X", "Y", "Z", *self.rotary)
         for name, value, text, *_ in line.words:
             if name not in (*axes, "N") and (name, value) not in beside:
-                state.refuse(line, f"{text} beside a position of the machine", "give it a block of its own")
+                raise refused(line, f"{text} beside a position of the machine", "give it a block of its own")
         return "".join(word.name for word in line.words if word.name in axes)
 
     @staticmethod
-    def refuse(line: Line, name: str, text: str, state: Reader) -> NoReturn:
-        """Give up at a word that is not understood."""
+    def not_understood(line: Line, name: str, text: str) -> InputError:
+        """Error for a word that is not understood."""
         if name in "ABC":
-            state.refuse(line, f"{text}: rotary words", "name the machine they are for, with --machine")
-        state.refuse(line, f"{text} is not understood here", "see that the control is the one the text is for")
+            return refused(line, f"{text}: rotary words", "name the machine they are for, with --machine")
+        return refused(line, f"{text} is not understood here", "see that the control is the one the text is for")
 
     def decimals(self, text: bytes) -> tuple[int, int | None]:
         """Decimals of the tip and of the second triple, from a sample of the text; None without any."""

@@ -5,16 +5,15 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
+from cornersmooth.nc_reader.acts import Acts, Beside, Modes, Move, Tilt, ToMachine, Wrong
 from cornersmooth.nc_reader.dialects.base import Dialect, values
 from cornersmooth.nc_reader.hole_cycles import HoleCycle, drill
 from cornersmooth.nc_reader.lexer import NUMBER, Lexer, fixed, number_of
+from cornersmooth.nc_reader.modal_state import ModalState
 from cornersmooth.nc_reader.planes import TiltedPlane, room_of, rotated_frame
-from cornersmooth.nc_reader.words import SPL, Columns, Line, Word
-
-if TYPE_CHECKING:
-    from cornersmooth.nc_reader.reader import Reader
+from cornersmooth.nc_reader.words import SPL, Columns, Line, Word, refused
 
 _VECTOR: Final = {"TX": "I", "TY": "J", "TZ": "K"}
 _PATHS: Final = ("L", "LN", "SPL")
@@ -61,13 +60,13 @@ class Heidenhain(Dialect):
         super().__init__(control, rotary)
         self.lexer = _KlartextLexer(rotary)
 
-    def words(self, line: Line, state: Reader) -> None:
-        """Interpret a line that is no motion block."""
+    def acts(self, line: Line, state: ModalState) -> Acts:
+        """As `Dialect.acts`."""
         if line.words[0].name == "block":
-            self._block(line.words[0].text, line, state)
+            yield from self._block(line.words[0].text, line, state)
             return
         if any(word[:2] == ("M", 91.0) for word in line.words):
-            self._to_machine(line, state)
+            yield from self._to_machine(line, state)
             return
         motion: dict[str, float] = {}
         called = False
@@ -75,47 +74,47 @@ class Heidenhain(Dialect):
             if (name, value) == ("M", 99.0):
                 called = True
             elif name == "M":
-                self._miscellaneous(value, text, line, state)
+                yield from self._miscellaneous(value, text, line, state)
             elif name == "side":
-                state.event(line, "G", value, text)
+                yield Beside("G", value, text)
             elif name == "S":
-                state.event(line, "S", value, text)
+                yield Beside("S", value, text)
             elif name in self.lexer.names or name in ("circle", "centre", "turn", "R"):
                 motion[name] = value
             else:
-                self.refuse(line, name, text, state)
+                raise self.not_understood(line, name, text)
         if "centre" in motion:
-            state.memory.centre = {axis: motion[axis] for axis in "XY" if axis in motion}
+            state.centre = {axis: motion[axis] for axis in "XY" if axis in motion}
         elif "circle" in motion:
-            state.move(line, self._circle(motion, line, state))
+            yield Move(self._circle(motion, line, state))
         else:
             paths = motion.keys() & set(_PATHS)
             if motion and not paths and motion.keys() - {"F"}:
-                state.refuse(line, "words of a path without L, LN or SPL", "give the whole block")
+                raise refused(line, "words of a path without L, LN or SPL", "give the whole block")
             columns = self.lexer.coded({word.name: word for word in line.words if word.name in motion})
             if columns is None:
-                state.refuse(
+                raise refused(
                     line, "words that this kind of block does not take", "give L, LN or SPL what belongs to it"
                 )
-            state.move(line, values(columns))
+            yield Move(values(columns))
         if called:
-            self._call(line, state)
+            yield from self._call(line, state)
 
-    def _call(self, line: Line, state: Reader) -> None:
+    def _call(self, line: Line, state: ModalState) -> Acts:
         """M99: the hole cycle that was defined last, where the block ends."""
-        defined, modal = state.memory.cycle, state.modal
+        defined, modal = state.cycle, state.modal
         if defined is None:
-            state.refuse(line, "M99 without a cycle before it", "define the cycle that it calls")
+            raise refused(line, "M99 without a cycle before it", "define the cycle that it calls")
         if state.tip_control:
-            state.wrong("CS506", line, f"a hole cycle under {state.tip_control}")
-        drill(defined, modal.tip[0], modal.tip[1], line, state)
+            yield Wrong("CS506", f"a hole cycle under {state.tip_control}")
+        yield from drill(defined, modal.tip[0], modal.tip[1], line, modal, state.clamped)
 
-    def _define(self, number: int, text: str, line: Line, state: Reader) -> None:
+    def _define(self, number: int, text: str, line: Line, state: ModalState) -> None:
         """CYCL DEF 200, 201, 207 with their parameters."""
         given = {int(q): float(value) for q, value in _PARAMETER.findall(text)}
         rest = _PARAMETER.sub("", text).split("CYCL DEF", 1)[1].split()
         if given.keys() != _CYCLES[number] or rest[1:] != _CYCLE_NAMES[number].split():
-            state.refuse(
+            raise refused(
                 line, f"CYCL DEF {number} with other parameters", f"give {_shown(_CYCLES[number])} and no others"
             )
         top, depth = given[203], -given[201]
@@ -130,79 +129,79 @@ class Heidenhain(Dialect):
             cycle = replace(cycle, feed_out=True)
         wrong = (number == 200 and (given[210] != 0.0 or not given[202] > 0.0)) or depth < 0.0
         if wrong or given.get(208, given.get(206)) != given.get(206) or given.get(239, 1.0) <= 0.0:
-            state.refuse(line, f"CYCL DEF {number} with values that are not understood", "see its parameters")
-        state.memory.cycle = cycle
+            raise refused(line, f"CYCL DEF {number} with values that are not understood", "see its parameters")
+        state.cycle = cycle
 
-    def _to_machine(self, line: Line, state: Reader) -> None:
+    def _to_machine(self, line: Line, state: ModalState) -> Acts:
         """M91: a rapid in machine coordinates."""
         sides = {word for word in line.words if word.name == "side"}
         for word in sides:
-            state.event(line, "G", word.value, word.text)
+            yield Beside("G", word.value, word.text)
         beside = {("L", 0.0), ("RAPID", 1.0), ("M", 91.0), *(word[:2] for word in sides)}
-        axes = self.machine_axes(line, state, beside)
+        axes = self.machine_axes(line, beside)
         if all(word.name != "RAPID" for word in line.words):
-            state.refuse(line, "M91 without FMAX", "positions of the machine are read in rapids only")
-        state.leave(axes)
+            raise refused(line, "M91 without FMAX", "positions of the machine are read in rapids only")
+        yield ToMachine(axes)
 
-    def _circle(self, motion: dict[str, float], line: Line, state: Reader) -> dict[str, float]:
+    def _circle(self, motion: dict[str, float], line: Line, state: ModalState) -> dict[str, float]:
         """C: about the centre that CC has said, in the plane XY; CR: with a radius."""
-        centre = state.memory.centre
+        centre = state.centre
         by_radius = line.words[0].text == "CR"
         known = "R" in motion if by_radius else "R" not in motion and len(centre) == 2
         if "turn" not in motion or not known or {*motion} & {"Z", *self.rotary}:
-            state.refuse(line, "an arc that is not in the plane XY about a CC or with a radius", "write it as lines")
+            raise refused(line, "an arc that is not in the plane XY about a CC or with a radius", "write it as lines")
         x, y, _ = state.modal.tip
         row: dict[str, float] = {name: motion[name] for name in ("X", "Y", "F", "R") if name in motion}
         if by_radius:
             return {**row, "G": motion["turn"]}
         return {**row, "G": motion["turn"], "I": centre["X"] - x, "J": centre["Y"] - y}
 
-    def _miscellaneous(self, value: float, text: str, line: Line, state: Reader) -> None:
+    def _miscellaneous(self, value: float, text: str, line: Line, state: ModalState) -> Acts:
         if value in (136.0, 137.0):
-            state.change(line, per_revolution=value == 136.0)
+            yield Modes({"per_revolution": value == 136.0})
         elif value in (128.0, 129.0):
             state.tip_control = "M128" if value == 128.0 else ""
         elif value in (126.0, 127.0):
-            state.memory.shorter_way = value == 126.0  # for others turns are less than half a turn either way
+            state.shorter_way = value == 126.0  # for others turns are less than half a turn either way
         elif value in (91.0, 92.0):
-            state.refuse(line, f"{text}: positions of the machine", "only positions of the part are read")
+            raise refused(line, f"{text}: positions of the machine", "only positions of the part are read")
         else:
-            state.event(line, "M", value, text)
+            yield Beside("M", value, text)
 
-    def _block(self, text: str, line: Line, state: Reader) -> None:
+    def _block(self, text: str, line: Line, state: ModalState) -> Acts:
         """Blocks that are words: tools, cycles, functions."""
         if text.startswith(("BEGIN PGM", "END PGM")):
             unit = text.split()[-1]
             if unit not in ("MM", "INCH"):
-                state.refuse(line, f"{text}: no units", "name MM or INCH at its end")
+                raise refused(line, f"{text}: no units", "name MM or INCH at its end")
             if text.startswith("BEGIN"):
-                state.change(line, inch=unit == "INCH")
+                yield Modes({"inch": unit == "INCH"})
         elif match := _TOOL_CALL.fullmatch(text):
             if match[1] is not None:
-                state.event(line, "T", float(match[1]), text)
-                state.event(line, "M", 6.0, text)
+                yield Beside("T", float(match[1]), text)
+                yield Beside("M", 6.0, text)
             if match[2] is not None:
-                state.event(line, "S", float(match[2]), text)
+                yield Beside("S", float(match[2]), text)
         elif match := re.fullmatch(r"TOOL DEF (\d+)(?: .*)?", text):
-            state.event(line, "T", float(match[1]), text)
+            yield Beside("T", float(match[1]), text)
         elif match := re.fullmatch(rf"CYCL DEF 9\.1 (?:DWELL|V\.ZEIT) ?({NUMBER})", text):
-            state.event(line, "G", 4.0, f"{1000.0 * float(match[1]):.10g}")
+            yield Beside("G", 4.0, f"{1000.0 * float(match[1]):.10g}")
         elif match := re.match(r"CYCL DEF (200|201|207) ", text):
             self._define(int(match[1]), text, line, state)
         elif match := _SPATIAL.fullmatch(text):
             angles = match.groups()
             turns = [(axis, float(angle)) for axis, angle in zip("ZYX", angles[::-1], strict=True)]
-            state.tilt(line, TiltedPlane(rotated_frame(turns), room_of(angles)))
+            yield Tilt(TiltedPlane(rotated_frame(turns), room_of(angles)))
         elif text == "PLANE RESET STAY":
-            state.level(line)
+            yield Tilt(None)
         elif text == "STOP":
-            state.event(line, "M", 0.0, text)
+            yield Beside("M", 0.0, text)
         elif match := re.fullmatch(r"FUNCTION TCPM F (?:TCP|CONT) AXIS POS PATHCTRL (AXIS|VECTOR)(?: .*)?", text):
             state.tip_control = f"TCPM {match[1]}"
         elif text == "FUNCTION RESET TCPM":
             state.tip_control = ""
         elif not text.startswith(_SILENT):
-            state.refuse(line, f"{text} is not understood", "see that the control is the one the text is for")
+            raise refused(line, f"{text} is not understood", "see that the control is the one the text is for")
 
 
 def _shown(parameters: set[int]) -> str:

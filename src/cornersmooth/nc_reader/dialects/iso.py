@@ -6,17 +6,15 @@ import math
 import re
 from collections.abc import Mapping, Set
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
+from cornersmooth.nc_reader.acts import Acts, Beside, Move, Tilt, ToMachine, TurnToPlane, Wrong
 from cornersmooth.nc_reader.dialects.base import Dialect
 from cornersmooth.nc_reader.hole_cycles import HoleCycle, drill
 from cornersmooth.nc_reader.lexer import NUMBER, Lexer, fixed, number_of
+from cornersmooth.nc_reader.modal_state import ModalState
 from cornersmooth.nc_reader.planes import TiltedPlane, room_of, rotated_frame, turned_frame
 from cornersmooth.nc_reader.word_tables import word_table
-from cornersmooth.nc_reader.words import MOTION_CODES, NURBS, Columns, Line, Word, tools_first
-
-if TYPE_CHECKING:
-    from cornersmooth.nc_reader.reader import Reader
+from cornersmooth.nc_reader.words import MOTION_CODES, NURBS, Columns, Line, Word, refused, tools_first
 
 #: letters whose words are events
 _EVENT_LETTERS = "TSMHD"
@@ -73,77 +71,76 @@ class Iso(Dialect):
         text = _PLANE_LINE.sub(b"", text) if planes else text
         return super().decimals(_ARC_LINE.sub(lambda line: _CENTRE.sub(b"", line[0]), text))
 
-    def words(self, line: Line, state: Reader) -> None:
-        """Interpret a line that is no motion block."""
+    def acts(self, line: Line, state: ModalState) -> Acts:
+        """As `Dialect.acts`."""
         if self._switched(line, state):
             return
         codes = {word[1] for word in line.words if word[0] == "G"}
         if codes & {*_TO_REFERENCE, _IN_MACHINE}:
-            self._to_machine(line, codes, state)
+            yield from self._to_machine(line, codes, state)
             return
         if codes & _CYCLES.keys():
-            self._cycle(line, codes, state)
+            yield from self._cycle(line, codes, state)
             return
         if codes & _PLANE_WORDS.get(self.planes, frozenset()):
-            self._plane(line, codes, state)
+            yield from self._plane(line, codes, state)
             return
         if _NO_CYCLE in codes:
-            state.memory.height, state.memory.rigid = None, False
+            state.height, state.rigid = None, False
         motion: dict[str, float] = {}
         late = any(self.after_motion(*word[:2]) for word in line.words)
         given = {letter: value for letter, value, *_ in line.words}
         if given.get("G") == 5.0:
-            state.memory.high_speed = given.get("P", 0.0) >= 10000.0
+            state.high_speed = given.get("P", 0.0) >= 10000.0
         for letter, value, text, *_ in tools_first(line.words):
             if letter == "G":
                 if value in MOTION_CODES:
                     motion["G"] = value
                 elif value == 4.0:
                     time = self.dwell * given["P"] if "P" in given else 1000.0 * given.get("X", given.get("U", 0.0))
-                    state.event(line, "G", 4.0, f"{time:.10g}")
+                    yield Beside("G", 4.0, f"{time:.10g}")
                     return
                 else:
-                    self.mode(value, line, state)
+                    yield from self.mode(value, line, state)
             elif (letter, value) == ("M", 29.0) and self.rigid:
-                state.memory.rigid = True
+                state.rigid = True
             elif letter in _EVENT_LETTERS:
-                state.event(line, letter, value, text)
+                yield Beside(letter, value, text)
             elif letter in self.lexer.letters:
                 motion[letter] = value
             elif letter not in self.others:
-                self.refuse(line, letter, text, state)
+                raise self.not_understood(line, letter, text)
         if self.lexer.odd_vector(motion.keys(), motion.get("G")):
-            state.refuse(line, "I J K beside rotary words", "leave out --machine for a text with tool vectors")
-        state.move(line, motion, later=bool(codes & self.tip_control.keys()) and not late)
+            raise refused(line, "I J K beside rotary words", "leave out --machine for a text with tool vectors")
+        yield Move(motion, later=bool(codes & self.tip_control.keys()) and not late)
 
-    def _switched(self, line: Line, state: Reader) -> bool:
+    def _switched(self, line: Line, state: ModalState) -> bool:
         """Take a block that switches tip control of the kinematics; return whether it is one."""
         blocks = state.rotary.machine.tip_control if self.switches and state.rotary is not None else None
         given = {(word.name, word.value) for word in line.words if word.name != "N"}
         for block, on in zip(blocks or (), (True, False), strict=False):
             if given == {(word[0], float(word[1:])) for word in block.split()}:
-                state.change(line)
-                state.memory.keeps_tip = on
+                state.keeps_tip = on
                 return True
         return False
 
-    def _cycle(self, line: Line, codes: set[float], state: Reader) -> None:
+    def _cycle(self, line: Line, codes: set[float], state: ModalState) -> Acts:
         """A hole cycle, with G98: all that it takes stands in its block."""
         code = next(iter(codes & _CYCLES.keys()))
         given = {letter: value for letter, value, *_ in line.words if letter != "N"}
         needed = {*"GXYZR", *_CYCLES[code]} - ({"P"} if code == 84.0 else set())
         if codes != {code, _BACK_TO_START} or len(given) + 1 != len([w for w in line.words if w[0] != "N"]):
-            state.refuse(line, f"G{code:g} beside other words", "give it G98 and nothing else")
+            raise refused(line, f"G{code:g} beside other words", "give it G98 and nothing else")
         if not needed <= given.keys() <= needed | {"F", *_CYCLES[code]} or self.cycles_in == "none":
-            state.refuse(
+            raise refused(
                 line, f"G{code:g} with words that are missing or not understood", "give X Y Z R and F in its block"
             )
         if state.tip_control != self.cycles_in:
-            state.wrong("CS506", line, f"a hole cycle under {state.tip_control or 'no length of the tool'}")
-        travel = state.modal.tip[2] if state.memory.height is None else state.memory.height
-        state.memory.height = travel
+            yield Wrong("CS506", f"a hole cycle under {state.tip_control or 'no length of the tool'}")
+        travel = state.modal.tip[2] if state.height is None else state.height
+        state.height = travel
         feed, turning = given.get("F", state.modal.feed), state.modal.per_revolution
-        speed = state.memory.speed
+        speed = state.speed
         cycle = HoleCycle(
             travel,
             given["R"],
@@ -155,65 +152,65 @@ class Iso(Dialect):
             feed_out=code in (85.0, 89.0),
         )
         if state.modal.inverse_time:
-            state.wrong("CS506", line, "a hole cycle at inverse time feed (G93)")
+            yield Wrong("CS506", "a hole cycle at inverse time feed (G93)")
         tap = code == 84.0
         if tap:
-            if self.rigid and not state.memory.rigid:
-                state.wrong("CS506", line, "a tap without M29, which turns the spindle with the feed")
+            if self.rigid and not state.rigid:
+                yield Wrong("CS506", "a tap without M29, which turns the spindle with the feed")
             pitch = feed if turning else feed / speed
             cycle = replace(cycle, feed=pitch, pitch=pitch)
         state.modal = state.modal.but(feed=feed)  # that of the blocks after it, too
-        drill(cycle, given["X"], given["Y"], line, state)
+        yield from drill(cycle, given["X"], given["Y"], line, state.modal, state.clamped)
 
-    def _plane(self, line: Line, codes: set[float], state: Reader) -> None:
+    def _plane(self, line: Line, codes: set[float], state: ModalState) -> Acts:
         """G68.2, G53.1 and G69, or G254 and G255."""
         given = {word.name: word for word in line.words if word.name not in "GN"}
         count = sum(word.name != "N" for word in line.words)
         if len(codes) > 1 or count != 1 + len(given) or (given and _TILTED not in codes):
-            state.refuse(line, "words beside those of a tilted plane", "give it a block of its own")
+            raise refused(line, "words beside those of a tilted plane", "give it a block of its own")
         if codes & {69.0, 255.0}:
-            state.level(line)
+            yield Tilt(None)
         elif 53.1 in codes:
-            state.turn_to_plane(line)
+            yield TurnToPlane()
         elif _TILTED in codes:
             if given.keys() != set("XYZIJK"):
-                state.refuse(line, "G68.2 in another form", "give its zero X Y Z and the Euler angles I J K")
+                raise refused(line, "G68.2 in another form", "give its zero X Y Z and the Euler angles I J K")
             turns = [(axis, given[name].value) for axis, name in zip("ZXZ", "IJK", strict=True)]
             room = room_of([given[name].text for name in "IJK"])
             origin = given["X"].value, given["Y"].value, given["Z"].value
-            state.tilt(line, TiltedPlane(rotated_frame(turns), room, "G43", turned=False, origin=origin))
+            yield Tilt(TiltedPlane(rotated_frame(turns), room, "G43", turned=False, origin=origin))
         else:
             angles = state.modal.second[:2]
             frame = turned_frame(state.rotary, angles) if state.rotary is not None else None
             if frame is None or state.rotary is None or math.isnan(sum(angles)):
-                state.refuse(line, "G254 where the angles of the tables are not known", "name the machine")
+                raise refused(line, "G254 where the angles of the tables are not known", "name the machine")
             else:
-                state.tilt(line, TiltedPlane(frame, math.radians(state.rotary.angle_step), "G43"))
+                yield Tilt(TiltedPlane(frame, math.radians(state.rotary.angle_step), "G43"))
 
-    def _to_machine(self, line: Line, codes: set[float], state: Reader) -> None:
+    def _to_machine(self, line: Line, codes: set[float], state: ModalState) -> Acts:
         """G91 G28 Z0. and the like: to the reference position without a detour; G53: in machine coordinates."""
-        incremental = state.memory.incremental
+        incremental = state.incremental
         incremental = 91.0 in codes or (incremental and 90.0 not in codes)
-        axes = self.machine_axes(line, state, {("G", code) for code in (*_TO_REFERENCE, _IN_MACHINE, 0.0, 90.0, 91.0)})
+        axes = self.machine_axes(line, {("G", code) for code in (*_TO_REFERENCE, _IN_MACHINE, 0.0, 90.0, 91.0)})
         for word in line.words:
             if word.name in axes and _IN_MACHINE not in codes and not (incremental and word.value == 0.0):
-                state.refuse(line, f"{word.text} on the way to the reference position", "write G91 and zero")
+                raise refused(line, f"{word.text} on the way to the reference position", "write G91 and zero")
         if _IN_MACHINE in codes and (incremental or 0.0 not in codes):
-            state.refuse(line, "G53 without G90 and G0", "write G90 before it, and G0")
-        state.memory.incremental = incremental
+            raise refused(line, "G53 without G90 and G0", "write G90 before it, and G0")
+        state.incremental = incremental
         if 0.0 in codes:
-            state.move(line, {"G": 0.0})
-        state.leave(axes)
+            yield Move({"G": 0.0})
+        yield ToMachine(axes)
 
-    def mode(self, code: float, line: Line, state: Reader) -> None:
+    def mode(self, code: float, line: Line, state: ModalState) -> Acts:
         """Take a G word outside group 01 that changes what holds from block to block."""
         if code == 90.0:
-            state.memory.incremental = False
+            state.incremental = False
         elif code in self.tip_control:
             state.tip_control = self.tip_control[code]
-            state.event(line, "G", code, f"G{code:g}")
+            yield Beside("G", code, f"G{code:g}")
         else:
-            super().mode(code, line, state)
+            yield from super().mode(code, line, state)
 
 
 class _IsoLexer(Lexer):

@@ -5,18 +5,17 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
-from cornersmooth.nc_reader.dialects.base import BY_WORD, Dialect
+from cornersmooth.nc_reader.acts import Acts, Beside, Move, Tilt, ToMachine, Unknown, Wrong
+from cornersmooth.nc_reader.dialects.base import Dialect
 from cornersmooth.nc_reader.hole_cycles import HoleCycle, drill, numbers
 from cornersmooth.nc_reader.lexer import NUMBER, Lexer, fixed, number_of
+from cornersmooth.nc_reader.modal_state import ModalState
 from cornersmooth.nc_reader.planes import TiltedPlane, room_of, rotated_frame
-from cornersmooth.nc_reader.words import BSPLINE, POLY, Columns, Line, Word, tools_first
-
-if TYPE_CHECKING:
-    from cornersmooth.nc_reader.reader import Reader
+from cornersmooth.nc_reader.words import BSPLINE, BY_WORD, POLY, Columns, Line, Word, refused, tools_first
 
 #: names of words of several letters: vectors are I J K, second points U V W, as in `motion`
 _NAMES: Final = {
@@ -76,42 +75,42 @@ class Siemens(Dialect):
         super().__init__(control, rotary)
         self.lexer = _SiemensLexer(rotary)
 
-    def words(self, line: Line, state: Reader) -> None:
-        """Interpret a line that is no motion block."""
+    def acts(self, line: Line, state: ModalState) -> Acts:
+        """As `Dialect.acts`."""
         if any(name == "G" and value == 4.0 for name, value, *_ in line.words):
             given = {name: value for name, value, *_ in line.words}
             if "F" not in given:
-                state.refuse(line, "a dwell in revolutions", "give it in seconds")
-            state.event(line, "G", 4.0, f"{1000.0 * given['F']:.10g}")
+                raise refused(line, "a dwell in revolutions", "give it in seconds")
+            yield Beside("G", 4.0, f"{1000.0 * given['F']:.10g}")
             return
         if any(word[0] == "SUPA" for word in line.words):
-            self._to_machine(line, state)
+            yield from self._to_machine(line, state)
             return
         if any(word[0] in _CYCLES for word in line.words):
-            self._cycle(line, state)
+            yield from self._cycle(line, state)
             return
         if any(word[0] == "CYCLE800" for word in line.words):
-            self._plane(line, state)
+            yield from self._plane(line, state)
             return
         motion: dict[str, float] = {}
         for name, value, text, *_ in tools_first(line.words):
             if name == "G" and value in _CODES:
                 motion["G"] = value
             elif name == "G":
-                self.mode(value, line, state)
+                yield from self.mode(value, line, state)
             elif name in ("M", "T", "S"):
-                state.event(line, name, value, text)
+                yield Beside(name, value, text)
             elif name == "SPOS":
-                state.event(line, "M", 19.0, text)
+                yield Beside("M", 19.0, text)
             elif name in ("X", "Y", "Z", "F", *self.rotary) or name.removeprefix(f"{BY_WORD} ") in self.rotary:
                 motion[name] = value
             elif name in ("TRAORI", "TRAFOOF", *_AXIS_FRAMES, *_ORIENTATIONS):
                 self._transform(name, state)
             elif name not in ("D", "N", "%") and name not in _SILENT_CALLS:
-                self.refuse(line, name, text, state)
-        state.move(line, motion)
+                raise self.not_understood(line, name, text)
+        yield Move(motion)
 
-    def _cycle(self, line: Line, state: Reader) -> None:
+    def _cycle(self, line: Line, state: ModalState) -> Acts:
         """CYCLE81 to CYCLE85, called where the tool stands."""
         words = [word for word in line.words if word.name != "N"]
         name, (_, _, inside) = words[0].name, words[0].text.partition("(")
@@ -120,11 +119,11 @@ class Siemens(Dialect):
         except ValueError:
             args = []
         if len(words) > 1 or len(args) not in _CYCLES[name] or None in args[:4]:
-            state.refuse(
+            raise refused(
                 line, f"{words[0].text} is not understood", "give RTP, RFP, SDIS and DP first, in its own block"
             )
         if state.tip_control:
-            state.wrong("CS506", line, f"a hole cycle under {state.tip_control}")
+            yield Wrong("CS506", f"a hole cycle under {state.tip_control}")
         whole = [value if value is not None else 0.0 for value in args] + [0.0] * 12
         travel, top, setup, bottom, depth, fifth = whole[:6]
         known = HoleCycle(travel, top + setup, bottom, top=top, from_clearance=False)
@@ -132,65 +131,65 @@ class Siemens(Dialect):
             known = replace(known, dwell=1000.0 * fifth)
         elif name == "CYCLE83":
             if depth or fifth or whole[7:11] != [0.0, 0.0, 0.0, 1.0] or not whole[6] > 0.0:
-                state.refuse(line, f"{words[0].text} is not understood", "give pecks of one depth (FDPR) alone")
+                raise refused(line, f"{words[0].text} is not understood", "give pecks of one depth (FDPR) alone")
             known = replace(known, step=whole[6], chip=whole[11] == 0.0)
         elif name == "CYCLE84":
             if args[6:8] != [3.0, None] or not whole[8] > 0.0 or whole[10] != whole[11]:
-                state.refuse(line, f"{words[0].text} is not understood", "give a pitch, SDAC 3 and one speed")
+                raise refused(line, f"{words[0].text} is not understood", "give a pitch, SDAC 3 and one speed")
             known = replace(known, pitch=whole[8], feed=whole[8], dwell=1000.0 * fifth)
-            if state.memory.speed != whole[10]:
-                state.wrong("CS506", line, f"CYCLE84 at {whole[10]:g} revolutions, where S says otherwise")
+            if state.speed != whole[10]:
+                yield Wrong("CS506", f"CYCLE84 at {whole[10]:g} revolutions, where S says otherwise")
         elif name == "CYCLE85":
             if whole[6] != whole[7] or not whole[6] > 0.0:
-                state.refuse(line, f"{words[0].text} is not understood", "give one feed for both ways")
+                raise refused(line, f"{words[0].text} is not understood", "give one feed for both ways")
             known = replace(known, feed=whole[6], feed_out=True, dwell=1000.0 * fifth)
-        drill(known, state.modal.tip[0], state.modal.tip[1], line, state)
+        yield from drill(known, state.modal.tip[0], state.modal.tip[1], line, state.modal, state.clamped)
 
-    def _plane(self, line: Line, state: Reader) -> None:
+    def _plane(self, line: Line, state: ModalState) -> Acts:
         """CYCLE800: a plane by turns about its own axes, one after another; without arguments none."""
         words = [word for word in line.words if word.name != "N"]
         match = _SWIVEL.fullmatch(words[0].text)
         if len(words) > 1 or match is None:
             hint = 'write CYCLE800(0,"",0,57,0,0,0,A,B,C,0,0,0,-1), or CYCLE800()'
-            state.refuse(line, f"{words[0].text} is not understood", hint)
+            raise refused(line, f"{words[0].text} is not understood", hint)
         elif match["mode"] is None:
-            state.level(line)
+            yield Tilt(None)
         else:
             mode, angles = int(match["mode"]), match["angles"].split(",")
             axes = [(mode >> shift) & 3 for shift in (0, 2, 4)]
             if mode > 0b111111 or 0 in axes or axes[0] == axes[1] or axes[1] == axes[2]:
-                state.refuse(line, f"CYCLE800 in the mode {mode}", "use 57: axis by axis about X, Y, Z")
+                raise refused(line, f"CYCLE800 in the mode {mode}", "use 57: axis by axis about X, Y, Z")
             turns = [("XYZ"[axis - 1], float(angle)) for axis, angle in zip(axes, angles, strict=True)]
             frame = rotated_frame(turns)
             before, behind = (list(map(float, match[name].split(","))) for name in ("before", "behind"))
             x, y, z = (np.array(before) + frame @ behind).tolist()
-            state.tilt(line, TiltedPlane(frame, room_of(angles), origin=(x, y, z)))
+            yield Tilt(TiltedPlane(frame, room_of(angles), origin=(x, y, z)))
 
-    def _to_machine(self, line: Line, state: Reader) -> None:
+    def _to_machine(self, line: Line, state: ModalState) -> Acts:
         """SUPA: a rapid in machine coordinates, without frames."""
-        axes = self.machine_axes(line, state, {("SUPA", 0.0), ("G", 0.0), ("D", 0.0)})
+        axes = self.machine_axes(line, {("SUPA", 0.0), ("G", 0.0), ("D", 0.0)})
         if not any(word[:2] == ("G", 0.0) for word in line.words):
-            state.refuse(line, "SUPA without G0", "positions of the machine are read in rapids only")
-        state.move(line, {"G": 0.0})
-        state.leave(axes)
+            raise refused(line, "SUPA without G0", "positions of the machine are read in rapids only")
+        yield Move({"G": 0.0})
+        yield ToMachine(axes)
 
-    def _transform(self, name: str, state: Reader) -> None:
+    def _transform(self, name: str, state: ModalState) -> None:
         on = state.tip_control.startswith("TRAORI")
         if name in _ORIENTATIONS:
-            state.memory.orientation = name
+            state.orientation = name
         elif name in _AXIS_FRAMES:
-            state.memory.axis_frame = name
+            state.axis_frame = name
         else:
             on = name == "TRAORI"
-        words = ("TRAORI", state.memory.axis_frame, state.memory.orientation) if on else ()
+        words = ("TRAORI", state.axis_frame, state.orientation) if on else ()
         state.tip_control = " ".join(filter(None, words))
 
-    def mode(self, code: float, line: Line, state: Reader) -> None:
+    def mode(self, code: float, line: Line, state: ModalState) -> Acts:
         """Take a G word outside group 01 that changes what holds from block to block."""
         if code in _LENGTHS_ALONE:
             what = f"feeds under G{code:g}, whose units the machine's basic system says: G{code:g}0 says them"
-            state.unlooked.append((line.number, what))
-        super().mode(code, line, state)
+            yield Unknown(what)
+        yield from super().mode(code, line, state)
 
 
 class _SiemensLexer(Lexer):
