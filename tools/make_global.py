@@ -9,7 +9,6 @@ from __future__ import annotations
 import io
 import sys
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -32,7 +31,6 @@ PATHS = {
     "shenmuxin (A to ±180°)": "shenmuxin_5x_path.csv",
     "NX contour (A to ±180°)": "nx_clsf_varcontour5x_ust_a.cls",
 }
-TULSYAN = "cnclite_tulsyan_altintas.apt"
 TEXTS = {
     "proportional, fanuc g6.2": ("proportional", "fanuc", "g6.2"),
     "global, fanuc g6.2": ("global", "fanuc", "g6.2"),
@@ -104,50 +102,6 @@ def written(program: Program, settings: Settings, control: str, form: str, machi
     return plan_text(nc, Limits(feed=FEED), settings=settings, machine=machine), target.getvalue().count(b"\n")
 
 
-def published(folder: Path) -> None:
-    """Paths with published times under the limits of their publications, as far as they are known."""
-    machine = load_machine("table-ac")
-    slow = replace(machine, dynamics=tuple(replace(axis, **_rotary(axis.name)) for axis in machine.dynamics))
-    cases = (
-        (
-            "fan, 50 mm/s, 300, 3000, tool axis 17 deg/s, rotary axes 25 deg/s, ε 0.02, H 229 (0.01 deg)",
-            PATHS["fan"],
-            Limits(feed=3000.0, accel=300.0, jerk=3000.0, turn_speed=17.0),
-            Settings(tolerance=0.02, axis_length=229.0),
-            slow,
-        ),
-        (
-            "Tulsyan, 20 mm/s, 150, 3000, tool axis 0.5, 2.5, 50 rad, ε 0.05, H 10",
-            TULSYAN,
-            Limits(
-                feed=1200.0,
-                accel=150.0,
-                jerk=3000.0,
-                turn_speed=float(np.degrees(0.5)),
-                turn_accel=float(np.degrees(2.5)),
-                turn_jerk=float(np.degrees(50.0)),
-            ),
-            Settings(tolerance=0.05),
-            None,
-        ),
-    )
-    say("\n| path and limits | proportional | global |\n|---|---|---|")
-    for name, file, limits, settings, axes in cases:
-        if (folder / file).exists():
-            program = cornersmooth.read(folder / file)
-            seconds = [
-                plan(cornersmooth.smooth(program, settings.but(method=method)), limits, machine=axes).total
-                for method in COLOURS
-            ]
-            say(f"| {name} | {seconds[0]:.3f} | {seconds[1]:.3f} |")
-
-
-def _rotary(name: str) -> dict[str, float]:
-    """Limits of the fan path's machine: only its rotary axes have one."""
-    free = float("inf")
-    return {"velocity": free if name in "XYZ" else 25.0 * 60.0, "acceleration": free, "jerk": free}
-
-
 def picture(file: Path) -> str:
     """Curvature of the tip and jerk of the rotary axes over the way, both methods, as SVG text."""
     program, machine = cornersmooth.read(file), load_machine("table-ac")
@@ -199,7 +153,6 @@ def main() -> None:
         for tolerance in (0.01, 0.04):
             curves(folder, tolerance)
             texts(folder, tolerance)
-        published(folder)
     else:
         sys.exit(__doc__)
 

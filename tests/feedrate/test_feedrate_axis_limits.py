@@ -107,31 +107,12 @@ def test_derivatives_on_an_arc() -> None:
         assert norm(order[0]) == pytest.approx(expected)
 
 
-@pytest.mark.parametrize("seed", range(1, 7))
-def test_vector_jerk_of_the_tip(chain: Callable[[int], Program], seed: int) -> None:
-    limits = Limits(vector_jerk=8000.0)
-    law = plan(smooth(chain(seed), Settings(tolerance=0.05)), limits)
-    tip, _ = sampled(law)
-    assert largest(tip, 3, outliers=10) <= 8000.0 * 1.005
-    assert law.total > plan(smooth(chain(seed), Settings(tolerance=0.05))).total
-
-
-@pytest.mark.parametrize("seed", [1, 3, 4])
-def test_turning_of_the_tool_axis(chain: Callable[[int], Program], seed: int) -> None:
-    limits = Limits(turn_speed=20.0, turn_accel=200.0, turn_jerk=5000.0)
-    law = plan(smooth(chain(seed), Settings(tolerance=0.05)), limits)
-    _, axis = sampled(law)
-    assert np.degrees(largest(axis, 1)) <= 20.0 * 1.001
-    assert np.degrees(largest(axis, 2)) <= 200.0 * 1.005
-    assert np.degrees(largest(axis, 3, outliers=10)) <= 5000.0 * 1.01
-
-
 def test_turn_on_the_spot_beside_lines() -> None:
     """The tip stops on the transitions to the turn; the limits of the axis are kept in the turn itself."""
     tip = [[0, 0, 0], [5, 0, 0], [5, 0, 0], [10, 0, 0]]
     axis = [[0, 0, 1], [0, 0, 1], [0, 1, 1], [0, 1, 1]]
     program = Program.from_poses(tip, axis, feed=3000.0)
-    for limits in (Limits(), Limits(turn_speed=10.0, turn_accel=100.0, turn_jerk=1000.0, vector_jerk=4000.0)):
+    for limits in (Limits(), Limits(angular_feed=10.0, angular_accel=100.0, angular_jerk=1000.0)):
         law = plan(smooth(program, Settings(tolerance=0.2)), limits)
         assert law.path.turning.sum() == 1
         states = law.at(np.arange(0.0, law.total, 1e-3))

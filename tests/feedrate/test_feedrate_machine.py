@@ -101,7 +101,6 @@ def test_derivatives_are_those_of_the_kinematics(chain: Callable[[int], Program]
 def test_limits_hold_on_random_chains(chain: Callable[[int], Program], name: str, seed: int) -> None:
     law = plan(
         smooth(tilted(chain(seed)), Settings(tolerance=0.05)),
-        Limits(vector_jerk=2e5),
         machine=offset(load_machine(name)),
     )
     peaks = used(law)

@@ -58,10 +58,7 @@ _everyday, _output, _control, _program, _curves, _lines, _holes, _limits, _readi
 
 
 #: of plans, in the order of the helps, and of a plan whose feeds are written
-LIMITS = (
-    "feed accel jerk centripetal period rapid rapid_accel rapid_jerk angular_feed angular_accel angular_jerk "
-    "vector_jerk turn_speed turn_accel turn_jerk"
-)
+LIMITS = "feed accel jerk centripetal period rapid rapid_accel rapid_jerk angular_feed angular_accel angular_jerk"
 PLANNED = "accel jerk centripetal period"
 
 
@@ -241,10 +238,6 @@ class Options:
     angular_feed: float = _limits("DEG/S", "Speed of moves that only turn the tool axis.", 30.0)
     angular_accel: float = _limits("DEG/S2", "Their acceleration.", 150.0)
     angular_jerk: float = _limits("DEG/S3", "Their jerk.", 3000.0)
-    vector_jerk: float | None = _limits("MM/S3", "Jerk of the tip in any direction. [default: no limit]")
-    turn_speed: float | None = _limits("DEG/S", "Turning of the tool axis in all moves. [default: no limit]")
-    turn_accel: float | None = _limits("DEG/S2", "Its acceleration. [default: no limit]")
-    turn_jerk: float | None = _limits("DEG/S3", "Its jerk. [default: no limit]")
     look_ahead: Count | None = _limits("BLOCKS", "Blocks within which the control must be able to stop. [default: all]")
     tilt: Annotated[float, click.FloatRange(0.0, 90.0)] = _limits(
         "DEG", "Largest tilt about X and about Y, either way; 0 for none.", 45.0

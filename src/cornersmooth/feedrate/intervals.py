@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cornersmooth.arrays.vectors import norm
 from cornersmooth.feedrate import rational_curves, taylor
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.machine_axes import MachineAxes
@@ -33,39 +32,29 @@ _BENT = 0.2
 #: most halvings, and most intervals of one element that are halved: where more are uneven halving does not help, as
 #: where the tip all but stands and its digits are lost (bounds of v² hold over whole intervals, however long they are)
 _DEEPEST, _MOST = 14, 128
-#: the length of a vector as four quantities: derivatives may point anywhere, so their lengths count with any signs
-_SIGNS = np.array(((1.0, -1.0, 1.0, -1.0), (1.0, 1.0, -1.0, -1.0), (1.0, 1.0, 1.0, 1.0)))
 
 
 @dataclass(frozen=True)
 class Quantities:
-    """What has limits besides the way itself: tip and tool axis as vectors, and the axes of a machine."""
+    """What has limits besides the way itself: the axes of a machine."""
 
     path: Path
     machine_axes: MachineAxes | None
-    vectors: tuple[bool, bool]  #: whether tip and tool axis are limited
     bounds: Floats  #: (3, d): limits of speed, acceleration and jerk; inf for none
     counts: Bools  #: (d, m): whether each is limited on each element
 
     @classmethod
-    def of(cls, path: Path, limits: Limits, machine_axes: MachineAxes | None) -> Quantities:
+    def of(cls, path: Path, machine_axes: MachineAxes | None) -> Quantities:
         """All that is limited.
 
         Nothing is on halves of transitions between a motion of the tip and a turn on the spot: by the way of the tip
         derivatives have no bound there.
         """
+        if machine_axes is None:
+            return cls(path, None, np.zeros((3, 0)), np.zeros((0, len(path)), np.bool_))
+        machine_axes = replace(machine_axes, cone=WITHIN * machine_axes.cone)
         steady = ~path.of_curves(path.curves.resting)
-        bounds, counts, vectors = [np.zeros((3, 0))], [np.zeros((0, len(path)), np.bool_)], []
-        for bound, on in zip(limits.vector_limits, (steady & ~path.turning, steady), strict=True):
-            vectors.append(bool(np.isfinite(bound).any()))
-            copies = _SIGNS.shape[1] if vectors[-1] else 0
-            bounds.append(np.tile(bound[:, None], copies))
-            counts.append(np.tile(on, (copies, 1)))
-        if machine_axes is not None:
-            machine_axes = replace(machine_axes, cone=WITHIN * machine_axes.cone)
-            bounds.append(machine_axes.limits)
-            counts.append(np.tile(steady, (machine_axes.limits.shape[1], 1)))
-        return cls(path, machine_axes, (vectors[0], vectors[1]), np.concatenate(bounds, 1), np.concatenate(counts))
+        return cls(path, machine_axes, machine_axes.limits, np.tile(steady, (machine_axes.limits.shape[1], 1)))
 
     def __len__(self) -> int:
         return len(self.counts)
@@ -80,14 +69,10 @@ class Quantities:
         """
         which, where = element.ravel(), share.ravel()
         tip, axis, speed = taylor_along(self.path, which, where)
-        parts = [np.zeros((3, 0, len(which)))]
-        for series, limited in zip((tip, axis), self.vectors, strict=True):
-            if limited:
-                parts.append(norm(np.stack(taylor.by_way(series, speed)))[:, None] * _SIGNS[..., None])
+        found = np.zeros((3, 0, len(which)))
         if self.machine_axes is not None:
             positions = self.machine_axes.positions(which, where, tip, axis)
-            parts.append(np.stack(taylor.by_way(positions, speed)).transpose(0, 2, 1))
-        found = np.concatenate(parts, axis=1)
+            found = np.stack(taylor.by_way(positions, speed)).transpose(0, 2, 1)
         found = np.where(self.counts[:, which] & np.isfinite(found), found, 0.0)
         return found.reshape(3, len(self), *element.shape), tip.reshape(4, *element.shape, 3)
 
@@ -143,7 +128,7 @@ def path_limits(
     path: Path, limits: Limits, machine_axes: MachineAxes | None = None, resolution: Resolution = FINER
 ) -> Intervals:
     """Limits of speed, and what else is limited."""
-    quantities = Quantities.of(path, limits, machine_axes)
+    quantities = Quantities.of(path, machine_axes)
     asked = _curved(path, limits.centripetal_accel) | quantities.counts.any(axis=0)
     joined = np.flatnonzero(np.isfinite(path.junction_speed[:-1]) & (path.junction_speed[:-1] > 0.0))
     whole = np.flatnonzero(~asked)

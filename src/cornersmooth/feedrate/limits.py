@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from cornersmooth.errors import SettingsError
-from cornersmooth.model import Floats
 
 
 @dataclass(frozen=True)
@@ -32,11 +31,6 @@ class Limits:
         Their acceleration and jerk; None for those of feed moves.
     angular_feed, angular_accel, angular_jerk : float, deg/s, deg/s², deg/s³
         Limits of moves that only turn the axis.
-    vector_jerk : float or None, mm/s³
-        Jerk of the tip as a vector, across the path too; None for no limit. Transitions have curvature without jumps
-        but their curvature changes quickly, so this costs time at corners.
-    turn_speed, turn_accel, turn_jerk : float or None, deg/s, deg/s², deg/s³
-        Limits of the turning of the tool axis in all moves; None for no limit.
     period : float, s
         Interpolation period: a corner passed without a stop changes the velocity by at most ``accel · period``.
     """
@@ -51,10 +45,6 @@ class Limits:
     angular_feed: float = 30.0
     angular_accel: float = 150.0
     angular_jerk: float = 3000.0
-    vector_jerk: float | None = None
-    turn_speed: float | None = None
-    turn_accel: float | None = None
-    turn_jerk: float | None = None
     period: float = 0.002
 
     def __post_init__(self) -> None:
@@ -80,17 +70,8 @@ class Limits:
     @property
     def angular_limits(self) -> tuple[float, float, float]:
         """Speed, acceleration and jerk of pure rotations in rad/s, rad/s², rad/s³."""
-        _, turn = self.vector_limits
-        own = np.radians((self.angular_feed, self.angular_accel, self.angular_jerk))
-        speed, accel, jerk = np.minimum(own, turn).tolist()
+        speed, accel, jerk = np.radians((self.angular_feed, self.angular_accel, self.angular_jerk)).tolist()
         return speed, accel, jerk
-
-    @property
-    def vector_limits(self) -> tuple[Floats, Floats]:
-        """Speed, acceleration and jerk of tip (mm) and tool axis (rad) as vectors; inf for none."""
-        tip = [math.inf, math.inf, math.inf if self.vector_jerk is None else self.vector_jerk]
-        turn = [math.inf if x is None else math.radians(x) for x in (self.turn_speed, self.turn_accel, self.turn_jerk)]
-        return np.array(tip), np.array(turn)
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values with their units in the keys, for reports."""
@@ -105,9 +86,5 @@ class Limits:
             "angular_feed_deg_per_s": self.angular_feed,
             "angular_accel_deg_per_s2": self.angular_accel,
             "angular_jerk_deg_per_s3": self.angular_jerk,
-            "vector_jerk_mm_per_s3": self.vector_jerk,
-            "turn_speed_deg_per_s": self.turn_speed,
-            "turn_accel_deg_per_s2": self.turn_accel,
-            "turn_jerk_deg_per_s3": self.turn_jerk,
             "period_s": self.period,
         }
