@@ -90,7 +90,15 @@ def test_an_error_is_an_object_too(part: Path, words: tuple[str, ...], code: str
 
 
 @pytest.mark.parametrize(
-    "words", [("--axis-tolerance", "0"), ("--weights", "0,1"), ("--chord", "9"), ("--reversal-angle", "999")]
+    "words",
+    [
+        ("--axis-tolerance", "0"),
+        ("--weights", "0,1"),
+        ("--chord", "9"),
+        ("--reversal-angle", "999"),
+        ("--rewind", "1e-9", "--machine", "table-ac"),
+        ("--accel", "0", "--feed-from-plan"),
+    ],
 )
 def test_what_is_out_of_bounds_is_named_as_it_is_typed(part: Path, words: tuple[str, ...]) -> None:
     result = run("smooth", part, *words)

@@ -121,7 +121,7 @@ class Settings:
             bound, word = (longest / low, "at most") if length < low else (longest / high, "at least")
             raise SettingsError(
                 "CS208",
-                f"axis_tolerance {degrees:g} deg does not go with a tolerance of {self.tolerance:g} mm",
+                f"an axis tolerance of {degrees:g} deg does not go with a tolerance of {self.tolerance:g} mm",
                 f"use {word} {math.degrees(bound):.2g} deg",
             )
         return length

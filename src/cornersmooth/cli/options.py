@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -343,16 +345,17 @@ class Options:
         """Form of the control that the options ask for."""
         from cornersmooth.nc import choose_form
 
-        return choose_form(
-            self.load_control(),
-            self.form,
-            machine=self.load_machine(),
-            tcp=not self.no_tcp,
-            extras=self.extras,
-            digits=self.digits,
-            rewind=self.rewind or 0.0,
-            planes=self.planes == "tilted",
-        )
+        with _named_as_typed():
+            return choose_form(
+                self.load_control(),
+                self.form,
+                machine=self.load_machine(),
+                tcp=not self.no_tcp,
+                extras=self.extras,
+                digits=self.digits,
+                rewind=self.rewind or 0.0,
+                planes=self.planes == "tilted",
+            )
 
     def settings(self) -> Settings:
         """How to smooth; options that a command does not have keep their defaults."""
@@ -360,14 +363,8 @@ class Options:
 
         self.check_axis()
         names = (item.name for item in fields(Settings) if hasattr(self, item.name))
-        try:
+        with _named_as_typed():
             return Settings(**{name: getattr(self, name) for name in names})
-        except SettingsError as wrong:  # it names fields
-            words = [
-                FLAGS.get(word, [word])[-1] if number == 0 or "_" in word else word
-                for number, word in enumerate(wrong.what.split(" "))
-            ]
-            raise SettingsError(wrong.code, " ".join(words), wrong.hint) from None
 
     def check_axis(self) -> None:
         """Refuse a length and a tolerance of the axis in one command: the one takes the place of the other."""
@@ -378,7 +375,8 @@ class Options:
         """What the machine can do."""
         from cornersmooth.feedrate import Limits
 
-        return Limits(**{name: getattr(self, name) for name in names.split()})
+        with _named_as_typed():
+            return Limits(**{name: getattr(self, name) for name in names.split()})
 
     def planned_limits(self) -> Limits | None:
         """Limits of the plan whose feeds are written; None where they are the programmed ones (and UsageError)."""
@@ -427,6 +425,22 @@ def _machine(machine: Any) -> Machine | None:
     from cornersmooth.kinematics import load_machine
 
     return load_machine(machine) if isinstance(machine, str) and machine else machine or None
+
+
+@contextlib.contextmanager
+def _named_as_typed() -> Iterator[None]:
+    """Errors about a value name its option; those of the library name its field."""
+
+    def spelled(text: str) -> str:
+        return " ".join(FLAGS.get(word, [word])[-1] for word in text.split(" "))
+
+    try:
+        yield
+    except SettingsError as wrong:
+        field_name, verb, rest = wrong.what.partition(" is ")
+        what = spelled(field_name) + verb + rest if wrong.code in ("CS202", "CS260") else wrong.what
+        hint = spelled(wrong.hint) if wrong.code == "CS207" else wrong.hint
+        raise SettingsError(wrong.code, what, hint, file=wrong.file, line=wrong.line) from None
 
 
 def typed(name: str) -> bool:
