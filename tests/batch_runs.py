@@ -40,7 +40,8 @@ class Way:
 
     def words(self, out: Path) -> list[str]:
         """Argument vector."""
-        return [*COMMAND, "-d", str(out), *self.options]
+        around = [word for word in self.options if word.startswith("CORNERSMOOTH_")]
+        return ["env", *around, *COMMAND, "-d", str(out), *(word for word in self.options if word not in around)]
 
     def workers(self, process: subprocess.Popen[bytes]) -> list[int]:
         """Processes that do the files."""
@@ -116,7 +117,7 @@ def main(files: int, kills: int, seed: int) -> int:
         ways = [
             Way("-j 1", ("-j", "1")),
             Way("-j 2", ("-j", "2")),
-            Way("cluster", ("--scheduler", cluster.scheduler_address), cluster),
+            Way("cluster", (f"CORNERSMOOTH_SCHEDULER={cluster.scheduler_address}",), cluster),
         ]
         whole: dict[str, bytes] = {}
         wrong, seconds = [], {}

@@ -97,7 +97,12 @@ def test_what_has_changed_is_not_skipped(tree: Path, tmp_path: Path) -> None:
     ]
     assert said[-1] == "3 files: 1 skipped, 2 errors"
     assert files_in(out) == before | {"a/two.nc": b"edited by hand"}
-    for options in (["-e", "0.02"], ["--no-verify"], ["-f", "g6.2"], ["--block-numbers"], ["--feed", "900"]):
+    for options in (
+        ["-e", "0.02"],
+        ["--no-verify"],
+        ["-f", "g6.2"],
+        ["--feed", "900"],
+    ):
         assert lines(tree, "-d", out, *options, code=BAD_OUTPUT)[-1] == "3 files: 3 errors"
 
 
@@ -126,14 +131,6 @@ def test_without_marks_what_is_made_is_compared(tree: Path, tmp_path: Path, monk
     said = lines(tree, "-d", out, code=BAD_OUTPUT)
     assert said[-1] == "3 files: 2 PASSED (2 to check), 1 error"
     assert {name: text for name, text in files_in(out).items() if ".cornersmooth" not in name} == before
-
-
-def test_existing_outputs_may_be_skipped(tree: Path, tmp_path: Path) -> None:
-    out = tmp_path / "nc"
-    out.mkdir()
-    (out / "one.nc").write_bytes(b"mine")
-    assert lines(tree, "-d", out, "--skip-existing")[-1] == "3 files: 2 PASSED (2 to check), 1 skipped"
-    assert (out / "one.nc").read_bytes() == b"mine"
 
 
 def test_summaries_have_a_row_for_each_file(tree: Path, tmp_path: Path) -> None:

@@ -81,8 +81,8 @@ def test_a_lost_worker_loses_no_file(scheduler: Path, folder: Path, tmp_path: Pa
     (folder / "bad.cls").write_text("GOTO/nan\n")
     here, there = tmp_path / "here", tmp_path / "there"
     plain = run("smooth", "cl", "-d", "here", cwd=tmp_path)
-    words = command("smooth", "cl", "-d", "there", "--scheduler", scheduler)
-    process = subprocess.Popen(words, stderr=subprocess.PIPE, env=environment(), cwd=tmp_path)
+    words, around = command("smooth", "cl", "-d", "there"), environment(CORNERSMOOTH_SCHEDULER=str(scheduler))
+    process = subprocess.Popen(words, stderr=subprocess.PIPE, env=around, cwd=tmp_path)
     while not list(there.rglob(".part*.part")):  # a worker is at one
         assert process.poll() is None
         time.sleep(0.005)
@@ -96,17 +96,17 @@ def test_a_lost_worker_loses_no_file(scheduler: Path, folder: Path, tmp_path: Pa
     assert [line.rpartition(",")[0] for line in lines[:-1]] == [line.rpartition(",")[0] for line in others[:-1]]
     assert lines[-1] == others[-1] == f"{FILES + 1} files: {FILES} PASSED ({FILES} to check), 1 error"
     address = json.loads(scheduler.read_text())["address"]
-    again = run("smooth", "cl", "-d", "there", "--scheduler", address, cwd=tmp_path)
+    again = run("smooth", "cl", "-d", "there", f"CORNERSMOOTH_SCHEDULER={address}", cwd=tmp_path)
     assert again.stderr.decode().splitlines()[-1] == f"{FILES + 1} files: {FILES} skipped, 1 error"
 
 
 def test_the_commands_of_the_page_work(scheduler: Path, folder: Path, tmp_path: Path) -> None:
-    lines = [line for line in PAGE.read_text().splitlines() if "--scheduler " in line and line.startswith("    corner")]
+    lines = [line for line in PAGE.read_text().splitlines() if "CORNERSMOOTH_SCHEDULER=" in line]
     address = json.loads(scheduler.read_text())["address"]
     assert len(lines) == 2
     for line in lines:
         there = line.replace("/shared/scheduler.json", str(scheduler)).replace("tcp://host:8786", address)
-        result = run(*shlex.split(there)[1:], cwd=tmp_path)
+        result = run(*(word for word in shlex.split(there) if word != "cornersmooth"), cwd=tmp_path)
         assert result.returncode == DONE, result.stderr.decode()
     assert result.stderr.decode().splitlines()[-1] == f"{FILES} files: {FILES} skipped"
     assert len(files_in(tmp_path / "nc")) == FILES
@@ -140,7 +140,7 @@ def test_a_scheduler_with_tls_takes_those_with_its_certificate(folder: Path, tmp
         assert address.startswith("tls://")
         for settings, code in ((strange, USAGE), ({}, USAGE), (ours, DONE)):
             with config.set(settings):
-                found = run("smooth", folder, "-d", tmp_path / "nc", "--scheduler", address, cwd=tmp_path)
+                found = run("smooth", folder, "-d", tmp_path / "nc", f"CORNERSMOOTH_SCHEDULER={address}", cwd=tmp_path)
             said = found.stderr.decode().splitlines()
             assert found.returncode == code, said
             if code == USAGE:
@@ -168,8 +168,10 @@ def test_what_a_killed_run_has_left_goes_with_the_next(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("-d", "out", "--scheduler", "nonsense://nowhere"), "no scheduler answers at nonsense://nowhere; give tcp://"),
-        (("--scheduler", "tcp://localhost:1"), "--scheduler is for batches, which need -d FOLDER"),
+        (
+            ("-d", "out", "CORNERSMOOTH_SCHEDULER=nonsense://nowhere"),
+            "no scheduler answers at nonsense://nowhere; give tcp://",
+        ),
     ],
 )
 def test_what_cannot_work_is_refused(folder: Path, tmp_path: Path, words: tuple[str, ...], said: str) -> None:

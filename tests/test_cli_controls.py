@@ -76,7 +76,7 @@ def test_comments_may_be_left_out() -> None:
     data = CL.replace(b"LOADTL/3", b"PPRINT SAID\nLOADTL/3")
     assert "(SAID)" in lines_of(data=data)
     assert [line for line in lines_of(data=data) if line.startswith("(CORNERSMOOTH ")]
-    assert not [line for line in lines_of("--no-comments", data=data) if "(" in line]
+    assert not [line for line in lines_of("CORNERSMOOTH_NO_COMMENTS=1", data=data) if "(" in line]
 
 
 def test_machines_are_listed_and_described() -> None:
@@ -121,11 +121,6 @@ def test_own_tables_are_taken_from_files(tmp_path: Path) -> None:
         (("--machine", "table-xy"), 2, "unknown machine 'table-xy'"),
         (("--control", "siemens", "-f", "g6.2"), 2, "siemens has no form 'g6.2'; choose one of g1, bspline, poly"),
         (("--control", "none.toml"), 2, "none.toml: error: control file cannot be read"),
-        (
-            ("--control", "siemens", "-f", "poly", "--weights", "1,2"),
-            2,
-            "siemens form poly holds curves with weights 1",
-        ),
         (("--control", "mitsubishi", "-f", "g6.2"), 2, "<stdin>:4: error: the tool is not parallel to Z"),
         (
             ("-f", "g6.2", "--machine", "table-ac"),
@@ -160,7 +155,7 @@ def test_frame_of_the_text(tmp_path: Path) -> None:
     header, footer = tmp_path / "head.txt", tmp_path / "foot.txt"
     header.write_text("({program} IN {units})\nG54\n")
     footer.write_text("G91 G28 Z0.\n")
-    options = ("--header", header, "--footer", footer, "--program-name", "O0815", "--block-numbers")
+    options = ("--header", header, "--footer", footer, "--program-name", "O0815", "CORNERSMOOTH_BLOCK_NUMBERS=1")
     lines = lines_of(*options)
     assert lines[1:5] == ["O0815", "N10 G21 G90 G94 G17 G40 G49 G80", "N20 G91 G28 Z0.", "N30 G90"]
     assert lines[5].startswith("N40 (CORNERSMOOTH ")
@@ -179,7 +174,7 @@ def test_frame_of_the_text(tmp_path: Path) -> None:
         ("--control", "linuxcnc", "--machine", "xyzac-trt"),
         ("--control", "haas", "--machine", "table-ac"),
         ("--machine", "head-ac", "--no-tcp"),
-        ("--control", "generic", "-f", "g6.2", "--block-numbers"),
+        ("--control", "generic", "-f", "g6.2", "CORNERSMOOTH_BLOCK_NUMBERS=1"),
     ],
     ids=" ".join,
 )

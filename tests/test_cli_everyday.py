@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 from importlib.resources import files
 from pathlib import Path
@@ -93,11 +94,9 @@ def test_an_error_is_an_object_too(part: Path, words: tuple[str, ...], code: str
     "words",
     [
         ("--axis-tolerance", "0"),
-        ("--weights", "0,1"),
         ("--chord", "9"),
-        ("--reversal-angle", "999"),
+        ("--axis-length", "1e5"),
         ("--rewind", "1e-9", "--machine", "table-ac"),
-        ("--accel", "0", "--feed-from-plan"),
     ],
 )
 def test_what_is_out_of_bounds_is_named_as_it_is_typed(part: Path, words: tuple[str, ...]) -> None:
@@ -106,7 +105,21 @@ def test_what_is_out_of_bounds_is_named_as_it_is_typed(part: Path, words: tuple[
     assert f"{words[0]} is " in one_line(result.stderr) or f"'{words[0]}'" in one_line(result.stderr)
 
 
-def test_limits_of_a_plan_say_what_they_are_for() -> None:
-    said = " ".join(run("smooth", "--help").stdout.decode().split())
-    for name in ("accel MM/S2", "jerk MM/S3", "centripetal MM/S2", "period TIME"):
-        assert f"--{name} With --feed-from-plan: " in said
+def test_settings_of_a_shop_are_no_options(part: Path) -> None:
+    """They are given by cornersmooth.toml and the environment alone."""
+    refused = run("smooth", part, "--block-numbers", "-o", "-")
+    assert refused.returncode == USAGE
+    assert "--block-numbers is no option; write block-numbers into cornersmooth.toml" in one_line(refused.stderr)
+    assert b"block-numbers" not in run("smooth", "--help-all").stdout
+    (part.parent / "cornersmooth.toml").write_text("[smooth]\nblock-numbers = true\n")
+    assert b"\nN" in run("smooth", part, "-o", "-", "-q").stdout
+    assert "block-numbers" in run("config", part).stdout.decode()
+
+
+def test_the_short_help_has_the_options_of_every_day() -> None:
+    short, whole = (run("smooth", word).stdout.decode() for word in ("--help", "--help-all"))
+    assert "--limits" in short
+    assert "--method [" not in short
+    assert "--help-all" in short
+    assert "--method [" in whole
+    assert len(re.findall(r"^  (?:-\w, )?--", whole, re.MULTILINE)) <= 52

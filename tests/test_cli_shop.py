@@ -89,7 +89,7 @@ def test_config_says_where_every_value_is_from(part: Path, monkeypatch: pytest.M
     assert found["with"] == ("cycle832", f"{shop} [smooth]")
     assert found["form"] == ("bspline", f"{shop} [smooth.siemens]")
     assert found["method"] == ("zhang2016", "CORNERSMOOTH_METHOD")
-    assert found["reversal-angle"] == ("170.0", "default")
+    assert found["cycles"] == ("moves", "default")
     assert "output" not in found
 
 

@@ -85,7 +85,7 @@ def help_text(name: str) -> str:
 
 
 #: what test_docs_tools.py and test_cli_cluster.py run: lines of a script, batches on other machines
-ELSEWHERE = ("$file", "{}", "--scheduler")
+ELSEWHERE = ("$file", "{}", "SCHEDULER")
 SHOWN = {page.name: list(commands(page.read_text())) for page in PAGES if page.name not in STORIES}
 HELPS = {name: list(commands(help_text(name))) for name in COMMANDS}
 
@@ -290,6 +290,27 @@ def imported(path: Path) -> Iterator[str]:
             first, *below = node.module.split(".")
             names = below[:1] or [alias.name for alias in node.names]
             yield from (name for name in names if first == "cornersmooth" and not name.startswith("_"))
+
+
+def test_what_the_declarations_of_options_make_is_here() -> None:
+    maker = load("make_options")
+    assert maker.PAGE.read_text(encoding="utf-8") == maker.page(), "run: python tools/make_options.py"
+    assert maker.SCHEMA.read_text(encoding="utf-8") == maker.schema(), "run: python tools/make_options.py"
+
+
+def test_every_flag_that_a_help_or_a_page_names_exists() -> None:
+    known = {flag for command in COMMANDS.values() for param in command.params for flag in param.opts}
+    known |= {"--help", "--help-all", "--version"}
+    texts = {name: run(name, "--help-all").stdout.decode() for name in COMMANDS}
+    texts |= {page.name: page.read_text() for page in (ROOT / "docs").glob("*.md")}
+    #: of other programs
+    others = {"--cpus-per-task", "--array", "--time", "--joblog", "--resume-failed", "--sshlogin", "--workdir"}
+    others |= {"--scheduler-file", "--nthreads", "--nworkers", "--cuts"}
+    named = {(name, flag) for name, text in texts.items() for flag in re.findall(r"(?<![\w-])--[a-z][a-z-]+\b", text)}
+    settings = {param.opts[-1] for param in COMMANDS["smooth"].params if type(param).__name__ == "_Setting"}
+    smooth_alone = settings - {"--accel", "--jerk", "--centripetal", "--period"}
+    assert len(named) > 300
+    assert {one for one in named if one[1] not in known | others or one[1] in smooth_alone - others} == set()
 
 
 def test_links_lead_somewhere() -> None:

@@ -72,13 +72,6 @@ def test_first_three_points_lie_on_the_way_in_and_the_last_three_on_the_way_out(
             np.testing.assert_allclose(points[inner] - points[start], share * way, atol=2 * STEP)
 
 
-@pytest.mark.parametrize("weights", ["1,1", "0.5,2", "1.234,0.777", "3,0.001"])
-def test_weights_keep_three_decimals(weights: str) -> None:
-    _, written = smooth(corner_file(), "-e", "0.05", "--weights", weights)
-    w1, w2 = map(float, weights.split(","))
-    assert {curve.weights for curve in curves(written)} == {(1.0, w1, w2, w1, 1.0)}
-
-
 @pytest.mark.parametrize(
     "statement",
     ["COOLNT/ON", "SPINDL/5000,RPM,CLW", "STOP", "OPSTOP", "DELAY/1", "COOLNT/ON\nPPRINT TEXT\nSPINDL/OFF"],

@@ -87,7 +87,7 @@ def test_what_is_not_understood_is_refused_with_its_line(tmp_path: Path) -> None
 
 def test_what_is_left_out_is_counted(tmp_path: Path) -> None:
     out, report = tmp_path / "o.nc", tmp_path / "r.json"
-    done = run("smooth", "-", "-o", out, "--report", report, "--skip-cycles", "--no-comments", data=OPEN)
+    done = run("smooth", "-", "-o", out, "--report", report, "--skip-cycles", "CORNERSMOOTH_NO_COMMENTS=1", data=OPEN)
     assert done.returncode == DONE, done.stderr
     assert out.read_text().count("(NOT DRILLED: HOLE AT X") == 3
     left_out = [one for one in json.loads(report.read_text())["findings"] if one["code"] == "CS315"]

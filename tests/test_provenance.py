@@ -46,7 +46,7 @@ def test_the_head_of_a_text(part: Path) -> None:
     first = f"(CORNERSMOOTH {__version__}: E=0.0127 H=25 METHOD=global CONTROL=fanuc FORM=g6.2)"
     second = f"(SHA256={hashlib.sha256(SMALL).hexdigest()} CL=part one [A].cls)"
     assert f"\n{first}\n{second}\n" in text
-    assert "CORNERSMOOTH " not in run("smooth", part, "--no-comments").stdout.decode("ascii")
+    assert "CORNERSMOOTH " not in run("smooth", part, "CORNERSMOOTH_NO_COMMENTS=1").stdout.decode("ascii")
 
 
 @pytest.mark.parametrize(

@@ -20,10 +20,10 @@ from scipy.sparse import csr_array, diags_array, vstack
 from cornersmooth.feedrate import scurve
 from cornersmooth.feedrate.grid import make_grid
 from cornersmooth.feedrate.intervals import Intervals, path_limits
-from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.path import Path
 from cornersmooth.feedrate.resolution import Resolution
 from cornersmooth.model import Floats
+from cornersmooth.settings.limits import Limits
 
 #: change of the time, relative, below which a round brought nothing
 SETTLED = 2e-4

@@ -77,15 +77,6 @@ def test_refusals(arguments: list[str], code: int, words: str, capsys: pytest.Ca
     assert words in capsys.readouterr().err
 
 
-def test_weights_are_for_both_methods(capsys: pytest.CaptureFixture[str]) -> None:
-    seconds = []
-    for more in ([], ["--weights", "1,0.65"]):
-        assert run(["time", TABLE_1, *PAPER, "--json", "-v", *more]) == 0
-        seconds.append(json.loads(capsys.readouterr().out)["seconds"])
-    assert seconds[0]["zhang2016"] != seconds[1]["zhang2016"]
-    assert seconds[0]["proportional"] != seconds[1]["proportional"]
-
-
 def test_machine(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Times grow, peaks keep the limits, and the axis columns of the CSV are those of the kinematics."""
     from cornersmooth.kinematics import load_machine, machine_position, tool_axis

@@ -153,18 +153,18 @@ def test_a_feed_beyond_what_the_control_takes_is_a_warning(
 
 @pytest.mark.parametrize("control", CONTROLS)
 def test_lines_end_as_asked_for(control: str, cl: Path) -> None:
-    options = ("smooth", cl, "-o", "-", "--control", control, *CONTROLS[control], "-q", "--block-numbers")
-    plain, windows = run(*options).stdout, run(*options, "--line-ends", "crlf").stdout
+    options = ("smooth", cl, "-o", "-", "--control", control, *CONTROLS[control], "-q", "CORNERSMOOTH_BLOCK_NUMBERS=1")
+    plain, windows = run(*options).stdout, run(*options, "CORNERSMOOTH_LINE_ENDS=crlf").stdout
     assert b"\r" not in plain
     assert windows == plain.replace(b"\n", b"\r\n")
-    assert run(*options, "--line-ends", "lf").stdout == plain
+    assert run(*options, "CORNERSMOOTH_LINE_ENDS=lf").stdout == plain
 
 
 def test_planned_feeds_are_put_into_lines_of_any_end(cl: Path) -> None:
-    options = ("smooth", cl, "-o", "-", "-q", "--feed-from-plan", "--accel", "500", "--jerk", "5000")
+    options = ("smooth", cl, "-o", "-", "-q", "--feed-from-plan", "CORNERSMOOTH_ACCEL=500")
     plain = run(*options).stdout
     assert len(re.findall(rb" F\d", plain)) > 10
-    assert run(*options, "--line-ends", "crlf").stdout == plain.replace(b"\n", b"\r\n")
+    assert run(*options, "CORNERSMOOTH_LINE_ENDS=crlf").stdout == plain.replace(b"\n", b"\r\n")
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Words that repeat, left out with ``--modal``: the same motion in less text, and never a word that has changed."""
+"""Words that repeat, left out with ``modal``: the same motion in less text, and never a word that has changed."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ def test_nothing_is_guessed_without_a_sign(text: bytes) -> None:
 def files(tmp_path: Path) -> tuple[Path, Path]:
     part, text = tmp_path / "part.cls", tmp_path / "part.mpf"
     part.write_bytes(SMALL)
-    assert run("smooth", part, "--control", "siemens", "--no-comments", "-o", text).returncode == DONE
+    assert run("smooth", part, "--control", "siemens", "CORNERSMOOTH_NO_COMMENTS=1", "-o", text).returncode == DONE
     return part, text
 
 
@@ -51,5 +51,5 @@ def test_what_is_said_counts_more(files: tuple[Path, Path]) -> None:
 def test_another_control_of_the_same_words_is_no_surprise(files: tuple[Path, Path], tmp_path: Path) -> None:
     text = tmp_path / "part.nc"
     given = ("--control", "mitsubishi")
-    assert run("smooth", files[0], *given, "--no-comments", "-o", text).returncode == DONE
+    assert run("smooth", files[0], *given, "CORNERSMOOTH_NO_COMMENTS=1", "-o", text).returncode == DONE
     assert run("verify", files[0], text, *given).stderr == b""

@@ -61,17 +61,19 @@ def environment(**changes: str) -> dict[str, str]:
 def run(*args: str | Path, data: bytes = b"", cwd: Path | None = None) -> subprocess.CompletedProcess[bytes]:
     """Run the command line to its end in this process, with streams of its own.
 
-    Warnings are errors here, as everywhere in the tests.
+    Warnings are errors here, as everywhere in the tests. Words such as CORNERSMOOTH_MODAL=1 are for the environment.
     """
     from cornersmooth import cli
 
-    words = [str(word) for word in args]
+    given = [str(word) for word in args]
+    changes = dict(word.split("=", 1) for word in given if word.startswith("CORNERSMOOTH_"))
+    words = [word for word in given if not word.startswith("CORNERSMOOTH_")]
     streams = [
         io.TextIOWrapper(io.BytesIO(given), encoding="utf-8", errors="backslashreplace") for given in (data, b"", b"")
     ]
     with contextlib.ExitStack() as stack:
         stack.enter_context(contextlib.chdir(cwd or os.getcwd()))
-        stack.enter_context(patch.dict(os.environ, environment(), clear=True))
+        stack.enter_context(patch.dict(os.environ, environment(**changes), clear=True))
         stack.enter_context(patch.object(sys, "argv", ["cornersmooth", *words]))
         for name, stream in zip(("stdin", "stdout", "stderr"), streams, strict=True):
             stack.enter_context(patch.object(sys, name, stream))

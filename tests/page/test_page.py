@@ -296,7 +296,7 @@ def test_the_time_is_that_of_the_whole_program_or_none(tmp_path, monkeypatch):
     source.write_text(f"TOOL PATH/LONG,TOOL,T\nFEDRAT/MMPM,1500.0\n{rows}END-OF-PATH\n")
     verdicts = []
     monkeypatch.setattr("cornersmooth.cli.job.TIMED_POSES", 30)
-    for more in ((), ("--time",), ("-q",), ("--time", "--report", tmp_path / "long.html")):
+    for more in ((), ("CORNERSMOOTH_TIME=1",), ("-q",), ("CORNERSMOOTH_TIME=1", "--report", tmp_path / "long.html")):
         done = run("smooth", source, "-e", "0.02", "-o", nc, "--force", "--machine", "table-ac", *more)
         assert done.returncode == 0, done.stderr
         verdicts.append(done.stderr.decode())

@@ -7,7 +7,8 @@ import pytest
 
 import cornersmooth
 from cornersmooth.model import Program
-from cornersmooth.settings import FINEST_CHORD, Settings
+from cornersmooth.settings import Settings
+from cornersmooth.smoothing.line_density import FINEST_CHORD
 from cornersmooth.smoothing.segments import lines_per_half
 
 

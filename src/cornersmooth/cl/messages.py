@@ -17,7 +17,7 @@ ERRORS: Final[dict[str, tuple[str, str]]] = {
     "CS102": ("is a binary file", "write the CL data in readable form: NX .cls, CATIA .aptsource, Creo .ncl, ..."),
     "CS103": ("is not a complete gzip file: {why}", "compress it again"),
     "CS206": ("not read: {what}", "{hint}"),
-    "CS199": ("holds more than {limit}", "divide it; --no-size-limit reads it all the same"),
+    "CS199": ("holds more than {limit}", "divide it; CORNERSMOOTH_NO_SIZE_LIMIT=1 reads it all the same"),
     # statements
     "CS104": ("{word} ends in a continuation sign but {next} follows", "complete the statement or remove the $"),
     "CS105": ("a line of numbers that continues no GOTO: {text!r}", "write the statement in front of its numbers"),

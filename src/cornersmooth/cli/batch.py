@@ -46,7 +46,7 @@ class Batch:
         processes: int,
         progress: Callable[[str, int, int], None] | None = None,
         *,
-        scheduler: str = "",
+        scheduler: str | None = None,
     ) -> None:
         self.jobs, self._progress, self._scheduler = jobs, progress, scheduler
         self._rows: list[dict[str, Any] | None] = [None] * len(jobs)

@@ -16,7 +16,8 @@ from typing import Any, Final, Literal, get_args, get_origin, get_type_hints
 import click
 
 from cornersmooth.cli import shop
-from cornersmooth.cli.options import FLAGS, HEADINGS, Options
+from cornersmooth.cli.declared import FLAGS, HEADINGS, Declared
+from cornersmooth.cli.options import Options
 from cornersmooth.cli.parameters import ControlName, MachineName, Path
 
 #: epilogs of commands that read no input, of those that do, and of those that write programs, too
@@ -26,7 +27,12 @@ EXIT_CODES_OF_WRITERS: Final = EXIT_CODES_OF_READERS.replace(
     "0 done;", "0 done; 1 the program FAILED, or is not PASSED under --strict;"
 )
 #: what options may be
-_TYPES: Final = get_type_hints(Options, include_extras=True)
+_TYPES: Final = get_type_hints(Declared, include_extras=True)
+
+#: options of a command whose short help has all of them
+_SHORT: Final = 16
+#: key of a context whose help has all of them
+_ALL: Final = f"{__name__}.all"
 
 #: room for the names of options
 _NAMES: Final = 26
@@ -45,21 +51,49 @@ _ARGUMENTS: Final[dict[str, tuple[str, dict[str, Any]]]] = {
 
 
 class Command(click.Command):
-    """A command whose help has its options under headings."""
+    """A command whose help has its options under headings: those of every day, or all of them."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Read the shop settings that go with the input, then the options."""
-        return shop.parse_args(self, ctx, args, super().parse_args)
+        try:
+            return shop.parse_args(self, ctx, args, super().parse_args)
+        except click.NoSuchOption as wrong:
+            for param in self.params:
+                if isinstance(param, _Setting) and wrong.option_name in param.opts:
+                    key = shop.key(str(param.name))
+                    ctx.fail(f"{wrong.option_name} is no option; write {key} into cornersmooth.toml (docs/settings.md)")
+            raise
+
+    def get_params(self, ctx: click.Context) -> list[click.Parameter]:
+        """Arguments and options, and what shows the help."""
+        every = click.Option(["--help-all"], is_flag=True, is_eager=True, expose_value=False, help="Show all options.")
+        every.callback = _show_all
+        return [*self.params, *([every] if self._many else []), *super().get_params(ctx)[len(self.params) :]]
+
+    @property
+    def _many(self) -> bool:
+        """Whether there are options that the short help leaves out."""
+        return sum(isinstance(param, _Option) for param in self.params) > _SHORT
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the options of each heading."""
         parts: dict[str, list[tuple[str, str]]] = {heading: [] for heading in HEADINGS}
+        few = self._many and not ctx.meta.get(_ALL)
         for param in self.get_params(ctx):
             if isinstance(param, click.Option) and (record := param.get_help_record(ctx)) is not None:
-                parts[getattr(param, "heading", "Output")].append((record[0].ljust(_NAMES), record[1]))
+                heading = getattr(param, "heading", "Everyday" if few else "Output")
+                parts[heading].append((record[0].ljust(_NAMES), record[1]))
         for heading, rows in parts.items():
-            if rows:
+            if rows and not (few and heading != "Everyday"):
                 write_part(formatter, heading, rows)
+
+
+def _show_all(ctx: click.Context, param: click.Parameter, value: bool) -> None:
+    """Print the help with all options, and leave."""
+    if value and not ctx.resilient_parsing:
+        ctx.meta[_ALL] = True
+        click.echo(ctx.get_help())
+        ctx.exit()
 
 
 class _Option(click.Option):
@@ -68,6 +102,16 @@ class _Option(click.Option):
     def __init__(self, *args: Any, heading: str, **given: Any) -> None:
         super().__init__(*args, **given)
         self.heading = heading
+
+
+class _Setting(_Option):
+    """What no command line has: only ``cornersmooth.toml`` and the environment give it."""
+
+    def get_help_record(self, ctx: click.Context) -> None:
+        """Nothing: docs/settings.md has it."""
+
+    def add_to_parser(self, parser: Any, ctx: click.Context) -> None:
+        """Nothing: it is not spelled."""
 
 
 def write_part(formatter: click.HelpFormatter, heading: str, rows: list[tuple[str, str]]) -> None:
@@ -87,22 +131,25 @@ def new_command(
     options: str,
     help: str,
     *,
+    settings: str = "",
     epilog: str = EXIT_CODES,
     module: str = "",
     **changes: str | Mapping[str, Any],
 ) -> click.Command:
     """Make a command, whose work is `run_NAME` in the module of its name, or in another.
 
-    Arguments are as the usage line has them, and options fields of `Options` in the order of the help. Changes are the
-    helps of some options in this command, or all that is different of them there.
+    Arguments are as the usage line has them, and options fields of `Options` in the order of the help; settings are
+    fields that no command line has. Changes are the helps of some options in this command, or all that is different of
+    them there.
     """
     params: list[click.Parameter] = []
     for metavar in arguments.split():
         field, more = _ARGUMENTS[metavar]
         params.append(click.Argument([field], **{"metavar": metavar, **more}))
-    for field in dict.fromkeys(options.split()):
-        change = changes.get(field, {})
-        params.append(_option(field, {"help": change} if isinstance(change, str) else change))
+    for kind, names in ((_Option, options), (_Setting, settings)):
+        for field in dict.fromkeys(names.split()):
+            change = changes.get(field, {})
+            params.append(_option(kind, field, {"help": change} if isinstance(change, str) else change))
 
     def called(**given: Any) -> int:
         run = getattr(import_module(f"cornersmooth.cli.{module or name}"), f"run_{name}")
@@ -111,9 +158,9 @@ def new_command(
     return Command(name, params=params, callback=called, help=help, epilog=epilog)
 
 
-def _option(name: str, changes: Mapping[str, Any]) -> click.Option:
+def _option(kind: type[_Option], name: str, changes: Mapping[str, Any]) -> click.Option:
     """Option of a field: its type says what it may be."""
-    item = next(item for item in fields(Options) if item.name == name)
+    item = next(item for item in fields(Declared) if item.name == name)
     given = dict(item.metadata) | dict(changes)
     for word in given.pop("spelled").split():
         if not word.startswith("-"):
@@ -132,4 +179,4 @@ def _option(name: str, changes: Mapping[str, Any]) -> click.Option:
         given |= {"default": item.default, "show_default": "[default" not in given["help"]}
     if name not in shop.ONE_RUN:
         given["envvar"] = shop.variable(name)
-    return _Option([*FLAGS[name], name], **given)
+    return kind([*FLAGS[name], name], **given)

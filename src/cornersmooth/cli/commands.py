@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from cornersmooth.cli.command import EXIT_CODES_OF_READERS, EXIT_CODES_OF_WRITERS, new_command
-from cornersmooth.cli.options import CURVES, FEED_OF_ALL, LIMITS, LINES, PLANNED, PLANNED_HELPS, READING, WRITING
+from cornersmooth.cli.declared import FEED_OF_ALL, LIMITS, LINES, PLANNED, READING, SHOP_ALONE, WRITING
 
 SMOOTH = new_command(
     "smooth",
     "IN...",
-    "tolerance output form axis_length axis_tolerance directory glob skip_existing summary jobs scheduler reports "
-    f"as_json tool {WRITING} method {CURVES} {LINES} feed feed_from_plan {PLANNED} limits time "
+    "tolerance output form axis_length axis_tolerance directory glob summary jobs reports "
+    f"as_json tool {WRITING} method {LINES} feed feed_from_plan limits "
     f"{READING} tool_number spindle no_verify strict force quiet verbose",
     """
     Round the corners of the CL files IN and write NC programs.
@@ -30,8 +30,8 @@ SMOOTH = new_command(
       cornersmooth smooth cl/ -e 0.04 -d nc/ -j --summary made.csv
       cat part.cls | cornersmooth smooth - -e 0.04 > part.nc
     """,
+    settings=f"{PLANNED} {SHOP_ALONE}",
     epilog=f"{EXIT_CODES_OF_WRITERS} With several inputs: that of the worst.",
-    **{name: f"With --feed-from-plan: {text}" for name, text in PLANNED_HELPS.items()},
 )
 
 FILTER = new_command(
@@ -81,6 +81,7 @@ VERIFY = new_command(
       cornersmooth verify part.cls part.ngc -e 0.04 --control linuxcnc
       cornersmooth verify part.cls part.nc -e 0.04 --report found.html
     """,
+    settings="no_size_limit",
     epilog="Exit codes: 0 PASSED or INCOMPLETE; 1 FAILED or NOT VERIFIED, and INCOMPLETE under --strict; "
     "2 wrong usage or configuration; 3 an input cannot be read or is not valid; 4 output cannot be written.",
     strict="Take no verdict but PASSED: else 1 is returned.",
@@ -111,6 +112,7 @@ SURFACE = new_command(
       cornersmooth surface part.cls part.nc --tool 10,5 --report map.html
       cornersmooth surface part.cls part.nc --tool 12,0,3 --report points.csv
     """,
+    settings="no_size_limit",
     epilog="Exit codes: 0 the surface is within the tolerance; 1 it is not; 2 wrong usage or configuration; 3 an input "
     "cannot be read or is not valid; 4 output cannot be written.",
     reports="Write what was found: .json, .csv for a row per point, .html for a page to look at. May be repeated.",
@@ -119,7 +121,7 @@ SURFACE = new_command(
 COMPARE = new_command(
     "compare",
     "IN",
-    f"tolerance axis_length axis_tolerance control machine limits look_ahead {CURVES} feed {READING} tip_control "
+    f"tolerance axis_length axis_tolerance control machine limits look_ahead feed {READING} tip_control "
     "as_json csv force quiet verbose",
     """
     Write the CL file IN in every form, method and line density that the control can run, and compare the times.
@@ -136,6 +138,7 @@ COMPARE = new_command(
       cornersmooth compare part.cls --control linuxcnc --machine xyzac-trt -v
       cornersmooth compare part.ngc --control linuxcnc --machine xyzac-trt
     """,
+    settings="no_size_limit",
     epilog=EXIT_CODES_OF_READERS,
 )
 
@@ -143,7 +146,7 @@ TIME = new_command(
     "time",
     "IN",
     f"tolerance axis_length axis_tolerance {LIMITS} control form machine method limits text text_machine block_time "
-    f"look_ahead {CURVES} {READING} tip_control as_json law csv reports tool force quiet verbose",
+    f"look_ahead {READING} tip_control as_json law csv reports tool force quiet verbose",
     """
     Plan the CL file IN as it is and the program that the options write, under the same limits.
 
@@ -163,6 +166,7 @@ TIME = new_command(
       cornersmooth time part.cls --text part.nc --block-time 1ms --look-ahead 200
       cornersmooth time part.ngc --control linuxcnc --machine xyzac-trt
     """,
+    settings="no_size_limit",
     epilog=EXIT_CODES_OF_READERS,
     feed=FEED_OF_ALL,
     block_time="Shortest time that the control takes for one block, of lines to write and in the plan. [default: that "
@@ -189,6 +193,7 @@ SETUP = new_command(
       cornersmooth setup part.cls --limits mill.toml --control siemens
       cornersmooth setup part.cls --limits table-ac --tilt 20 --json
     """,
+    settings="no_size_limit",
     epilog=EXIT_CODES_OF_READERS,
     feed=FEED_OF_ALL,
     limits={
@@ -216,6 +221,7 @@ INFO = new_command(
       cornersmooth info part.ncl -e 0.05 -H 25
       cornersmooth info part.cls --json > part.json
     """,
+    settings="no_size_limit",
     epilog=EXIT_CODES_OF_READERS,
 )
 

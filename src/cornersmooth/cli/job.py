@@ -12,7 +12,7 @@ from cornersmooth import __version__
 from cornersmooth.cl.apt import refuse_program
 from cornersmooth.cli.files import Beginning, check_path, read_input, suffix_of, target_of, write_report
 from cornersmooth.cli.inputs import Input
-from cornersmooth.cli.options import Options
+from cornersmooth.cli.options import POINTS, Options
 from cornersmooth.cli.show import more
 from cornersmooth.errors import EXIT_INTERNAL, CornersmoothError, VerdictError, internal_error, message, printable
 from cornersmooth.kinematics import Machine
@@ -122,11 +122,7 @@ def run_job(job: Job, progress: Progress | None = None) -> Outcome:
     return_large_arrays()
     outcome = Outcome(job)
     try:
-        mine = job.run and (read_mark(job.target) or {}).get("run") == job.run
-        if job.given.skip_existing and os.path.exists(job.target) and not mine:
-            outcome.skipped = "its output exists"
-        else:
-            outcome.contents = _smooth_file(job, outcome, progress)
+        outcome.contents = _smooth_file(job, outcome, progress)
     except CornersmoothError as failure:
         outcome.exit_code = failure.exit_code
         outcome.message = str(failure)
@@ -189,7 +185,7 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> dict[
     """Make text and reports; a verdict that is not good enough goes to the outcome, and why there was nothing to do."""
     given = job.given
     source, name = read_input(job.source, size_limit=not given.no_size_limit)
-    if given.format is None:  # what is wrong with the input comes before what is wrong with the output
+    if given.dialect != POINTS:  # what is wrong with the input comes before what is wrong with the output
         refuse_program(source, name)
     may_replace = {} if job.batch else _check(job)
     made_of = ""

@@ -70,14 +70,6 @@ def _duration(text: str) -> float:
     return float(match[1]) * (1e-3 if match[2] == "ms" else 1.0)
 
 
-def _weights(text: str) -> tuple[float, float]:
-    try:
-        first, second = map(float, text.split(","))
-    except ValueError:
-        raise ValueError(f"{text!r} is not two numbers; write 1,0.7") from None
-    return first, second
-
-
 def _processes(text: str) -> int:
     """Text to a count; 0 stands for all cores."""
     try:
@@ -163,7 +155,6 @@ def _forms_of(name: str, tables: dict[str, dict[str, Any]]) -> set[str]:
 
 Length = Annotated[float, Value("mm", _length)]
 Duration = Annotated[float, Value("time", _duration)]
-Weights = Annotated[tuple[float, float], Value("w1,w2", _weights)]
 Processes = Annotated[int, Value("n", _processes)]
 Spindle = Annotated[tuple[float, str], Value("RPM[,CCLW]", _spindle)]
 ToolShape = Annotated[Any, Value("tool", _tool)]

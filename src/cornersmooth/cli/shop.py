@@ -33,7 +33,7 @@ from typing import Any
 
 import click
 
-from cornersmooth.cli.options import FLAGS
+from cornersmooth.cli.declared import FLAGS
 from cornersmooth.cli.show import warn
 from cornersmooth.errors import SettingsError, command_text
 from cornersmooth.system.output import reason
@@ -47,7 +47,7 @@ _OWN_TABLES = {"controls": ("control",), "machines": ("machine", "limits")}
 
 #: options that belong to one run
 ONE_RUN = frozenset(
-    "output directory force reports csv summary scheduler as_json law no_verify operation help table pose".split()
+    "output directory force reports csv summary as_json law no_verify operation help table pose".split()
 )
 
 #: commands with a verdict, whose line says what settings loosen

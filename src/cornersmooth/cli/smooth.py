@@ -45,7 +45,7 @@ def run_smooth(given: Options) -> int:
     ending: Shutdown = click.get_current_context().obj
     worst = 0
     with progress_bar(given.quiet, rate=True) as progress:
-        batch = Batch(jobs, given.jobs, progress, scheduler=given.scheduler or "")
+        batch = Batch(jobs, given.jobs, progress, scheduler=given.scheduler if given.jobs == 1 else None)
 
         def keep() -> None:
             if given.summary:
@@ -151,8 +151,6 @@ def _check_usage(given: Options) -> None:
     if given.summary and not folder:
         raise click.UsageError("--summary is for batches, which need -d FOLDER; --report tells of a single file")
     check_endings("summary", [given.summary] if given.summary else [], ".json or .csv")
-    if given.scheduler and (not folder or given.jobs != 1):
-        raise click.UsageError("--scheduler is for batches, which need -d FOLDER and take no -j")
     if given.feed is not None and not 0.0 < given.feed < 1e6:
         raise click.UsageError("--feed must be a positive number of mm/min")
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from cornersmooth.feedrate.compare import Comparison, compare
-from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.planner import direct, plan
 from cornersmooth.feedrate.reached import AxisPeaks, axis_peaks, limiting
 from cornersmooth.feedrate.timelaw import States, TimeLaw
 from cornersmooth.feedrate.written import BlockLimits, block_feeds, plan_text
+from cornersmooth.settings.limits import Limits
 
 __all__ = [
     "AxisPeaks",

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.planner import direct, plan
 from cornersmooth.feedrate.reached import axis_peaks, peaks
 from cornersmooth.feedrate.timelaw import TimeLaw
@@ -17,6 +16,7 @@ from cornersmooth.kinematics import Machine
 from cornersmooth.methods import METHODS
 from cornersmooth.model import Program
 from cornersmooth.settings import Settings
+from cornersmooth.settings.limits import Limits
 from cornersmooth.smoothing import smooth
 
 SCHEMA = "cornersmooth-time/1"

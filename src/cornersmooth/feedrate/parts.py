@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.machine_axes import MachineAxes
 from cornersmooth.feedrate.path import Path
 from cornersmooth.feedrate.planner import Progress, plan_along
@@ -20,6 +19,7 @@ from cornersmooth.feedrate.reached import limiting
 from cornersmooth.feedrate.resolution import FINER, Resolution
 from cornersmooth.feedrate.scurve import stopping_distance
 from cornersmooth.model import Ints
+from cornersmooth.settings.limits import Limits
 from cornersmooth.system.processes import map_in_processes
 
 #: coarse cells, and one round

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from cornersmooth.arrays.vectors import angle_between, dot, norm, unit
 from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate.curves import Curves
-from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.rational_curves import STANDSTILL, WHOLE, end_tangents
 from cornersmooth.model import Bools, Corners, FeedMode, Floats, Ints, Move, Program, Runs, Status
 from cornersmooth.settings import Settings
+from cornersmooth.settings.limits import Limits
 from cornersmooth.smoothing.construction import find_neighbours
 
 #: angles below this are no motion of the axis, rad

@@ -14,7 +14,6 @@ from cornersmooth.feedrate import scurve
 from cornersmooth.feedrate.between import fastest
 from cornersmooth.feedrate.grid import make_grid
 from cornersmooth.feedrate.intervals import Intervals, path_limits
-from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.machine_axes import MachineAxes, follow
 from cornersmooth.feedrate.path import Path, build_path
 from cornersmooth.feedrate.resolution import FINER, PLAIN, Resolution
@@ -23,6 +22,7 @@ from cornersmooth.feedrate.timelaw import TimeLaw, crossing_time
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import Floats, Ints, Program, SmoothProgram
 from cornersmooth.settings import Settings
+from cornersmooth.settings.limits import Limits
 
 Baseline = Literal["exact_stop", "velocity_jump"]
 Progress = Callable[[int, int], None]

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.machine_axes import MachineAxes
 from cornersmooth.feedrate.motion import poses, shares_at
 from cornersmooth.feedrate.path import Path
 from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.settings.limits import Limits
 
 _HALVINGS = 60
 

@@ -11,7 +11,6 @@ from cornersmooth.arrays.vectors import norm, unit
 from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate import scurve
 from cornersmooth.feedrate.curves import Curves
-from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.path import Path, build_path
 from cornersmooth.feedrate.planner import Progress, plan_path
 from cornersmooth.feedrate.rational_curves import polynomial
@@ -21,6 +20,7 @@ from cornersmooth.model import Arcs, Bools, FeedMode, Floats, Ints, Move, Progra
 from cornersmooth.nc_reader.curves import groups
 from cornersmooth.nc_reader.elements import Element, Event, NcProgram
 from cornersmooth.settings import Settings
+from cornersmooth.settings.limits import Limits
 
 #: what a motion block does, as a move
 _MOVES = {Element.RAPID: Move.RAPID, Element.LINE: Move.LINEAR, Element.ARC: Move.ARC, Element.CURVE: Move.LINEAR}

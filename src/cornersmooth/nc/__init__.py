@@ -90,7 +90,7 @@ def fit_settings(settings: Settings, form: Form, units: Units) -> Settings:
         raise SettingsError(
             "CS217",
             f"{form.control} form {form.name} holds curves with weights 1 only",
-            "leave out --weights, or choose another form",
+            "leave out weights, or choose another form",
         )
     long = form.table.lines
     lines = settings.lines or (long.lines if form.long_lines else "dense")

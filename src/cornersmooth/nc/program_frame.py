@@ -18,6 +18,7 @@ from cornersmooth.nc.control_tables import control_names, load_control
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.tools import tool_loads
 from cornersmooth.settings import Settings
+from cornersmooth.settings.frame import FrameSettings
 from cornersmooth.statements.work_offsets import spellings, work_offset_of
 from cornersmooth.tables import filled as filled_in
 from cornersmooth.text import format_number
@@ -57,31 +58,8 @@ class Stream(Protocol):
 
 
 @dataclass(frozen=True)
-class Frame:
-    """What a user wants around the motion."""
-
-    program: str | None = None  #: name or number; None for that of the CL file, or of the control's table
-    block_numbers: bool = False  #: whether blocks are numbered where the control does not ask for it
-    #: lines after the head and before the tail, with ``{program}``, ``{units}`` and ``{blend}``
-    header: tuple[str, ...] = ()
-    footer: tuple[str, ...] = ()
-    comments: bool = True  #: whether what the CL file says in words is written, and `provenance`
-    #: such as ``G54``, or the number of a preset; None for that of the control's table, empty for none
-    work_offset: str | None = None
-    provenance: tuple[str, ...] = ()  #: what the program is made of, for comments before the header
-    stem: str = ""  #: name of the CL file without its ending, for `program`; empty for none
-    #: whether holes whose cycle cannot be written are only gone over, with a warning and a comment NOT DRILLED, rather
-    #: than an error
-    skip_cycles: bool = False
-    #: how holes are written: as plain moves ("moves"), or as the control's own cycles ("native") where it has such and
-    #: the tool stays along Z. Taps are its own cycles anyway.
-    cycles: str = "moves"
-    #: mm; how far the tool comes down along its axis to the first position after a retract, and goes back along it
-    #: before a retract; 0 for neither. A form with a point on the axis comes down by `POINT_APPROACH` at least.
-    approach: float = 0.0
-    retract: float = 0.0
-    modal: bool = False  #: whether words that repeat are left out where the control keeps them
-    line_ends: str | None = None  #: "lf" or "crlf": what lines end with; None for that of the control's table
+class Frame(FrameSettings):
+    """What a user wants around the motion, as blocks."""
 
     def values(self, form: Form, program: Program, settings: Settings) -> dict[str, str]:
         """What stands for braces in blocks around the motion and in those of extras; refuses a program name (CS216)."""

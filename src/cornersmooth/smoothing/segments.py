@@ -18,6 +18,7 @@ from cornersmooth.methods import METHODS
 from cornersmooth.model import Bools, Floats, Ints, Move, Numbers, SmoothProgram, Status
 from cornersmooth.settings import FLIP_ANGLE, STANDING, Settings
 from cornersmooth.smoothing.construction import construction_of, legs_at
+from cornersmooth.smoothing.line_density import lines_for_feed
 
 #: exponent of the graded nodes s = (j/n)^(2/3)
 GRADED = 2.0 / 3.0
@@ -203,7 +204,7 @@ def lines_of(smoothed: SmoothProgram, rows: Ints) -> Ints:
     # in each half the directions change by half of what they do at the corner
     halved = np.maximum(2.0 * way, STANDING)
     kinks = norm(bends[0]) / halved, norm(bends[1] - bends[0]) / (settings.axis_length * halved)
-    by_chord = settings.lines_for_feed(by_chord, way, program.feed_at(after), kinks)
+    by_chord = lines_for_feed(settings, by_chord, way, program.feed_at(after), kinks)
     number = np.ceil(by_chord - 1e-9)
 
     by_turn = np.zeros(len(rows))

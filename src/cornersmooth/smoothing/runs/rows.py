@@ -22,6 +22,7 @@ from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.geometry.ragged import batches, search, spread, starts
 from cornersmooth.model import Floats, Ints, Numbers, Program, Runs
 from cornersmooth.settings import STANDING, Settings
+from cornersmooth.smoothing.line_density import lines_for_feed
 from cornersmooth.smoothing.runs.polylines import Pieces, Polylines
 from cornersmooth.smoothing.segments import turn_limit
 
@@ -169,7 +170,7 @@ def _effort(
     along = np.maximum(way, STANDING)
     kinks = norm(change[:, :3]) / along, norm(change[:, 3:] - change[:, :3]) / (settings.axis_length * along)
     feed = program.feed_at(runs.pose[pieces.segment + 1])
-    by_chord = settings.lines_for_feed(np.sqrt(size / (8.0 * settings.chord)), way, feed, kinks)
+    by_chord = lines_for_feed(settings, np.sqrt(size / (8.0 * settings.chord)), way, feed, kinks)
     levers = lines.point[:, 3:] - lines.point[:, :3]
     turn = np.concatenate((angle_between(levers[:-1], levers[1:]), [0.0]))[pieces.segment]
     turned = angle_between(hull[:, 0, 3:] - hull[:, 0, :3], hull[:, 3, 3:] - hull[:, 3, :3])

@@ -3,76 +3,96 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from numbers import Real
 from typing import Any, Literal
 
-import numpy as np
-
-from cornersmooth.arrays import Floats
 from cornersmooth.errors import SettingsError
 from cornersmooth.methods import AUTO, CURVES_METHOD, DEFAULT_METHOD, METHODS
+from cornersmooth.settings.declared import key_of, option
 
 Lines = Literal["dense", "long"]
-
-
-def _setting(default: Any, low: float, high: float, unit: str = "") -> Any:
-    """Field of one number or several, with closed bounds."""
-    return field(default=default, metadata={"bounds": (low, high), "unit": unit})
 
 
 @dataclass(frozen=True)
 class Settings:
     """What `cornersmooth.smooth` promises and how it goes about it. Lengths in mm, angles in degrees."""
 
-    #: mm: ε: bound on the deviation of the written tip path and axis-point path (docs/method.md).
-    tolerance: float = _setting(0.01, 1e-6, 10.0, "mm")
-    #: mm: H: distance of the axis point from the tip. Choose the length of the cutting edge. An axis tolerance takes
-    #: its place: H follows from it then, whatever is given.
-    axis_length: float = _setting(10.0, 1e-3, 1e4, "mm")
-    #: degrees: τ: in place of ε at the axis point, what the tool axis may be off where the tip is within ε.
-    axis_tolerance: float | None = _setting(None, 1e-4, 45.0, "deg")
+    #: ε: of the written tip path and axis-point path (docs/method.md)
+    tolerance: float = option(
+        0.01, "Largest deviation of the written path.", unit="mm", bounds=(1e-6, 10.0), flags="-e"
+    )
+    #: H. An axis tolerance takes its place: H follows from it then, whatever is given.
+    axis_length: float = option(
+        10.0,
+        "Distance from the tool tip to the second point that keeps the tolerance: the length of the cutting edge.",
+        unit="mm",
+        bounds=(1e-3, 1e4),
+        flags="-H",
+    )
+    #: τ: in place of ε at the axis point, what the tool axis may be off where the tip is within ε
+    axis_tolerance: float | None = option(
+        None,
+        "Largest deviation of the tool axis where the tip is within -e, in place of -e at the axis point (-H): for"
+        " ball-end mills, whose centre is all that counts.",
+        unit="deg",
+        bounds=(1e-4, 45.0),
+    )
     #: A name in `cornersmooth.methods.METHODS`, or "auto" for what suits the form: global in curves, if nothing that
     #: is given is against it, else proportional.
-    method: str = AUTO
+    method: str = option(
+        AUTO,
+        "How the curves are made. With auto: global in curves (g6.2, bspline, poly, spl), proportional in lines. "
+        + " ".join(f"With {item.name}: {item.summary}." for item in METHODS.values())
+        + " Global takes less time on the machine and about a block a pose in curves; on LinuxCNC it takes more time.",
+    )
     #: w1 and w2 of the five-point curve, in (0, 3]; rounded to the three decimals that controls accept.
-    weights: tuple[float, float] = _setting((1.0, 1.0), 0.001, 3.0)
-    #: degrees: A corner that turns by more (in the six-dimensional sense) stays sharp.
-    reversal_angle: float = _setting(170.0, 1.0, 180.0, "deg")
-    #: degrees: A corner next to a segment whose axis turns by more stays sharp: the ruled motion is not a motion any
-    #: more.
-    max_axis_step: float = _setting(90.0, 1.0, 90.0, "deg")
-    #: mm: Largest distance between the written lines and the curve in dense output; None for a tenth of ε, at most
-    #: 0.0005 mm.
-    chord_tolerance: float | None = _setting(None, 1e-7, 1.0, "mm")
-    #: s: Shortest time in which the control takes a block: dense lines follow the curves as closely as 0.00005 mm
-    #: where none is passed sooner at the programmed feed. 0 for lines by the chord tolerance alone; None for what the
-    #: control's table says, and without a control 0.
-    block_time: float | None = _setting(None, 0.0, 1.0, "s")
-    #: degrees: Largest change of axis in one written line next to a rounded corner; None for what ε and H ask for.
-    axis_step: float | None = _setting(None, 1e-3, 90.0, "deg")
-    #: Whether lines follow the curves closely, or are as few as ε allows; None for what suits the control.
-    lines: Lines | None = None
+    weights: tuple[float, float] = option((1.0, 1.0), bounds=(0.001, 3.0))
+    #: A corner that turns by more (in the six-dimensional sense) stays sharp.
+    reversal_angle: float = option(170.0, unit="deg", bounds=(1.0, 180.0))
+    #: A corner next to a segment whose axis turns by more stays sharp: the ruled motion is not a motion any more.
+    max_axis_step: float = option(90.0, unit="deg", bounds=(1.0, 90.0))
+    #: in dense output
+    chord_tolerance: float | None = option(
+        None,
+        "Largest distance between the written lines and the curve. [default: a tenth of -e, at most 0.0005]",
+        unit="mm",
+        bounds=(1e-7, 1.0),
+        flags="--chord",
+    )
+    #: Dense lines follow the curves as closely as 0.00005 mm where none is passed sooner at the programmed feed. 0 for
+    #: lines by the chord tolerance alone; None for what the control's table says, and without a control 0.
+    block_time: float | None = option(
+        None,
+        "Shortest time in which the control takes a block, as in 1ms. At the programmed feed, no line along a curve "
+        "takes less. [default: that of the control's table]",
+        unit="s",
+        bounds=(0.0, 1.0),
+    )
+    #: Largest change of axis in one written line next to a rounded corner; None for what ε and H ask for.
+    axis_step: float | None = option(None, unit="deg", bounds=(1e-3, 90.0))
+    lines: Lines | None = option(
+        None, "Lines close to the curves, or as few as -e allows. [default: what suits the control]"
+    )
     #: Parts of what the rounding of the digits leaves of ε: for the curves, and for long lines along them. What is
     #: left of `line_share` is for what the control does to lines by itself.
-    curve_share: float = _setting(1.0, 0.01, 1.0)
-    line_share: float = _setting(1.0, 0.01, 1.0)
-    #: Part of ε within which the control is told to round the corners of lines by itself, where it can be told.
-    blend_share: float = _setting(0.1, 0.0, 1.0)
+    curve_share: float = option(1.0, bounds=(0.01, 1.0))
+    line_share: float = option(1.0, bounds=(0.01, 1.0))
+    #: Part of ε within which the control rounds the corners of lines by itself, where it has a word for it.
+    blend_share: float = option(0.1, bounds=(0.0, 1.0))
     #: Whether a corner where the feed changes may be rounded; false for output that cannot change F inside a curve,
     #: and has no curves at a feed per revolution.
-    round_feed_changes: bool = True
-    # what forms in rotary words take off for them grows with the tolerance
-    #: mm: Step of the written tip coordinates; half of it per axis is taken off ε. 0 for no rounding.
-    tip_resolution: float = _setting(0.0, 0.0, 10.0, "mm")
-    #: mm: Step of the written axis points, or of the written vectors times H.
-    axis_point_resolution: float = _setting(0.0, 0.0, 10.0, "mm")
-    #: mm: Poses closer than this, in tip and axis point, are one pose.
-    duplicate_distance: float = _setting(1e-6, 0.0, 0.01, "mm")
-    #: mm: By how much poses that are almost doubled are moved at most: taken off ε, as digits are. Smoothing finds it.
-    pose_shift: float = _setting(0.0, 0.0, 10.0, "mm")
-    #: mm: A straight remainder shorter than this between two transitions is not written as a line of its own.
-    shortest_line: float = _setting(1e-3, 0.0, 1.0, "mm")
+    round_feed_changes: bool = option(True)
+    #: Step of the written tip coordinates; half of it per axis is taken off ε. 0 for no rounding.
+    tip_resolution: float = option(0.0, unit="mm", bounds=(0.0, 10.0))
+    #: Step of the written axis points, or of the written vectors times H.
+    axis_point_resolution: float = option(0.0, unit="mm", bounds=(0.0, 10.0))
+    #: Poses closer than this, in tip and axis point, are one pose.
+    duplicate_distance: float = option(1e-6, unit="mm", bounds=(0.0, 0.01))
+    #: By how much poses that are almost doubled are moved at most: taken off ε, as digits are. Smoothing finds it.
+    pose_shift: float = option(0.0, unit="mm", bounds=(0.0, 10.0))
+    #: A straight remainder shorter than this between two transitions is not written as a line of its own.
+    shortest_line: float = option(1e-3, unit="mm", bounds=(0.0, 1.0))
 
     def __post_init__(self) -> None:
         if self.method not in (AUTO, *METHODS):
@@ -187,28 +207,6 @@ class Settings:
         """Effective chord tolerance of dense output, mm."""
         return min(self.tolerance / 10, LARGEST_CHORD) if self.chord_tolerance is None else self.chord_tolerance
 
-    def lines_for_feed(self, by_chord: Floats, length: Floats, feed: Floats, kinks: tuple[Floats, Floats]) -> Floats:
-        """Lines that a stretch of a curve is written in, so that the axes jump little in speed where they meet.
-
-        Parameters
-        ----------
-        by_chord : (n,) float64
-            Lines that the chord tolerance asks for; their chord error goes with the square of their number.
-        length : (n,) float64, mm
-            Way of the tip.
-        feed : (n,) float64, mm/min
-            NaN for none: then the chord tolerance alone counts.
-        kinks : ((n,) float64, (n,) float64), rad, rad/mm
-            By how much the direction of the tip, and the turning of the tool axis on its way, change in the stretch.
-        """
-        if not self.block_time or self.lines == "long" or self.chord <= FINEST_CHORD:
-            return by_chord
-        finest = by_chord * math.sqrt(self.chord / FINEST_CHORD)
-        speed = feed / 60.0
-        jump = np.maximum(speed * kinks[0] / SMALL_JUMPS[0], np.degrees(speed * kinks[1]) / SMALL_JUMPS[1])
-        most = np.minimum(length / (speed * self.block_time), jump)
-        return np.maximum(by_chord, np.minimum(finest, np.nan_to_num(most, nan=0.0, posinf=0.0)))
-
     @property
     def interpolation_tolerance(self) -> float:
         """Distance, at `axis_scale` from the tip, that turning the axis inside one written line may add, mm.
@@ -224,12 +222,11 @@ class Settings:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values in field order, for the report; keys carry their unit."""
-        names = (item.name for item in fields(self))
-        return {f"{name}_{UNITS[name]}" if name in UNITS else name: getattr(self, name) for name in names}
+        return {key_of(item.name, item.metadata["unit"]): getattr(self, item.name) for item in fields(self)}
 
 
 #: unit of each setting that has one
-UNITS = {item.name: item.metadata["unit"] for item in fields(Settings) if item.metadata.get("unit")}
+UNITS = {item.name: item.metadata["unit"] for item in fields(Settings) if item.metadata["unit"]}
 
 #: What the axis point may be off, over ε, where the axis has a tolerance of its own. The larger, the less the way of
 #: the tip takes of what the axis may turn (a tenth of it at most), and the longer is H.
@@ -244,14 +241,6 @@ def chord_of(degrees: float) -> float:
 #: Largest default of the chord tolerance, mm. Where lines meet, the axes jump in speed, and a control slows down for
 #: it: a larger tolerance must not mean coarser lines. docs/feedrate.md has the times that led to this.
 LARGEST_CHORD = 5e-4
-
-#: Chord error below which lines are not divided for their feed, mm: half of a step of 0.0001 mm, the last digit of most
-#: controls. Finer lines follow the digits.
-FINEST_CHORD = 5e-5
-
-#: Jumps in speed between two lines for which no line is divided, of the tip in mm/s and of the tool axis in deg/s: what
-#: 1000 mm/s² and 150 deg/s² make in 2 ms, the limits of ``cornersmooth time``.
-SMALL_JUMPS = (2.0, 0.3)
 
 #: mm: on a shorter way the tip stands still, and no feed divides lines
 STANDING = 1e-9
@@ -270,5 +259,5 @@ TIMED_POSES = 20_000
 
 #: closed bounds of the numeric settings
 BOUNDS: dict[str, tuple[float, float]] = {
-    item.name: item.metadata["bounds"] for item in fields(Settings) if item.metadata
+    item.name: item.metadata["bounds"] for item in fields(Settings) if item.metadata["bounds"]
 }
