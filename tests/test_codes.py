@@ -13,7 +13,7 @@ from types import ModuleType
 import pytest
 
 from cornersmooth.cli.commands import COMMANDS
-from cornersmooth.cli.lookup import _one, codes
+from cornersmooth.cli.explain import _one, codes
 from oracle.command import run
 from writing import faults, plain, sentences, words
 

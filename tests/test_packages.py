@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import subprocess
 import sys
 import tarfile
 import zipfile
+from collections.abc import Iterator
 from email.parser import Parser
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -69,3 +72,36 @@ def test_helps_name_pages_that_are_there() -> None:
     }
     assert named
     assert [name for name in sorted(named) if not (Path(folder) / name).is_file()] == []
+
+
+SOURCE = ROOT / "src" / "cornersmooth"
+MODULES = {
+    ".".join(("cornersmooth", *path.relative_to(SOURCE).with_suffix("").parts)).removesuffix(".__init__"): path
+    for path in SOURCE.rglob("*.py")
+}
+
+
+def imports(nodes: list[ast.AST]) -> Iterator[str]:
+    """Modules of the package that statements import, at once or when they run; not those that only types need."""
+    for node in nodes:
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
+            yield from imports([*node.orelse])
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            for alias in node.names:
+                name = f"{node.module}.{alias.name}"
+                yield name if name in MODULES else node.module
+        else:
+            yield from imports([*ast.iter_child_nodes(node)])
+
+
+def test_no_file_imports_itself_in_a_circle() -> None:
+    graph = {
+        name: {one for one in imports([ast.parse(path.read_text(encoding="utf-8"))]) if one in MODULES and one != name}
+        for name, path in MODULES.items()
+    }
+    assert sum(map(len, graph.values())) > 800
+    TopologicalSorter(graph).prepare()  # it names a circle
+
+
+def test_the_root_has_ten_modules() -> None:
+    assert len(list(SOURCE.glob("*.py"))) <= 10

@@ -18,9 +18,9 @@ from itertools import islice
 from multiprocessing import parent_process
 from typing import Any
 
-from cornersmooth.cli import Shutdown
 from cornersmooth.cli.files import suffix_of, write_report
 from cornersmooth.cli.job import STATUSES, Job, Outcome, run_job
+from cornersmooth.cli.shutdown import Shutdown
 from cornersmooth.errors import message
 from cornersmooth.report.record import report_json
 from cornersmooth.system.output import remove_leftovers, remove_unfinished

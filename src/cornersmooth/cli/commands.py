@@ -241,7 +241,6 @@ CONTROLS = new_command(
       cornersmooth controls siemens --table > mine.toml
       cornersmooth controls mine.toml
     """,
-    module="lookup",
 )
 
 MACHINES = new_command(
@@ -263,7 +262,6 @@ MACHINES = new_command(
       cornersmooth machines mine.toml --pose A30,C45
       cornersmooth machines mine.toml --json
     """,
-    module="lookup",
 )
 
 CONFIG = new_command(
@@ -281,7 +279,6 @@ CONFIG = new_command(
       cornersmooth config
       cornersmooth config jobs/part.cls
     """,
-    module="lookup",
 )
 
 EXPLAIN = new_command(
@@ -301,7 +298,6 @@ EXPLAIN = new_command(
       cornersmooth explain --stream part.nc --control haas --machine table-bc
     """,
     epilog=EXIT_CODES_OF_READERS,
-    module="lookup",
     units="Units of a program that does not say them.",
 )
 
@@ -318,7 +314,6 @@ COMPLETION = new_command(
       eval "$(cornersmooth completion zsh)"     # in ~/.zshrc, behind compinit
       cornersmooth completion fish | source     # in ~/.config/fish/config.fish
     """,
-    module="lookup",
 )
 
 #: as the list of them shows them

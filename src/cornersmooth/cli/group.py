@@ -12,10 +12,10 @@ from typing import Any
 import click
 
 from cornersmooth import __version__
-from cornersmooth.cli import Shutdown
 from cornersmooth.cli.command import write_part
 from cornersmooth.cli.commands import COMMANDS, GROUPS
 from cornersmooth.cli.show import print_message, say_json
+from cornersmooth.cli.shutdown import Shutdown
 from cornersmooth.errors import EXIT_INTERNAL, CornersmoothError, SettingsError, internal_error, message
 from cornersmooth.system.output import ClosedPipe, reason
 

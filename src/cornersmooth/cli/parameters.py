@@ -100,6 +100,9 @@ def _tool(text: str) -> Any:
     return parse_tool(text)
 
 
+#: key of the shop settings in a context
+SHOP = "cornersmooth.shop"
+
 #: folders of the tables in the package
 _FOLDERS = {"controls": ("nc", "controls"), "machines": ("kinematics", "machines")}
 
@@ -132,14 +135,12 @@ def _tables(kind: str, ctx: click.Context) -> dict[str, dict[str, Any]]:
     import tomllib
     from importlib import resources
 
-    from cornersmooth.cli import shop
-
     found: dict[str, dict[str, Any]] = {
         item.name.removesuffix(".toml"): tomllib.loads(item.read_text(encoding="utf-8"))
         for item in resources.files("cornersmooth").joinpath(*_FOLDERS[kind]).iterdir()
         if item.name.endswith(".toml")
     }
-    for file in ctx.meta.get(shop.__name__, shop.Shop()).files:
+    for file in getattr(ctx.meta.get(SHOP), "files", ()):
         found |= {name: table for name, table in file.tables.get(kind, {}).items() if isinstance(table, dict)}
     return found
 

@@ -34,6 +34,7 @@ from typing import Any
 import click
 
 from cornersmooth.cli.declared import FLAGS
+from cornersmooth.cli.parameters import SHOP
 from cornersmooth.cli.show import warn
 from cornersmooth.errors import SettingsError, command_text
 from cornersmooth.system.output import reason
@@ -98,14 +99,14 @@ def parse_args(
         return parse(ctx, args)
     if ctx.resilient_parsing:  # a shell wants to complete what is not whole yet
         with contextlib.suppress(SettingsError, click.UsageError):
-            ctx.meta[__name__] = Shop(find_files(_first_look(command, ctx, list(args))[0]))
+            ctx.meta[SHOP] = Shop(find_files(_first_look(command, ctx, list(args))[0]))
         return parse(ctx, args)
     first, control = _first_look(command, ctx, list(args))
     _check_environment(command)
     shop = Shop(find_files(first))
     for file in shop.files:
         _name_strangers(file.path)
-    ctx.meta[__name__] = shop
+    ctx.meta[SHOP] = shop
     ctx.default_map = _defaults(command, shop, control)
     rest = parse(ctx, args)
     for kind, options in _OWN_TABLES.items():
@@ -154,7 +155,7 @@ def origin(ctx: click.Context, name: str) -> str:
     if source == click.core.ParameterSource.ENVIRONMENT:
         return variable(name)
     if source == click.core.ParameterSource.DEFAULT_MAP:
-        return str(ctx.meta[__name__].origins[name])
+        return str(ctx.meta[SHOP].origins[name])
     return "default"
 
 

@@ -9,7 +9,6 @@ from dataclasses import replace
 
 import click
 
-from cornersmooth.cli import Shutdown
 from cornersmooth.cli.batch import Batch, batch_report, end_lines, interrupted_line, line_of, write_summary
 from cornersmooth.cli.files import STANDARD, check_endings, check_inputs, check_path, read_lines
 from cornersmooth.cli.inputs import find_inputs
@@ -27,6 +26,7 @@ from cornersmooth.cli.show import (
     show_verdict,
     warn,
 )
+from cornersmooth.cli.shutdown import Shutdown
 from cornersmooth.errors import printable
 from cornersmooth.nc import Frame, fit_settings
 from cornersmooth.system.output import make_folder

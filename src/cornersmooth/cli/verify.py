@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 import click
 
@@ -15,22 +13,18 @@ from cornersmooth.cli.files import (
     STANDARD,
     check_inputs,
     check_reports,
-    read_head,
     read_input,
     read_lines,
     suffix_of,
     write_report,
 )
-from cornersmooth.cli.options import Options, typed
+from cornersmooth.cli.head import take_head
+from cornersmooth.cli.options import Options
 from cornersmooth.cli.shop import command_line, loosened
 from cornersmooth.cli.show import more, print_line, print_message, say_json, say_line, show_findings, warn
-from cornersmooth.errors import SettingsError
-from cornersmooth.kinematics import machine_names
-from cornersmooth.nc import control_names, own_words
-from cornersmooth.nc_reader import NcProgram, Problem, read_nc
-from cornersmooth.nc_reader.recognition import recognise_control
+from cornersmooth.nc import own_words
+from cornersmooth.nc_reader import NcProgram, read_nc
 from cornersmooth.nc_reader.source import readable_twice
-from cornersmooth.provenance import read_provenance, weights_word
 from cornersmooth.report import NcFile, findings_table, report_json
 from cornersmooth.report.record import cl_file, record, sha256_of
 from cornersmooth.report.verdict import judge, trusted_blocks
@@ -47,9 +41,6 @@ _PROBLEMS_SHOWN = 20
 #: rewinds shown
 _REWINDS_SHOWN = 5
 
-#: share by which numbers may differ that are alike
-_ALIKE = 1e-9
-
 
 def run_verify(given: Options) -> int:
     """Do the work of the command; return its exit code."""
@@ -65,7 +56,7 @@ def run_verify(given: Options) -> int:
 
         return verify_with_program(name, data, given)
     nc: bytes | str | os.PathLike[str] = read_input(text)[0] if text == STANDARD else text
-    head = _take_over(given, nc, data)
+    head = take_head(given, nc, data)
     given = head.given
     given.check_axis()
     if given.work_offset not in (None, "none"):
@@ -163,87 +154,6 @@ def run_verify(given: Options) -> int:
                 say_line(line)
     taken = (Verdict.PASSED,) if given.strict else (Verdict.PASSED, Verdict.INCOMPLETE)
     return 0 if found.verdict in taken else 1
-
-
-@dataclass(frozen=True)
-class _Head:
-    """What was taken from the head of a program."""
-
-    given: Options  #: with what took the place of options that were not typed
-    taken: tuple[str, ...] = ()  #: the words of it
-    loose: tuple[str, ...] = ()  #: what is not verified because the program itself loosens the check
-    weights: tuple[float, ...] | None = None  #: Weights of its curves; None for any.
-    form: str | None = None  #: In which it was written; None where it does not say.
-    remark: str = ""  #: what is strange about it; empty for nothing
-    problem: Problem | None = None
-
-
-def _take_over(given: Options, nc: bytes | str | os.PathLike[str], source: bytes) -> _Head:
-    """Take what the head of a program says of how it was made for options that were not typed."""
-    head = read_head(nc)
-    made = read_provenance(head)
-    if made is None:
-        return recognised(given, head)
-    words: dict[str, tuple[str, Any]] = {"tolerance": ("E", made.tolerance), "axis_length": ("H", made.axis_length)}
-    if not typed("axis_length"):
-        words["axis_tolerance"] = ("AXIS", made.axis_tolerance)
-    words |= {"control": ("CONTROL", made.control)} if made.control in control_names() else {}
-    words |= {"machine": ("MACHINE", made.machine or None)} if made.machine in ("", *machine_names()) else {}
-    words |= {"operation": ("OPERATION", str(made.operation))} if made.operation else {}
-    words |= {"no_tcp": ("TCP", not made.tcp), "slower": ("FEEDS", made.planned_feeds)}
-    words |= {"work_offset": ("OFFSET", "none")} if made.work_offset == "none" else {}
-    words = {name: word for name, word in words.items() if not typed(name)}
-    if "axis_length" in words and (typed("axis_tolerance") or made.axis_tolerance is not None):
-        del words["axis_length"]  # H is no measure where the axis has a tolerance of its own
-    now = replace(given, **{name: value for name, (_, value) in words.items()})
-    if made.machine and not now.machine:
-        raise SettingsError("CS225", f"the program is for the machine {made.machine}", "name its file with --machine")
-    spelled = {"machine": made.machine, "no_tcp": "no", "slower": "plan"}
-    taken = [
-        f"{word}={spelled.get(name, f'{value:.9g}' if isinstance(value, float) else value)}"
-        for name, (word, value) in words.items()
-        if value not in (None, False)
-    ]
-    taken += [f"WEIGHTS={word}" for word in [weights_word(made.weights)] if word]
-    problem = None
-    if made.sha256 and made.sha256 != hashlib.sha256(source).hexdigest():
-        text = "the program was made from another CL file, or that has changed since: its SHA-256 is another"
-        problem = Problem("CS567", 0, 1, text)
-    return _Head(now, tuple(taken), tuple(_loose(given, now, set(words))), made.weights, made.form, problem=problem)
-
-
-def _loose(before: Options, given: Options, taken: set[str]) -> Iterator[str]:
-    """Say where words of the head make the check looser than the options and settings do without them."""
-
-    def lever(options: Options) -> float:
-        """Distance from the tip at which the axis is off by the tolerance where it is off by what it may."""
-        own = options.axis_tolerance
-        return float(options.axis_length if own is None else length_of(options.tolerance, own))
-
-    was, now = before.tolerance, given.tolerance
-    if "tolerance" in taken and now > was * (1.0 + _ALIKE):
-        yield f"the tolerance {now:g} mm is the program's own word, looser than {was:g} mm: name it with -e"
-    looser = lever(given) < lever(before) * (1.0 - _ALIKE) and now / lever(given) > was / lever(before) * (1.0 + _ALIKE)
-    if looser and taken & {"axis_length", "axis_tolerance"}:
-        name = "-H" if given.axis_tolerance is None else "--axis-tolerance"
-        yield f"the tolerance of the tool axis is the program's own word, looser than without: name it with {name}"
-    if "operation" in taken:
-        yield f"that operation {given.operation} is enough is the program's own word: name it with --operation"
-    if "slower" in taken and given.slower:
-        yield "feeds: that they may be lower is the program's own word: name it with --planned-feeds"
-    if "work_offset" in taken:
-        yield "that no work offset is selected is the program's own word: name it with --work-offset none"
-
-
-def recognised(given: Options, head: bytes) -> _Head:
-    """Take the control that a program looks like, where none was named, and say so."""
-    looks = recognise_control(head)
-    source = click.get_current_context().get_parameter_source("control")
-    named = source != click.core.ParameterSource.DEFAULT
-    if looks in ("", given.load_control().dialect) or (named and looks == "fanuc"):  # others say its words, too
-        return _Head(given)
-    advice = f"it looks like {looks.capitalize()}: --control {looks}"
-    return _Head(given, remark=advice) if named else _Head(replace(given, control=looks), remark=f"{advice} is taken")
 
 
 def _problems(found: Verification, name: str, text: str, verbose: int) -> Iterator[str]:
