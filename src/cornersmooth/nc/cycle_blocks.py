@@ -103,7 +103,7 @@ def hole_feeds(cycle: Cycle, program: Program, poses: Ints) -> tuple[Floats, Int
 def kind_of(cycle: Cycle, form: Form, program: Program, poses: Ints) -> str:
     """Name of the cycle of the control that does the same, as in `Cycles`; empty for none."""
     cycles, (feed, modes) = form.table.cycles, hole_feeds(cycle, program, poses)
-    stepped = cycle.pecking and bool(cycle.steps)
+    stepped = bool(cycle.steps)
     if cycle.clearance is None or np.isnan(feed).any() or (modes != modes[0]).any() or not cycle.depth > 0.0:
         return ""  # a depth of nothing is drilled by no TNC
     if stepped and (len(set(cycle.steps)) > 1 or cycle.dwell or cycle.feed_out):

@@ -67,7 +67,7 @@ class Cycle:
     steps: tuple[float, ...] = ()  #: depths of the pecks, the last one repeated; none for a single feed
     full_retract: bool = True  #: whether a peck comes out of the hole
     feed_out: bool = False
-    pecking: bool = False  #: whether `steps` are to be taken; without any the hole is drilled in one feed
+    pecking: bool = False  #: whether pecks are asked for; without any steps the hole is drilled in one feed
     tap: bool = False  #: whether a thread is cut: the spindle turns with the feed
 
 
@@ -139,6 +139,8 @@ def read_cycle(args: tuple[float | str, ...], program: Program, speed: float | N
     first, rest = values.get("1STPECK", ()), values.get("SUBPECK", ())
     steps = tuple(scale * step for step in (*values.get("STEP", ()), *values.get("INCR", ()), *first, *rest))
     if any(step <= 0.0 for step in steps) or (steps and depth * scale / min(steps) > _MOST_PECKS):
+        return None
+    if steps and not _PECKING & kinds:  # whether pecks come out of the hole nobody says
         return None
     dwell = 0
     if "DWELL" in values:

@@ -246,7 +246,7 @@ def travel_height(program: Program, poses: Ints, approach: Ints) -> Floats:
 def _peck_depths(cycle: Cycle) -> list[float]:
     """Depths to which the tool feeds, one after another."""
     depths = []
-    depth, steps = 0.0, list(cycle.steps) if cycle.pecking else []
+    depth, steps = 0.0, list(cycle.steps)
     while steps:
         depth += steps.pop(0) if len(steps) > 1 else steps[0]
         if depth >= cycle.depth - LEAST_PECK:

@@ -113,3 +113,5 @@ class WordRules:
                 room = (rule.share or 0.0) * self._rooms[name] * (1 + 1e-9) + 1e-5
                 if number is not None and float(number) > room:
                     yield wrong(f"{word} is more than {rule.share:g} of the tolerance")
+                elif number is not None and not float(number):
+                    yield wrong(f"{word}: 0 is no tolerance, and the control rounds as it likes")

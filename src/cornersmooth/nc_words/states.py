@@ -104,8 +104,8 @@ class WordStates:
         self._unsaid_at_retract: list[str] | None = None  # what was missing before the first retract
         self._moved = 0  # line of the last motion
         self._changed = True  # words have been said since
-        #: states that words have ended since, with these and their lines: they must be said again before the next
-        self._ended: dict[str, tuple[str, int]] = {}
+        #: states that words have ended since, with these: they must be said again before the next motion
+        self._ended: dict[str, str] = {}
 
     # complaints
 
@@ -215,15 +215,15 @@ class WordStates:
                 tell(NOT_LISTED, line, f"{word} under {tip}")
         spindle = self._held.get("spindle")
         if rule.changes_tool and spindle is not None and spindle.rule.tidy and spindle.line > self._moved:
-            self._ended["spindle"] = word, line
+            self.wrong(NOT_LISTED, line, f"{word} stops the spindle that was started before it")
 
     def _set(self, line: int, word: str, rule: WordRule, ruled: Ruled) -> None:
         """Take over the state that a word sets, and complain of what a program of our own says around it."""
         if rule.drops in self._held:
-            self._ended[rule.drops] = word, line
+            self._ended[rule.drops] = word
         if word in _STOPS:  # ends spindle and coolant on most machines
             on = [state for state, held in self._held.items() if held.rule.tidy and held.rule.compared]
-            self._ended = dict.fromkeys(on, (word, line)) | self._ended
+            self._ended = dict.fromkeys(on, word) | self._ended
         if rule.state:
             beside = [(other, its) for other, its in ruled if its.needs and its.needs.fullmatch(word)]
             more = [other for other, its in beside if not (its.compared or its.follows)]
@@ -266,10 +266,8 @@ class WordStates:
 
         `drills`: in a cycle of the control, so it does not go there at once.
         """
-        for state, (word, number) in self._ended.items():
-            if self._held[state].rule.compared and word not in _STOPS:
-                self.wrong(NOT_LISTED, number, f"{word} stops the spindle that was started before it")
-            elif state not in self._left and word in _STOPS:
+        for state, word in self._ended.items():
+            if state not in self._left and word in _STOPS:
                 self._lost_since(line, [f"{word} ends {self._held[state].text}, and the tool moves on without it"])
             elif state not in self._left:
                 self.unframed(NOT_ESTABLISHED, line, f"{state}: it must come after {word}, which deselects it")

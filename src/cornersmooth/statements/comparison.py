@@ -48,6 +48,9 @@ _AT_START: dict[str, float | str] = {**dict.fromkeys(_ENDED, "OFF"), "offset": 1
 #: kinds for which a control may have no words
 _WORDED = (*_ENDED, "offset", "register")
 
+#: values of what ends
+_ENDINGS = ("OFF", "ORIENT")
+
 #: states that a tool change stops, to go on behind it
 _STOPPED = ("spindle", "coolant")
 
@@ -282,8 +285,8 @@ def _habits(ours: list[Token], changes: list[int], end: float, away: _Away) -> s
     Those are what only ends what ends with the program anyway; and what ends a state which begins again before any
     motion, also where the program waits after a tool change: `changes` are the lines of those.
     """
-    found = _optional(ours)
     off = [token.kind in _ENDED and token.value == "OFF" for token in ours]
+    found = {k for k in _optional(ours) if ours[k].optional or ours[k].value in _ENDINGS}
     last = len(ours) - len(list(takewhile(bool, reversed(off))))
     found |= {k for k in range(last, len(ours)) if ours[k].place >= end or not away(end, ours[k])}
     on: Token | None = None

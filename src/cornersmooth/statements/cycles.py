@@ -97,7 +97,7 @@ def drilling(args: tuple[float | str, ...], program: Program, speed: float = 0.0
         depth = abs(depth)
     unit = program.mm_per_unit
     steps = tuple(unit * step for name in _STEPS for step in pecks[name])
-    if depth < 0 or any(step <= 0.0 for step in steps):
+    if depth < 0 or any(step <= 0.0 for step in steps) or (steps and not kinds & _PECKING):
         return Drilling()
     feeds = [(values[name] * (scale or unit), turn) for name, (scale, turn) in _FEEDS.items() if name in values]
     feed, per_revolution = feeds[0] if len(feeds) == 1 else (math.nan, False)
@@ -109,8 +109,7 @@ def drilling(args: tuple[float | str, ...], program: Program, speed: float = 0.0
     retract = _height(values, _RETURNS, unit)
     found = Drilling(depth * unit, feed, per_revolution, dwell, clearance=above, retract=retract)
     if "TAP" not in kinds:
-        pecking = steps if kinds & _PECKING else ()
-        return replace(found, feed_out=bool(kinds & _AT_FEED), steps=pecking, breaks_chips="BRKCHP" in kinds)
+        return replace(found, feed_out=bool(kinds & _AT_FEED), steps=steps, breaks_chips="BRKCHP" in kinds)
     if len(kinds) > 1 or steps or math.isnan(feed) or not (per_revolution or speed):
         return Drilling()
     return replace(found, feed=feed if per_revolution else feed / speed, per_revolution=True, tap=True, feed_out=True)

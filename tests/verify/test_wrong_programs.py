@@ -1,0 +1,171 @@
+"""Small wrong programs, each of a kind that has passed once: a word or a block of a right program is another one."""
+
+from __future__ import annotations
+
+import io
+import re
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from cornersmooth.cl import read
+from cornersmooth.errors import InputError
+from cornersmooth.kinematics import load_machine
+from cornersmooth.model import Program
+from cornersmooth.nc import Frame, choose_form
+from cornersmooth.pipeline import postprocess
+from cornersmooth.settings import Settings
+from cornersmooth.verdict import Verdict
+from cornersmooth.verify import Verification, verify
+
+SAMPLES = Path(__file__).parents[2] / "samples"
+ISO = ("fanuc", "haas", "linuxcnc", "mitsubishi")
+CONTROLS = (*ISO, "generic", "heidenhain", "siemens")
+MACHINES = {"haas": "table-ac", "linuxcnc": str(SAMPLES / "machines" / "three-axis.toml")}
+
+TWO_TOOLS = """LOADTL/3
+SPINDL/RPM,3000,CLW
+COOLNT/ON
+RAPID
+GOTO/0,0,50,0,0,1
+RAPID
+GOTO/0,0,5
+FEDRAT/MMPM,500
+GOTO/0,0,0
+GOTO/10,0,0
+RAPID
+GOTO/10,0,50
+LOADTL/4
+SPINDL/RPM,2000,CLW
+RAPID
+GOTO/0,0,50
+RAPID
+GOTO/0,0,5
+FEDRAT/MMPM,500
+GOTO/0,0,0
+GOTO/10,10,0
+RAPID
+GOTO/10,10,50
+FINI
+"""
+HOLES = """LOADTL/3
+SPINDL/RPM,3000,CLW
+RAPID
+GOTO/0,0,50,0,0,1
+CYCLE/{},DEPTH,15,CLEAR,2
+GOTO/10,0,0
+GOTO/40,0,0
+CYCLE/OFF
+RAPID
+GOTO/40,0,80
+SPINDL/OFF
+FINI
+"""
+
+
+@cache
+def program(text: str) -> Program:
+    """A CL file."""
+    return read(text.encode(), name="part.cls")
+
+
+@cache
+def right(text: str, control: str, cycles: str = "moves") -> tuple[str, ...]:
+    """The lines of a right program."""
+    machine = load_machine(MACHINES[control]) if control in MACHINES else None
+    form, stream = choose_form(control, "g1", machine=machine), io.BytesIO()
+    postprocess(program(text), stream, Settings(tolerance=0.02), form=form, frame=Frame(cycles=cycles), verify=False)
+    lines = tuple(stream.getvalue().decode().splitlines())
+    assert judged(text, control, lines).verdict == Verdict.PASSED
+    return lines
+
+
+def judged(text: str, control: str, lines: tuple[str, ...]) -> Verification:
+    """What is found in a program."""
+    machine = load_machine(MACHINES[control]) if control in MACHINES else None
+    written = ("\n".join(lines) + "\n").encode()
+    return verify(program(text), written, tolerance=0.02, control=control, machine=machine)
+
+
+def passes(text: str, control: str, lines: tuple[str, ...]) -> bool:
+    """Whether a program passes."""
+    try:
+        return judged(text, control, lines).verdict == Verdict.PASSED
+    except InputError:
+        return False
+
+
+def put(lines: tuple[str, ...], at: int, block: str, control: str, *, gone: int = 0) -> tuple[str, ...]:
+    """A program with a block more, in place of some."""
+    return *lines[:at], f"99 {block}" if control == "heidenhain" else block, *lines[at + gone :]
+
+
+def where(lines: tuple[str, ...], pattern: str, number: int = 0) -> int:
+    """The line of a pattern."""
+    return [k for k, line in enumerate(lines) if re.search(pattern, line) and line[:1] not in "(;"][number]
+
+
+# blending, and other smoothing of the control, without a limit
+
+
+@pytest.mark.parametrize("word", ["G64", "G64 P0", "G64 P0.000 Q0", "G64 Q0"])
+def test_path_control_without_a_tolerance(word: str) -> None:
+    lines = right(TWO_TOOLS, "linuxcnc")
+    assert not passes(TWO_TOOLS, "linuxcnc", put(lines, where(lines, "G64"), word, "linuxcnc", gone=1))
+
+
+# words beside a tool change
+
+
+@pytest.mark.parametrize("control", CONTROLS)
+@pytest.mark.parametrize("word", ["M3", "M4"])
+def test_the_spindle_is_started_before_a_tool_change(control: str, word: str) -> None:
+    lines = tuple(line for line in right(TWO_TOOLS, control) if "CORNERSMOOTH" not in line)  # also of another post
+    change = where(lines, "^(T4|.*TOOL CALL 4)", 0)
+    assert not passes(TWO_TOOLS, control, put(lines, change, word, control))
+    stop = where(lines[:change], r"\bM1\b", -1) if control != "generic" else change - 1
+    assert not passes(TWO_TOOLS, control, put(lines, stop, word, control, gone=1))
+
+
+@pytest.mark.parametrize("control", CONTROLS)
+@pytest.mark.parametrize("word", ["M4", "M7"])
+def test_what_is_switched_on_for_no_motion(control: str, word: str) -> None:
+    lines = right(TWO_TOOLS, control)
+    for place in (where(lines, r"\bM9\b"), where(lines, r"\bM3\b", 1)):
+        assert not passes(TWO_TOOLS, control, put(lines, place, word, control))
+
+
+# planes under tip control
+
+
+@pytest.mark.parametrize(
+    ("control", "word"),
+    [
+        ("siemens", "CYCLE800()"),
+        ("siemens", 'CYCLE800(1,"TC",0,57,0.,0.,0.,0.,0.,0.,0.,0.,0.,-1)'),
+        ("heidenhain", "PLANE RESET STAY"),
+        ("heidenhain", "PLANE SPATIAL SPA+0.0 SPB+0.0 SPC+0.0 TURN FMAX"),
+        ("fanuc", "G69"),
+        ("fanuc", "G68.2 X0. Y0. Z0. I0. J0. K0."),
+        ("mitsubishi", "G69"),
+        ("haas", "G255"),
+    ],
+)
+def test_planes_under_tip_control(control: str, word: str) -> None:
+    lines = right(TWO_TOOLS, control)
+    on = where(lines, "G43.5|TRAORI|FUNCTION TCPM F|G234")
+    for place in (on + 1, where(lines, r"^(\d+ )?(G1|LN) .*") + 1):
+        assert not passes(TWO_TOOLS, control, put(lines, place, word, control))
+
+
+# holes
+
+
+@pytest.mark.parametrize("words", ["DRILL,STEP,3", "SPOT,INCR,3", "REAM,1STPECK,3"])
+def test_pecks_of_a_cycle_that_does_not_peck_are_not_understood(words: str) -> None:
+    text = HOLES.format(f"{words},MMPM,100")
+    with pytest.raises(InputError, match="CS342"):
+        right(text, "fanuc")
+    plain = right(HOLES.format("DRILL,MMPM,100"), "fanuc", "native")
+    assert not passes(text, "fanuc", plain)
