@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import fields, replace
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from cornersmooth.model import Bools, Ints, Program, Runs
+from cornersmooth.arrays import Bools, Ints
+
+if TYPE_CHECKING:
+    from cornersmooth.model import Program, Runs
 
 Columns = TypeVar("Columns")
 
