@@ -1,4 +1,4 @@
-"""What can go wrong, and how it is said.
+"""What can go wrong, and how messages have it.
 
 `CornersmoothError` is raised for what stops the work; `Finding` records what was noticed while the work went on.
 Both carry a stable code. The library raises and returns them; only `cornersmooth.cli` prints them.
@@ -19,14 +19,14 @@ Severity = Literal["note", "warning", "error"]
 #: exit code of the command line for a fault of the program itself
 EXIT_INTERNAL = 70
 
-#: numbers of warnings that say nothing of the metal: how the input is spelt, what was asked for, what costs time, what
+#: numbers of warnings that say nothing of the metal: how the input is spelt, what options choose, what costs time, what
 #: the verdict says already
 _BESIDE_THE_METAL = frozenset((133, 134, 139, 174, 184, 325, 371, 509))
 
 #: numbers of warnings of what an option leaves out of the program
 _LEFT_OUT = frozenset((315,))
 
-#: numbers of notes of what the method asked for could not do, and another way did
+#: numbers of notes of what the chosen method could not do, and another way did
 _INSTEAD = frozenset((226, 229, 239, 378))
 
 

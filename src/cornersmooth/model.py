@@ -120,7 +120,7 @@ class Source:
 
 @dataclass(frozen=True)
 class Program:
-    """A tool path of n poses and what is said between them.
+    """A tool path of n poses and the statements between them.
 
     Notes
     -----
@@ -275,8 +275,8 @@ def _refuse(wrong: Bools | np.bool_, what: str, values: Floats, hint: str) -> No
     """Say which pose is the first that is wrong (n,), and the value (n,) or (n, 3) that it has."""
     if wrong.any():
         pose = int(np.argmax(wrong))
-        told = ", ".join(f"{value:g}" for value in np.atleast_1d(values[pose]))
-        raise InputError("CS167", f"the {what} of pose {pose} is {told}", hint)
+        numbers = ", ".join(f"{value:g}" for value in np.atleast_1d(values[pose]))
+        raise InputError("CS167", f"the {what} of pose {pose} is {numbers}", hint)
 
 
 class Trait(Flag):

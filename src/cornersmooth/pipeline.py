@@ -191,7 +191,7 @@ def postprocess(
         For moves that have none.
     plan_feeds : Limits, optional
         Plan the text within these limits, and those of the axes of the form's machine, and give every block the feed
-        that it reaches there. The whole text is held in memory then.
+        that it reaches there. The whole text is kept in memory then.
     verify : bool
         Whether the text is read back and measured before it takes its place.
     strict : bool
@@ -227,8 +227,8 @@ def postprocess(
     with _timed(seconds, "read"):
         program = (source if isinstance(source, Program) else read(source, **(reading or {}))).with_feed(feed)
     with _timed(seconds, "smooth"):
-        told = stage_of(progress, "smoothing")
-        smoothed = smooth(program, settings, form=form, progress=told, processes=processes)
+        step = stage_of(progress, "smoothing")
+        smoothed = smooth(program, settings, form=form, progress=step, processes=processes)
     return_free_memory()  # before processes share what there is
     frame = (frame or Frame()).with_offset_of(program, form)
     provenance = replace(
@@ -257,12 +257,12 @@ def postprocess(
             )
             stack.enter_context(verifier)
         with _timed(seconds, "write"):
-            told = stage_of(progress, "writing")
+            step = stage_of(progress, "writing")
             if plan_feeds is None:
-                written = nc.write(smoothed, output.stream, form=form, frame=frame, progress=told)
+                written = nc.write(smoothed, output.stream, form=form, frame=frame, progress=step)
             else:
                 whole = io.BytesIO()
-                written = nc.write(smoothed, whole, form=form, frame=frame, progress=told)
+                written = nc.write(smoothed, whole, form=form, frame=frame, progress=step)
                 output.stream.write(_with_planned_feeds(whole.getvalue(), program, smoothed.settings, form, plan_feeds))
             output.stream.flush()
         return_free_memory()
@@ -359,7 +359,7 @@ def _provenance(
 
 
 def _remarks(program: Program, settings: Settings) -> Iterator[Finding]:
-    """What is strange about what is asked for."""
+    """What is strange about path and settings."""
     cuts = np.isin(program.kind, (Move.LINEAR, Move.ARC, Move.HOLE))
     cuts[:1] = False  # nothing to come from
     if not cuts.any():

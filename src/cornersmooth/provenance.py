@@ -1,4 +1,4 @@
-"""What a text was made of and how, as comments in its head: enough to verify it without being told again."""
+"""What a text was made of and how, as comments in its head: enough to verify it without options."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Provenance:
     axis_tolerance: float | None = None  #: degrees: what the tool axis may be off, in place of ε at the axis point
     #: With ``_`` for blanks; ``"none"`` where the text says none, empty for that of the control's own table.
     work_offset: str = ""
-    extras: str = ""  #: functions of the control that were asked for
+    extras: str = ""  #: functions of the control that are on
     operation: int = 0  #: number of the operation of the CL file that it holds alone; 0 for all
 
     def lines(self) -> tuple[str, ...]:

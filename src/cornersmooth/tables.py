@@ -231,7 +231,7 @@ class Shelf:
         raise self.wrong(f"{where} is {value!r}", f"use {several}{', or leave it out' * (len(named) < 2)}")
 
     def _mapping(self, value: Any, where: str, keys: tuple[str, ...], kind: Any) -> dict[str, Any]:
-        """Table of entries of one type, by any keys, or by those that are known; dataclasses get theirs as a name."""
+        """Table of entries of one type, by any keys, or by known ones; dataclasses get their key as a name."""
         table = self.table(value, where)
         if keys:
             self.check_keys(table, keys, f"{where}.")

@@ -10,7 +10,7 @@ class Verdict(StrEnum):
     """How an NC program turned out, from the best to the worst."""
 
     PASSED = "PASSED"  #: All that the CL file asks for is in the program, within ε, and was measured
-    NOT_SMOOTHED = "NOT SMOOTHED"  #: Smoothing was asked for, and nothing was smoothed: the program is as it was
+    NOT_SMOOTHED = "NOT SMOOTHED"  #: Nothing was smoothed: the program is as it was
     INCOMPLETE = "INCOMPLETE"  #: An option left something out, such as holes; the rest was measured
     NOT_VERIFIED = "NOT VERIFIED"  #: Something that may bear on the motion was not looked at
     FAILED = "FAILED"  #: The program is wrong: verification found a problem

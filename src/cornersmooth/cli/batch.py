@@ -1,6 +1,6 @@
 """Several inputs: one after the other, in processes beside one another, or on a cluster; counted as they end.
 
-What became of the files is told in lines, and as a table for other programs: a row a file.
+What became of the files is printed in lines, and as a table for other programs: a row a file.
 """
 
 from __future__ import annotations
@@ -193,7 +193,7 @@ def counts_line(rows: Sequence[Mapping[str, Any]]) -> str:
         same = [row for row in rows if row["status"] == status]
         checks = sum(bool(row["to_check"]) for row in same)
         within = [f"{checks} to check"] if checks else []
-        if status == "skipped":  # what the run before said of them
+        if status == "skipped":  # with the verdicts of the run before
             words = Counter(row["verdict"] for row in same)
             within = [f"{words[word]} {word}" for word in list(Verdict)[1:] if words[word]]
         name = "errors" if status == "error" and len(same) != 1 else status
@@ -202,7 +202,7 @@ def counts_line(rows: Sequence[Mapping[str, Any]]) -> str:
 
 
 def row_of(outcome: Outcome) -> dict[str, Any]:
-    """Everything that is told of a file; None where there is nothing to tell."""
+    """Everything that a summary has of a file; None where there is nothing."""
     contents = outcome.contents
     summary = contents.get("summary", {})
     return {
@@ -256,8 +256,8 @@ def write_summary(path: str, rows: Sequence[Mapping[str, Any]]) -> None:
     else:
         table = csv.DictWriter(text, fieldnames=list(rows[0]), lineterminator="\n")
         table.writeheader()
-        told = ("; ".join(f"{code} {count}" for code, count in _counts(row).items()) for row in rows)
-        table.writerows({**row, "warnings": warnings} for row, warnings in zip(rows, told, strict=True))
+        warning_counts = ("; ".join(f"{code} {count}" for code, count in _counts(row).items()) for row in rows)
+        table.writerows({**row, "warnings": warnings} for row, warnings in zip(rows, warning_counts, strict=True))
     write_report(path, [text.getvalue()])
 
 

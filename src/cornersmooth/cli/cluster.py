@@ -90,7 +90,7 @@ def _connect(scheduler: str) -> tuple[Client, Any]:
         from distributed import Client, as_completed
     except ImportError as missing:
         raise SettingsError("CS243", "a scheduler needs Dask distributed", install_hint("cluster")) from missing
-    for name in ("distributed", "distributed.client"):  # what matters of it is told with the file
+    for name in ("distributed", "distributed.client"):  # what matters is in the message of the file
         logging.getLogger(name).setLevel(logging.CRITICAL)
     given: dict[str, Any] = {"scheduler_file": scheduler} if os.path.isfile(scheduler) else {"address": scheduler}
     try:

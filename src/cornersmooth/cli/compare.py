@@ -79,8 +79,8 @@ def _lines(table: Table, commands: list[str], verbose: bool) -> Iterator[str]:
         yield "leave it: no program takes less time than the unsmoothed lines"
     if best is not None:
         yield f"* {commands[best]}"
-        if told := limits_text(table.rows[best].limits):
-            yield f"  {told.removeprefix('; ')}"
+        if reached := limits_text(table.rows[best].limits):
+            yield f"  {reached.removeprefix('; ')}"
     if table.wider is not None:
         gain = table.wider_gain
         yield (

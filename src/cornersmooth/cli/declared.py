@@ -64,7 +64,7 @@ _frame = partial(declared, "Program", FrameSettings)
 
 @dataclass(frozen=True, kw_only=True)
 class Declared:
-    """What was asked for, as click has read it: fields are arguments and options, their types say what these may be.
+    """Arguments and options as click has read them; the types of the fields say what these may be.
 
     A command has some of them; the others have their defaults. Lengths are mm, angles degrees, times s.
     """

@@ -19,7 +19,7 @@ from cornersmooth.system import output
 STANDARD = "-"
 
 
-#: lines of a text that a terminal is shown where nobody has asked for all of it
+#: lines of a text that a terminal is shown without -o
 _SHOWN = 20
 
 
@@ -102,12 +102,12 @@ def target_of(path: str) -> output.Target:
     return sys.stdout.buffer
 
 
-def check_path(path: str, inputs: list[str], *, force: bool | None, ours: bytes = b"") -> bool:
+def check_path(path: str, inputs: list[str], *, force: bool | None, beginning: bytes = b"") -> bool:
     """Refuse an output that would destroy something, as `check_output`; standard streams are known by ``-``."""
     if path == STANDARD:
         return True
     sources = [0 if source == STANDARD else source for source in inputs]
-    return output.check_output(path, sources, force=force, ours=ours)
+    return output.check_output(path, sources, force=force, beginning=beginning)
 
 
 def suffix_of(path: str) -> str:

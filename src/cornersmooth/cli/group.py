@@ -103,7 +103,7 @@ def run(args: list[str] | None, ending: Shutdown) -> int:
         return EXIT_CLOSED_PIPE
     except (click.exceptions.Abort, KeyboardInterrupt):
         return EXIT_INTERRUPTED
-    except Exception as failure:  # a fault of ours: said in a line, and never with the code of a verdict
+    except Exception as failure:  # a fault of the program itself: one line, and never the code of a verdict
         if isinstance(failure, OSError) and failure.errno in _NO_ROOM:  # files are spoken for: it is standard output
             return _unwritten(failure)
         _say(internal_error(failure))
@@ -138,7 +138,7 @@ def flushed(code: int) -> int:
             return EXIT_CLOSED_PIPE
         if code == 0:
             return _unwritten(failure)
-        _close_quietly()  # it has been said already
+        _close_quietly()  # there is a message already
     return code
 
 

@@ -18,14 +18,14 @@ def run_info(given: Options) -> int:
     if is_program:
         from cornersmooth.cli.filter import describe_program
 
-        told = describe_program(data, name)
-        looks = f", looks like {told['looks_like']}" if told["looks_like"] else ""
+        contents = describe_program(data, name)
+        looks = f", looks like {contents['looks_like']}" if contents["looks_like"] else ""
         lines = [
-            f"file   {name}: an NC program{looks}, {told['lines']} lines",
-            f"cuts   {told['cuts']}",
+            f"file   {name}: an NC program{looks}, {contents['lines']} lines",
+            f"cuts   {contents['cuts']}",
             "       'cornersmooth filter' smooths them; name the control and the machine there",
         ]
-        say(given, told, lines)
+        say(given, contents, lines)
         return 0
     program = read(data, name=name, **given.reading())
     info = describe(program, given.tolerance, given.axis_length, given.load_machine())

@@ -27,7 +27,7 @@ class Input:
     source: str
     target: str
     reports: tuple[str, ...]
-    stem: str  #: its place below the folder that was named, without the ending: where its outputs go below theirs
+    stem: str  #: its place below the folder that was named, without the ending; outputs have the same in their folders
 
     @property
     def outputs(self) -> tuple[str, ...]:

@@ -28,7 +28,7 @@ from cornersmooth.verdict import Verdict
 if TYPE_CHECKING:
     from cornersmooth.feedrate import Limits
 
-#: how the reports of earlier runs begin; such files are replaced without being asked
+#: how the reports of earlier runs begin; such files are replaced without --force
 _OURS = {
     ".json": b'{\n "schema": "cornersmooth-report/',
     ".csv": b"corner,line,x,y,z,tip_angle_deg,",
@@ -110,7 +110,7 @@ def _check(job: Job, *, replace_target: bool | None = False) -> dict[str, bool |
     if not force and replace_target is None:
         may_replace[job.target] = None
     for path in job.reports:
-        may_replace[path] = check_path(path, [job.source], force=force, ours=_OURS[suffix_of(path)])
+        may_replace[path] = check_path(path, [job.source], force=force, beginning=_OURS[suffix_of(path)])
     return may_replace
 
 

@@ -29,7 +29,7 @@ POINTS = "points"
 
 
 class Options(Declared):
-    """What was asked for, and what that stands for."""
+    """Arguments and options, and what they stand for."""
 
     def load_control(self) -> Control:
         """Control of that name, of that file, or of the shop settings."""

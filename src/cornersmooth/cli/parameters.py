@@ -163,5 +163,5 @@ ToolShape = Annotated[Any, Value("tool", _tool)]
 ControlName = Annotated[Any, Value("text", str, partial(_offer, "controls"))]
 MachineName = Annotated[Any, Value("text", str, partial(_offer, "machines"))]
 FormName = Annotated[str, Value("text", str, _forms)]
-#: whether a file can be read is said where it is read, with the exit code of inputs
+#: whether a file can be read shows where it is read, with the exit code of inputs
 Path = Annotated[str, click.Path(readable=False)]

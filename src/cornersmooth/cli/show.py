@@ -98,8 +98,8 @@ def _progress_of_axis(stage: str, done: int, total: int) -> None:
 
 def show_findings(source: str, findings: Sequence[dict[str, Any]], verbose: int) -> None:
     """Print the findings of one file, each on its line: first what is to be checked, all of it."""
-    told = [finding for finding in findings if finding["code"] != NOT_VERIFIED]  # the first line says it
-    ranked = sorted(told, key=lambda one: (not one["to_check"], ("error", "warning", "note").index(one["severity"])))
+    listed = [finding for finding in findings if finding["code"] != NOT_VERIFIED]  # the first line says it
+    ranked = sorted(listed, key=lambda one: (not one["to_check"], ("error", "warning", "note").index(one["severity"])))
     if not verbose:
         ranked = [finding for finding in ranked if finding["severity"] != "note"]
     count = max(_FINDINGS_SHOWN, sum(finding["to_check"] for finding in ranked))

@@ -58,10 +58,10 @@ def run_smooth(given: Options) -> int:
         ending.keep = keep
         ending.say = lambda: "\n".join((*lines(), interrupted_line(batch.rows())))
         for outcome in batch.run(ending):
-            told = outcome.status != "error" and not given.quiet and (progress is None or given.verbose > 0)
-            if told:
+            printed = outcome.status != "error" and not given.quiet and (progress is None or given.verbose > 0)
+            if printed:
                 print_line(line_of(outcome))
-            _tell(outcome, told)
+            _tell(outcome, printed)
             worst = max(worst, outcome.exit_code)
     ending.keep = None
     keep()
@@ -81,31 +81,31 @@ def _alone(job: Job) -> int:
         outcome = run_job(job, progress)
     if outcome.held_back and not given.quiet:
         print_line(f"... {more(outcome.held_back, 'line')}; -o FILE writes them, -o - shows them all")
-    told = outcome.contents and not given.quiet and not given.as_json
-    if told:
+    printed = outcome.contents and not given.quiet and not given.as_json
+    if printed:
         show_verdict(outcome.contents, outcome.saving)
     _tell(outcome)
     if outcome.contents and given.as_json:
         say_json(outcome.contents)
-    if told:
+    if printed:
         show_summary(outcome.contents, outcome.seconds, given.verbose)
     return outcome.exit_code
 
 
-def _tell(outcome: Outcome, told: bool = False) -> None:
-    """Print what went wrong and what was noticed; where no line has told the verdict, any but a plain PASSED."""
+def _tell(outcome: Outcome, printed: bool = False) -> None:
+    """Print what went wrong and what was noticed; where no line has the verdict, any but a plain PASSED."""
     job, given = outcome.job, outcome.job.given
     if outcome.message:
         print_message(outcome.message)
     elif (
-        not told
+        not printed
         and (given.quiet or job.batch)
         and (outcome.verdict not in ("", Verdict.PASSED) or (outcome.contents and job.loosened))
     ):
         print_line(f"{job.source}: {outcome.verdict_text}")
     if outcome.contents and not given.quiet:
         findings = outcome.contents["findings"]
-        if not job.batch:  # the verdict has told what is to be checked
+        if not job.batch:  # the verdict has what is to be checked
             findings = [finding for finding in findings if not finding["to_check"]]
         show_findings(job.source, findings, given.verbose)
 

@@ -51,10 +51,10 @@ def run_surface(given: Options) -> int:
     return 0 if found.kept else 1
 
 
-def _tool(program: Program, asked: Tool | None) -> Tool:
+def _tool(program: Program, chosen: Tool | None) -> Tool:
     """The tool of the option, or the only one of the file."""
-    if asked is not None:
-        return asked
+    if chosen is not None:
+        return chosen
     tools = tools_of(program)
     distinct = list({tool: line for _, tool, line in tools}.items())
     if len(distinct) == 1:

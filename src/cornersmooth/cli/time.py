@@ -140,8 +140,8 @@ def _tell_feeds(program: Program, feed: float | None) -> None:
 def _tables(compared: Comparison, verbose: bool) -> Iterator[str]:
     """Times and savings; with `verbose` what was reached, and the places that lose most."""
     settings, saving = compared.settings, compared.saving_percent
-    told = times_text(compared.seconds, ["as_written"], limiting(compared.laws["as_written"]))
-    yield f"{told}; {limits_of(None if compared.machine is None else compared.machine.name)}"
+    shown = times_text(compared.seconds, ["as_written"], limiting(compared.laws["as_written"]))
+    yield f"{shown}; {limits_of(None if compared.machine is None else compared.machine.name)}"
     own = settings.axis_tolerance
     second = f"axis point at {settings.axis_length:g} mm" if own is None else f"tool axis {own:g} deg"
     yield f"tolerance {settings.tolerance:g} mm, {second}"
@@ -153,8 +153,8 @@ def _tables(compared: Comparison, verbose: bool) -> Iterator[str]:
             f"{saved[base]:>{width}.1f}" if base in saved else f"{'':>{width}}"
             for base, width in zip(LAWS[:2], (11, 14), strict=True)
         )
-        told = f"{stops(law):>6}{turning_seconds(law):>8.1f}{law.length:>9.1f}"
-        yield f"{_TITLES[name]:<22}{law.total:>10.3f}{parts}{told}"
+        shown = f"{stops(law):>6}{turning_seconds(law):>8.1f}{law.length:>9.1f}"
+        yield f"{_TITLES[name]:<22}{law.total:>10.3f}{parts}{shown}"
     yield f"{'at constant feed':<22}{compared.constant_feed_seconds:>10.3f}"
     if not verbose:
         return
@@ -188,8 +188,8 @@ def _axis_table(compared: Comparison) -> Iterator[str]:
     yield f"reached of the limits of {machine}, %: speed, acceleration, jerk"
     yield f"{'':<20}" + "".join(f"{peak.name:>12}" for peak in first)
     for name, axes in found.items():
-        told = (" ".join(f"{100.0 * used:.0f}" for used in peak.used) for peak in axes)
-        yield f"{_TITLES[name].replace(',', ''):<20}" + "".join(f"{text:>12}" for text in told)
+        shown = (" ".join(f"{100.0 * used:.0f}" for used in peak.used) for peak in axes)
+        yield f"{_TITLES[name].replace(',', ''):<20}" + "".join(f"{text:>12}" for text in shown)
     for order, per in enumerate(("s", "s2", "s3")):
         units = (f"{peak.limits[order]:g} {'mm' if peak.name in LINEAR else 'deg'}/{per}" for peak in first)
         yield f"{('limits' if not order else ''):<20}" + "".join(f"{text:>12}" for text in units)

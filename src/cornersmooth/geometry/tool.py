@@ -31,7 +31,7 @@ class Tool:
     centre_up: float
     tip_angle: float = 0.0  #: degrees: Rise of the bottom line from the tip outwards (APT's α)
     taper: float = 0.0  #: degrees: Angle between side line and axis, positive where the tool widens upwards (APT's β)
-    length: float = 0.0  #: mm: For drawing; the side line goes on without end for measuring. 0 where it is not said.
+    length: float = 0.0  #: mm: For drawing; the side line goes on without end for measuring. 0 where the file has none.
 
     def __post_init__(self) -> None:
         numbers = (self.diameter, self.corner_radius, self.centre_out, self.centre_up, self.tip_angle, self.taper)

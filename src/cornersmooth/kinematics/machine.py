@@ -63,8 +63,8 @@ class Dynamics:
         """One line for people."""
         unit = "mm" if self.linear else "deg"
         limits = ((self.velocity, "min"), (self.acceleration, "s2"), (self.jerk, "s3"))
-        told = ", ".join(f"{value:g} {unit}/{per}" for value, per in limits if math.isfinite(value))
-        return f"{self.name} up to {told}" if told else f"{self.name} without limits"
+        described = ", ".join(f"{value:g} {unit}/{per}" for value, per in limits if math.isfinite(value))
+        return f"{self.name} up to {described}" if described else f"{self.name} without limits"
 
 
 Vector = tuple[float, float, float]
@@ -304,8 +304,8 @@ class Machine:
         if self.tip_control:
             lines.append("  tip control of the kinematics on by {}, off by {}".format(*self.tip_control))
         for key, position in (("home", self.home), ("tool change", self.tool_change)):
-            told = " ".join(f"{name}{value:g}" for name, value in position)
-            lines += [f"  {key} at {told} of the machine"] * bool(position)
+            described = " ".join(f"{name}{value:g}" for name, value in position)
+            lines += [f"  {key} at {described} of the machine"] * bool(position)
         lines += [f"  {item.describe()}" for item in self.dynamics]
         return "\n".join(lines)
 

@@ -107,13 +107,13 @@ class Posed:
     def describe(self) -> str:
         """Say which way the tool points and where the linear axes stand, in a few lines."""
         machine = self.machine
-        told = "with the heads at zero, as travel and points are given"
+        remark = "with the heads at zero, as travel and points are given"
         lines = [
             f"{machine.name} at {_rotary(machine, self.angles)} deg" if machine.names else machine.name,
             f"  tool vector       {_words('IJK', self.axis, 7)}",
             f"  tip on the part   {_words(LINEAR, self.tip)} mm",
             f"  machine position  {_words(LINEAR, self.position)} mm, from the zero of the part, tool length taken off",
-            f"  spindle nose      {_words(LINEAR, self.nose)} mm {told}",
+            f"  spindle nose      {_words(LINEAR, self.nose)} mm {remark}",
         ]
         if self._found.singular[0]:
             lines.append(f"  at the pole: {machine.names[0]} does not turn the tool axis")

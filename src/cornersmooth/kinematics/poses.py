@@ -72,7 +72,7 @@ def solutions(machine: Machine, axis: Floats) -> Solutions:
 def _with_one_axis(machine: Machine, axis: Floats) -> Solutions:
     """Angles that come nearest to tool axes with one rotary axis or none: both solutions are the same.
 
-    The axis k₀ goes round a₁ on a cone; the nearest k on it has the azimuth of the axis asked for.
+    The axis k₀ goes round a₁ on a cone; the nearest k on it has the azimuth of the wanted axis.
     """
     angles = np.zeros((len(axis), 2, 2))
     about, tool = machine.axes[0].unit, machine.tool

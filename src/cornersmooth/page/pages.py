@@ -46,7 +46,7 @@ def page_and_saving(
     """Page of a file that was smoothed, written and verified, and the times that its verdict tells.
 
     A program that went to a stream is written once more for it, in the same `frame`. Speeds are planned within
-    `limits`, and those of `axes` or of the machine of the form. `timed` says whether a time is said. `tool` replaces
+    `limits`, and those of `axes` or of the machine of the form. `timed` says whether there is a time. `tool` replaces
     that of the file.
     """
     form, settings = result.form, result.smoothed.settings
@@ -174,10 +174,10 @@ _MOST_PROBLEMS = 100
 
 def surface_text(surface: SurfaceMap) -> str:
     """What is cut too much and what is left, in words."""
-    told = surface.as_dict()
-    over, under = told["overcut"]["max_mm"], told["undercut"]["max_mm"]
-    within = told["within_tolerance_percent"]
-    share = "" if within is None else f"; {within:.4g} % of {told['points']:,} points within {surface.tolerance:g} mm"
+    shown = surface.as_dict()
+    over, under = shown["overcut"]["max_mm"], shown["undercut"]["max_mm"]
+    within = shown["within_tolerance_percent"]
+    share = "" if within is None else f"; {within:.4g} % of {shown['points']:,} points within {surface.tolerance:g} mm"
     rows = "" if surface.passes is None else f"; passes: {passes_text(surface.passes)}"
     return f"the surface is overcut by up to {over:.4f} mm and undercut by up to {under:.4f} mm{share}{rows}"
 
@@ -219,9 +219,9 @@ def _told(
 def _problems(found: Verification | None, findings: Iterable[Finding]) -> list[dict[str, Any]]:
     """Problems in the order of the program, then warnings: those to check first."""
     rows = [] if found is None else [("error", one.nc_line, one.cl_line, one.text, one.code) for one in found.problems]
-    told = sorted((one for one in findings if one.severity != "note"), key=lambda one: not one.to_check)
-    rows += [(one.severity, 0, one.line, _text(one), one.code) for one in told]
-    count = len(told) + (0 if found is None else found.problem_count)
+    shown = sorted((one for one in findings if one.severity != "note"), key=lambda one: not one.to_check)
+    rows += [(one.severity, 0, one.line, _text(one), one.code) for one in shown]
+    count = len(shown) + (0 if found is None else found.problem_count)
     if count > _MOST_PROBLEMS:
         rows[_MOST_PROBLEMS:] = [("note", 0, 0, f"{count - _MOST_PROBLEMS:,} more; a JSON report lists them", "")]
     keys = ("severity", "nc_line", "cl_line", "text", "code")

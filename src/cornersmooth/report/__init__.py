@@ -61,7 +61,7 @@ def report(
     machine : Machine, optional
         Whose rotary axes accelerate at places that are listed.
     """
-    told = (*smoothed.findings, *findings)
+    all_findings = (*smoothed.findings, *findings)
     program, corners = smoothed.program, smoothed.corners
     done, runs = corners.rounded, smoothed.runs
     worst = worst_corners(smoothed, dense=dense)
@@ -71,7 +71,7 @@ def report(
         "method": smoothed.settings.method,
         "corners": len(corners),
         "corners_in_runs": int((corners.status == Status.IN_RUN).sum()),
-        "instead": [{"count": one.count, "text": one.text} for one in told if one.instead],
+        "instead": [{"count": one.count, "text": one.text} for one in all_findings if one.instead],
         "smoothed": int(done.sum()),
         **counts_of(corners),
         "sharp": sharp,
@@ -90,11 +90,11 @@ def report(
     summary |= construction_of(smoothed.settings.method).report_summary(corners)
     contents = record(
         "smooth",
-        judge(verification, told, unverified),
+        judge(verification, all_findings, unverified),
         source=cl_file(program, source_sha256),
         program=nc_file,
         settings=smoothed.settings.as_dict(),
-        findings=told,
+        findings=all_findings,
         command=command,
         loosened=loosened,
         times=times,

@@ -39,22 +39,23 @@ def surface_csv(surface: SurfaceMap) -> Iterator[str]:
 
 def surface_lines(surface: SurfaceMap) -> Iterator[str]:
     """Table and histogram to read."""
-    told = surface.as_dict()
+    values = surface.as_dict()
     yield f"{'tool':<18}{surface.tool.describe()}, cutting edge {surface.edge:g} mm"
-    yield f"{'points':<18}{told['points']:,}; {told['points_cut_away_elsewhere']:,} more are cut away by other moves"
-    if told["points_beyond_reach"]:
-        yield f"{'not reached':<18}{told['points_beyond_reach']:,} points, farther off than {surface.reach:g} mm"
+    elsewhere = values["points_cut_away_elsewhere"]
+    yield f"{'points':<18}{values['points']:,}; {elsewhere:,} more are cut away by other moves"
+    if values["points_beyond_reach"]:
+        yield f"{'not reached':<18}{values['points_beyond_reach']:,} points, farther off than {surface.reach:g} mm"
     for name in ("overcut", "undercut"):
-        own = told[name]
+        own = values[name]
         where = f" at CL line {own['cl_line']}" if own["cl_line"] else ""
         yield (
             f"{name:<18}largest {own['max_mm']:.6f} mm{where}, 95 % within {own['percentile_95_mm']:.6f} mm, "
             f"mean {own['mean_mm']:.6f} mm, {own['points']:,} points"
         )
     yield f"{'passes':<18}{passes_text(surface.passes)}"
-    if told["rms_mm"] is not None:
-        yield f"{'all':<18}mean {told['mean_mm']:.6f} mm, root mean square {told['rms_mm']:.6f} mm"
-        yield f"{'within':<18}{told['within_tolerance_percent']:.4g} % of the points within {surface.tolerance:g} mm"
+    if values["rms_mm"] is not None:
+        yield f"{'all':<18}mean {values['mean_mm']:.6f} mm, root mean square {values['rms_mm']:.6f} mm"
+        yield f"{'within':<18}{values['within_tolerance_percent']:.4g} % of the points within {surface.tolerance:g} mm"
         yield ""
         yield from _histogram(surface)
 

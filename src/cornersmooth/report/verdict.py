@@ -61,7 +61,7 @@ class Saving:
 
     @property
     def gains(self) -> bool:
-        """Whether the program as it is written takes less time, in the digits that are said."""
+        """Whether the program as it is written takes less time, in the digits that are written."""
         return round(self.written, 1) < round(self.direct, 1)
 
 
@@ -166,8 +166,8 @@ def time_text(saving: Saving, limits: str | None) -> str:
     share = f" ({100.0 * (saving.written / saving.direct - 1.0):+.0f} %)" if saving.direct else ""
     against = f" of {saving.against}" if saving.against else ""
     where = f" on {limits}" if limits else ""
-    told = "" if saving.gains else "; no time is gained, leave the program as it was"
-    text = f"time{where} {saving.written:.1f} s instead of {saving.direct:.1f} s{against}{share}{told}"
+    advice = "" if saving.gains else "; no time is gained, leave the program as it was"
+    text = f"time{where} {saving.written:.1f} s instead of {saving.direct:.1f} s{against}{share}{advice}"
     return text + limits_text(saving.limits) + ("" if limits else f"; {limits_of(None)}")
 
 
@@ -211,7 +211,7 @@ def times_text(seconds: Mapping[str, float], names: Sequence[str], limits: Seque
     best = min(names, key=lambda name: seconds[name])
     saved = jumps - seconds[best]
     share = f" ({100.0 * abs(saved) / jumps:.0f} %)" if jumps else ""
-    told = f"saves {saved:.1f} s of" if saved >= 0.0 else f"takes {-saved:.1f} s more than"
+    gain = f"saves {saved:.1f} s of" if saved >= 0.0 else f"takes {-saved:.1f} s more than"
     best = best.replace("_", " ")
-    text = f"{best} {told} the {jumps:.1f} s of the direct path{share}, which takes {stops:.1f} s with stops at corners"
+    text = f"{best} {gain} the {jumps:.1f} s of the direct path{share}, which takes {stops:.1f} s with stops at corners"
     return text + limits_text(limits)

@@ -254,7 +254,7 @@ WEIGHT_DECIMALS = 3
 #: Half a unit of the fourth decimal, which some CL files have, is a tenth of a degree there at 175, and 6 at 179.9.
 FLIP_ANGLE = 175.0
 
-#: Poses up to which the time is planned without being asked for: a minute of work.
+#: Poses up to which the time is planned by default: a minute of work.
 TIMED_POSES = 20_000
 
 #: closed bounds of the numeric settings

@@ -56,7 +56,7 @@ _SYNCHRONIZE, _NO_SUCH_PROCESS, _WAIT_TIMEOUT = 0x100000, 87, 258
 _unfinished: dict[str, int] = {}
 
 
-class ClosedPipe(Exception):  # noqa: N818 - no error of ours: whoever read the output has seen enough
+class ClosedPipe(Exception):  # noqa: N818 - no error: whoever read the output has seen enough
     """The reader of the output has gone, as with ``| head``."""
 
 
@@ -65,7 +65,7 @@ def check_output(
     inputs: Iterable[str | os.PathLike[str] | int] = (),
     *,
     force: bool | None = False,
-    ours: bytes = b"",
+    beginning: bytes = b"",
 ) -> bool:
     """Refuse an output that would destroy something; say whether what stands at its place may be replaced.
 
@@ -75,7 +75,7 @@ def check_output(
         What is read: an output is never one of them.
     force : bool or None
         Whether an existing file may be replaced; None for not, but it may stay if it turns out to be the same.
-    ours : bytes
+    beginning : bytes
         How a file begins that an earlier run made; such a file is replaced without `force`.
 
     Raises SettingsError CS220: the output is an input. OutputError CS401 to CS403: it exists and may not be replaced,
@@ -94,7 +94,7 @@ def check_output(
     if force or force is None or not os.path.isfile(path):
         return bool(force)
     with contextlib.suppress(OSError), open(path, "rb") as stream:
-        if ours and stream.read(len(ours)) == ours:
+        if beginning and stream.read(len(beginning)) == beginning:
             return True
     raise OutputError("CS403", "exists already", "use --force to replace it", file=path)
 
@@ -281,7 +281,7 @@ def reason(failure: OSError) -> str:
 
 
 @contextlib.contextmanager
-def _moving(target: str, told: str, *, replace: bool) -> Iterator[Output]:
+def _moving(target: str, name_in_errors: str, *, replace: bool) -> Iterator[Output]:
     """Write beside the target, and move there at the end."""
     with temporary_name(*os.path.split(target)) as temporary:
         with _opened(temporary) as file:
@@ -300,12 +300,12 @@ def _moving(target: str, told: str, *, replace: bool) -> Iterator[Output]:
         if replace:
             os.replace(temporary, target)
         else:
-            _move_to_free_place(temporary, target, told)
+            _move_to_free_place(temporary, target, name_in_errors)
         if not marked:
             _write_beside(target, mark)
 
 
-def _move_to_free_place(temporary: str, target: str, told: str) -> None:
+def _move_to_free_place(temporary: str, target: str, name_in_errors: str) -> None:
     """Move a file to a name that nobody else has taken meanwhile."""
     try:
         try:
@@ -321,7 +321,7 @@ def _move_to_free_place(temporary: str, target: str, told: str) -> None:
         if filecmp.cmp(temporary, target, shallow=False):  # what stands there is the same
             return
         raise OutputError(
-            "CS403", "has appeared while the program was made", "use --force to replace it", file=told
+            "CS403", "has appeared while the program was made", "use --force to replace it", file=name_in_errors
         ) from None
 
 
@@ -358,7 +358,7 @@ def _remove_abandoned(folder: str, name: str) -> None:
 
 
 def _is_running(process: int) -> bool:
-    """Whether a process of this number runs on this computer, as far as that can be told."""
+    """Whether a process of this number runs on this computer, as far as that can be seen."""
     if sys.platform == "win32":  # there, signal 0 is Ctrl-C
         kernel = ctypes.WinDLL("kernel32", use_last_error=True)
         kernel.OpenProcess.restype = ctypes.c_void_p

@@ -32,7 +32,7 @@ _CONTEXT: Final = get_context("fork" if sys.platform == "linux" else None)
 #: after so many seconds a wait looks for signals: Windows ends it for Ctrl-C only
 _LOOK: Final = 0.5
 
-#: what is said of a process that has gone without a word, which is what a system short of memory does
+#: the message of a process that has gone without a word, which is what a system short of memory does
 _ENDED: Final = "a process that helped was ended"
 
 
@@ -52,10 +52,10 @@ class Helper:
     """A process that calls `work` while this one does another thing; it has all that this one has, and may fork."""
 
     def __init__(self, work: Callable[[], Any]) -> None:
-        self.connection, theirs = _CONTEXT.Pipe()
-        self._process = _forked(_report, work, theirs, self.connection, daemon=False)
+        self.connection, other_end = _CONTEXT.Pipe()
+        self._process = _forked(_report, work, other_end, self.connection, daemon=False)
         self.pid = self._process.pid
-        theirs.close()
+        other_end.close()
 
     def result(self) -> Any:
         """Wait for what the work returns, or raise what it raised.
@@ -125,10 +125,10 @@ class _Member:
     """A process at the other end of a pipe, with one item at a time: a pipe full both ways would stand still."""
 
     def __init__(self, work: Callable[[Any], Any], others: list[_Member]) -> None:
-        self.connection, theirs = _CONTEXT.Pipe()
-        ours = [*(other.connection for other in others), self.connection]
-        self.process = _forked(_serve, work, theirs, ours, daemon=True)
-        theirs.close()
+        self.connection, other_end = _CONTEXT.Pipe()
+        own_ends = [*(other.connection for other in others), self.connection]
+        self.process = _forked(_serve, work, other_end, own_ends, daemon=True)
+        other_end.close()
         self.found = deque[Any]()
         self.working = False
 

@@ -117,7 +117,7 @@ class Cell:
             group.put(matrix, values, ended)
             if self.form.trim:
                 ended = (values == 0) & ended
-        # a zero before the point stays where it is asked for, and where it is all there is
+        # a zero before the point stays where the layout has one, and where it is all there is
         alone: Bools | bool = ended if self.part and not self.form.leading_zero else True
         for group in self.whole[:-1]:
             left, values = group.split(left)

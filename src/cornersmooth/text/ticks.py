@@ -13,7 +13,7 @@ from cornersmooth.errors import OutputError
 from cornersmooth.model import Floats, Ints
 
 #: largest number of ticks, and the most decimals: within them a product with a power of ten is known to a fraction of
-#: a tick, so that a tie can be told
+#: a tick, so that a tie can be seen
 TICK_LIMIT: Final = 10**15
 MOST_DECIMALS: Final = 15
 

@@ -87,7 +87,7 @@ class Table:
     share: float  #: Part of the poses that was looked at
     law: str  #: By which lines are planned
     rows: tuple[Row, ...]
-    wider: Row | None = None  #: The best row with twice the tolerance, where that was asked for
+    wider: Row | None = None  #: The best row with twice the tolerance, if it was planned
 
     @property
     def best(self) -> int | None:
@@ -101,7 +101,7 @@ class Table:
 
     @property
     def gains(self) -> bool:
-        """Whether any program takes less time than the unsmoothed lines, in the digits that are said."""
+        """Whether any program takes less time than the unsmoothed lines, in the digits that are written."""
         best = None if self.best is None else self.rows[self.best].seconds
         return best is not None and round(best, 1) < round(self.unsmoothed, 1)
 

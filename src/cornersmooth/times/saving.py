@@ -77,14 +77,14 @@ class Timing:
         )
         moves = law.path.program
         begin, end = _from_to(program, moves.tip, moves.axis)
-        told = tuple(limiting(law))
+        reached = tuple(limiting(law))
         if begin < 0:
-            return law.total, told
+            return law.total, reached
         seconds = law.times_at(law.edge[np.searchsorted(law.path.move, [begin, end], side="right")])
-        return float(seconds[1] - seconds[0]), told
+        return float(seconds[1] - seconds[0]), reached
 
     def unsmoothed(self, program: Program, progress: Progress | None = None) -> tuple[float, str]:
-        """Time of the lines of the CL file, s, and what is to be said of them.
+        """Time of the lines of the CL file, s, and a remark on them.
 
         On LinuxCNC they are written as lines of rotary words under G64 with P = ε.
         """
