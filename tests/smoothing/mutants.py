@@ -32,10 +32,10 @@ class Mutant(NamedTuple):
 
 # fmt: off
 MUTANTS = (
-    Mutant('(20)-(22): v = u', ROOTS, (('    return v, missing\n', '    return 0.0 * v + u, missing\n'),), '20 or 22'),
+    Mutant('(20)-(22): v = u', ROOTS, (('    return v.T, missing.T\n', '    return 0.0 * v.T + u, missing.T\n'),), '20 or 22'),
     Mutant('(26): the joint has the axis of v(1)', PAPER, (('        tops[:, -1] = axis_curve[:, -1]', '        tops[:, -1] = tops[:, -1]'),), '26'),
     Mutant('(27): linear in place of the great circle', PAPER, (('turned = np.sin((1.0 - share) * angle) * one + np.sin(share * angle) * other', 'turned = (1.0 - share) * one + share * other'),), '24'),
-    Mutant('(21): the grid alone', ROOTS, (('_NEAR, _NEAR_STEPS, _SHORT = 1.0 / 16.0, 6, 1e-7', '_NEAR, _NEAR_STEPS, _SHORT = -1.0, 6, 1e-7'), ('found = _zero(ends, start, wanted)', 'found = np.clip(start, *ends)'),), '20'),
+    Mutant('(21): the grid alone', ROOTS, (('_NEAR, _NEAR_STEPS, _SHORT = 1.0 / 16.0, 4, 1e-7', '_NEAR, _NEAR_STEPS, _SHORT = -1.0, 4, 1e-7'), ('near = ~turns & (', 'near = turns & ('), ('found = _zero(ends, start, wanted)', 'found = np.clip(start, *ends)'),), '20'),
     Mutant('(4): another basis', CURVES, (('            0.25 * s**3,\n', '            0.2 * s**3,\n'),), '3_and_4'),
     Mutant('(3): weights left out', CURVES, (('np.stack((one, w1, w2, w1, one)', 'np.stack((one, one, w2, one, one)'),), '3_and_4'),
     Mutant('(9): second control point', CURVES, (('points[:, 1] -= RATIO', 'points[:, 1] -= 0.6'),), '5_to_9'),
@@ -44,9 +44,10 @@ MUTANTS = (
     Mutant('(15), (16): the larger of both lengths', PAPER, (('by_tolerance = np.minimum(\n', 'by_tolerance = np.maximum(\n'),), '11'),
     Mutant('(16): 1.1 of the tolerance', PAPER, (('divide(settings.common_tolerance +', 'divide(1.1 * settings.common_tolerance +'),), '11'),
     Mutant('(19): sine of the whole turn', PAPER, (('unit(leg_in)) / 2.0, 0.0)', 'unit(leg_in)), 0.0)'),), '11'),
-    Mutant('v runs backwards', ROOTS, (('        low_limit = v[:, j]\n        target = low_limit + step', '        low_limit, target = 0.0 * v[:, j], v[:, j] + step'),), '20'),
-    Mutant('the root nearest to the last one', ROOTS, (('target = low_limit + step', 'target = low_limit + 0.0 * step'),), '20'),
-    Mutant('v in another knot interval', ROOTS, (('float(u[j] >= 0.5) / 2.0, (1.0 + float(u[j] > 0.5)) / 2.0', '0.0, 1.0'),), '20'),
+    Mutant('v runs backwards', ROOTS, (('np.maximum(last, low), np.clip(', 'np.maximum(0.0 * last, low), np.clip('), ('np.maximum.accumulate(found, axis=0)', 'found + 0.0')), '20'),
+    Mutant('the root nearest to the last one', ROOTS, (('np.clip(last + step,', 'np.clip(last + 0.0 * step,'),), '20'),
+    Mutant('v in another knot interval', ROOTS, (('float(half.second) / 2.0, (1.0 + half.second) / 2.0', '0.0, 1.0'), ('near = ~turns & (', 'near = turns & (')), '20'),
+    Mutant('the only root, of an excess that turns', ROOTS, (('turns = (least <= 0.0) & (most >= 0.0)', 'turns = np.zeros_like(least, np.bool_)'),), '20'),
     Mutant('without a root, any v', ROOTS, (('sign * first), np.where(root', '0.0 * first - 1.0), np.where(root'),), '20'),
     Mutant('(22): the tip at v, too', PAPER, (('tips = nurbs.evaluate(tip_curve[which], weights, u[:, None])', 'tips = nurbs.evaluate(tip_curve[which], weights, at[:, None])'),), '22'),
     Mutant('(24): shares of the whole segment', PAPER, (('fraction: Floats = low + share * (high - low)', 'fraction: Floats = share * high'),), '24'),
@@ -54,7 +55,7 @@ MUTANTS = (
     Mutant('least residual in place of the largest', ROOTS, (('return v, residual.max(axis=1)', 'return v, residual.min(axis=1)'),), '23'),
     Mutant('the motion is not measured', PAPER, (('over = share > 1.0 + EXACT', 'over = share > 1e9'),), 'keeps_the_tolerance'),
     Mutant('0.99 of the size in place of what just keeps ε', PAPER, (('keeping = (1.0 - _JUST) / share', 'keeping = 0.97 * (1.0 - _JUST) / share'),), 'eq_16 or construction'),
-    Mutant('the rest of segments is not looked at', PAPER, (('found.append(part[share.max(axis=1) > 1.0])', 'found.append(part[:0])'),), 'left_of'),
+    Mutant('the rest of segments is not looked at', PAPER, (('found.append(part[doubtful[share.max(axis=1) > 1.0]])', 'found.append(part[:0])'),), 'left_of'),
 )
 # fmt: on
 

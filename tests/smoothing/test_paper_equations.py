@@ -346,8 +346,8 @@ def test_the_motion_keeps_the_tolerance_at_fine_parameters(seed: int, curves: bo
 def test_corners_are_made_smaller_by_no_more_than_what_just_keeps_the_tolerance() -> None:
     """A little larger, the motion leaves the tolerance somewhere."""
     program, settings = random_program(31, 40, wobble=0.3), settings_of(0.05)
-    found = Construction.smooth(CONSTRUCTION, program, settings)
-    free = Construction.smooth(CONSTRUCTION, program, settings.but(tolerance=0.05 * 1.02))
+    found = CONSTRUCTION.smooth(program, settings)
+    free = CONSTRUCTION.smooth(program, settings.but(tolerance=0.05 * 1.02))
     made_smaller = found.corners.limited_by == LimitedBy.TOLERANCE
     assert made_smaller.sum() > 10
     assert (free.corners.extra["size"][made_smaller] > found.corners.extra["size"][made_smaller]).all()
@@ -377,7 +377,7 @@ def test_what_is_left_of_a_segment_is_looked_at() -> None:
     axis = np.array([[0.85034, 0.0523, 0.52363], [0.49832, -0.82776, 0.25784], [0.74856, 0.10228, 0.65513]])
     program = Program.from_poses(tip, axis, feed=1000.0)
     settings = Settings(tolerance=0.031, axis_tolerance=2.959, method="zhang2016")
-    found = Construction.smooth(CONSTRUCTION, program, settings)
+    found = CONSTRUCTION.smooth(program, settings)
     corners = found.corners
     unlike = replace(corners, axis_trim_in=corners.axis_trim_in.copy())
     assert not len(straying_remainders(found)) or corners.status[0] == Status.SMOOTHED

@@ -79,6 +79,7 @@ def test_bounds_are_above_what_is_measured() -> None:
         tip_off *= errors[0] / np.linalg.norm(tip_off, axis=-1)[..., None]
         top_off *= errors[1] / np.linalg.norm(top_off, axis=-1)[..., None]
         motion = Motion(tip + tip_off, lever + top_off - tip_off, PARTS, PARTS)
-        own, both = bounded(motion, path, (errors[[0]], errors[[1]]), 20.0)
+        missing = np.abs(np.linalg.norm(motion.lever, axis=-1) - 20.0).max(axis=1)
+        own, both = bounded((PARTS, PARTS), missing, path, (errors[[0]], errors[[1]]), 20.0)
         share = taken(motion, path, np.zeros(1), settings)
         assert share.max() * 0.01 <= max(own[0], both[0] / 1.8) * (1.0 + 1e-9)

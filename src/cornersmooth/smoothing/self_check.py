@@ -36,30 +36,34 @@ class Motion(NamedTuple):
     axis_at: Floats
 
 
+def parts_gone(trims: tuple[Floats, ...], parameters: tuple[Floats, Floats], weights: Floats) -> tuple[Floats, Floats]:
+    """(g, m) parts of the segments that tips and axis points are away from corners at u (m,) and v (g, m).
+
+    `trims` (g,) are those of the tip in and out, and of the axis point in and out; parts before the corner are below 0.
+    """
+    paper = bool((weights == 1.0).all())  # then σ is 1 − 2u, and 2v − 1 behind the corner
+    (u, v), found = parameters, []
+    for at, (trim_in, trim_out) in ((u[None], trims[:2]), (v, trims[2:])):
+        away = 2.0 * at - 1.0 if paper else nurbs.leg_coefficients(at, weights)[..., 1:].sum(axis=-1)
+        found.append(away * np.where(away < 0.0, trim_in[:, None], trim_out[:, None]))
+    return found[0], found[1]
+
+
 def motion_of(
     tip_legs: tuple[Floats, Floats],
     axis_legs: tuple[Floats, Floats],
-    trims: tuple[Floats, ...],
+    gone: tuple[Floats, Floats],
     lever: Floats,
     parameters: tuple[Floats, Floats],
     weights: Floats,
 ) -> Motion:
-    """Transitions at parameters u (m,) and v (g, m).
+    """Transitions at parameters u (m,) and v (g, m), where `parts_gone` are gone; legs (g, 3) are those of the curves.
 
-    Legs (g, 3) are those of the curves, `trims` (g,) their parts of the segments: of the tip in and out, of the axis
-    point in and out. `weights` (2,).
+    `weights` (2,).
     """
-    (u, v), (tip_in, tip_out, axis_in, axis_out) = parameters, trims
-    of_tip, of_axis = (nurbs.leg_coefficients(at, weights) for at in (u[None], v))
-    at_tip, at_axis = of_tip[..., 1:].sum(axis=-1), of_axis[..., 1:].sum(axis=-1)  # σ, below 0 before the corner
-    tip = of_tip[..., 1:] @ np.stack(tip_legs, axis=1)
-    top = lever[:, None] + of_axis[..., 1:] @ np.stack(axis_legs, axis=1)
-    return Motion(
-        tip,
-        top - tip,
-        at_tip * np.where(at_tip < 0.0, tip_in[:, None], tip_out[:, None]),
-        at_axis * np.where(at_axis < 0.0, axis_in[:, None], axis_out[:, None]),
-    )
+    of_tip, of_axis = (nurbs.leg_coefficients(at, weights)[..., 1:] for at in (parameters[0][None], parameters[1]))
+    tip = of_tip @ np.stack(tip_legs, axis=1)
+    return Motion(tip, lever[:, None] + of_axis @ np.stack(axis_legs, axis=1) - tip, *gone)
 
 
 class Original(NamedTuple):
@@ -96,32 +100,39 @@ def taken(motion: Motion, original: Original, spare: Floats, settings: Settings,
     return np.maximum(own, together / TOGETHER) / common
 
 
-def bounded(motion: Motion, original: Original, errors: tuple[Floats, Floats], height: float) -> tuple[Floats, Floats]:
+def bounded(
+    gone: tuple[Floats, Floats], missing: Floats, original: Original, errors: tuple[Floats, Floats], height: float
+) -> tuple[Floats, Floats]:
     """(g,) mm: bounds of what the axis point is off its path, and of what both are off a common pose.
 
     By the control polygons the tip is within `errors[0]` of its path, and Q within `errors[1]` of the straight path of
-    the axis point: equation (10). The axis point is off Q by what is missing of |Q − P| = H, and its path is off the
-    straight one by what the chord of the turn leaves of H.
+    the axis point: equation (10). The axis point is off Q by what is `missing` (g,) of |Q − P| = H, and its path is off
+    the straight one by what the chord of the turn leaves of H. `gone` are `parts_gone`.
     """
-    missing = np.abs(norm(motion.lever) - height).max(axis=1)
-    sag = height - np.sqrt(np.maximum(height**2 - np.maximum(*map(square, original.turns)) / 4.0, 0.0))
-    own = errors[1] + missing + sag
-    return own, np.maximum(errors[0], own) + _out_of_step(motion.tip_at, motion.axis_at, original).max(axis=1)
+    own = errors[1] + missing + chord_sag(original, height)
+    return own, np.maximum(errors[0], own) + _out_of_step(*gone, original).max(axis=1)
+
+
+def chord_sag(original: Original, height: float) -> Floats:
+    """(g,) mm: what the chord of the larger turn leaves of the height at most."""
+    shortest = np.sqrt(np.maximum(height**2 - np.maximum(*map(square, original.turns)) / 4.0, 0.0))
+    return height - shortest
 
 
 def _out_of_step(tip_at: Floats, axis_at: Floats, original: Original) -> Floats:
     """(g, m) mm: what tip and axis point are off the pose between their own at which they are off by as much."""
     sizes = [
         np.where(at < 0.0, norm(one[0])[:, None], norm(one[1])[:, None])
-        for at, one in ((tip_at, original.tips), (axis_at, _sums(original)))
+        for at, one in ((tip_at, original.tips), (axis_at, sums(original.tips, original.turns)))
     ]
     apart = np.abs(tip_at - axis_at) * sizes[0] * sizes[1] / np.maximum(sizes[0] + sizes[1], _LEAST)
     # one before the corner, one behind it: the pose is that of the corner
     return np.where(tip_at * axis_at < 0.0, np.maximum(np.abs(tip_at) * sizes[0], np.abs(axis_at) * sizes[1]), apart)
 
 
-def _sums(original: Original) -> tuple[Floats, Floats]:
-    return original.tips[0] + original.turns[0], original.tips[1] + original.turns[1]
+def sums(tips: tuple[Floats, Floats], turns: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+    """Axis-point segments in and out, (g, 3) each."""
+    return tips[0] + turns[0], tips[1] + turns[1]
 
 
 def most_taken(

@@ -29,7 +29,7 @@ _GRID = np.linspace(0.0, 1.0, 33)
 _NO_EXCESS, _NO_STEP, _STEPS = 1e-13, 1e-12, 60
 
 #: how far from where it is expected a root is looked for without the grid, and in how many steps of Newton
-_NEAR, _NEAR_STEPS, _SHORT = 1.0 / 16.0, 6, 1e-7
+_NEAR, _NEAR_STEPS, _SHORT = 1.0 / 16.0, 4, 1e-7
 
 #: shares of the control points in weight, σ and β of the first half
 _OF_SHARES = np.array([[1.0, 1, 1, 1, 1], [1, nurbs.RATIO, 0, -nurbs.RATIO, 0], [0, 0, 0, nurbs.RATIO, 0]])
@@ -54,26 +54,49 @@ class _Excess:
 
     def __call__(self, v: Floats, rows: Ints) -> tuple[Floats, Floats]:
         """Equation (21) as a length, mm, and its derivative, at parameters (k,) of the curves of rows."""
-        return self._derivatives(v, rows, bends=False)[:2]
+        return self._derivatives(v, np.take(self.terms, rows, axis=1), bends=False)[:2]
 
     def bends(self, v: Floats, rows: Ints) -> tuple[Floats, Floats]:
         """First and second derivative."""
-        return self._derivatives(v, rows, bends=True)[1:]
+        return self._derivatives(v, np.take(self.terms, rows, axis=1), bends=True)[1:]
 
-    def on(self, grid: Floats, rows: Ints) -> Floats:
-        """(k, m) the excess of rows at common parameters (m,)."""
+    def on(self, grid: Floats) -> Floats:
+        """(g, m) the excess at common parameters (m,)."""
         s = 2.0 * (1.0 - grid if self.second else grid)
         weight, sigma, beta = self.powers @ s ** np.arange(4)[:, None]
         sigma, beta = sigma / weight, beta / weight
-        return self.terms[:, rows].T @ np.stack((sigma**0, sigma, beta, sigma**2, sigma * beta, beta**2))
+        return self.terms.T @ np.stack((sigma**0, sigma, beta, sigma**2, sigma * beta, beta**2))
 
-    def missing(self, v: Floats, rows: Ints) -> Floats:
-        """(k,) ``||Q(v) − P| − H|``, mm."""
-        squared = self.axis_length * (self.axis_length + 2.0 * self(v, rows)[0])
+    def missing(self, v: Floats) -> Floats:
+        """``||Q(v) − P| − H|``, mm."""
+        squared = self.axis_length * (self.axis_length + 2.0 * self._derivatives(v, self.terms, bends=False)[0])
         return np.abs(np.sqrt(np.maximum(squared, 0.0)) - self.axis_length)
 
-    def _derivatives(self, v: Floats, rows: Ints, *, bends: bool) -> tuple[Floats, Floats, Floats]:
-        one, c_s, c_b, c_ss, c_sb, c_bb = np.take(self.terms, rows, axis=1)
+    def only_roots(self, v: Floats) -> Floats:
+        """(m, g) roots, or the end that comes nearest to one, where the excess surely never turns; NaN elsewhere.
+
+        It is a polynomial p of degree 6 in s then. Newton starts from the parameters (m,).
+        """
+        if not self.paper:
+            return np.full(self.terms.shape[1:], np.nan)
+        one, c_s, c_b, c_ss, c_sb, c_bb = self.terms
+        of_beta = nurbs.RATIO / 4.0
+        p0, p1, p2 = one + c_s + c_ss, -c_s - 2.0 * c_ss, c_ss
+        p3, p4, p6 = of_beta * (c_b + c_sb), -of_beta * c_sb, of_beta**2 * c_bb
+        least = p1 + np.minimum(3.0 * p3, 0.0) + np.minimum(4.0 * p4, 0.0)
+        most = p1 + 2.0 * p2 + np.maximum(3.0 * p3, 0.0) + np.maximum(4.0 * p4, 0.0) + 6.0 * p6
+        turns = (least <= 0.0) & (most >= 0.0)
+        here = np.broadcast_to(2.0 * (1.0 - v if self.second else v)[:, None], p0.shape)
+        for _ in range(_NEAR_STEPS):
+            tail = p4 + here * here * p6
+            value = p0 + here * (p1 + here * (p2 + here * (p3 + here * tail)))
+            slope = p1 + here * (2.0 * p2 + here * (3.0 * p3 + here * (4.0 * tail + 2.0 * here * here * p6)))
+            last, here = here, np.clip(here - value / np.where(turns, 1.0, slope), 0.0, 1.0)
+        near = ~turns & (np.abs(here - last) <= _SHORT)
+        return np.where(near, 1.0 - here / 2.0 if self.second else here / 2.0, np.nan)
+
+    def _derivatives(self, v: Floats, terms: Floats, *, bends: bool) -> tuple[Floats, Floats, Floats]:
+        one, c_s, c_b, c_ss, c_sb, c_bb = terms
         s, turned = (2.0 - 2.0 * v, -2.0) if self.second else (2.0 * v, 2.0)
         (sigma, d_sigma, s2), (beta, d_beta, b2) = self._shares(s)
         mixed = c_sb * beta
@@ -114,35 +137,69 @@ def matching_parameters(
     Equations (20) and (21).
     Control points (g, 5, 3) are those of P and Q; weights (2,) are those of all, u (m,) ascends.
     """
-    lever = np.ascontiguousarray((axis_curve[:, 2] - tip_curve[:, 2]).T)
-    tip_legs, axis_legs = (
-        [np.ascontiguousarray((curve[:, k + 2] - curve[:, k]).T) for k in (0, 2)] for curve in (tip_curve, axis_curve)
-    )
-    bend = axis_legs[1] - axis_legs[0]
-    forms = [(leg, _dot(leg, leg), 2.0 * _dot(leg, bend), _dot(bend, bend)) for leg in (-axis_legs[0], axis_legs[1])]
-    powers, paper = (nurbs.full_weights(weights) * _OF_SHARES) @ _POWERS.T, bool((weights == 1.0).all())
-    v, missing = np.zeros((2, len(u), len(tip_curve))).transpose(0, 2, 1)
-    every = np.arange(len(tip_curve))
-    low_limit, target, shares = np.zeros(len(v)), np.full(len(v), u[0]), nurbs.leg_coefficients(u, weights)
-    for j, step in enumerate(np.diff(u, append=u[-1])):
-        # the paper solves (21) in the knot interval of u, n = 3 or 4: so both are ½ together
-        low, high = float(u[j] >= 0.5) / 2.0, (1.0 + float(u[j] > 0.5)) / 2.0
-        low_limit, target = np.maximum(low_limit, low), np.clip(target, low, high)
-        away, second = lever - shares[j, 1] * tip_legs[0] - shares[j, 2] * tip_legs[1], bool(u[j] > 0.5)
-        leg, *form = forms[second]
-        terms = _dot(away, away) - axis_length**2, 2.0 * _dot(leg, away), 2.0 * _dot(bend, away), *form
-        excess = _Excess(np.stack(terms) / (2.0 * axis_length), powers, paper, second, axis_length)
-        v[:, j] = low if low == high else _near(low_limit, high, target, excess)
-        rows = every if low == high else np.flatnonzero(np.isnan(v[:, j]))
+    lever = axis_curve[:, 2] - tip_curve[:, 2]
+    legs = [(curve[:, 2] - curve[:, 0], curve[:, 4] - curve[:, 2]) for curve in (tip_curve, axis_curve)]
+    return synchronised(legs[0], legs[1], lever, weights, u, axis_length)
+
+
+def synchronised(
+    tip_legs: tuple[Floats, Floats],
+    axis_legs: tuple[Floats, Floats],
+    lever: Floats,
+    weights: Floats,
+    u: Floats,
+    axis_length: float,
+) -> tuple[Floats, Floats]:
+    """`matching_parameters` of curves by their legs in and out, and by levers at the corners, (g, 3) each."""
+    lever, *legs = (np.ascontiguousarray(values.T) for values in (lever, *tip_legs, *axis_legs))
+    bend, away, paper = legs[3] - legs[2], (lever, legs[0], legs[1]), bool((weights == 1.0).all())
+    shares = nurbs.leg_coefficients(u, weights) * (1.0, -1.0, -1.0)  # of `away` in P less the corner of Q
+    first, other = np.triu_indices(3)
+    pairs = np.stack([_dot(away[i], away[j]) for i, j in zip(first, other, strict=True)])
+    pairs[0] -= axis_length**2
+    powers = (nurbs.full_weights(weights) * _OF_SHARES) @ _POWERS.T
+    halves = []
+    for second, leg in enumerate((-legs[2], legs[3])):
+        own = shares[(u > 0.5) == second]
+        squares = own[:, first] * own[:, other] * np.where(first == other, 1.0, 2.0) @ pairs
+        terms = (squares, *(2.0 * own @ np.stack([_dot(one, part) for part in away]) for one in (leg, bend)))
+        terms += _dot(leg, leg), 2.0 * _dot(leg, bend), _dot(bend, bend)
+        every = np.stack([np.broadcast_to(term, squares.shape) for term in terms]) / (2.0 * axis_length)
+        halves.append(_Excess(every, powers, paper, bool(second), axis_length))
+
+    # the paper solves (21) in the knot interval of u, n = 3 or 4: so both are ½ together
+    v, missing = np.empty((2, len(u), lever.shape[1]))
+    last, before = np.zeros(lever.shape[1]), 0.0
+    for half in halves:
+        own = (u > 0.5) == half.second
+        found = half.only_roots(u[own])
+        found[u[own] == 0.5] = 0.5
+        found = np.maximum.accumulate(found, axis=0)
+        rows = np.flatnonzero(np.isnan(found[-1:]).any(axis=0))
         if len(rows):
-            if low < high:
+            found[:, rows] = _in_turn(replace(half, terms=half.terms[..., rows]), u[own], last[rows], before)
+        v[own], missing[own] = found, half.missing(found)
+        if len(found):
+            last, before = found[-1], u[own][-1]
+    return v.T, missing.T
+
+
+def _in_turn(half: _Excess, u: Floats, last: Floats, before: float) -> Floats:
+    """(m, g) v where the excess may turn: the root is followed from one parameter to the next, from `last` (g,) on."""
+    v = np.full((len(u), len(last)), 0.5)
+    low, high = float(half.second) / 2.0, (1.0 + half.second) / 2.0
+    for j, step in enumerate(np.diff(u, prepend=before)):
+        if u[j] != 0.5:
+            low_limit, target = np.maximum(last, low), np.clip(last + step, low, high)
+            excess = replace(half, terms=half.terms[:, j])
+            v[j] = _near(low_limit, high, target, excess)
+            left = np.flatnonzero(np.isnan(v[j]))
+            if len(left):
+                excess = replace(excess, terms=excess.terms[:, left])
                 own = _GRID[slice(*np.searchsorted(_GRID, (low, high + _NO_STEP)))]
-                here = replace(excess, terms=excess.terms[:, rows])
-                v[rows, j] = _follow(own, excess.on(own, rows), low_limit[rows], target[rows], here)
-            missing[rows, j] = excess.missing(v[rows, j], rows)
-        low_limit = v[:, j]
-        target = low_limit + step
-    return v, missing
+                v[j, left] = _follow(own, excess.on(own), low_limit[left], target[left], excess)
+        last = v[j]
+    return v
 
 
 def _near(low_limit: Floats, high: float, target: Floats, excess: _Excess) -> Floats:
@@ -259,11 +316,11 @@ def synchronisation_report(
     there, mm; angles, rad, between the axis of the transition and that of the straight motion before it and after it,
     and between the axis at u = ½ and that at the corner.
     """
-    tip_curve = nurbs.five_points(np.zeros_like(lever), *tip_legs)
-    axis_curve = nurbs.five_points(lever, *axis_legs)
-    v, residual = matching_parameters(tip_curve, axis_curve, weights, u, axis_length)
+    v, residual = synchronised(tip_legs, axis_legs, lever, weights, u, axis_length)
     half = len(u) // 2
-    tops = nurbs.evaluate(axis_curve, weights, v[:, [0, half, -1]])
-    tips = nurbs.evaluate(tip_curve, weights, u[[half]])[:, 0]
-    jumps = (angle_between(axis_curve[:, at] - tip_curve[:, at], tops[:, at // 2] - tip_curve[:, at]) for at in (0, 4))
-    return v, residual.max(axis=1), *jumps, angle_between(tops[:, 1] - tips, lever)
+    of_tip, of_axis = (nurbs.leg_coefficients(at, weights)[..., 1:] for at in (u[[0, half, -1]], v[:, [0, half, -1]]))
+    tips, axes = of_tip @ np.stack(tip_legs, axis=1), of_axis @ np.stack(axis_legs, axis=1)
+    levers = lever[:, None] + axes - tips
+    before, after = lever - axis_legs[0] + tip_legs[0], lever + axis_legs[1] - tip_legs[1]
+    jumps = (angle_between(one, levers[:, at]) for one, at in ((before, 0), (after, 2)))
+    return v, residual.max(axis=1), *jumps, angle_between(levers[:, 1], lever)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -26,8 +27,24 @@ from cornersmooth.smoothing.construction import (
 from cornersmooth.smoothing.proportional import EXACT
 from cornersmooth.smoothing.sampling import nodes
 from cornersmooth.smoothing.segments import Segments, lines_of, segments_of
-from cornersmooth.smoothing.self_check import TOGETHER, Motion, Original, bounded, most_taken, motion_of, taken
-from cornersmooth.smoothing.synchronise import REPORT_PARAMETERS, matching_parameters, synchronisation_report
+from cornersmooth.smoothing.self_check import (
+    TOGETHER,
+    Motion,
+    Original,
+    bounded,
+    chord_sag,
+    most_taken,
+    motion_of,
+    parts_gone,
+    sums,
+    taken,
+)
+from cornersmooth.smoothing.synchronise import (
+    REPORT_PARAMETERS,
+    matching_parameters,
+    synchronisation_report,
+    synchronised,
+)
 
 #: what `Corners.extra` holds: the largest ``||Q−P|−H|`` that the synchronisation leaves (mm), the jumps of the axis at
 #: both ends of the transition (rad), and the length (15) of a curve whose segments have room for it (mm)
@@ -59,24 +76,34 @@ class Zhang2016(Construction):
         """Smooth a whole program; corners beside segments whose rest strays get smaller, or stay sharp."""
         smoothed = super().smooth(program, settings, progress, processes)
         corners, every = smoothed.corners, np.arange(len(smoothed.corners))
+
+        def again(rows: Ints, most: Floats) -> None:
+            for part in np.split(np.arange(len(rows)), np.arange(BATCH, len(rows), BATCH)):
+                own = rows[part]
+                legs = legs_at(
+                    program, settings.axis_length, corners.pose[own], corners.before[own], corners.after[own]
+                )
+                placed = self.sized(legs, settings, most[part])
+                if np.isfinite(most[part]).all():
+                    placed.status[placed.status == Status.TOO_SHORT] = Status.STRAYS
+                put(corners, own, placed, legs.shift)
+
+        rows = np.flatnonzero(corners.status == Status.STRAYS)
+        again(rows, np.full(len(rows), np.inf))
         rows = np.union1d(straying_lines(smoothed, every), straying_remainders(smoothed))
         for number in range(_TIMES):
             if not len(rows):
                 break
-            legs = legs_at(program, settings.axis_length, corners.pose[rows], corners.before[rows], corners.after[rows])
-            size = _SMALLER * corners.extra["size"][rows]
-            part = self.sized(legs, settings, np.zeros(len(rows)) if number == _TIMES - 1 else size)
-            part.status[part.status == Status.TOO_SHORT] = Status.STRAYS
-            put(corners, rows, part, legs.shift)
+            again(rows, (0.0 if number == _TIMES - 1 else _SMALLER) * corners.extra["size"][rows])
             rows = np.union1d(straying_lines(smoothed, rows), straying_remainders(smoothed, rows))
         return smoothed
 
     def place(self, legs: Legs, settings: Settings) -> Placed:
-        """Trim tip and axis-point segments each on its own, as the paper does, by the lengths that just keep ε."""
-        return self.sized(legs, settings, np.full(len(legs.axis), np.inf))
+        """Trim tip and axis-point segments each on its own, as the paper does; what does not keep ε so strays."""
+        return self.sized(legs, settings, np.full(len(legs.axis), np.inf), rounds=1)
 
-    def sized(self, legs: Legs, settings: Settings, most: Floats) -> Placed:
-        """Place transitions (g,) of a length of at most `most`, mm: equations (10) to (16) and (19).
+    def sized(self, legs: Legs, settings: Settings, most: Floats, rounds: int = _ROUNDS) -> Placed:
+        """Place transitions (g,) of a length of at most `most`, mm, that just keeps ε: equations (10) to (16) and (19).
 
         (16) and (19) give the curve with the larger sine the tolerance and the other one its share by the ratio of the
         sines; put into (15) that is one and the same length for both: 3(w1+w2)ε/(2·w1·max(sin α/2, sin β/2)).
@@ -102,7 +129,7 @@ class Zhang2016(Construction):
         size = np.minimum(np.minimum(by_tolerance, np.maximum(*halves)), most)
         rows = np.flatnonzero(status == Status.SMOOTHED)
         found, last, step, power = np.zeros((4, g)), np.ones(g), np.ones(g), np.ones(g)
-        for number in range(_ROUNDS):
+        for number in range(rounds):
             found[:, rows], share = _measured(legs, settings, rows, *(np.minimum(half, size)[rows] for half in halves))
             over = share > 1.0 + EXACT
             rows, share = rows[over], share[over]
@@ -215,71 +242,122 @@ def _turn(leg_in: Floats, leg_out: Floats) -> tuple[tuple[Floats, Floats], Float
     return sizes, np.where(np.minimum(*sizes) > 0.0, norm(unit(leg_out) - unit(leg_in)) / 2.0, 0.0)
 
 
+@dataclass(frozen=True)
+class _Transitions:
+    """Transitions at g corners."""
+
+    tip_legs: tuple[Floats, Floats]
+    axis_legs: tuple[Floats, Floats]
+    trims: tuple[Floats, ...]  # of the tip in and out, of the axis point in and out
+    original: Original
+    spare: Floats
+
+    @classmethod
+    def of(cls, legs: Legs, trims: Sequence[Floats], settings: Settings) -> _Transitions:
+        tips, turns = (legs.tip_in, legs.tip_out), (legs.turn_in, legs.turn_out)
+        own = [trim[:, None] * leg for trim, leg in zip(trims, (*tips, *sums(tips, turns)), strict=True)]
+        original = Original(tips, turns, settings.axis_length * legs.axis)
+        return cls((own[0], own[1]), (own[2], own[3]), tuple(trims), original, legs.spare(settings))
+
+    def bounded(
+        self, parameters: tuple[Floats, Floats], missing: Floats, settings: Settings
+    ) -> tuple[Floats, Floats, Ints]:
+        """(g,) mm that the axis point is off its path at most; (g,) the share of ε in use at most; where that is none.
+
+        There is no bound for a tolerance of the axis.
+        """
+        weights = np.array(settings.weights)
+        factor = float(nurbs.deviation_factor(weights))
+        errors = (
+            factor * norm(self.tip_legs[1] - self.tip_legs[0]),
+            factor * norm(self.axis_legs[1] - self.axis_legs[0]),
+        )
+        gone = parts_gone(self.trims, parameters, weights)
+        own, both = bounded(gone, missing, self.original, errors, settings.axis_length)
+        share = _most_share(own, both, self.spare, settings)
+        return own, share, np.flatnonzero(share > 1.0)
+
+    def motion(
+        self, rows: Ints, parameters: tuple[Floats, Floats], settings: Settings
+    ) -> tuple[Motion, Original, Floats]:
+        """Poses of some, the segments that they are measured against, and what is left of the tolerances."""
+        (u, v), weights = parameters, np.array(settings.weights)
+        tip_legs, axis_legs = ((one[0][rows], one[1][rows]) for one in (self.tip_legs, self.axis_legs))
+        own, trims = (u, v if len(v) == 1 else v[rows]), tuple(trim[rows] for trim in self.trims)
+        original = self.original.some(rows)
+        gone = parts_gone(trims, own, weights)
+        return motion_of(tip_legs, axis_legs, gone, original.lever, own, weights), original, self.spare[rows]
+
+    def missing_at_ends(self, height: float) -> Floats:
+        """(g,) mm: the larger ``||Q − P| − H|`` of both ends of the curves."""
+        (tip_in, tip_out), (axis_in, axis_out), lever = self.tip_legs, self.axis_legs, self.original.lever
+        ends = norm(lever + tip_in - axis_in), norm(lever - tip_out + axis_out)
+        return np.maximum(*(np.abs(end - height) for end in ends))
+
+
 def _measured(
     legs: Legs, settings: Settings, rows: Ints, tip_length: Floats, axis_length: Floats
 ) -> tuple[tuple[Floats, ...], Floats]:
     """Residual, jumps and turn of transitions with these lengths (15), and what of the tolerances they take (g,)."""
-    tips, turns = (legs.tip_in[rows], legs.tip_out[rows]), (legs.turn_in[rows], legs.turn_out[rows])
-    original = Original(tips, turns, settings.axis_length * legs.axis[rows])
-    axes = tips[0] + turns[0], tips[1] + turns[1]
-    trims = [divide(length, norm(leg)) for legs, length in ((tips, tip_length), (axes, axis_length)) for leg in legs]
-    trims = [np.where(np.isfinite(trim), trim, 0.0) for trim in trims]
-    tip_legs, axis_legs = (
-        (trims[k][:, None] * both[0], trims[k + 1][:, None] * both[1]) for k, both in ((0, tips), (2, axes))
-    )
+    legs = Legs(*(values[rows] for values in legs))
+    tips = legs.tip_in, legs.tip_out
+    axes = sums(tips, (legs.turn_in, legs.turn_out))
+    trims = [divide(length, norm(leg)) for each, length in ((tips, tip_length), (axes, axis_length)) for leg in each]
+    made = _Transitions.of(legs, [np.where(np.isfinite(trim), trim, 0.0) for trim in trims], settings)
     weights = np.array(settings.weights)
     u = REPORT_PARAMETERS if settings.weights == (1.0, 1.0) and settings.axis_tolerance is None else _MORE_PARAMETERS
-    v, *report = synchronisation_report(tip_legs, axis_legs, original.lever, weights, settings.axis_length, u)
-    lines = settings.round_feed_changes
+    both, lever = (made.tip_legs, made.axis_legs), made.original.lever
+    v, *report = synchronisation_report(*both, lever, weights, settings.axis_length, u)
+    lines, missing = settings.round_feed_changes, report[0]
     at = u[None]  # controls run curves at common parameters
-    if lines:  # which begin and end where straight motion does, equation (26), and in between are at v
-        u, at = np.pad(u, 1, mode="edge"), np.pad(v, ((0, 0), (1, 1)), constant_values=((0, 0), (0.0, 1.0)))
-    motion = motion_of(tip_legs, axis_legs, tuple(trims), original.lever, (u, at), weights)
-    middle = len(u) // 2
-    factor, spare = float(nurbs.deviation_factor(weights)), legs.spare(settings)[rows]
-    errors = factor * norm(tip_legs[1] - tip_legs[0]), factor * norm(axis_legs[1] - axis_legs[0])
-    own, both = bounded(motion, original, errors, settings.axis_length)
+    if lines:
+        (u, at), missing = _joined(u, v), np.maximum(missing, made.missing_at_ends(settings.axis_length))
+    own, share, doubtful = made.bounded((u, at), missing, settings)
     passing = own + (settings.chord if lines else 0.0)
-    share = _bound(passing, both, spare, settings)
-    doubtful = np.flatnonzero(share > 1.0)
-    some, there = Motion(*(part[doubtful] for part in motion)), original.some(doubtful)
-    share[doubtful] = most_taken(some, there, spare[doubtful], settings, middle, passing[doubtful] if lines else None)
+    most = *made.motion(doubtful, (u, at), settings), settings, len(u) // 2, passing[doubtful] if lines else None
+    share[doubtful] = most_taken(*most)
     return tuple(report), share
 
 
-def _bound(own: Floats, both: Floats, spare: Floats, settings: Settings) -> Floats:
-    """(g,) bound of what transitions take of the tolerances, from those of `bounded`; none for one of the axis."""
+def _most_share(own: Floats, both: Floats, spare: Floats, settings: Settings) -> Floats:
+    """(g,) bound of what is taken of the tolerances, from those of `bounded`; none for a tolerance of the axis."""
     share: Floats = np.maximum(own, both / TOGETHER) / (settings.common_tolerance + spare)
     return share if settings.axis_tolerance is None else np.full_like(share, np.inf)
 
 
+def _joined(u: Floats, v: Floats) -> tuple[Floats, Floats]:
+    """Parameters of lines, which begin and end where straight motion does: equation (26)."""
+    return np.concatenate(([0.0], u, [1.0])), np.pad(v, ((0, 0), (1, 1)), constant_values=((0, 0), (0.0, 1.0)))
+
+
 def straying_lines(smoothed: SmoothProgram, rows: Ints) -> Ints:
-    """Rows whose transitions stray at the ends of their lines: v follows on from one end to the next."""
+    """Rows whose transitions stray at the ends of their lines: v follows on from one end to the next.
+
+    One line for each half ends where `_measured` has looked.
+    """
     program, corners, settings = smoothed.program, smoothed.corners, smoothed.settings
     rows = rows[corners.smoothed[rows]]
     if not settings.round_feed_changes or not len(rows):
         return rows[:0]
     weights, height = np.array(settings.weights), settings.axis_length
     number = lines_of(smoothed, rows)
+    rows, number = rows[np.abs(number) > 1], number[np.abs(number) > 1]
     found = [rows[:0]]
     order = np.argsort(number, kind="stable")
     cuts = np.union1d(np.flatnonzero(np.diff(number[order])) + 1, np.arange(BATCH, len(rows), BATCH))
-    for part in np.split(order, cuts):
-        own, u = rows[part], nodes(int(number[part[0]]))
+    for part in np.split(order, cuts) if len(rows) else ():
+        own, u = rows[part], nodes(int(number[part[0]]))[:-1]
         legs = legs_at(program, height, corners.pose[own], corners.before[own], corners.after[own])
-        tips, turns = (legs.tip_in, legs.tip_out), (legs.turn_in, legs.turn_out)
-        curves = nurbs.control_points(program, corners, own, height)
-        v, _ = matching_parameters(*curves, weights, u[:-1], height)
-        u, v = np.append(0.0, u), np.pad(v, ((0, 0), (1, 1)), constant_values=((0, 0), (0.0, 1.0)))
-        tip_legs, axis_legs = ((one[:, 2] - one[:, 0], one[:, 4] - one[:, 2]) for one in curves)
-        trims = corners.trim_in[own], corners.trim_out[own], corners.axis_trim_in[own], corners.axis_trim_out[own]
-        original = Original(tips, turns, height * legs.axis)
-        motion = motion_of(tip_legs, axis_legs, trims, original.lever, (u, v), weights)
-        spare, factor = legs.spare(settings), float(nurbs.deviation_factor(weights))
-        errors = factor * norm(tip_legs[1] - tip_legs[0]), factor * norm(axis_legs[1] - axis_legs[0])
-        doubtful = np.flatnonzero(_bound(*bounded(motion, original, errors, height), spare, settings) > 1.0)
-        some = Motion(*(values[doubtful] for values in motion)), original.some(doubtful), spare[doubtful]
-        found.append(own[doubtful[taken(*some, settings).max(axis=1) > 1.0 + 1e-6]])
+        trims = [
+            column[own] for column in (corners.trim_in, corners.trim_out, corners.axis_trim_in, corners.axis_trim_out)
+        ]
+        made = _Transitions.of(legs, trims, settings)
+        v, missing = synchronised(made.tip_legs, made.axis_legs, made.original.lever, weights, u, height)
+        missing = np.maximum(missing.max(axis=1), made.missing_at_ends(height))
+        parameters = _joined(u, v)
+        doubtful = made.bounded(parameters, missing, settings)[2]
+        share = taken(*made.motion(doubtful, parameters, settings), settings)
+        found.append(own[doubtful[share.max(axis=1) > 1.0 + 1e-6]])
     return np.concatenate(found)
 
 
@@ -294,21 +372,28 @@ def straying_remainders(smoothed: SmoothProgram, rows: Ints | slice = slice(None
     beside = np.zeros(len(program), np.bool_)
     beside[smoothed.corners.pose[rows]] = True
     pose = np.flatnonzero(unlike & segments.has_line & (segments.start >= 0) & (beside | beside[segments.start]))
-    found = [pose[:0]]
+    found, reserve = [pose[:0]], settings.interpolation_tolerance
+    cuts = (segments.entry, segments.exit), (segments.axis_entry, segments.axis_exit)
     for part in np.split(pose, np.arange(BATCH, len(pose), BATCH)):
         start = segments.start[part]
         step = program.tip[part] - program.tip[start]
         lever = settings.axis_length * program.axis[start]
         turn = settings.axis_length * program.axis[part] - lever
-        tip_at, axis_at = (
-            low[part, None] + _PARTS * (high - low)[part, None]
-            for low, high in ((segments.entry, segments.exit), (segments.axis_entry, segments.axis_exit))
-        )
+        ends = [[values[part, None] for values in pair] for pair in cuts]
+        none, original = np.zeros(len(part)), Original((step, step), (turn, turn), lever)
+        # at one pose |Q − P| is H but for the chord of the turn; the tip is `apart` from that of the axis point
+        apart = np.maximum(*(np.abs(of_tip - of_axis) for of_tip, of_axis in zip(*ends, strict=True)))
+        missing = chord_sag(original, settings.axis_length) + apart[:, 0] * norm(step)
+        own, both = bounded((apart, 0.0 * apart), missing, original, (none, none + reserve), settings.axis_length)
+        doubtful = np.flatnonzero(_most_share(own, both, none, settings) > 1.0)
+
+        tip_at, axis_at = (low[doubtful] + _PARTS * (high - low)[doubtful] for low, high in ends)
+        original = original.some(doubtful)
+        (step, _), (turn, _), lever = original
         tip = tip_at[..., None] * step[:, None]
         motion = Motion(tip, lever[:, None] + axis_at[..., None] * (step + turn)[:, None] - tip, tip_at, axis_at)
-        original, none = Original((step, step), (turn, turn), lever), np.zeros(len(part))
-        share = taken(motion, original, none, settings, reserve=settings.interpolation_tolerance)
-        found.append(part[share.max(axis=1) > 1.0])
+        share = taken(motion, original, none[doubtful], settings, reserve=reserve)
+        found.append(part[doubtful[share.max(axis=1) > 1.0]])
     pose = np.concatenate(found)
     rows = np.unique(segments.row[np.concatenate((segments.start[pose], pose))])
     return rows[rows >= 0]
