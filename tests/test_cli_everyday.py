@@ -97,12 +97,19 @@ def test_an_error_is_an_object_too(part: Path, words: tuple[str, ...], code: str
         ("--chord", "9"),
         ("--axis-length", "1e5"),
         ("--rewind", "1e-9", "--machine", "table-ac"),
+        ("--accel", "0", "--feed-from-plan"),
     ],
 )
 def test_what_is_out_of_bounds_is_named_as_it_is_typed(part: Path, words: tuple[str, ...]) -> None:
     result = run("smooth", part, *words)
     assert result.returncode == USAGE
     assert f"{words[0]} is " in one_line(result.stderr) or f"'{words[0]}'" in one_line(result.stderr)
+
+
+def test_limits_of_a_plan_name_its_option() -> None:
+    said = " ".join(run("smooth", "--help-all").stdout.decode().split())
+    for name in ("accel MM/S2", "jerk MM/S3", "period TIME"):
+        assert f"--{name} With --feed-from-plan: " in said
 
 
 def test_settings_of_a_shop_are_no_options(part: Path) -> None:
@@ -122,4 +129,4 @@ def test_the_short_help_has_the_options_of_every_day() -> None:
     assert "--method [" not in short
     assert "--help-all" in short
     assert "--method [" in whole
-    assert len(re.findall(r"^  (?:-\w, )?--", whole, re.MULTILINE)) <= 52
+    assert len(re.findall(r"^  (?:-\w, )?--", whole, re.MULTILINE)) <= 55

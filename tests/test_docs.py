@@ -310,7 +310,7 @@ def test_every_flag_that_a_help_or_a_page_names_exists() -> None:
     others |= {"--scheduler-file", "--nthreads", "--nworkers", "--cuts"}
     named = {(name, flag) for name, text in texts.items() for flag in re.findall(r"(?<![\w-])--[a-z][a-z-]+\b", text)}
     settings = {param.opts[-1] for param in COMMANDS["smooth"].params if type(param).__name__ == "_Setting"}
-    smooth_alone = settings - {"--accel", "--jerk", "--centripetal", "--period"}
+    smooth_alone = settings - {"--centripetal"}
     assert len(named) > 300
     assert {one for one in named if one[1] not in known | others or one[1] in smooth_alone - others} == set()
 

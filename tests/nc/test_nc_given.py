@@ -161,7 +161,7 @@ def test_lines_end_as_asked_for(control: str, cl: Path) -> None:
 
 
 def test_planned_feeds_are_put_into_lines_of_any_end(cl: Path) -> None:
-    options = ("smooth", cl, "-o", "-", "-q", "--feed-from-plan", "CORNERSMOOTH_ACCEL=500")
+    options = ("smooth", cl, "-o", "-", "-q", "--feed-from-plan", "--accel", "500", "--jerk", "5000")
     plain = run(*options).stdout
     assert len(re.findall(rb" F\d", plain)) > 10
     assert run(*options, "CORNERSMOOTH_LINE_ENDS=crlf").stdout == plain.replace(b"\n", b"\r\n")

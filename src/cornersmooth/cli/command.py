@@ -16,7 +16,7 @@ from typing import Any, Final, Literal, get_args, get_origin, get_type_hints
 import click
 
 from cornersmooth.cli import shop
-from cornersmooth.cli.declared import FLAGS, HEADINGS, Declared
+from cornersmooth.cli.declared import FLAGS, GONE, HEADINGS, Declared
 from cornersmooth.cli.options import Options
 from cornersmooth.cli.parameters import ControlName, MachineName, Path
 
@@ -62,6 +62,8 @@ class Command(click.Command):
                 if isinstance(param, _Setting) and wrong.option_name in param.opts:
                     key = shop.key(str(param.name))
                     ctx.fail(f"{wrong.option_name} is no option; write {key} into cornersmooth.toml (docs/settings.md)")
+            if wrong.option_name in GONE:
+                ctx.fail(f"{wrong.option_name} is no option any more; {GONE[wrong.option_name]}")
             raise
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:

@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 from cornersmooth.cli.command import EXIT_CODES_OF_READERS, EXIT_CODES_OF_WRITERS, new_command
-from cornersmooth.cli.declared import FEED_OF_ALL, LIMITS, LINES, PLANNED, READING, SHOP_ALONE, WRITING
+from cornersmooth.cli.declared import (
+    FEED_OF_ALL,
+    LIMITS,
+    LINES,
+    PLANNED,
+    PLANNED_ALONE,
+    PLANNED_HELPS,
+    READING,
+    SHOP_ALONE,
+    WRITING,
+)
 
 SMOOTH = new_command(
     "smooth",
     "IN...",
     "tolerance output form axis_length axis_tolerance directory glob summary jobs reports "
-    f"as_json tool {WRITING} method {LINES} feed feed_from_plan limits "
+    f"as_json tool {WRITING} method {LINES} feed feed_from_plan {PLANNED} limits "
     f"{READING} tool_number spindle no_verify strict force quiet verbose",
     """
     Round the corners of the CL files IN and write NC programs.
@@ -30,8 +40,9 @@ SMOOTH = new_command(
       cornersmooth smooth cl/ -e 0.04 -d nc/ -j --summary made.csv
       cat part.cls | cornersmooth smooth - -e 0.04 > part.nc
     """,
-    settings=f"{PLANNED} {SHOP_ALONE}",
+    settings=f"{PLANNED_ALONE} {SHOP_ALONE}",
     epilog=f"{EXIT_CODES_OF_WRITERS} With several inputs: that of the worst.",
+    **PLANNED_HELPS,
 )
 
 FILTER = new_command(

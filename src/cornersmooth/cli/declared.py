@@ -289,8 +289,8 @@ def under(*headings: str) -> str:
 
 #: limits of plans, in the order of the helps
 LIMITS = "feed accel jerk centripetal period rapid rapid_accel rapid_jerk angular_feed angular_accel angular_jerk"
-#: those of a plan whose feeds are written
-PLANNED = "accel jerk centripetal period"
+#: those of a plan whose feeds are written, with options and without
+PLANNED, PLANNED_ALONE = "accel jerk period", "centripetal"
 #: options that several commands have
 LINES = under("Lines")
 READING = "dialect units arc_rule operation scale flip_axis between_passes cycle_order lenient"
@@ -298,5 +298,20 @@ CONTROL = under("Control", "Holes and planes")
 WRITING = f"control machine {CONTROL} program_name work_offset approach retract rewind header footer"
 #: those that `cornersmooth.toml` and the environment alone give: of shops, not of runs
 SHOP_ALONE = "block_numbers line_ends modal no_comments no_size_limit scheduler time"
+#: helps of the limits of a plan whose feeds are written
+PLANNED_HELPS = {
+    item.name: f"With --feed-from-plan: {item.metadata['help'][:1].lower()}{item.metadata['help'][1:]}"
+    for item in fields(Declared)
+    if item.name in PLANNED.split()
+}
+#: options of earlier versions, and what takes their place
+GONE = {
+    "--input-format": "write --dialect points for a table of points",
+    "--skip-existing": "leave it out: outputs that are up to date stay, and others need --force",
+    **dict.fromkeys(("--weights", "--reversal-angle", "--axis-step"), "Settings of the library has it"),
+    **dict.fromkeys(
+        ("--vector-jerk", "--turn-speed", "--turn-accel", "--turn-jerk"), "limit the axes of a machine with --limits"
+    ),
+}
 #: the feed of commands that only plan
 FEED_OF_ALL = {"heading": "Limits", "help": Limits.__dataclass_fields__["feed"].metadata["help"]}

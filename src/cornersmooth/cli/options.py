@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from cornersmooth.cli.declared import FLAGS, LIMITS, PLANNED, Declared
+from cornersmooth.cli.declared import FLAGS, LIMITS, PLANNED, PLANNED_ALONE, Declared
 from cornersmooth.cli.files import read_input
 from cornersmooth.errors import SettingsError
 
@@ -84,8 +84,12 @@ class Options(Declared):
             return Limits(**{name: getattr(self, name) for name in names.split()})
 
     def planned_limits(self) -> Limits | None:
-        """Limits of the plan whose feeds are written; None where they are the programmed ones."""
-        return self.path_limits(PLANNED) if self.feed_from_plan else None
+        """Limits of the plan whose feeds are written; None where they are the programmed ones (and UsageError)."""
+        if self.feed_from_plan:
+            return self.path_limits(f"{PLANNED} {PLANNED_ALONE}")
+        for name in filter(typed, PLANNED.split()):
+            raise click.UsageError(f"--{name} is for --feed-from-plan")
+        return None
 
     def reading(self) -> dict[str, Any]:
         """Keyword arguments of `cornersmooth.read`."""
