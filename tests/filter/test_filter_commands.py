@@ -10,6 +10,7 @@ import pytest
 
 from filter.programs import PROGRAMS
 from oracle.command import BAD_INPUT, DONE, USAGE, run
+from page.making import values_of
 
 LINUXCNC = ("--control", "linuxcnc", "--machine", "xyzac-trt")
 FANUC = ("--control", "fanuc", "--machine", "table-ac")
@@ -122,6 +123,10 @@ def test_page_shows_runs_before_and_after(tmp_path: Path) -> None:
         assert '"origin": "old"' in text
         assert "old program" in text
         assert "PASSED" in text
+        meta = values_of(text)[0]
+        assert meta["corners"] is None
+        assert [one["first"] for one in meta["runs"]] == sorted(one["first"] for one in meta["runs"])
+        assert meta["runs"]
 
 
 def test_options_of_cl_files_are_refused(tmp_path: Path) -> None:

@@ -23,6 +23,19 @@ SOFTWARE = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swifts
 #: milliseconds for one thing to happen on a busy machine
 PATIENCE = 60_000
 
+#: a program with two runs, which is filtered
+ZIGZAG = (
+    "%\nO1\nG21 G17 G40 G49 G80 G90 G94\nT1 M6\nG54\nS9000 M3\nG43.5 H1\n"
+    + "".join(
+        f"G0 X0. Y{y}. Z20. I0. J0. K1.\nG0 Z1.\nG1 Z0. F2000.\n"
+        + "".join(f"G1 X{x}. Y{y + x % 4}.\n" for x in range(2, 40, 2))
+        + "G0 Z20.\n"
+        for y in (0, 10)
+    )
+    + "G49\nM5\nM30\n%\n"
+)
+FILTER = ("--control", "fanuc", "--limits", "table-ac", "-e", "0.02")
+
 #: where pictures are left
 ARTEFACTS = Path(os.environ.get("CORNERSMOOTH_ARTEFACTS", Path(__file__).parents[2] / "build" / "pages"))
 
@@ -526,7 +539,7 @@ def test_the_first_problem_is_open_and_looked_at(look, wrong):
 def test_the_view_is_most_of_a_wide_window_and_the_part_fills_it(look, text):
     looked = look(text, width=1400, height=900)
     box = looked.page.locator("#stage").bounding_box()
-    assert box["width"] * box["height"] > 0.5 * 1400 * 900
+    assert box["width"] * box["height"] > 0.4 * 1400 * 900
     assert looked.page.evaluate("() => document.documentElement.scrollHeight") <= 900
     pixels = looked.canvas().astype(int)
     drawn = np.abs(pixels - pixels[-3, -3]).max(axis=2) > 24
@@ -539,6 +552,52 @@ def test_the_view_is_most_of_a_wide_window_and_the_part_fills_it(look, text):
     np.testing.assert_allclose(looked.page.evaluate(ring), corner, atol=1e-6)
     assert "worst corner" in looked.page.inner_text("#panel")
     assert looked.page.get_attribute("#panel .before", "d").count("L") >= 1
+
+
+def test_charts_before_and_after_are_beside_each_other_with_the_time_saved(look, text):
+    page = look(text, width=1400, height=900).page
+    plots = page.evaluate(
+        """() => cornersmooth.charts.plots.map(plot => { const box = plot.root.getBoundingClientRect();
+        const title = plot.root.querySelector(".u-title").textContent;
+        return [title, box.left, box.top, box.bottom, plot.scales.y.max]; })"""
+    )
+    assert [title.split(",")[0] for title, *_ in plots] == [
+        "speed of the tip before",
+        "speed of the tip after",
+        "seconds saved so far",
+    ]
+    assert plots[0][1] < plots[1][1] < plots[2][1]
+    assert plots[0][2] == plots[1][2] == plots[2][2]
+    assert plots[0][4] == plots[1][4]  # one scale
+    assert all(180 < bottom - top < 300 and bottom <= 900 for _, _, top, bottom, _ in plots)
+
+
+def test_a_filtered_program_shows_its_runs(look, tmp_path):
+    source, page = tmp_path / "old.nc", tmp_path / "runs.html"
+    source.write_text(ZIGZAG)
+    done = run("filter", source, "-o", tmp_path / "new.nc", *FILTER, "--report", page)
+    assert done.returncode == 0, done.stderr
+    looked = look(page.read_text(encoding="utf-8"))
+    rows = looked.page.locator("#list .row")
+    runs = looked.page.evaluate("() => cornersmooth.meta.runs")
+    assert looked.page.inner_text("#corners h2").startswith("2 runs smoothed")
+    assert rows.count() == len(runs) == 2
+    assert runs[0]["first"] < runs[0]["last"] < runs[1]["first"]
+    for row, own in zip(rows.all(), runs, strict=True):
+        assert f"{own['first']}–{own['last']}" in row.inner_text()
+        assert own["before"] > own["after"] > 0.0
+        assert 0.0 < own["off"] <= 0.02
+    assert "saves" in looked.page.inner_text("#verdict")
+    # a click goes there, with both paths in one picture, and the charts look at the run
+    rows.nth(1).click()
+    looked.settle()
+    assert "run 2" in looked.page.inner_text("#panel")
+    assert looked.page.get_attribute("#panel .before", "d").count("L") >= 1
+    low, high = looked.page.evaluate(
+        "() => { const { min, max } = cornersmooth.charts.plots[0].scales.x; return [min, max]; }"
+    )
+    assert (low, high) == pytest.approx(tuple(runs[1]["way"]))
+    looked.keep("runs")
 
 
 def test_paper_has_everything_in_sight_and_a_photograph_of_the_view(look, wrong):
@@ -562,9 +621,11 @@ def test_paper_has_everything_in_sight_and_a_photograph_of_the_view(look, wrong)
         [id, document.getElementById(id).offsetHeight > 0]))"""
     )
     assert [name for name, there in shown.items() if there] == ["problems", "photo", "panel", "list"]
+    page.evaluate("() => dispatchEvent(new Event('beforeprint'))")
     charts = page.evaluate("() => cornersmooth.charts.plots.map(plot => plot.root.offsetHeight)")
-    assert len(charts) == 3
+    assert len(charts) == 4  # the deviation, the tip's speed before and after, the time saved
     assert min(charts) > 80
+    page.evaluate("() => dispatchEvent(new Event('afterprint'))")
     assert page.evaluate("() => getComputedStyle(document.querySelector('.problem')).breakInside") == "avoid"
 
 

@@ -144,6 +144,8 @@ def test_axes_of_a_machine_have_charts(result):
     )
     meta, pack = scene(subject, Story("part", "", True))
     assert set(meta["charts"]["axes"]) == set("XYZA")  # C turns by less than can be drawn
+    named = Story("part", "", True, limited_by=("the programmed feed", "jerk of A"))
+    assert scene(subject, named)[0]["charts"]["axes"][0] == "A"  # the axis of the verdict comes first
     bare = replace(subject, machine=None)
     assert scene(bare, Story("part", "", True))[0]["charts"]["axes"] == []
     meta, arrays = values_of(document(meta, pack))

@@ -139,7 +139,7 @@ def _filter(job: Input, settings: Settings, given: Options) -> Verdict:
         settings,
         job.reports,
         axes,
-        times=planned_times(saving, axes),
+        saving=saving,
         summary={
             "cuts": found.cuts,
             "smoothed": found.smoothed,
@@ -191,7 +191,7 @@ def _reported(
     settings: Settings,
     reports: Iterable[str],
     axes: Machine | None = None,
-    times: Mapping[str, Any] | None = None,
+    saving: Saving | None = None,
     **more: Any,
 ) -> dict[str, Any]:
     """Make the report of two programs, write it where it is asked for, and the page of the runs before and after."""
@@ -206,7 +206,7 @@ def _reported(
         settings=settings.as_dict(),
         command=command_line(),
         loosened=loosened(settings.tolerance),
-        times=times,
+        times=planned_times(saving, axes),
     )
     checked = found.checked
     contents["compared"] = checked and {
@@ -232,6 +232,9 @@ def _reported(
                 planner=form.table.lines.planner,
                 judgement=judgement,
                 origin="old program",
+                runs=found.changed,
+                left=[asdict(one) for one in found.left],
+                saving=saving,
             )
             write_report(path, [page])
     return contents

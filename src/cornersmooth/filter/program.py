@@ -55,6 +55,8 @@ class Filtered:
     seconds: tuple[float, float] | None = None  #: planned time before and after; see `planned_times`
     #: what the control does in the runs before and after, where that was asked for
     motions: tuple[NcProgram, NcProgram] | None = None
+    #: first and last line of each run that was replaced, in the old program and in the new one; of those in `motions`
+    changed: tuple[tuple[int, int, int, int], ...] = ()
     rounding: float = 0.0  #: mm: by how much the control may round what has changed on its own: it adds to ε
     compared: bool = False  #: whether two programs were compared alone, and nothing was to be smoothed
 
@@ -247,6 +249,7 @@ def _result(
         units_said="units" in old.said,
         seconds=planned_times(job, old, new, where, axes) if axes is not None and where else None,
         motions=pair(job, old, new, drawn) if paths and where else None,
+        changed=tuple((place.run.first + 1, place.run.stop, place.first + 1, place.stop) for place in drawn),
         rounding=max((place.run.state.unit * _rounding(new, place) for place in where), default=0.0),
     )
 

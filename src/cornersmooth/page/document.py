@@ -61,6 +61,7 @@ _SCRIPTS = (
     "places.js",
     "problems.js",
     "corners.js",
+    "runs.js",
     "drive.js",
     "wiring.js",
     "main.js",

@@ -6,7 +6,7 @@ import hashlib
 import io
 import json
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +19,16 @@ from cornersmooth.nc import Frame, choose_form, write
 from cornersmooth.nc_reader import NcProgram
 from cornersmooth.page.scene import Story, Subject, page
 from cornersmooth.report.surface import passes_text
-from cornersmooth.report.verdict import Judgement, Saving, first_line, judge, times_text, trusted_blocks
+from cornersmooth.report.verdict import (
+    LIMITS_TOLD,
+    Judgement,
+    Saving,
+    first_line,
+    judge,
+    saving_text,
+    times_text,
+    trusted_blocks,
+)
 from cornersmooth.settings import Settings
 from cornersmooth.times.saving import planned_saving
 from cornersmooth.verdict import Verdict
@@ -63,6 +72,7 @@ def page_and_saving(
         findings=result.findings,
         facts=_settings_facts(settings),
         source=source,
+        limited_by=() if saving is None else [name for name, _ in saving.limits[:LIMITS_TOLD]],
     )
     return made, saving
 
@@ -121,11 +131,15 @@ def verified_page(
     surface: SurfaceMap | None = None,
     judgement: Judgement | None = None,
     origin: str = "CL file",
+    runs: Sequence[tuple[int, int, int, int]] | None = None,
+    left: Sequence[Mapping[str, Any]] = (),
+    saving: Saving | None = None,
 ) -> str:
     """Page of a program that somebody wrote, measured against its CL file; with a map of the surface if there is one.
 
     `name`, `control` and `form` are those of the program, as far as they are known. What was filtered has a `judgement`
-    of its own, and an old program as its `origin`.
+    of its own, an old program as its `origin`, its `runs` (first and last line in the old program and in the new one),
+    the cuts that are `left` as they were (count, line, reason), and the time that it saves.
     """
     settings = Settings(tolerance=found.tolerance, axis_tolerance=found.axis_tolerance)
     settings = settings if found.axis_tolerance is not None else settings.but(axis_length=found.axis_length)
@@ -140,16 +154,19 @@ def verified_page(
         planner=planner,
         tool=tool if surface is None else surface.tool,
         surface=surface,
+        runs=runs,
     )
     findings = (*program.findings, *trusted_blocks(found))
     judgement = judge(found, findings) if judgement is None else judgement
     facts, text = _measured_facts(found, origin.split()[0]), judgement.text
+    if saving is not None:
+        text += "; " + saving_text(saving)
     if surface is not None:
         text += "; " + surface_text(surface)
         facts += [("tool", surface.tool.describe()), ("cutting edge", f"{surface.edge:g} mm")]
     title = _name(name) or program.source.name
     written = control, form, machine
-    return _told(subject, title, text, judgement.verdict, written, findings, facts, source, origin)
+    return _told(subject, title, text, judgement.verdict, written, findings, facts, source, origin, left=left)
 
 
 def times_page(compared: Comparison, *, source: bytes = b"", tool: Tool | None = None) -> str:
@@ -196,6 +213,9 @@ def _told(
     facts: Iterable[tuple[str, str]],
     source: bytes,
     origin: str = "CL file",
+    *,
+    limited_by: Sequence[str] = (),
+    left: Sequence[Mapping[str, Any]] = (),
 ) -> str:
     """Page of a subject, for a control, form and machine; what is not known is left out of what is always in sight."""
     settings, own, given = subject.settings, subject.settings.axis_tolerance, subject.program.source
@@ -213,7 +233,8 @@ def _told(
     inputs += [(f"SHA-256 of the {origin}", hashlib.sha256(source).hexdigest())] if source else []
     every, findings = [*inputs, *facts, *_limit_facts(subject.limits, subject.machine)], tuple(findings)
     problems = _problems(subject.verification, findings)
-    return page(subject, Story(title, text, badge, head, problems, every, _notes(findings), origin.split()[0]))
+    notes, whose = _notes(findings), origin.split()[0]
+    return page(subject, Story(title, text, badge, head, problems, every, notes, whose, limited_by, left))
 
 
 def _problems(found: Verification | None, findings: Iterable[Finding]) -> list[dict[str, Any]]:

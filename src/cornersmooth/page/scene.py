@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cornersmooth.arrays.slices import some_rows
 from cornersmooth.feedrate import Limits, TimeLaw
 from cornersmooth.geometry.tool import Tool, tools_of
 from cornersmooth.kinematics import Machine
@@ -66,6 +67,9 @@ class Story:
     facts: Sequence[tuple[str, str]] = ()  #: labels and values: settings, versions, hash
     notes: Sequence[str] = ()  #: sentences of what was noticed that nobody has to check
     origin: str = "CL"  #: whose lines the path is of: those of the CL file, or of the old program
+    limited_by: Sequence[str] = ()  #: limits that the verdict names, such as ``"jerk of C"``
+    #: of a filtered program: cuts that stay as they are: how many, first line, reason
+    left: Sequence[Mapping[str, Any]] = ()
 
 
 @dataclass(frozen=True)
@@ -84,6 +88,8 @@ class Subject:
     planner: str = ""  #: of the control's table: with a law of its own no speeds are planned
     tool: Tool | None = None  #: instead of those in the file
     surface: SurfaceMap | None = None
+    #: of a filtered program: first and last line of each run, in the old program and in the new one
+    runs: Sequence[tuple[int, int, int, int]] | None = None
 
 
 def page(subject: Subject, story: Story) -> str:
@@ -122,6 +128,8 @@ def scene(subject: Subject, story: Story) -> tuple[dict[str, Any], Pack]:
     else:
         assert subject.verification is not None
         corners = measured_corners(program, subject.verification)
+    if subject.runs is not None:
+        corners = replace(some_rows(corners, np.zeros(0, np.int64)), counts={})
     centre = 0.5 * (program.tip.min(axis=0) + program.tip.max(axis=0)) if len(program) else np.zeros(3)
     pack = Pack()
     seconds = planned.seconds
@@ -139,7 +147,7 @@ def scene(subject: Subject, story: Story) -> tuple[dict[str, Any], Pack]:
             np.maximum.at(off, places[poses], of_poses[poses])
     _add_original(pack, original, program, corners, centre)
     _add_written(pack, written, planned, seconds, corners, places, settings, centre)
-    charts = _add_charts(pack, original, written, planned, seconds)
+    charts = _add_charts(pack, original, written, planned, seconds, story.limited_by)
     _add_corners(pack, corners, program, original, centre)
     meta: dict[str, Any] = {
         "schema": SCHEMA,
@@ -158,10 +166,15 @@ def scene(subject: Subject, story: Story) -> tuple[dict[str, Any], Pack]:
         "timed": timed,
         "way": float(original.way[-1]) if len(original.way) else 0.0,
         "totals": {name: law.total for name, law in planned.laws.items()},
-        "corners": {"kinds": list(KINDS), "reasons": list(corners.reasons), "counts": corners.counts},
+        "corners": None
+        if subject.runs is not None
+        else {"kinds": list(KINDS), "reasons": list(corners.reasons), "counts": corners.counts},
         "charts": charts,
         "tools": _tools(subject, seconds, written),
     }
+    if subject.runs is not None:
+        meta["runs"] = _runs(subject.runs, written, planned)
+        meta["left"] = [dict(one) for one in story.left]
     if subject.surface is not None:
         meta["surface"] = _add_surface(pack, subject.surface, centre)
     return meta, pack
@@ -268,7 +281,12 @@ def _add_corners(pack: Pack, corners: CornerList, program: Program, original: Or
 
 
 def _add_charts(
-    pack: Pack, original: OriginalPath, written: WrittenPath, planned: Planned, seconds: Floats
+    pack: Pack,
+    original: OriginalPath,
+    written: WrittenPath,
+    planned: Planned,
+    seconds: Floats,
+    limited_by: Sequence[str],
 ) -> dict[str, Any]:
     """Series of the charts along the way and over time; values come in pairs, so that no peak is lost."""
     count = int(np.clip(_STEPS_PER_POSE * len(original.way), _STEPS, _MOST_STEPS))
@@ -299,9 +317,37 @@ def _add_charts(
             pack.add(f"{scale}_saved", np.round(saved, 3), "f4")
         if along:
             changes = {axis: _change(loads, axis) for axis in loads.get("written", ())}
-            charts["axes"] = sorted(filter(changes.get, changes), key=lambda axis: -changes[axis])
+            named = [text[-1] for text in limited_by if text[-5:-1] == " of "]  # the axis that the verdict names first
+            rank = {axis: named.index(axis) if axis in named else len(named) for axis in changes}
+            charts["axes"] = sorted(filter(changes.get, changes), key=lambda axis: (rank[axis], -changes[axis]))
     charts["speeds"] = list(planned.laws)
     return charts
+
+
+def _runs(runs: Sequence[tuple[int, int, int, int]], written: WrittenPath, planned: Planned) -> list[dict[str, Any]]:
+    """What each run of a filtered program is off, and its time before and after where both are planned, s."""
+    off = np.nan_to_num(np.fmax(written.tip_off, written.axis_off), nan=-1.0)
+    found = []
+    for first, last, nc_first, nc_last in runs:
+        rows = np.flatnonzero((written.nc_line >= nc_first) & (written.nc_line <= nc_last) & ~written.rapid)
+        if not len(rows):
+            continue
+        way = written.way[[max(rows[0] - 1, 0), rows[-1]]]
+        times = [np.diff(clock(planned, law, way)) for law in ("direct", "written") if law in planned.laws]
+        before, after = (float(time[0]) for time in times) if len(times) == 2 else (None, None)
+        found.append(
+            {
+                "first": first,
+                "last": last,
+                "nc_first": nc_first,
+                "nc_last": nc_last,
+                "way": way.tolist(),
+                "off": float(off[rows].max()),
+                "before": before,
+                "after": after,
+            }
+        )
+    return found
 
 
 def _change(loads: Mapping[str, Mapping[str, Floats]], axis: str) -> float:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _LISTED = 100
 
 #: limits that the sentence about times names
-_LIMITS_TOLD = 2
+LIMITS_TOLD = 2
 _LEAST_TOLD = 0.005
 
 
@@ -197,7 +197,7 @@ def saving_text(saving: Saving) -> str:
 
 def limits_text(limits: Sequence[tuple[str, float]]) -> str:
     """Say which limits are reached the longest, after a semicolon; empty where none is."""
-    parts = [f"{name} {100.0 * part:.0f} %" for name, part in limits[:_LIMITS_TOLD] if part >= _LEAST_TOLD]
+    parts = [f"{name} {100.0 * part:.0f} %" for name, part in limits[:LIMITS_TOLD] if part >= _LEAST_TOLD]
     return f"; limited by {', '.join(parts)} of the cutting time" if parts else ""
 
 

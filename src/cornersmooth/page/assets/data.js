@@ -26,6 +26,8 @@
  * @property {{kinds: string[], reasons: string[], counts: Record<string, number>} | null} corners
  * @property {{speeds: string[], axes: string[]}} charts
  * @property {ToolShape[]} tools
+ * @property {Run[] | undefined} runs of a filtered program, in place of corners
+ * @property {{count: number, line: number, reason: string}[] | undefined} left cuts of a filtered program that stay
  * @property {Metal | undefined} surface
  * @property {Record<string, Entry>} arrays
  */

@@ -27,14 +27,17 @@ async function start() {
     drive.set(place.second, "place");
   };
   const problems = new Problems(meta, arrays, (place) => {
-    corners?.select(-1);
+    corners.select(-1);
     go(place, true);
   });
-  const corners = meta.corners ? new Corners(meta, arrays, (place, fly) => {
+  const corners = meta.runs ? new Runs(meta, arrays, (place, run, fly) => {
     problems.select(-1);
     go(place, fly);
-  }) : null;
-  element("corners").hidden = !corners;
+    if (fly && charts.scale === "way") charts.look(run.way[0], run.way[1]);
+  }) : new Corners(meta, arrays, (place, fly) => {
+    problems.select(-1);
+    go(place, fly);
+  });
 
   const channels = channelsOf(meta, arrays);
   const select = element("channel");
@@ -79,10 +82,15 @@ async function start() {
   view.fit();
   // the first problem is looked at; else the worst corner is marked in the whole, and enlarged beside it
   if (meta.problems[0]?.severity === "error") problems.select(0);
-  else if (corners?.groups.length) corners.select(0, false);
+  else if (arrays.c_kind.length || meta.runs?.length) corners.select(meta.runs ? bestOf(meta.runs) : 0, false);
   // for tests and for the curious
   Object.assign(globalThis, { cornersmooth: { meta, arrays, view, charts, corners, problems, drive, channels } });
   document.documentElement.dataset.ready = "true";
+}
+
+/** The run that gains most, else the first. @param {Run[]} runs */
+function bestOf(runs) {
+  return runs.reduce((best, run, k) => ((gainOf(run) ?? -Infinity) > (gainOf(runs[best]) ?? -Infinity) ? k : best), 0);
 }
 
 /** @param {Meta} meta */

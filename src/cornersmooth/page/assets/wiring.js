@@ -30,7 +30,7 @@ function wireSwitches(view, recolour) {
   }
 }
 
-/** @param {View} view @param {Drive} drive @param {Corners | null} corners */
+/** @param {View} view @param {Drive} drive @param {Corners | Runs} corners */
 function wireKeys(view, drive, corners) {
   document.addEventListener("keydown", (event) => {
     const field = /** @type {HTMLElement} */ (event.target).tagName;
@@ -41,8 +41,8 @@ function wireKeys(view, drive, corners) {
     else if (event.key === "+" || event.key === "=") view.eye.orbit(0, 0, 1 / 1.2);
     else if (event.key === "-") view.eye.orbit(0, 0, 1.2);
     else if (event.key === "f" || event.key === "F") view.fit();
-    else if (event.key === "n" || event.key === "N") corners?.step(1);
-    else if (event.key === "p" || event.key === "P") corners?.step(-1);
+    else if (event.key === "n" || event.key === "N") corners.step(1);
+    else if (event.key === "p" || event.key === "P") corners.step(-1);
     else if (event.key === " " && field !== "BUTTON" && field !== "SUMMARY") drive.play(!drive.running);
     else return;
     event.preventDefault();
@@ -51,24 +51,23 @@ function wireKeys(view, drive, corners) {
 
 /** Paper is white, has all charts, and a photograph of the view. @param {View} view @param {Charts} charts */
 function wirePrinting(view, charts) {
-  /** @param {boolean} paper @param {number} [width] pixels */
-  const change = (paper, width) => {
-    document.documentElement.classList.toggle("paper", paper);
+  /** @param {number} paper pixels, 0 for the screen */
+  const change = (paper) => {
+    document.documentElement.classList.toggle("paper", paper > 0);
     view.setScheme();
-    charts.build();
-    charts.resize(width);
+    charts.build(paper);
   };
   addEventListener("beforeprint", () => {
-    change(true, PAPER);
+    change(PAPER);
     view.draw(0, true);
     const photo = element("photo");
     [photo.width, photo.height] = [view.canvas.width, view.canvas.height];
     photo.getContext("2d").drawImage(view.canvas, 0, 0);
   });
-  addEventListener("afterprint", () => change(false));
+  addEventListener("afterprint", () => change(0));
 }
 
-/** @param {View} view @param {Drive} drive @param {Corners | null} corners @param {Record<string, Values>} arrays */
+/** @param {View} view @param {Drive} drive @param {Corners | Runs} corners @param {Record<string, Values>} arrays */
 function wirePicking(view, drive, corners, arrays) {
   /** @type {[number, number] | null} */
   let pressed = null;
@@ -77,7 +76,7 @@ function wirePicking(view, drive, corners, arrays) {
     const moved = !pressed || Math.hypot(event.offsetX - pressed[0], event.offsetY - pressed[1]) > 4;
     if (moved) return;
     const found = view.pick(event.offsetX, event.offsetY);
-    if (found && "corner" in found) corners?.select(found.corner);
+    if (found && "corner" in found) corners.select(found.corner);
     else if (found) drive.set(arrays.w_time[found.point], "view");
   });
 }
