@@ -12,7 +12,7 @@ from nc.splines import HeidenhainSplines, KnotSplines, SiemensPolynomials, Sieme
 #: comments, ends, tools, spindle, coolant, stops, feed modes, planes and compensation of the ISO controls
 ISO = (
     r"\([^()]*\)|%|T\d+ M6|T\d+|S\d+ M[34]|M(?:0|1|3|4|5|7|8|9|19|30)|G9[345]|G1[789]|G4[12] D\d+|G40|"
-    r"G2[01] G90 G94 G17 G40 G49 G80|G54"
+    r"G1|G2[01] G90 G94 G17 G40 G49 G80|G54"
 )
 MILLISECONDS, SECONDS = r"|O\d{4}|G4 P\d+", r"|O\d{4}|G4 P\d+\.\d*"
 SIEMENS = (
@@ -99,7 +99,7 @@ def _iso(control: str, form: str, machine: str, tcp: bool, tip: int) -> Reader:
         turn,
         machine,
         decimals=(tip,) * 3 + decimals,
-        circles="R" if turn == "great circle" else "",
+        circles="" if control in ("haas", "generic") and turn in ("angles", "point") else "R",
         longest=252,
         extra=KnotSplines(weight_decimals=4 if control == "mitsubishi" else 3) if form == "g6.2" else None,
         **switch,
@@ -119,7 +119,7 @@ def _siemens(control: str, form: str, machine: str, tcp: bool, tip: int) -> Read
         turn,
         machine,
         decimals=(tip,) * 3 + decimals,
-        circles="CR=" if turn == "great circle" else "",
+        circles="" if turn == "point" else "CR=",
         longest=512,
         extra={"bspline": SiemensSplines(), "poly": SiemensPolynomials()}.get(form),
         **(TRAORI if tcp else {}),
@@ -145,6 +145,7 @@ def _heidenhain(control: str, form: str, machine: str, tcp: bool, tip: int) -> R
         rapid_end=" FMAX",
         decimals=(tip,) * 3 + decimals,
         signs=True,
+        circles="R+",
         number="{number} ",
         modes=("M137", "M136", "G93"),
         extra=HeidenhainSplines() if form == "spl" else None,

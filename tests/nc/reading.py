@@ -23,6 +23,8 @@ Floats = NDArray[np.float64]
 
 #: digits of what is written as zero with a minus
 NEGATIVE_ZERO = re.compile(r"-0*\.?0*")
+#: how far above the tip a point of the axis is put that is not written
+POINT = 100.0
 #: how far a written vector may be from length 1: half a step of the seventh decimal in each component, and a hair
 UNIT_LENGTH = 1e-7
 
@@ -125,7 +127,8 @@ class Reader:
     home, back : str
         Patterns of the retract, and of the block that must follow it; empty where there is none.
     circles : str
-        Address of the radius of circular blocks; empty where there are none.
+        Address of the radius of circular blocks; empty where there are none. In Klartext they say the direction at
+        their end, and stay at one height.
     longest : int
         Characters of a line.
     """
@@ -163,10 +166,14 @@ class Reader:
             rf"(?:(?P<rapid>{self.rapid} )|{self.feed} ){' '.join(number)}(?P<tail>{self.rapid_end}|{feed})"
         )
         other = " " + " ".join(number[3:]) if number[3:] else ""
+        self.aside = re.compile(rf"{self.rapid} {number[0]} {number[1]}")
         self.above = re.compile(rf"{self.rapid} {number[0]} {number[1]}{other}{self.rapid_end}")
         self.turn_only = re.compile(rf"{self.rapid}{other}{self.rapid_end}") if self.machine else None
-        radius = rf"{self.circles}((?:0|[1-9]\d*)\.\d{{{self.decimals[0]}}})"
-        self.circle = re.compile(rf"G(?P<way>[23]) {' '.join(number[:3])} {radius}{feed}") if self.circles else None
+        radius = rf"{re.escape(self.circles)}(?P<radius>(?:0|[1-9]\d*)\.\d{{{self.decimals[0]}}})"
+        arc = rf"G(?P<way>[23]) {' '.join(number[:3])} {radius}{feed}"
+        if self.circles == "R+":
+            arc = rf"CR {' '.join(number[:2])} {radius} DR(?P<way>[+-]){feed}"
+        self.circle = re.compile(arc) if self.circles else None
 
     def read(self, text: str, axis_length: float, limit: float) -> Reading:
         """Read a whole text; TextError where it breaks a rule."""
@@ -175,7 +182,8 @@ class Reader:
         self.step, self.axis_length = axis_step(axis_length, limit), axis_length
         self.limit, self.plane, self.mode, self.tip_control = limit, 17, self.modes[0], not self.on
         self.compensation, self.raised, self.over, self.wanted = False, False, None, ""
-        for number, line in self.blocks(text):
+        for number, block in self.blocks(text):
+            line = self.with_point(block) if self.turn == "point" and self.circles else block
             if self.with_z and (match := re.fullmatch(f"({self.on}) (.*)", line)):
                 if self.tip_control or not self.raised or not self.straight.fullmatch(match[2]):
                     raise TextError(f"{number}: {match[1]} beside what does not come down from a retract")
@@ -196,7 +204,7 @@ class Reader:
                 if not self.raised:
                     raise TextError(f"{number}: rotary axes turn below the height of the retract")
                 reading.codes.append(line)
-            elif match := self.above.fullmatch(line):
+            elif match := self.above.fullmatch(line) or (self.turn == "point" and self.aside.fullmatch(line)):
                 again = self.over is not None or self.tilted(match.groups()[2:])
                 if not self.raised or self.tip_control is self.with_z or again:
                     raise TextError(f"{number}: a rapid without Z that comes from no retract, or of a tilted tool")
@@ -221,8 +229,12 @@ class Reader:
                 if position is None:
                     raise TextError(f"{number}: arc from nowhere")
                 self.check_motion(number, False, match["f"])
-                end = np.concatenate((self.numbers(number, match.groups()[1:4]), position[3:]))
-                reading.pieces.append(self.arc(number, match["way"] == "2", position, end, float(match.groups()[4])))
+                end, flat = position.copy(), self.circles == "R+"
+                place = match.groups()[0:2] if flat else match.groups()[1:4]
+                end[: len(place)] = self.numbers(number, place)
+                if self.turn == "point":
+                    end[3:] += end[:3] - position[:3]
+                reading.pieces.append(self.arc(number, match["way"] in "2-", position, end, float(match["radius"])))
                 position = end
             elif self.extra and (after := self.extra(self, line, number, position, reading)) is not None:
                 position = after
@@ -237,6 +249,14 @@ class Reader:
         if any(left):
             raise TextError(f"end: feed mode, plane, compensation, tip control still on: {left}")
         return reading
+
+    def with_point(self, line: str) -> str:
+        """Straight block or control point of a tool along Z, with a point of its axis that it does not name."""
+        match = re.search(r" X(\S+) Y(\S+) Z(\S+)(?! U| R\d+\.\d{4,})", line)
+        if match is None or " U" in line or line.startswith(("(", "G2 ", "G3 ")):
+            return line
+        above = f"{float(match[3]) + POINT:.{self.decimals[0]}f}"
+        return f"{line[: match.end()]} U{match[1]} V{match[2]} W{above}{line[match.end() :]}"
 
     def tilted(self, words: tuple[str, ...]) -> bool:
         """Whether the words behind the tip lean the tool in the part: X Y alone go aside or down on the machine."""
@@ -358,6 +378,11 @@ class Reader:
 
         def at(share: Floats) -> tuple[Floats, Floats]:
             tip = points[np.rint(share * (len(points) - 1)).astype(int)]
-            return tip, np.broadcast_to(start[3:], tip.shape)
+            values = np.hstack((tip, np.broadcast_to(start[3:], (len(tip), len(start) - 3))))
+            if self.turn == "point":
+                return tip, np.broadcast_to(start[3:] - start[:3], tip.shape)
+            if self.turn == "great circle":
+                return values[:, :3], values[:, 3:]
+            return self.along(values, values, share)
 
         return Piece(number, False, at, len(points) - 1, None, self.mode)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import cmath
+import io
 import math
 import re
 from collections.abc import Callable
@@ -12,9 +13,19 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from cornersmooth.cl import read
+from cornersmooth.geometry.arcs import arc_points
+from cornersmooth.kinematics import load_machine
 from cornersmooth.model import Program
+from cornersmooth.nc import choose_form, fit_settings, write
+from cornersmooth.settings import Settings
+from cornersmooth.smoothing import smooth
+from nc.cases import without_limits
+from nc.grammars import reader
 from nc.writing import codes, one_arc, text_of, text_of_cl
 from oracle.files import cl_file, of_corpus
+from oracle.judge import judge
+from oracle.motion import Original, unit
 from oracle.share import covering_share, how_many
 
 Floats = NDArray[np.float64]
@@ -156,19 +167,142 @@ def test_turning_tool_axis_becomes_lines_with_the_axis_spread() -> None:
     np.testing.assert_allclose(vectors[-1], (0.6, 0.0, 0.8))
 
 
-@pytest.mark.parametrize(("chord", "form"), covering_share(product([None, 0.05], ["g1", "g6.2"]), 3))
-def test_lines_for_an_arc_stay_within_the_tolerance(form: str, chord: float | None) -> None:
+@pytest.mark.parametrize("chord", [None, 0.05])
+def test_lines_for_an_arc_stay_within_the_tolerance(chord: float | None) -> None:
     """Even where lines on curves may be coarser than the tolerance."""
     normal = np.array([0.0, 0.6, 0.8])
     arm = np.array([25.0, 0, 0])
     shares = np.linspace(0, 1, 2001)
     points = np.array([turned(normal, arm, 4.0 * s) for s in shares])
     program = one_arc(points[0], points[-1], (0, 0, 0), normal, 4.0)
-    lines, _ = text_of(program, form, tolerance=0.01, chord_tolerance=chord)
+    lines, _ = text_of(program, tolerance=0.01, chord_tolerance=chord)
     path = walk(lines)
     worst = max(nearest(point, path) for point in points)
     assert worst <= 0.01
     assert (worst > 5e-4) or chord is None, "finer than asked for"
+
+
+#: a whole turn, a helix, a tilted axis of the arc, an arc across a tilted tool
+LEANING = (0.6, 0.0, 0.8)
+BENT = {
+    "turn": one_arc((25.0, 0, 0), (25.0, 0, 0), (0, 0, 0), (0, 0, 1), 2 * math.pi, axis=LEANING),
+    "helix": one_arc((25.0, 0, 0), (-25.0, 0, 12.0), (0, 0, 0), (0, 0, -1), 5 * math.pi, axis=LEANING),
+    "tilted": one_arc((25.0, 0, 0), (0, 20.0, -15.0), (0, 0, 0), (0, -0.6, -0.8), 1.5 * math.pi),
+    "inside": one_arc((2.0, 0, 0), (0, 2.0, 0), (0, 0, 0), (0, 0, 1), math.pi / 2, axis=LEANING),
+}
+
+
+@pytest.mark.parametrize(
+    ("control", "form", "most"),
+    [("fanuc", "g6.2", 4), ("generic", "g6.2", 4), ("siemens", "bspline", 3), ("siemens", "poly", 4)],
+)
+@pytest.mark.parametrize("name", BENT)
+def test_arcs_are_curves_where_a_point_of_the_axis_goes_along(name: str, control: str, form: str, most: int) -> None:
+    """Rational ones are circles but for the rounding of their weights; so many rows for 120 degrees are enough."""
+    program = BENT[name]
+    chosen = choose_form(control, form)
+    settings = Settings(tolerance=0.002, chord_tolerance=0.0005)
+    smoothed = smooth(program, fit_settings(settings, chosen, program.units))
+    stream = io.BytesIO()
+    written = write(smoothed, stream, form=chosen)
+    text = stream.getvalue().decode("ascii")
+    assert [one.text for one in written.findings if one.code == "CS313"] == ["arc written as curves"]
+    assert "CS314" not in codes(written)
+    points = len(re.findall(r" (?:R|PW=)[01]|POLY", text))
+    assert points <= most * 2 * math.ceil(3 * program.arcs.sweep[0] / (2 * math.pi))
+    (path,) = reader(control, form).read(text, settings.axis_length, settings.tolerance).runs(10.0)
+    tip, axis = arc_points(program, np.zeros(4001, np.int64), np.linspace(0.0, 1.0, 4001))
+    assert max(nearest(point, tip) for point in path.tip) <= 0.0007  # chord tolerance, and rounding
+    assert np.linalg.norm(path.point - path.tip - 10.0 * axis[0], axis=1).max() <= 3e-4
+    way = np.linalg.norm(np.diff(path.tip, axis=0), axis=1).sum()
+    assert way == pytest.approx(np.linalg.norm(np.diff(tip, axis=0), axis=1).sum(), rel=2e-3)
+
+
+def test_no_curve_where_the_control_refuses_it() -> None:
+    """PS1006: G06.2 under G95, and under cutter compensation."""
+    cl = "UNITS/MM\nSPINDL/900,RPM,CLW\nFEDRAT/0.1,MMPR\nRAPID\nGOTO/10,0,0,0.6,0,0.8\n{}FEDRAT/{}\nGOTO/20,0,0\n"
+    cl += "CIRCLE/20,10,0,0,0,1,10\nGOTO/30,10,0\nFINI\n"
+    for before, feed, curves in (("", "90,MMPM", 1), ("", "0.1,MMPR", 0), ("CUTCOM/LEFT\n", "90,MMPM", 0)):
+        lines, _ = text_of_cl(cl.format(before, feed), "g6.2")
+        assert sum(line.startswith("G6.2") for line in lines) == curves
+
+
+def test_g62_ends_before_anything_but_control_points() -> None:
+    """Its mode takes no other commands (B-63324EN/03 4.17): G1 stands before them."""
+    cl = "UNITS/MM\nFEDRAT/90,MMPM\nRAPID\nGOTO/10,0,0,0.6,0,0.8\nGOTO/20,0,0\nCIRCLE/20,10,0,0,0,1,10\n"
+    lines, _ = text_of_cl(cl + "GOTO/30,10,0\nDELAY/2\nGOTO/30,20,0\nFINI\n", "g6.2")
+    last = max(index for index, line in enumerate(lines) if re.fullmatch(r"K\d+\.\d*", line))
+    assert lines[last + 1 : last + 3] == ["G1", "G4 P2000"]
+
+
+def test_a_tool_along_z_needs_no_axis_point() -> None:
+    """Then arcs are circles in curve forms, and taps the cycle of the control."""
+    cl = (
+        "UNITS/MM\nLOADTL/1\nSPINDL/900,RPM,CLW\nFEDRAT/90,MMPM\nRAPID\nGOTO/10,0,50\nGOTO/10,0,5\n"
+        "GOTO/20,0,5\nCIRCLE/20,10,5,0,0,1,10\nGOTO/30,10,5\nRAPID\nGOTO/30,10,50\n"
+        "CYCLE/TAP,DEPTH,9,MMPR,1.5,CLEAR,5\nGOTO/40,0,0\nCYCLE/OFF\nFINI\n"
+    )
+    lines, written = text_of_cl(cl, "g6.2")
+    assert not [line for line in lines if " U" in line]
+    assert any(re.fullmatch(r"G3 X30\.0+ Y10\.0+ Z5\.0+ R10\.0+", line) for line in lines)
+    assert any(line.startswith("G98 G84 X40.0000 Y0.0000 Z-9.0000") for line in lines)
+    assert "CS320" not in codes(written)
+
+
+@pytest.mark.parametrize(
+    ("control", "name", "tcp", "axis", "normal", "circles"),
+    [
+        ("fanuc", "table-ac", True, (0, 0, 1), 2, 1),
+        ("fanuc", "table-ac", True, (0, -1, 0), 1, 0),  # the table has tilted the plane: PS5421 where WKP is 1
+        ("fanuc", "head-ac", True, (0, -1, 0), 1, 1),  # "no restriction ... on a tool rotation axis"
+        ("fanuc", "head-ac", True, (0, -0.6, 0.8), 2, 1),
+        ("fanuc", "table-ac", False, (0, -1, 0), 1, 1),  # along Z of the machine
+        ("fanuc", "table-ac", False, (0, -0.6, 0.8), 2, 0),  # tilted in X Y Z of the machine
+        ("siemens", "table-ac", True, (0, -1, 0), 1, 1),
+        ("linuxcnc", "xyzac-trt", True, (0, 0, 1), 2, 1),
+        ("heidenhain", "table-bc", True, (0, 0, 1), 2, 1),
+        ("heidenhain", "table-bc", True, (0, 0, 1), 0, 0),  # CR lies in XY
+        ("haas", "table-bc", True, (0, 0, 1), 2, 0),
+        ("haas", "table-bc", False, (0, 0, 1), 2, 1),
+    ],
+)
+def test_arcs_are_circles_where_rotary_axes_stand(
+    control: str, name: str, tcp: bool, axis: tuple[float, ...], normal: int, circles: int
+) -> None:
+    """And where the control takes them; the text means the arc."""
+    start = np.roll(np.eye(3)[normal] * 20.0, 1)
+    about = np.eye(3)[normal]
+    end = turned(about, start, 1.5)
+    text_start = "{:.6f},{:.6f},{:.6f}".format(*start)
+    cl = "UNITS/MM\nLOADTL/1\nSPINDL/900,RPM,CLW\nRAPID\nGOTO/{},{},{},{}\n".format(text_start, *axis)
+    cl += "FEDRAT/90,MMPM\nCIRCLE/0,0,0,{:.0f},{:.0f},{:.0f},20\n".format(*about)
+    cl += "GOTO/{:.6f},{:.6f},{:.6f}\nFINI\n".format(*end)
+    machine = without_limits(load_machine(name))
+    chosen, program = choose_form(control, "g1", machine=machine, tcp=tcp), read(cl.encode(), name="arc.cls")
+    settings = Settings(tolerance=0.01)
+    stream = io.BytesIO()
+    written = write(smooth(program, fit_settings(settings, chosen, program.units)), stream, form=chosen)
+    assert codes(written).get("CS313", 0) == circles
+    found = reader(control, "g1", name, tcp).read(stream.getvalue().decode(), 10.0, settings.tolerance)
+    share = np.linspace(0.0, 1.0, 2001)
+    tip = np.array([turned(about, start, 1.5 * s) for s in share])
+    original = Original(tip, np.broadcast_to(unit(np.array([axis], np.float64)), tip.shape))
+    verdict = judge(found.runs(10.0), [original], 10.0, settings.tolerance)
+    assert verdict.deviation.worst <= settings.tolerance, verdict
+
+
+def test_an_arc_on_which_an_axis_would_turn_is_lines() -> None:
+    """Near the pole the first axis turns ahead of time, on the arc, too: there is no circle then."""
+    cl = (
+        "UNITS/MM\nLOADTL/1\nSPINDL/900,RPM,CLW\nRAPID\nGOTO/0,0,0,0,-0.6,0.8\nFEDRAT/90,MMPM\nGOTO/20,0,0,0,0,1\n"
+        "CIRCLE/20,10,0,0,0,1,10\nGOTO/30,10,0\nGOTO/30,40,0,0.6,0,0.8\nFINI\n"
+    )
+    chosen = choose_form("siemens", "g1", machine=load_machine("table-ac"))
+    program = read(cl.encode(), name="pole.cls")
+    stream = io.BytesIO()
+    written = write(smooth(program, fit_settings(Settings(tolerance=0.01), chosen, "mm")), stream, form=chosen)
+    assert codes(written)["CS314"] == 1
+    assert not re.search(r"^G[23] ", stream.getvalue().decode(), re.MULTILINE)
 
 
 def test_planes_change_only_when_they_must() -> None:

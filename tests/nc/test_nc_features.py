@@ -262,9 +262,8 @@ def arcs(control: str) -> str:
     return {
         (True, True, True): "all three",
         (False, True, True): "the last two",
-        (False, True, False): "without tip control",
-        (True, False, False): "with vectors; of a machine without rotary axes",
-    }[vectors and circles(ARC, None), without, in_planes]
+        (True, True, False): "the first two",
+    }[circles(ARC, None if vectors else ""), without, in_planes]
 
 
 def repeated(control: str) -> str:
@@ -305,7 +304,7 @@ ROWS: dict[str, Callable[[str], str]] = {
     "clamps of rotary axes": clamps,
     "modulo axes, the shorter way (machine file)": modulo,
     "vectors in the digits that the control keeps": vectors,
-    "arcs: with vectors, without tip control (a tool along Z), in planes": arcs,
+    "arcs: under tip control, without (a tool along Z), in planes": arcs,
     "repeated words left out": repeated,
     "name of the program": name,
 }

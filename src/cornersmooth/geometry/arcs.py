@@ -22,6 +22,9 @@ _MOST_OF_TOLERANCE = 0.9
 #: largest turn about the arc's axis in one chord, rad: coarser chords of small arcs would not look like an arc
 _LARGEST_STEP = math.pi / 2.0
 
+#: parameters at which curves are compared with their arcs: the middle and the ends are on them
+_PROBES = np.linspace(0.0, 1.0, 17)[1:-1]
+
 
 def arc_radii(program: Program) -> Floats:
     """(k,) mean of the distances of start and end from the axis, mm."""
@@ -66,7 +69,7 @@ def arc_points(program: Program, rows: Ints, share: Floats) -> tuple[Floats, Flo
     return tip, axis
 
 
-def arc_tangents(program: Program, rows: Ints, share: float) -> Floats:
+def arc_tangents(program: Program, rows: Ints, share: float | Floats) -> Floats:
     """Derivatives (m, 3) of the tips on arcs `rows` (m,) by their share, mm: where the tool goes there."""
     _, sweep, radius, side, closing = _swings(program, rows)
     swing = np.cos(sweep * share)[:, None] * side - np.sin(sweep * share)[:, None] * radius
@@ -83,6 +86,45 @@ def _swings(program: Program, rows: Ints) -> tuple[Ints, Floats, Floats, Floats,
     closing = program.tip[pose] - program.tip[pose - 1]
     closing -= (np.cos(sweep) - 1.0)[:, None] * radius + np.sin(sweep)[:, None] * side
     return pose, sweep, radius, side, closing
+
+
+def arc_weights(turn: Floats, decimals: int | None) -> Floats:
+    """(m,) weight of the inner control points of `arc_curves` that turn so far, rad; all 1 without decimals."""
+    exact: Floats = (1.0 + 2.0 * np.cos(turn / 2.0)) / 3.0
+    return np.ones(len(turn)) if decimals is None else np.round(exact, decimals)
+
+
+def arc_curves(program: Program, rows: Ints, begin: Floats, end: Floats, weight: Floats) -> Floats:
+    """Control points (m, 4, 3), mm, of cubic curves beside arcs `rows` (m,) from one share (m,) to another.
+
+    Outer weights are 1. With the inner weight ``(1 + 2 cos(turn / 2)) / 3`` a curve is a circle: a rational quadratic
+    one with its degree raised (Piegl and Tiller, The NURBS Book, 7.3). The inner points lie so far along the tangents
+    that the middle of the curve is on the arc, whatever the weight (m,): one that is rounded, or 1.
+    """
+    share = end - begin
+    turn = program.arcs.sweep[rows] * share
+    lever = (share * (1.0 + 3.0 * weight) / (3.0 * weight) * np.tan(turn / 4.0) / turn)[:, None]
+    first, last = (arc_points(program, rows, at)[0] for at in (begin, end))
+    slopes = (arc_tangents(program, rows, at) for at in (begin, end))
+    leaving, arriving = (lever * slope for slope in slopes)
+    return np.stack((first, first + leaving, last - arriving, last), axis=1)
+
+
+def curve_deviation(program: Program, rows: Ints, begin: Floats, end: Floats, weight: Floats) -> Floats:
+    """(m,) mm: how far curves of `arc_curves` are from their arcs at the same turns, at some places between."""
+    points = arc_curves(program, rows, begin, end, weight)
+    weights = np.stack((np.ones_like(weight), weight, weight, np.ones_like(weight)), axis=1)
+    normal, centre, sweep = program.arcs.normal[rows], program.arcs.centre[rows], program.arcs.sweep[rows]
+    ahead = np.cross(normal, points[:, 0] - centre)
+    back = np.cross(ahead, normal)
+    worst = np.zeros(len(rows))
+    for u in _PROBES.tolist():
+        basis = weights * (np.array([(1 - u) ** 3, 3 * u * (1 - u) ** 2, 3 * u**2 * (1 - u), u**3]))
+        point = (basis[:, None, :] @ points)[:, 0] / basis.sum(axis=1)[:, None]
+        turned = np.arctan2(dot(point - centre, ahead), dot(point - centre, back))
+        there, _ = arc_points(program, rows, begin + turned / sweep)
+        worst = np.maximum(worst, norm(point - there))
+    return worst
 
 
 def poses_and_arcs(program: Program, step: float) -> tuple[Ints, Floats, Floats]:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from cornersmooth.errors import Finding, SettingsError
-from cornersmooth.model import Ints, SmoothProgram, Units
+from cornersmooth.model import Bools, Ints, SmoothProgram, Units
 from cornersmooth.nc.blocks import Blocks
 from cornersmooth.nc.circles import Circles, plan_circles, with_arcs
 from cornersmooth.nc.control import Control
@@ -32,7 +34,7 @@ from cornersmooth.nc.motion import Motion
 from cornersmooth.nc.own_words import own_words
 from cornersmooth.nc.planes import Planes, check_travel_in_planes, check_travel_without_axes, plan_planes
 from cornersmooth.nc.program_frame import BLEND_STEP, POINT_APPROACH, Frame, Stream
-from cornersmooth.nc.rotary_rows import rotary_rows
+from cornersmooth.nc.rotary_rows import arc_angles, rotary_rows
 from cornersmooth.nc.rotary_words import rotary_way, within_reach
 from cornersmooth.nc.script import Script
 from cornersmooth.nc.statement_writer import StatementWriter
@@ -180,7 +182,8 @@ def write(
     upright = upright_poses(program, chosen, drills=native)
     planes = plan_planes(program, smoothed.settings, chosen, upright, findings, drills=native)
     check_travel_in_planes(planes, program, chosen, findings)
-    circles = plan_circles(program, smoothed.settings, chosen, planes, upright)
+    of_rows = Findings()  # rows are made in a thread of their own: their findings come last
+    rows, circles = _rows(smoothed, chosen, planes, upright, of_rows)
     add_warnings(chosen, smoothed, circles, findings)
     stretch = chosen.stretch(smoothed.settings.axis_length)
     tilting = Coordinates(chosen, program.units, stretch, modal=frame.modal)
@@ -189,40 +192,47 @@ def write(
     approach = max(frame.approach, POINT_APPROACH) if chosen.orientation == "point" else frame.approach
     motion = Motion(program, tilting, modals, blocks, findings, approach, frame.retract)
     script = Script(statements, motion, Holes(motion, statements, native), upright, planes)
-    of_rows = Findings()  # rows are made in a thread of their own: their findings come last
     with _BackgroundWriter(stream) as behind:
         text = frame.start(behind, chosen)
         motion.say(modals.start())
-        chunks = (
-            (rows, tilting.ticks(rows.tip, rows.other)) for rows in _rows(smoothed, chosen, circles, planes, of_rows)
-        )
-        for rows, ticks in chunks if len(program) < _MANY else _one_ahead(chunks):
-            script.run(rows, ticks)
+        chunks = ((some, tilting.ticks(some.tip, some.other)) for some in rows)
+        for some, ticks in chunks if len(program) < _MANY else _one_ahead(chunks):
+            script.run(some, ticks)
             script.hand_on(text)
-            if progress is not None and len(rows.move):
-                progress(int(rows.move[-1]) + 1, len(program))
+            if progress is not None and len(some.move):
+                progress(int(some.move[-1]) + 1, len(program))
         script.finish()
         script.hand_on(text)
     findings.add_all(of_rows.all())
     return Written(blocks.written, findings.all())
 
 
-def _rows(smoothed: SmoothProgram, form: Form, circles: Circles, planes: Planes, findings: Findings) -> Iterator[Rows]:
+def _rows(
+    smoothed: SmoothProgram, form: Form, planes: Planes, upright: Bools, findings: Findings
+) -> tuple[Iterator[Rows], Circles]:
+    """Rows as they come, and how their arcs are written; findings of rows come later."""
+    program, settings = smoothed.program, smoothed.settings
     if form.machine is not None and not form.rotary:
-        check_travel_without_axes(form.machine, smoothed.program)
+        check_travel_without_axes(form.machine, program)
+    circles, long = plan_circles(program, settings, form, planes, upright), settings.lines == "long"
     if form.curves:
-        return curve_rows(smoothed, divide=form.curve in _TURNING)
-    long = smoothed.settings.lines == "long"
-    if not long and not form.rotary:
-        rows = dense_rows(smoothed, circles.blocks)
+        rows = curve_rows(smoothed, circles, divide=form.curve in _TURNING)
+    elif form.rotary:
+        while True:  # arcs on which rotary axes would turn, or stand where the control wants no circle, become lines
+            whole, seen = (coarse_rows if long else all_dense_rows)(smoothed, circles), Findings()
+            way = rotary_way(whole, smoothed, form, seen)
+            known = plan_circles(program, settings, form, planes, upright, arc_angles(way, program, form))
+            before, circles = circles.blocks, replace(known, blocks=np.minimum(known.blocks, circles.blocks))
+            if (circles.blocks == before).all():
+                break
+        findings.add_all(seen.all())
+        inside = planes.of >= 0 if planes.planes else None
+        rows = rotary_rows(way, smoothed, form, findings, long=long, in_planes=inside)
+    elif long:
+        rows = long_rows(coarse_rows(smoothed, circles), smoothed, form)
     else:
-        whole = coarse_rows(smoothed, circles.blocks) if long else all_dense_rows(smoothed, circles.blocks)
-        if form.rotary:
-            inside, way = planes.of >= 0 if planes.planes else None, rotary_way(whole, smoothed, form, findings)
-            rows = rotary_rows(way, smoothed, form, findings, long=long, in_planes=inside)
-        else:
-            rows = long_rows(whole, smoothed, form)
-    return with_arcs(rows, smoothed.program, circles)
+        rows = dense_rows(smoothed, circles)
+    return with_arcs(rows, program, circles), circles
 
 
 def _one_ahead(chunks: Iterator[tuple[Rows, Ints]]) -> Iterator[tuple[Rows, Ints]]:

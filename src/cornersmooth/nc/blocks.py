@@ -15,11 +15,14 @@ from cornersmooth.nc.block_rows import BlockRows
 from cornersmooth.nc.circles import Circles
 from cornersmooth.nc.control import INVERSE_TIME
 from cornersmooth.nc.coordinates import Coordinates
-from cornersmooth.nc.curves import Part, SplineCount, joined, prepared, shape_of, spelt
+from cornersmooth.nc.curves import Part, SplineCount, joined, prepared, shapes_of, spelt
 from cornersmooth.nc.messages import Findings, refused
 from cornersmooth.nc.modals import Modals
 from cornersmooth.nc.program_frame import BLEND_STEP
 from cornersmooth.text import format_number, interleave, to_ticks
+
+#: curve styles whose word holds until another kind of motion
+MODAL_CURVES = ("g6.2", "bspline")
 
 #: steps of the last digit that a number may be below a whole one and still is it
 _ROUNDING = 1e-6
@@ -46,22 +49,26 @@ class Blocks:
         if self.counted is not None:
             self.counted.take(rows)
         count, rapid = len(rows), rows.rapid.astype(np.int64)
-        shape = shape_of(rows, at, self.circles, open_spline=modals["spline"])
-        if shape is not None and at.form.curve == "bspline":
-            modals.now["spline"] = bool(shape.rows[-1])
+        shapes = shapes_of(rows, at, self.circles, open_spline=modals["spline"])
         none, before = np.zeros(count, np.int64), self._changes(rows, at)
+        if at.form.curve in MODAL_CURVES:
+            if before and at.form.curve == "g6.2":
+                before.insert(0, self._end_of_curve(rows, at, before))
+            modals.now["spline"] = bool(rows.curve[-1])
         if words:
             before.append(([b"", f"{words}{at.gap}".encode()], (np.arange(count) == 0).astype(np.int64)))
         codes: Part = [f"{word}{at.gap}".encode() for word in (at.motion.line, at.motion.rapid)], rapid
         ends: list[Part] = [([b"", at.motion.rapid_end.encode()], rapid)] if at.motion.rapid_end else []
         ends = [self._feeds(rows, at, rows.curve > 0), *ends, ([b"\n"], none)]
-        if shape is not None:
+        behind: list[Part] = []
+        for shape in shapes:
             texts, ids = codes
             ids = ids.copy()
             ids[shape.rows] = len(texts) + shape.code[1]
             codes = [*texts, *shape.code[0]], ids
-            ends = [_of_rows(part, shape.rows) for part in shape.behind] + ends
+            behind += [_of_rows(part, shape.rows) for part in shape.behind]
             ends += [_of_rows(shape.after, shape.rows)] if shape.after is not None else []
+        ends = behind + ends
         if rows.dwell is not None and dwell:
             ends.append(([b"", "".join(f"{block}\n" for block in dwell).encode()], rows.dwell.astype(np.int64)))
         left_out = None
@@ -72,17 +79,18 @@ class Blocks:
             lines = [text.count(b"\n") for text in texts]
             several = len(set(lines)) > 1
             self.written += int(np.bincount(ids, minlength=len(lines)) @ lines) if several else lines[0] * count
-        if shape is None or shape.numbers is None:
-            if at.closing:
-                tail = [at.closing.encode() + text for text in tail]
-            return at.format.rows(at.shown(rows.ticks), head, head_id, tail, tail_id, left_out)[0]
-        plain, (form, numbers) = ~shape.rows, shape.numbers
+        apart = [(shape.rows, *shape.numbers) for shape in shapes if shape.numbers is not None]
+        closed = [at.closing.encode() + text for text in tail] if at.closing else tail
+        if not apart:
+            return at.format.rows(at.shown(rows.ticks), head, head_id, closed, tail_id, left_out)[0]
+        which = np.zeros(count, np.int64)
+        for number, (own, _, _) in enumerate(apart, 1):
+            which[own] = number
+        plain = which == 0
         out = None if left_out is None else left_out[plain]
-        made = [
-            at.format.rows(rows.ticks[plain], head, head_id[plain], tail, tail_id[plain], out),
-            form.rows(numbers, head, head_id[shape.rows], tail, tail_id[shape.rows]),
-        ]
-        return interleave(shape.rows.astype(np.int64), made)
+        made = [at.format.rows(at.shown(rows.ticks[plain]), head, head_id[plain], closed, tail_id[plain], out)]
+        made += [form.rows(numbers, head, head_id[own], tail, tail_id[own]) for own, form, numbers in apart]
+        return interleave(which, made)
 
     def _changes(self, rows: BlockRows, at: Coordinates) -> list[Part]:
         """Blocks that rows ask for: how far corners are rounded, what feeds count, the plane of arcs."""
@@ -106,6 +114,12 @@ class Blocks:
             on_arc = np.flatnonzero(rows.arc >= 0)
             changes.append(self._change("plane", on_arc, self.circles.plane[rows.arc[on_arc]], len(rows)))
         return changes
+
+    def _end_of_curve(self, rows: BlockRows, at: Coordinates, before: Sequence[Part]) -> Part:
+        """G1 where blocks stand right behind a curve: G06.2 is modal, and takes nothing but control points."""
+        behind = np.concatenate(([self.modals["spline"]], rows.curve[:-1] > 0))
+        changed = np.logical_or.reduce([ids > 0 for _, ids in before])
+        return [b"", f"{at.motion.line}\n".encode()], (behind & changed).astype(np.int64)
 
     def _change(self, group: str, rows: Ints, values: Ints, count: int) -> Part:
         """Blocks before those of `count` rows, in ascending order, from which on a group has another value."""

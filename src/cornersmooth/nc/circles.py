@@ -1,8 +1,9 @@
-"""Which arcs are written as G2 and G3, and how.
+"""Which arcs are written as G2 and G3 or as curves, and how.
 
 A circular block gives its end point and its radius; the control makes of them, and of the point it stands at, a circle
-in the plane that is selected. So an arc is written that way where its axis is a coordinate axis and the tool axis
-stays, and where the circle through the rounded numbers is within the tolerance of the arc; else it becomes lines.
+in the plane that is selected. So an arc is written that way where its axis is a coordinate axis of the words, where
+tool axis and rotary axes stand, and where the circle through the rounded numbers is within the tolerance of the arc.
+Where words of a second point would have to move with the tip, arcs are curves. All others become lines.
 """
 
 from __future__ import annotations
@@ -14,12 +15,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cornersmooth.arrays.vectors import norm
-from cornersmooth.geometry.arcs import arc_points, arc_radii, divided
-from cornersmooth.model import Bools, Floats, Ints, Keep, Program
+from cornersmooth.geometry.arcs import arc_lines, arc_points, arc_radii, arc_weights, curve_deviation, divided
+from cornersmooth.model import Bools, FeedMode, Floats, Ints, Keep, Program
 from cornersmooth.nc.form import Form
-from cornersmooth.nc.planes import Planes
+from cornersmooth.nc.planes import Planes, turned_part
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing.sampling import Rows
+from cornersmooth.smoothing.sampling import ArcBlocks, Rows
 from cornersmooth.text import to_ticks
 
 #: largest turn of one circular block: in R form a control cannot tell which way to go near 180 degrees
@@ -34,6 +35,12 @@ _SHORTEST_CHORD = 20
 #: how far an arc's axis may lean from a coordinate axis; the deviation is measured besides
 _UPRIGHT = 1e-6
 
+#: curve styles with weights
+_RATIONAL = ("g6.2", "bspline")
+
+#: part of the tolerance that curves may use, and how often their number is doubled
+_MOST_OF_TOLERANCE, _ROUNDS = 0.9, 4
+
 #: shares of a block at which its deviation is measured
 _PROBES = np.linspace(0.0, 1.0, 9)
 
@@ -44,68 +51,121 @@ FIRST_PLANE = 17
 
 
 @dataclass(frozen=True)
-class Circles:
+class Circles(ArcBlocks):
     """How the arcs of a program are written, k rows."""
 
-    blocks: Ints  #: (k,) circular blocks of each arc; 0 where it becomes lines
     plane: Ints  #: (k,) 17, 18 or 19
     clockwise: Bools  #: (k,) G2 rather than G3, seen from the positive end of the axis that stands on the plane
     radius: Ints  #: (k,) in steps of the last written digit
 
 
-def plan_circles(program: Program, settings: Settings, form: Form, planes: Planes, upright: Bools) -> Circles:
-    """Choose the arcs that a form can write as circles within the tolerance, at the tip and at the axis point.
+@dataclass(frozen=True)
+class ArcAngles:
+    """Rotary words on the arcs of a program, k of them."""
 
-    In a tilted plane arcs are those of its own coordinates. `upright` (n,) are poses of tools without tool tip control.
+    angles: Floats  #: (k, 2) degrees, in the order of the machine's axes
+    stand: Bools  #: (k,) whether they are the same on all of the arc, and its blocks have feeds per minute
+
+
+def plan_circles(
+    program: Program,
+    settings: Settings,
+    form: Form,
+    planes: Planes,
+    upright: Bools,
+    rotary: ArcAngles | None = None,
+) -> Circles:
+    """Choose the arcs that a form can write as circles or curves within the tolerance, at the tip and the axis point.
+
+    In a tilted plane arcs are those of its own coordinates, and where X Y Z are axes of the machine, of what these
+    make of the part. `upright` (n,) are poses of tools without tool tip control. Without `rotary` words that a form
+    has, arcs that might be circles are taken for such.
     """
-    arcs = program.arcs
+    arcs, own = program.arcs, upright[program.arcs.pose]
     frames, tilted = planes.frames(arcs.pose), planes.of[arcs.pose] >= 0
+    turned = form.rotary & ~own & ~tilted
+    unknown = turned & (rotary is None) & (form.orientation == "machine")
+    if rotary is not None and form.machine is not None and form.orientation == "machine":
+        distinct, which = np.unique(rotary.angles[turned], axis=0, return_inverse=True)
+        parts = np.array([np.eye(3), *(turned_part(form.machine, angles) for angles in distinct)])
+        frames[turned] = parts[1 + which.reshape(-1)]
     normal = _local(arcs.normal, frames)
     plane = np.array([2, 1, 0])[np.argmax(np.abs(normal), axis=1)] if len(arcs) else np.zeros(0, np.int64)
-    third = PLANES[plane, 2]
-    height = np.take_along_axis(normal, third[:, None], axis=1)[:, 0]
+    height = np.take_along_axis(normal, PLANES[plane, 2][:, None], axis=1)[:, 0]
     radius = arc_radii(program)
     unit = program.mm_per_unit
     decimals = form.tip_decimals(program.units)
     ticks = to_ticks(np.minimum(radius, _LARGEST_RADIUS) / unit, decimals)
     digits = form.table.digits
     vectors = to_ticks(digits.vector_length * program.axis, digits.vector)
-    modes = [(upright[arcs.pose], form.upright), (tilted, form.plane)]
-    flat, circular, in_xy = (
-        np.full(len(tilted), value)
-        for value in (bool(form.mode.motion.arc_directions), form.mode.circles, form.mode.circles_in_xy)
-    )
-    for here, mode in modes:
+    flat, circular, in_xy = (np.zeros(len(tilted), np.bool_) for _ in range(3))
+    for here, mode in ((~own & ~tilted, form.mode), (own, form.upright), (tilted, form.plane)):
         if mode is not None:
             flat[here], circular[here] = bool(mode.motion.arc_directions), mode.circles
             in_xy[here] = mode.circles_in_xy
-    fits = (
-        circular
-        & (~(flat | in_xy) | (plane == 0))
-        & (np.abs(height) > 1.0 - _UPRIGHT)
-        & (radius < _LARGEST_RADIUS)
-        & (ticks > 0)
-        & (tilted | (vectors[arcs.pose] == vectors[arcs.pose - 1]).all(axis=1))
-        # the plane of cutter compensation must not change under it, and it is XY
-        & ((plane == 0) | (program.keep[arcs.pose] != Keep.CUTTER_COMPENSATION))
-    )
+    keeps = tilted | (vectors[arcs.pose] == vectors[arcs.pose - 1]).all(axis=1)
+    if rotary is not None:
+        keeps &= ~turned | (rotary.stand & _may_turn(form, rotary.angles, plane))
+    keeps &= (radius < _LARGEST_RADIUS) & (ticks > 0)
+    offset = program.keep[arcs.pose] == Keep.CUTTER_COMPENSATION
+    fits = circular & keeps
+    # the plane of cutter compensation must not change under it, and it is XY
+    fits &= unknown | (~(flat | in_xy | offset) | (plane == 0)) & (np.abs(height) > 1.0 - _UPRIGHT)
     blocks = np.where(fits, np.ceil(arcs.sweep / _LARGEST_SWEEP - 1e-9), 0.0).astype(np.int64)
     if fits.any():
         step = float(unit * 10.0**-decimals)
         tolerance = min(settings.tip_tolerance, settings.axis_point_tolerance)
         written: Floats = ticks.astype(np.float64) * step
         deviation = _deviation(program, blocks, PLANES[plane], height > 0.0, written, step, frames, flat)
-        blocks[deviation > tolerance] = 0
-    return Circles(blocks, plane + FIRST_PLANE, height < 0.0, ticks)
+        blocks[(deviation > tolerance) & ~unknown] = 0
+    curved = np.zeros(len(blocks), np.bool_)
+    weight = digits.weight if form.curve in _RATIONAL else None
+    if form.curves:
+        per_minute = program.feed_mode[arcs.pose] == FeedMode.PER_MINUTE  # PS1006: G06.2 under G95
+        curves = _curves(program, settings, np.flatnonzero(keeps & per_minute & ~offset & (blocks == 0)), weight)
+        curved = curves > 0
+        blocks += curves
+    return Circles(blocks, curved, weight, plane + FIRST_PLANE, height < 0.0, ticks)
+
+
+def _may_turn(form: Form, angles: Floats, plane: Ints) -> Bools:
+    """(k,) whether tables stand at zero that would tilt the plane of an arc, where the control wants that."""
+    free = np.ones(len(plane), np.bool_)
+    if form.mode.circles_at_zero and form.machine is not None:
+        for k, axis in enumerate(form.machine.axes[: len(form.machine.names)]):
+            if axis.carrier == "table":
+                across = np.abs(axis.unit[PLANES[plane, 2]]) < 1.0 - _UPRIGHT
+                free &= ~across | (to_ticks(angles[:, k], form.table.digits.angle) == 0)
+    return free
+
+
+def _curves(program: Program, settings: Settings, rows: Ints, decimals: int | None) -> Ints:
+    """(k,) curves of arcs `rows`, as many as the chord tolerance asks for; 0 where lines are no more rows."""
+    chord = min(settings.chord, _MOST_OF_TOLERANCE * min(settings.tip_tolerance, settings.axis_point_tolerance))
+    found = np.zeros(len(program.arcs), np.int64)
+    found[rows] = np.ceil(program.arcs.sweep[rows] / _LARGEST_SWEEP - 1e-9)
+    for _ in range(_ROUNDS):
+        local, share = divided(found[rows])
+        own = rows[local]
+        part = 1.0 / found[own]
+        weight = arc_weights(program.arcs.sweep[own] * part, decimals)
+        deviation = np.zeros(len(found))
+        np.maximum.at(deviation, own, curve_deviation(program, own, share - part, share, weight))
+        if not (deviation > chord).any():
+            break
+        found[deviation > chord] *= 2
+    found[(deviation > chord) | (4 * found >= arc_lines(program, settings))] = 0
+    return found
 
 
 def with_arcs(rows: Iterator[Rows], program: Program, circles: Circles) -> Iterator[Rows]:
     """Rows with `Rows.arc`: all rows of a pose that an arc leads to are on it."""
-    if not (circles.blocks > 0).any():
+    circular = (circles.blocks > 0) & ~circles.curved
+    if not circular.any():
         yield from rows
         return
     own = np.full(len(program), -1, np.int64)
-    own[program.arcs.pose] = np.where(circles.blocks > 0, np.arange(len(circles.blocks)), -1)
+    own[program.arcs.pose] = np.where(circular, np.arange(len(circular)), -1)
     for part in rows:
         yield replace(part, arc=own[part.move])
 

@@ -198,6 +198,8 @@ class Mode:
     circles: bool = False  #: whether arcs may be written as circular blocks, without the words of the orientation
     #: whether only those of G17 may: the length of the tool acts across the plane
     circles_in_xy: bool = False
+    #: whether tables that would tilt their plane must stand at zero, where tip control began
+    circles_at_zero: bool = False
     #: whether blocks in which only rotary axes turn are written with inverse time: F would be degrees per minute
     timed_turns: bool = False
     #: within_on, within_off: blocks that stand within these: the latter before the retract

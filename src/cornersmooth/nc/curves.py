@@ -76,17 +76,19 @@ def prepared(rows: BlockRows, at: Coordinates) -> BlockRows:
     return _spans(rows, at.decimals) if at.form.curve in ("poly", "spl") else rows
 
 
-def shape_of(rows: BlockRows, at: Coordinates, circles: Circles, *, open_spline: bool) -> Shape | None:
-    """Words of rows on curves or arcs; None where there are none. `open_spline`: the block before is on one."""
-    on_arc = np.zeros(len(rows), np.bool_) if rows.arc is None else rows.arc >= 0
-    if not at.form.curve:
-        return _arcs(rows, on_arc, at, circles) if on_arc.any() else None
-    curved = rows.curve > 0
-    if not curved.any():
-        return None
-    if at.form.curve == "g6.2":
-        return _knots(rows, curved, at)
-    return _spline(rows, curved, at, open_spline) if at.form.curve == "bspline" else _polynomial(rows, curved, at)
+def shapes_of(rows: BlockRows, at: Coordinates, circles: Circles, *, open_spline: bool) -> list[Shape]:
+    """Words of rows on arcs and on curves, where there are any. `open_spline`: the block before is on a curve."""
+    shapes = []
+    if rows.arc is not None and (on_arc := rows.arc >= 0).any():
+        shapes.append(_arcs(rows, on_arc, at, circles))
+    if (curved := rows.curve > 0).any():
+        if at.form.curve == "g6.2":
+            shapes.append(_knots(rows, curved, at))
+        elif at.form.curve == "bspline":
+            shapes.append(_spline(rows, curved, at, open_spline))
+        else:
+            shapes.append(_polynomial(rows, curved, at))
+    return shapes
 
 
 def _arcs(rows: BlockRows, on_arc: Bools, at: Coordinates, circles: Circles) -> Shape:

@@ -29,13 +29,15 @@ _ALONG_Z, _SAME_PLACE = 1e-9, 1e-9
 def upright_poses(program: Program, form: Form, *, drills: bool) -> Bools:
     """(n,) whether a pose belongs to a tool that runs without tool tip control, for cycles or cutter compensation.
 
+    In curves all tools do that can: without words of the tool axis arcs are circles, and curves those of every control.
+
     `drills` says whether holes are to be written as cycles; taps are in any case.
     """
     chosen = np.zeros(len(program), np.bool_)
     holes = program.kind == Move.HOLE
     sides = [one for one in program.statements if one.word == "CUTCOM" and words_of(one)[:1] in _SIDES]
     compensated = [one.pose for one in sides if drills]
-    if (not compensated and not holes.any()) or not _can_stand_upright(form):
+    if not (form.curves or compensated or holes.any()) or not _can_stand_upright(form):
         return chosen
     tilted = np.abs(program.axis - (0.0, 0.0, 1.0)).max(axis=1) > _ALONG_Z
     tilted &= program.kind != Move.FROM
@@ -46,7 +48,7 @@ def upright_poses(program: Program, form: Form, *, drills: bool) -> Bools:
         here = slice(first, stop)
         if not tilted[here].any():
             offset = any(first <= pose < stop for pose in compensated)
-            chosen[here] = offset or has_cycles(program, form, here, drills=drills)
+            chosen[here] = form.curves or offset or has_cycles(program, form, here, drills=drills)
     return chosen
 
 
@@ -81,7 +83,7 @@ def _said_cycles(program: Program) -> list[tuple[int, tuple[float | str, ...], b
 
 def _can_stand_upright(form: Form) -> bool:
     """Whether the form has such blocks, and X Y Z are the tip while the rotary axes stand at zero."""
-    if form.upright is None or form.curves or not form.table.program.retract:
+    if form.upright is None or not form.table.program.retract:
         return False
     if form.machine is None or not form.rotary:
         return True

@@ -16,7 +16,7 @@ from cornersmooth.nc.form import Form
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.blending import largest_blends
 from cornersmooth.smoothing.long_lines import LineLimits, Vertices, fewest_lines, segments_of_rows, vertices
-from cornersmooth.smoothing.sampling import Rows, all_dense_rows
+from cornersmooth.smoothing.sampling import ArcBlocks, Rows, all_dense_rows
 
 #: rows handed on at a time: many long lines are tested at once
 LONG_CHUNK = 1 << 17
@@ -29,7 +29,7 @@ _COARSE = 1.0
 _LARGEST_STEP = 0.08
 
 
-def coarse_rows(smoothed: SmoothProgram, circles: Ints | None = None) -> Rows:
+def coarse_rows(smoothed: SmoothProgram, arcs: ArcBlocks | None = None) -> Rows:
     """Dense rows without those that only the chord tolerance asks for.
 
     Chords from the joints of a transition to its middle keep ε where one parameter drives both curves; else all stay.
@@ -37,7 +37,7 @@ def coarse_rows(smoothed: SmoothProgram, circles: Ints | None = None) -> Rows:
     settings = smoothed.settings
     if METHODS[settings.method].one_parameter:
         settings = settings.but(chord_tolerance=_COARSE)
-    return all_dense_rows(replace(smoothed, settings=settings), circles)
+    return all_dense_rows(replace(smoothed, settings=settings), arcs)
 
 
 def line_limits(settings: Settings, form: Form, largest_turn: float = 0.0) -> LineLimits:
@@ -62,9 +62,9 @@ def line_limits(settings: Settings, form: Form, largest_turn: float = 0.0) -> Li
 
 
 def corner_blends(
-    rows: Vertices, kept: Ints, rapid: Bools, limits: LineLimits, settings: Settings, form: Form
+    rows: Vertices, kept: Ints, usual: Bools, limits: LineLimits, settings: Settings, form: Form
 ) -> Floats | None:
-    """How far the control may round the corner at each kept row, mm: the usual blend after rapids.
+    """How far the control may round the corner at each kept row, mm: the usual blend at rapids and arcs.
 
     None where it is not told for each.
     """
@@ -72,7 +72,7 @@ def corner_blends(
     if not style.rounding:
         return None
     found = largest_blends(rows, kept, limits, settings.tolerance, style.executed_share * settings.tolerance)
-    return np.where(rapid, limits.blend, found)
+    return np.where(usual, limits.blend, found)
 
 
 def long_rows(rows: Rows, smoothed: SmoothProgram, form: Form) -> Iterator[Rows]:

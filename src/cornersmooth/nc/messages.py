@@ -162,6 +162,7 @@ FINDINGS: Final[dict[str, tuple[Severity, str]]] = {
 
 #: other texts of the same codes
 OTHER_FINDINGS: Final[dict[str, tuple[Severity, str]]] = {
+    "CS313": ("note", "arc written as curves"),
     "CS332": ("warning", "GOHOME without coordinates is written as the retract of the control's table"),
     "CS335": ("warning", "the spindle is not started before the first cut of a tool; put SPINDL before it"),
 }
@@ -221,10 +222,10 @@ class Findings:
         severity, text = (FINDINGS, OTHER_FINDINGS)[which][code]
         self.add_all([Finding(code, severity, line, text.format(**values), count)])
 
-    def note_each(self, code: str, lines: Ints, **values: object) -> None:
+    def note_each(self, code: str, lines: Ints, which: int = 0, **values: object) -> None:
         """Count what was noticed at each of some lines of the CL file, if any."""
         if len(lines):
-            self.note(code, int(lines[0]), len(lines), 0, **values)
+            self.note(code, int(lines[0]), len(lines), which, **values)
 
     def add_all(self, others: Iterable[Finding]) -> None:
         """Count what was noticed elsewhere."""

@@ -57,7 +57,9 @@ class Motion:
         self.warnings = MotionWarnings(self.program, self.findings)
 
     def say(self, blocks: Sequence[str]) -> None:
-        """Write blocks that are no rows."""
+        """Write blocks that are no rows; G06.2 takes none before a G1."""
+        if blocks and self.modals["spline"] and self.at.form.curve == "g6.2":
+            self.modals.now["spline"], blocks = False, [self.at.motion.line, *blocks]
         self.blocks.written += len(blocks)
         if blocks:
             self.text.append(("\n".join(blocks) + "\n").encode("ascii"))
@@ -84,8 +86,10 @@ class Motion:
             ticks = at.ticks(rows.tip, rows.other)
         self._go_back(int(move[0]), rows.other[:1])
         elsewhere = self._begins_elsewhere(int(move[0]))
-        if arc is not None and arc[0] >= 0:  # after a tool change, a hole or a FROM the tool is not at its start
-            self._go_to(at.ticks(program.tip[move[:1] - 1], rows.other[:1]), move[:1])
+        circular, curved = arc is not None and arc[0] >= 0, rows.curve[0] == 1 and program.kind[move[0]] == Move.ARC
+        if circular or curved:  # after a tool change, a hole or a FROM the tool is not at its start
+            start = ticks[:1] if curved else at.ticks(program.tip[move[:1] - 1], rows.other[:1])
+            self._go_to(start, move[:1])
         elif elsewhere and program.kind[move[0] - 1 : move[0] + 1].tolist() == [Move.FROM, Move.ARC]:  # in lines
             self._go_to(self.ticks_at(rows, program.tip[move[:1] - 1], np.zeros(1, np.int64)), move[:1])
         self._join(ticks, rows.joined)

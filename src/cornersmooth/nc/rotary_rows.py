@@ -11,7 +11,8 @@ from cornersmooth.arrays.slices import some_rows
 from cornersmooth.arrays.vectors import norm
 from cornersmooth.kinematics import Machine, inverse_time, machine_position, tool_axis
 from cornersmooth.methods import METHODS
-from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program, SmoothProgram
+from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program, SmoothProgram
+from cornersmooth.nc.circles import ArcAngles
 from cornersmooth.nc.form import TIP_SHARE, Form
 from cornersmooth.nc.long_rows import LONG_CHUNK, corner_blends, line_limits
 from cornersmooth.nc.messages import Findings
@@ -21,6 +22,7 @@ from cornersmooth.rotary import FilledPath, fill, insertions, rapid_moves
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.long_lines import LineLimits, Vertices, fewest_lines, segments_of_rows, vertices
 from cornersmooth.smoothing.sampling import Rows
+from cornersmooth.text import to_ticks
 
 #: dense rows handed on at a time
 _CHUNK = 1 << 15
@@ -95,7 +97,8 @@ def rotary_rows(
             found = chunk.vertices(filled, smoothed)
             kept = fewest_lines(found, limits)
             filled = some_rows(filled, kept)
-            blend = corner_blends(found, kept, way.free[here][filled.pose], limits, settings, form)
+            usual = way.free[here][filled.pose] | _beside_arcs(move[filled.pose], program)
+            blend = corner_blends(found, kept, usual, limits, settings, form)
         own = slice(1 if begin else 0, None)
         filled, rate = _timed(filled, chunk, own, smoothed, form, limits, findings)
         pose, inserted = filled.pose[own], filled.inserted[own]
@@ -112,6 +115,22 @@ def rotary_rows(
             blend=None if blend is None else blend[own],
             left=left[pose] & ~inserted if way.left.any() else None,
         )
+
+
+def arc_angles(way: RotaryWay, program: Program, form: Form) -> ArcAngles:
+    """Rotary words on the arcs of a program, from the rows of a way."""
+    pose, count = program.arcs.pose, len(program.arcs)
+    own = np.full(len(program), -1, np.int64)
+    own[pose] = np.arange(count)
+    rows = np.flatnonzero(own[way.move] >= 0)
+    arc = own[way.move[rows]]
+    turns = (np.diff(to_ticks(way.angles, (form.table.digits.angle,) * 2), axis=0, prepend=0) != 0).any(axis=1)
+    if form.orientation == "machine":
+        turns |= _timed_cuts(way.angles, way.move, program)
+    stand, angles = np.ones(count, np.bool_), np.zeros((count, 2))
+    stand[arc[turns[rows]]] = False
+    angles[arc] = way.angles[rows]
+    return ArcAngles(angles, stand)
 
 
 def largest_turn(settings: Settings) -> float:
@@ -216,6 +235,12 @@ def _beside_far_corners(rows: Vertices, at_pose: Bools, limits: LineLimits) -> B
     far = at_pose & ((off_tip > limits.tip) | (off_axis_point > limits.axis_point))
     move = np.concatenate(([0], np.cumsum(at_pose)[:-1]))
     return np.isin(move, move[far]) | np.isin(move, move[far] + 1)
+
+
+def _beside_arcs(move: Ints, program: Program) -> Bools:
+    """(n,) rows on arcs, and those after which one begins: how far they may be rounded is measured on lines alone."""
+    bent: Bools = program.kind[move] == Move.ARC
+    return bent | np.append(bent[1:], False)
 
 
 def _cuts(move: Ints, program: Program) -> Bools:

@@ -25,9 +25,11 @@ _TURNED: Final = float(np.cos(np.radians(1.0)))
 
 def add_warnings(form: Form, smoothed: SmoothProgram, circles: Circles, findings: Findings) -> None:
     """Note what a user of the form should know of the program."""
-    program, lines = smoothed.program, form.table.lines
-    findings.note_each("CS313", program.line[program.arcs.pose[circles.blocks > 0]])
-    findings.note_each("CS314", program.line[program.arcs.pose[circles.blocks == 0]])
+    program, style = smoothed.program, form.table.lines
+    lines = program.line[program.arcs.pose]
+    findings.note_each("CS313", lines[(circles.blocks > 0) & ~circles.curved])
+    findings.note_each("CS313", lines[circles.curved], which=1)
+    findings.note_each("CS314", lines[circles.blocks == 0])
     rapid = rapid_moves(program.kind)
     if not form.rotary:  # rotary words say which way to turn; feed moves that turn so far are refused before
         poses, _ = program.axis_steps(rapid, FLIP_ANGLE)
@@ -39,7 +41,7 @@ def add_warnings(form: Form, smoothed: SmoothProgram, circles: Circles, findings
         findings.note_each("CS323", program.line[~rapid & (program.feed_mode == FeedMode.PER_REVOLUTION)])
     if "{kinematics_on}" in form.mode.within_on and form.machine is not None and form.machine.tip_control is None:
         findings.note("CS393", 0)
-    if lines.lag and smoothed.settings.lines == "long" and smoothed.settings.method == CURVES_METHOD:
+    if style.lag and smoothed.settings.lines == "long" and smoothed.settings.method == CURVES_METHOD:
         findings.note("CS394", 0, control=form.control, method=CURVES_METHOD, default=DEFAULT_METHOD)
     if form.curve == "g6.2" and form.orientation == "point":
         findings.note("CS395", 0)

@@ -145,12 +145,14 @@ class WordCheck:
 
     def _check_weights(self, table: Table) -> None:
         """Complain of weights that no curve of the program has; R of an arc is its radius."""
-        weights = self._weights
-        for name in _WEIGHTS if weights is not None else ():
+        weights = np.sort(self._weights) if self._weights is not None else np.zeros(0)
+        for name in _WEIGHTS if len(weights) else ():
             column = table.column(name)
             off = ~np.isnan(column) & ~np.isin(table.column("G"), (2.0, 3.0))
-            for weight in weights or ():
-                off &= np.abs(column - weight) > _WEIGHT_ROOM
+            if off.any():
+                after = np.clip(np.searchsorted(weights, column), 1, len(weights) - 1)
+                near = np.minimum(np.abs(column - weights[after - 1]), np.abs(column - weights[after]))
+                off &= near > _WEIGHT_ROOM
             for row in np.flatnonzero(off)[:_MOST_WEIGHTS].tolist():
                 self._wrong(
                     NOT_LISTED, int(table.line[row]), f"a weight of {column[row]:g}, which no curve of this program has"

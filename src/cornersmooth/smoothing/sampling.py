@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from cornersmooth.arrays.slices import joined_rows, some_rows
 from cornersmooth.arrays.vectors import unit
 from cornersmooth.geometry import nurbs
-from cornersmooth.geometry.arcs import arc_lines, arc_points, divided
+from cornersmooth.geometry.arcs import arc_curves, arc_lines, arc_points, arc_weights, divided
 from cornersmooth.geometry.ragged import ranges, starts
 from cornersmooth.model import Bools, Floats, Ints, Numbers, SmoothProgram
 from cornersmooth.smoothing.construction import construction_of
@@ -52,6 +52,15 @@ class Rows:
 
 
 @dataclass(frozen=True)
+class ArcBlocks:
+    """How the arcs of a program are written, k of them."""
+
+    blocks: Ints  #: (k,) circles or curves of each; 0 where it becomes lines
+    curved: Bools  #: (k,) whether these are curves of four control points
+    decimals: int | None  #: of the weights of curves; None where all are 1
+
+
+@dataclass(frozen=True)
 class _Batch:
     """Poses begin to end − 1 and the rows they make, filled in place."""
 
@@ -64,19 +73,19 @@ class _Batch:
 #: knots that go with the control points of a transition; the last four are 1
 KNOTS = (0.0, 0.0, 0.0, 0.0, 0.5)
 
+#: control points of a curve that is a part of an arc
+_POINTS = 4
 
-def dense_rows(smoothed: SmoothProgram, circles: Ints | None = None, poses: int = 16384) -> Iterator[Rows]:
-    """Rows of the smoothed motion as lines with tool vectors, in batches of about `poses` poses.
 
-    `circles` (k,) is the number of circular arcs that each arc of the program is written as, 0 for lines.
-    """
-    layout = _Layout.of(smoothed, divide=True, circles=circles)
+def dense_rows(smoothed: SmoothProgram, arcs: ArcBlocks | None = None, poses: int = 16384) -> Iterator[Rows]:
+    """Rows of the smoothed motion as lines with tool vectors, in batches of about `poses` poses."""
+    layout = _Layout.of(smoothed, divide=True, arcs=arcs)
     return (layout.filled(own, layout.rows(own)) for own in layout.batches(poses))
 
 
-def all_dense_rows(smoothed: SmoothProgram, circles: Ints | None = None) -> Rows:
+def all_dense_rows(smoothed: SmoothProgram, arcs: ArcBlocks | None = None) -> Rows:
     """All rows of `dense_rows` at once, made in the place where they stay."""
-    layout = _Layout.of(smoothed, divide=True, circles=circles)
+    layout = _Layout.of(smoothed, divide=True, arcs=arcs)
     whole, stop = layout.rows(slice(None)), 0
     for own in layout.batches():
         begin, stop = stop, stop + int(layout.counts[own].sum())
@@ -84,12 +93,14 @@ def all_dense_rows(smoothed: SmoothProgram, circles: Ints | None = None) -> Rows
     return whole
 
 
-def curve_rows(smoothed: SmoothProgram, *, divide: bool = False, poses: int = 16384) -> Iterator[Rows]:
+def curve_rows(
+    smoothed: SmoothProgram, arcs: ArcBlocks | None = None, *, divide: bool = False, poses: int = 16384
+) -> Iterator[Rows]:
     """Rows of the smoothed motion as lines and curve pairs with axis points, in batches of about `poses` poses.
 
     `divide` says whether lines in which the axis turns much are divided: not all controls run the axis point straight.
     """
-    layout = _Layout.of(smoothed, curves=True, divide=divide)
+    layout = _Layout.of(smoothed, curves=True, divide=divide, arcs=arcs)
     return (layout.filled(own, layout.rows(own)) for own in layout.batches(poses))
 
 
@@ -105,6 +116,7 @@ class _Layout:
     replaced: Bools  # (n,) poses with rows of runs
     curves: bool
     divide: bool  # whether lines in which the axis turns much are several
+    arcs: ArcBlocks
 
     @classmethod
     def of(
@@ -113,7 +125,7 @@ class _Layout:
         *,
         curves: bool = False,
         divide: bool,
-        circles: Ints | None = None,
+        arcs: ArcBlocks | None = None,
     ) -> _Layout:
         program = smoothed.program
         segments = segments_of(smoothed, dense=divide)
@@ -126,10 +138,12 @@ class _Layout:
         counts[segments.skip] = 0
         if smoothed.runs is not None:
             counts[replaced] = np.bincount(runs.move, minlength=len(counts))[replaced]
-        if len(program.arcs):
-            lines = arc_lines(program, smoothed.settings)
-            counts[program.arcs.pose] = lines if circles is None else np.where(circles > 0, circles, lines)
-        return cls(smoothed, segments, halves, counts, runs, replaced, curves, divide)
+        number = len(program.arcs)
+        arcs = ArcBlocks(np.zeros(number, np.int64), np.zeros(number, np.bool_), None) if arcs is None else arcs
+        if number:
+            lines, several = arc_lines(program, smoothed.settings), np.where(arcs.curved, _POINTS, 1)
+            counts[program.arcs.pose] = np.where(arcs.blocks > 0, several * arcs.blocks, lines)
+        return cls(smoothed, segments, halves, counts, runs, replaced, curves, divide, arcs)
 
     def batches(self, poses: int = 16384) -> Iterator[slice]:
         """Parts of the poses."""
@@ -159,7 +173,7 @@ class _Layout:
         rows.tip[at], rows.other[at] = program.tip[pose], program.axis[pose]
         if self.divide:
             _fill_divided(smoothed, segments, batch)
-        _fill_arcs(smoothed, batch, self.counts)
+        _fill_arcs(smoothed, batch, self.counts, self.arcs)
         if self.curves:
             rows.other[:] = rows.tip + smoothed.settings.axis_length * rows.other
             _fill_curves(smoothed, segments, batch)
@@ -187,14 +201,26 @@ def _of_runs(smoothed: SmoothProgram, *, curves: bool) -> tuple[SectionRows, Boo
     return joined_rows(made), replaced
 
 
-def _fill_arcs(smoothed: SmoothProgram, batch: _Batch, counts: Numbers) -> None:
-    pose = smoothed.program.arcs.pose
-    inside = np.flatnonzero((pose >= batch.poses[0]) & (pose <= batch.poses[-1]))
-    if not len(inside):
-        return
-    local, share = divided(counts[pose[inside]].astype(np.int64))
-    at = np.flatnonzero(np.isin(batch.rows.move, pose[inside]))
-    batch.rows.tip[at], batch.rows.other[at] = arc_points(smoothed.program, inside[local], share)
+def _fill_arcs(smoothed: SmoothProgram, batch: _Batch, counts: Numbers, arcs: ArcBlocks) -> None:
+    program, rows = smoothed.program, batch.rows
+    pose = program.arcs.pose
+    inside = (pose >= batch.poses[0]) & (pose <= batch.poses[-1])
+    straight = np.flatnonzero(inside & ~arcs.curved)
+    if len(straight):
+        local, share = divided(counts[pose[straight]].astype(np.int64))
+        at = np.flatnonzero(np.isin(rows.move, pose[straight]))
+        rows.tip[at], rows.other[at] = arc_points(program, straight[local], share)
+    curved = np.flatnonzero(inside & arcs.curved)
+    if len(curved):
+        assert rows.spline is not None
+        local, share = divided(arcs.blocks[curved])
+        own, part = curved[local], 1.0 / arcs.blocks[curved[local]]
+        weight = arc_weights(program.arcs.sweep[own] * part, arcs.decimals)
+        of_curves = np.flatnonzero(np.isin(rows.move, pose[curved])).reshape(-1, _POINTS)
+        rows.tip[of_curves] = arc_curves(program, own, share - part, share, weight)
+        rows.other[of_curves], rows.curve[of_curves] = program.axis[pose[own]][:, None], np.arange(1, 1 + _POINTS)
+        rows.joined[of_curves[:, 0]] = True
+        rows.spline[of_curves[:, 1:3], 1], rows.spline[of_curves[:, -1], 2] = weight[:, None], 1.0
 
 
 def _fill_curves(smoothed: SmoothProgram, segments: Segments, batch: _Batch) -> None:

@@ -62,6 +62,9 @@ NO_FEED: Final = "no F before the first feed move, and most controls stop there 
 #: poses from which on it is worth while to let other processes work
 _LONG: Final = 30_000
 
+#: how often parts of arcs may be halved, and one
+_HALVED: Final = 5
+
 
 class Verifier:
     """Measures an NC text against the CL program it was made from, and may begin while the text is still being written.
@@ -94,7 +97,8 @@ class Verifier:
     accepted : set of str
         Words of the user's own that move nothing, as he declares: the text is verified with them.
     weights : sequence of float, optional
-        Those that curves have, where that is known: any other is a problem, even if the curve stays within ε.
+        Those that curves have, where that is known: any other is a problem, even if the curve stays within ε. Parts of
+        arcs have their own besides.
     slower : bool
         Whether feeds may be below those of the CL file, as where the text has those of a plan.
     skip_cycles : bool
@@ -137,7 +141,7 @@ class Verifier:
         self._program, self._words = program, words
         self._processes = processes if can_fork() and len(program) >= _LONG else 1
         self._trusted, self._slower = tuple(trusted), slower
-        self._own = (self._trusted, accepted, weights)
+        self._own = (self._trusted, accepted, None if weights is None else (*weights, *_arc_weights(program)))
         self._skip_cycles = skip_cycles
         self._machine = machine
         said = () if machine is None else (word for axis in machine.axes for word in axis.clamp or ())
@@ -319,6 +323,18 @@ def _watch_feeds(chunks: Iterator[Elements], findings: Findings) -> Iterator[Ele
         if without.any() and NO_FEED not in [text for _, text in findings.unlooked]:
             findings.unlooked.append((int(nc.line[without.argmax()]), NO_FEED))
         yield nc
+
+
+def _arc_weights(program: Program) -> list[float]:
+    """Inner weights of rational cubics that are a circle, for the arcs of a program in parts of 120 degrees at most.
+
+    With its degree raised the quadratic curve with the weights 1, w, 1 has 1, (1 + 2 w) / 3, the same, and 1, where w
+    is the cosine of half of the turn (Piegl and Tiller, The NURBS Book, 7.3). Parts may be halved.
+    """
+    sweep = program.arcs.sweep
+    parts = np.outer(np.ceil(sweep / (2.0 * np.pi / 3.0) - 1e-9), 2.0 ** np.arange(_HALVED))
+    found: list[float] = np.unique((1.0 + 2.0 * np.cos(sweep[:, None] / parts / 2.0)) / 3.0).tolist()
+    return found
 
 
 def _check_bounds(**values: float) -> None:
