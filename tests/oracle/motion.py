@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
-from oracle.nc_text import KNOTS, Arc, Curve, Line, Written
+from oracle.nc_text import ARC_KNOTS, KNOTS, Arc, Curve, Line, Written
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-KNOT_VECTOR = np.array([float(knot) for knot in KNOTS])
+KNOT_VECTORS = {len(knots) - 4: np.array([float(knot) for knot in knots]) for knots in (KNOTS, ARC_KNOTS)}
 #: parameters of the samples on a curve; u = 1/2 is among them
 CURVE_PARAMETERS = np.linspace(0.0, 1.0, 97)
 #: share of the limit that a chord may hide of the path of b
@@ -89,7 +89,7 @@ def curve_point(curve: Curve, parameters: Floats) -> Floats:
     """(m, 6) tip and axis point of a rational cubic at the parameters."""
     weights = np.array(curve.weights)[:, None]
     homogeneous = np.concatenate((np.array(curve.points) * weights, weights), axis=1)
-    values = BSpline(KNOT_VECTOR, homogeneous, 3)(parameters)
+    values = BSpline(KNOT_VECTORS[len(curve.points)], homogeneous, 3)(parameters)
     return values[:, :6] / values[:, 6:]
 
 
@@ -150,7 +150,9 @@ def written_path(
             parts.append(_path(six[:, :3], six[:, 3:] - six[:, :3], axis_length, index))
         elif isinstance(block, Arc):
             tip = arc_points(block, math.sqrt(8 * SAGITTA_SHARE * limit / block.radius))
-            parts.append(_path(tip, np.broadcast_to(block.end[3:], tip.shape), axis_length, index))
+            end = np.array(block.end)
+            axis = end[3:] - end[:3] if written.form == "g6.2" else end[3:]
+            parts.append(_path(tip, np.broadcast_to(axis, tip.shape), axis_length, index))
         elif isinstance(block, Line) and ((block.rapid and not rapids) or block.start is None):
             starts.append(index)
     whole = parts[0].joined(*parts[1:])

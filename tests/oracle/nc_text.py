@@ -15,7 +15,11 @@ from typing import Literal
 Form = Literal["g1", "g6.2"]
 Six = tuple[float, float, float, float, float, float]
 
+#: those of a corner and of a part of an arc, last ones in blocks of their own
 KNOTS = ("0.", "0.", "0.", "0.", "0.5", "1.", "1.", "1.", "1.")
+ARC_KNOTS = ("0.", "0.", "0.", "0.", "1.", "1.", "1.", "1.")
+#: how far above the tip a point of the axis is put that a tool along Z does not name
+POINT = 100.0
 #: words after the tip: vector from tip to spindle, or axis point
 SECOND = {"g1": "IJK", "g6.2": "UVW"}
 TIP_DECIMALS = {"mm": 4, "inch": 5}
@@ -44,7 +48,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Curve:
-    """G6.2: five control points of tip and axis point with their weights."""
+    """G6.2: five control points of tip and axis point with their weights, four where it is a part of an arc."""
 
     line: int
     points: tuple[Six, ...]
@@ -187,17 +191,23 @@ class _Grammar:
         six = _words("XYZ", tip) + " " + _words(SECOND[form], second)
         self.line = re.compile(rf"G([01]) {six}{FEED}")
         self.above = re.compile(rf"G0 {_words('XY', tip)} {_words(SECOND[form], second)}")
+        self.tip_decimals = tip
+        self.aside = re.compile(rf"G0 {_words('XY', tip)}")
         self.arc = re.compile(rf"G([23]) {_words('XYZ', tip)} R({_fixed(tip)}){FEED}")
         self.first = re.compile(rf"G6\.2 P4 K0\. {six} R({WEIGHT}){FEED}")
         self.point = re.compile(rf"K(0\.|0\.5) {six} R({WEIGHT})")
 
     def block(self, lines: list[str], index: int, state: _State) -> int:
         """Read the block at `lines[index]` into `state`; return the index of the next one."""
-        line, number = lines[index], index + 1
+        line, number = self.with_point(lines[index]), index + 1
         if state.ended:
             raise BadTextError(f"{number}: {line!r} after M30")
         if line.startswith("G6.2"):
             return self.curve(lines, index, state)
+        if line == "G1" and state.in_curve:
+            state.in_curve = False
+            state.blocks.append(Code(number, line))
+            return index + 1
         if match := re.fullmatch(r"(G43 H\d+) (G[01] .*)", line):
             if not state.raised:
                 raise BadTextError(f"{number}: {match[1]} beside a move that comes from no retract")
@@ -215,8 +225,9 @@ class _Grammar:
                 raise BadTextError(f"{number}: G90 is modal already")
             state.incremental = False
             state.blocks.append(Code(number, line))
-        elif match := self.above.fullmatch(line):
-            if not state.raised or not state.tool_length or state.over is not None:
+        elif match := self.above.fullmatch(line) or (self.form == "g6.2" and self.aside.fullmatch(line)):
+            # G43 of a tool along Z stands beside the first Z
+            if not state.raised or state.tool_length is (self.form == "g6.2") or state.over is not None:
                 raise BadTextError(f"{number}: a rapid without Z that comes from no retract")
             state.over = match.groups()
             state.blocks.append(Code(number, line))
@@ -294,9 +305,11 @@ class _Grammar:
     def circular(self, match: re.Match[str], number: int, state: _State) -> None:
         if state.position is None or state.values is None:
             raise BadTextError(f"{number}: arc without a position to start from")
-        if self.form != "g1":
-            raise BadTextError(f"{number}: arcs do not carry the axis point")
         words = (*match.groups()[1:4], *state.position[3:])
+        if self.form != "g1":
+            if state.position[3:] != self.point_above(*state.position[:3]):
+                raise BadTextError(f"{number}: arcs do not carry the axis point")
+            words = (*match.groups()[1:4], *self.point_above(*match.groups()[1:4]))
         self.moves(number, words, state)
         start, end = state.values, self.numbers(words, number)
         value = self.feed(number, match[6], state)
@@ -309,7 +322,7 @@ class _Grammar:
     def curve(self, lines: list[str], index: int, state: _State) -> int:
         """G6.2 with its four more points and four more knots; returns the index after them."""
         number = index + 1
-        first = self.first.fullmatch(lines[index])
+        first = self.first.fullmatch(self.with_point(lines[index]))
         if first is None or self.form != "g6.2":
             raise BadTextError(f"{number}: not the first block of a curve: {lines[index]!r}")
         if first.groups()[0:6] != state.position:
@@ -322,13 +335,15 @@ class _Grammar:
             raise BadTextError(f"{number}: PS1006, G6.2 in G41 or G42, or tool length is off")
         value = self.feed(number, first[8], state)
         words, weights = [first.groups()[0:6]], [first[7]]
-        for offset, knot in enumerate(KNOTS[1:5], 1):
-            match = self.point.fullmatch(lines[index + offset])
+        knots = ARC_KNOTS if lines[index + 4] == "K1." else KNOTS
+        count = len(knots) - 4
+        for offset, knot in enumerate(knots[1:count], 1):
+            match = self.point.fullmatch(self.with_point(lines[index + offset]))
             if match is None or match[1] != knot:
                 raise BadTextError(f"{number + offset}: expected control point with K{knot}: {lines[index + offset]!r}")
             words.append(match.groups()[1:7])
             weights.append(match[8])
-        for offset, knot in enumerate(KNOTS[5:], 5):
+        for offset, knot in enumerate(knots[count:], count):
             if lines[index + offset] != f"K{knot}":
                 raise BadTextError(f"{number + offset}: PS1004/PS1005, expected K{knot}: {lines[index + offset]!r}")
         if len(set(words)) == 1:
@@ -336,7 +351,19 @@ class _Grammar:
         points = tuple(self.numbers(point, number) for point in words)
         state.position, state.values, state.in_curve = words[-1], points[-1], True
         state.blocks.append(Curve(number, points, tuple(map(float, weights)), value, state.per_revolution))
-        return index + len(KNOTS)
+        return index + len(knots)
+
+    def point_above(self, x: str, y: str, z: str) -> tuple[str, str, str]:
+        """Words of a point above a tip."""
+        return x, y, f"{float(z) + POINT:.{self.tip_decimals}f}"
+
+    def with_point(self, line: str) -> str:
+        """Straight block or control point of a tool along Z, with a point of its axis that it does not name."""
+        match = re.search(r" X(\S+) Y(\S+) Z(\S+)", line)
+        if self.form == "g1" or match is None or " U" in line or line.startswith(("(", "G2 ", "G3 ")):
+            return line
+        u, v, w = self.point_above(*match.groups())
+        return f"{line[: match.end()]} U{u} V{v} W{w}{line[match.end() :]}"
 
     def moves(self, number: int, words: tuple[str, ...], state: _State) -> None:
         """Checks that every block with motion shares."""
