@@ -246,7 +246,7 @@ def test_a_tool_along_z_needs_no_axis_point() -> None:
     assert not [line for line in lines if " U" in line]
     assert any(re.fullmatch(r"G3 X30\.0+ Y10\.0+ Z5\.0+ R10\.0+", line) for line in lines)
     assert any(line.startswith("G98 G84 X40.0000 Y0.0000 Z-9.0000") for line in lines)
-    assert "CS320" not in codes(written)
+    assert not {"CS315", "CS395"} & codes(written).keys()  # left out; axis points
 
 
 @pytest.mark.parametrize(

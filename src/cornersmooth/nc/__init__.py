@@ -184,7 +184,7 @@ def write(
     check_travel_in_planes(planes, program, chosen, findings)
     of_rows = Findings()  # rows are made in a thread of their own: their findings come last
     rows, circles = _rows(smoothed, chosen, planes, upright, of_rows)
-    add_warnings(chosen, smoothed, circles, findings)
+    add_warnings(chosen, smoothed, circles, upright, findings)
     stretch = chosen.stretch(smoothed.settings.axis_length)
     tilting = Coordinates(chosen, program.units, stretch, modal=frame.modal)
     counted = SplineCount(program.line, findings) if chosen.curve == "bspline" else None

@@ -10,7 +10,7 @@ import numpy as np
 
 from cornersmooth.arrays.vectors import dot
 from cornersmooth.methods import CURVES_METHOD, DEFAULT_METHOD
-from cornersmooth.model import FeedMode, Floats, Ints, Move, Program, SmoothProgram
+from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program, SmoothProgram
 from cornersmooth.nc.block_rows import BlockRows
 from cornersmooth.nc.circles import Circles
 from cornersmooth.nc.first_block import UPRIGHT
@@ -23,8 +23,8 @@ from cornersmooth.settings import FLIP_ANGLE
 _TURNED: Final = float(np.cos(np.radians(1.0)))
 
 
-def add_warnings(form: Form, smoothed: SmoothProgram, circles: Circles, findings: Findings) -> None:
-    """Note what a user of the form should know of the program."""
+def add_warnings(form: Form, smoothed: SmoothProgram, circles: Circles, upright: Bools, findings: Findings) -> None:
+    """Note what a user of the form should know of the program; `upright` (n,) are tools without words of the axis."""
     program, style = smoothed.program, form.table.lines
     lines = program.line[program.arcs.pose]
     findings.note_each("CS313", lines[(circles.blocks > 0) & ~circles.curved])
@@ -43,7 +43,7 @@ def add_warnings(form: Form, smoothed: SmoothProgram, circles: Circles, findings
         findings.note("CS393", 0)
     if style.lag and smoothed.settings.lines == "long" and smoothed.settings.method == CURVES_METHOD:
         findings.note("CS394", 0, control=form.control, method=CURVES_METHOD, default=DEFAULT_METHOD)
-    if form.curve == "g6.2" and form.orientation == "point":
+    if form.curve == "g6.2" and form.orientation == "point" and not (upright | (program.kind == Move.FROM)).all():
         findings.note("CS395", 0)
     for extra in form.extras:
         if extra.warning:
