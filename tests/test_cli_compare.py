@@ -71,7 +71,9 @@ def test_linuxcnc_by_its_own_law(part: Path) -> None:
     assert "law of lines: planner linuxcnc-2.9" in said
     assert "unsmoothed lines under G64 P0.01" in said
     assert re.search(r"^twice the tolerance would (save \d+ %|gain nothing)$", said, re.MULTILINE)
-    (marked,) = (line for line in said.splitlines() if line.startswith("* cornersmooth "))
+    (marked,) = (line for line in said.splitlines() if line.startswith("  cornersmooth "))
+    assert re.search(r"^best of all: \d+\.\d s$", said, re.MULTILINE)
+    assert "best in lines" not in said  # it has nothing else
     assert "--lines long" in marked
     assert "--machine xyzac-trt" in marked
 
@@ -101,7 +103,7 @@ def test_what_gains_nothing_is_left(part: Path) -> None:
     given = ("--control", "siemens", "--limits", "table-ac")
     done = run("compare", part, *given)
     assert done.returncode == 0, done.stderr
-    assert "\nleave it: no program takes less time than the unsmoothed lines\n" in done.stdout.decode()
+    assert "\nleave it as it is: no program takes less time than the unsmoothed lines\n" in done.stdout.decode()
     done = run("smooth", part, *given, "-o", part.with_suffix(".mpf"))
     assert done.returncode == 0, done.stderr
     assert "no time is gained, leave the program as it was" in done.stderr.decode()

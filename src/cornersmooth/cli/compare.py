@@ -5,7 +5,8 @@ from __future__ import annotations
 import csv
 import io
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import click
@@ -13,7 +14,7 @@ import click
 from cornersmooth.cl import read
 from cornersmooth.cli.files import check_inputs, check_path, told_of, write_report
 from cornersmooth.cli.options import Options
-from cornersmooth.cli.show import progress_bar, say
+from cornersmooth.cli.show import progress_bar, say, say_line
 from cornersmooth.errors import command_text
 from cornersmooth.feedrate import BlockLimits
 from cornersmooth.report.verdict import limits_text
@@ -37,17 +38,28 @@ def run_compare(given: Options) -> int:
     machine, limits = given.load_machine(), given.load_limits()
     axes = axes_of(given)
     control, settings = given.load_control(), given.settings()
-    with told_of(name), progress_bar(given.quiet) as progress:
-        step = None if progress is None else lambda done, total: progress("programs", done, total)
+    with told_of(name), progress_bar(given.quiet or not given.as_json) as progress:
         if is_program:  # it has one kind of words, and lines
             tried = candidates(control, settings, machine)
             tried = [one for one in tried if one.form.machine == machine and not one.form.curves]
-            table = compare_filtered(data, tried, axes, **how_read(given), progress=step)
         else:
             program = read(data, name=name, **given.reading()).with_feed(given.feed)
             tried = candidates(control, settings, limits if machine is None else machine)
+        layout = _Layout.of([Row.of(one) for one in tried])
+
+        def watch(table: Table) -> None:
+            """Print each row as soon as it is there."""
+            if progress is not None:
+                progress("programs", len(table.rows), len(tried))
+            if not given.as_json and not given.quiet:
+                for line in layout.row(table.rows[-1]) if table.rows else layout.head(table, bool(given.verbose)):
+                    say_line(line)
+
+        if is_program:
+            table = compare_filtered(data, tried, axes, **how_read(given), watch=watch)
+        else:
             blocks = BlockLimits(look_ahead=given.look_ahead)
-            table = compare_programs(program, tried, axes, blocks, wider=bool(given.verbose), progress=step)
+            table = compare_programs(program, tried, axes, blocks, wider=bool(given.verbose), watch=watch)
     machine_named = named or given.limits
     made_by = ("filter", os.path.splitext(source)[1]) if is_program else ("smooth", control.layout.suffix)
     commands = [_command(given, row, machine_named, *made_by) for row in table.rows]
@@ -56,31 +68,56 @@ def run_compare(given: Options) -> int:
     contents = table.as_dict()
     for row, text in zip(contents["rows"], commands, strict=True):
         row["command"] = text
-    say(given, contents, _lines(table, commands, bool(given.verbose)))
+    say(given, contents, _end(table, commands))
     return 0
 
 
-def _lines(table: Table, commands: list[str], verbose: bool) -> Iterator[str]:
-    if table.share < 1.0:
-        yield f"from {100.0 * table.share:.2g} % of the poses: whole runs from the middle of the part"
-    if verbose:
-        yield f"law of lines: {table.law}"
-    yield f"unsmoothed: {table.unsmoothed:.1f} s{', ' + table.against if table.against else ''}; saves in %"
-    widths = [max(len(str(cell)) for cell in column) for column in zip(*map(_cells, table.rows), strict=True)]
-    head = ("form", "words", "method", "lines", "blocks", "kB", "s", "saves", "tip mm", "axis mm")
-    widths = [max(width, len(title)) for width, title in zip(widths, head, strict=True)]
-    yield "  " + "  ".join(f"{title:<{width}}" for title, width in zip(head, widths, strict=True)).rstrip()
-    best = table.best
-    for number, row in enumerate(table.rows):
-        cells = "  ".join(f"{cell:<{width}}" for cell, width in zip(_cells(row), widths, strict=True))
-        verdict = "" if row.usable else f"  {row.verdict}"
-        yield f"{'* ' if number == best else '  '}{cells.rstrip()}{verdict}"
+#: columns and the room of their numbers; that of the others follows from the rows
+_HEAD = ("form", "words", "method", "lines", "blocks", "kB", "s", "saves", "tip mm", "axis mm")
+_ROOM = (0, 0, 0, 0, 9, 6, 8, 5, 7, 7)
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """Widths of the columns, known before there is any row."""
+
+    widths: tuple[int, ...]
+
+    @classmethod
+    def of(cls, rows: Sequence[Row]) -> _Layout:
+        cells = [(row.form, _words(row), row.method, row.lines) for row in rows]
+        texts = [max(map(len, column)) for column in zip(*cells, strict=True)] + [0] * (len(_HEAD) - 4)
+        return cls(tuple(max(one, room, len(title)) for one, room, title in zip(texts, _ROOM, _HEAD, strict=True)))
+
+    def head(self, table: Table, verbose: bool) -> Iterator[str]:
+        """What holds for all rows, and the titles of the columns."""
+        if table.share < 1.0:
+            yield f"from {100.0 * table.share:.2g} % of the poses: whole runs from the middle of the part"
+        if verbose:
+            yield f"law of lines: {table.law}"
+        yield f"unsmoothed: {table.unsmoothed:.1f} s{', ' + table.against if table.against else ''}; saves in %"
+        yield self._line(_HEAD)
+
+    def row(self, row: Row) -> Iterator[str]:
+        """One line."""
+        yield self._line(_cells(row)) + ("" if row.usable else f"  {row.verdict}")
+
+    def _line(self, cells: Sequence[str]) -> str:
+        return "  ".join(f"{cell:<{width}}" for cell, width in zip(cells, self.widths, strict=True)).rstrip()
+
+
+def _end(table: Table, commands: list[str]) -> Iterator[str]:
+    """The best rows and their commands."""
     if not table.gains:
-        yield "leave it: no program takes less time than the unsmoothed lines"
-    if best is not None:
-        yield f"* {commands[best]}"
-        if reached := limits_text(table.rows[best].limits):
-            yield f"  {reached.removeprefix('; ')}"
+        yield "leave it as it is: no program takes less time than the unsmoothed lines"
+    both = {"best in lines": table.best_in_lines, "best of all": table.best}
+    for name, number in both.items():
+        if number is not None and not (name == "best in lines" and number == table.best):
+            row = table.rows[number]
+            yield f"{name}: {row.seconds:.1f} s"
+            yield f"  {commands[number]}"
+            if reached := limits_text(row.limits):
+                yield f"  {reached.removeprefix('; ')}"
     if table.wider is not None:
         gain = table.wider_gain
         yield (
@@ -104,7 +141,7 @@ def _cells(row: Row) -> tuple[str, ...]:
         f"{row.blocks:,}",
         f"{row.bytes / 1000.0:.0f}",
         f"{row.seconds:.1f}",
-        f"{share:.0f}",
+        f"{round(share)}",
         f"{row.tip:.4f}",
         "" if row.axis_point is None else f"{row.axis_point:.4f}",
     )

@@ -25,7 +25,7 @@ from cornersmooth.nc_reader.recognition import is_cl_file
 from cornersmooth.provenance import HEAD
 from cornersmooth.settings import Settings
 from cornersmooth.system.memory import return_free_memory
-from cornersmooth.times.comparing import MOST_POSES, Candidate, Row, Table, law_of_lines, rows_of
+from cornersmooth.times.comparing import MOST_POSES, Candidate, Row, Table, law_of_lines, with_rows
 from cornersmooth.times.saving import Timing
 from cornersmooth.verdict import Verdict
 
@@ -269,11 +269,11 @@ def compare_filtered(
     tip_from_start: bool = False,
     inch: bool = False,
     processes: int | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    watch: Callable[[Table], None] | None = None,
 ) -> Table:
     """Smooth, verify and plan the runs of a program in every way; other parameters as of `filter_program`.
 
-    `tried` has at least one, in forms with the words of the program; `progress` gets rows done and rows in all.
+    `tried` has at least one, in forms with the words of the program; `watch` as of `compare_programs`.
     CS265: the machine has no limits of axes; CS266: no cut can be smoothed; as `planned_times`.
     """
     form, settings, how = tried[0].form, tried[0].settings, {"tip_from_start": tip_from_start, "inch": inch}
@@ -308,5 +308,6 @@ def compare_filtered(
             axis_point=None if point != point else point,
         )
 
-    rows = rows_of(tried, work, processes, progress)
-    return Table(before, "the program as it is", share, law_of_lines(timing), rows)
+    return with_rows(
+        Table(before, "the program as it is", share, law_of_lines(timing), ()), tried, work, processes, watch
+    )

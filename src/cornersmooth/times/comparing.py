@@ -92,7 +92,15 @@ class Table:
     @property
     def best(self) -> int | None:
         """Number of the fastest row that keeps the tolerance; of those that no plan can tell apart the smallest."""
-        usable = [number for number, row in enumerate(self.rows) if row.usable]
+        return self._best(lambda row: True)
+
+    @property
+    def best_in_lines(self) -> int | None:
+        """Number of the best row that any control with these words runs: without curves."""
+        return self._best(lambda row: bool(row.lines))
+
+    def _best(self, wanted: Callable[[Row], bool]) -> int | None:
+        usable = [number for number, row in enumerate(self.rows) if row.usable and wanted(row)]
         if not usable:
             return None
         least = min(self.rows[number].seconds or 0.0 for number in usable)
@@ -170,7 +178,7 @@ def compare_programs(
     *,
     wider: bool = False,
     processes: int | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    watch: Callable[[Table], None] | None = None,
 ) -> Table:
     """Write, measure and plan every candidate, of which there is one at least; all moves of the program have a feed.
 
@@ -182,8 +190,8 @@ def compare_programs(
         Whether the best row is made with twice its tolerance as well.
     processes : int, optional
         As many as are useful by default; the rows do not depend on it.
-    progress : callable, optional
-        Called with (rows done, rows in all).
+    watch : callable, optional
+        Called with the table, without rows first, and after each row.
 
     Raises SettingsError CS265: no axis of the machine has limits. CornersmoothError: the unsmoothed lines cannot be
     planned.
@@ -198,8 +206,8 @@ def compare_programs(
     def work(candidate: Candidate) -> Row:
         return _row(part, candidate, unsmoothed, axes, blocks)
 
-    rows = rows_of(tried, work, processes, progress)
-    table = Table(unsmoothed, against, len(part) / max(len(program), 1), law_of_lines(timing), rows)
+    begun = Table(unsmoothed, against, len(part) / max(len(program), 1), law_of_lines(timing), ())
+    table = with_rows(begun, tried, work, processes, watch)
     if not wider or table.best is None or tried[table.best].settings.tolerance > BOUNDS["tolerance"][1] / 2.0:
         return table
     best = tried[table.best]
@@ -208,20 +216,21 @@ def compare_programs(
     )
 
 
-def rows_of(
+def with_rows(
+    table: Table,
     tried: Sequence[Candidate],
     work: Callable[[Candidate], Row],
     processes: int | None,
-    progress: Callable[[int, int], None] | None,
-) -> tuple[Row, ...]:
-    """Row of every candidate, by as many processes as are useful where no number is given."""
+    watch: Callable[[Table], None] | None,
+) -> Table:
+    """Add the row of every candidate, by as many processes as are useful where no number is given."""
     count = (useful_processes() if processes is None else processes) if can_fork() else 1
-    rows: list[Row] = []
+    tell = watch or (lambda table: None)
+    tell(table)
     for row in map_in_processes(work, tried, count):
-        rows.append(row)
-        if progress is not None:
-            progress(len(rows), len(tried))
-    return tuple(rows)
+        table = replace(table, rows=(*table.rows, row))
+        tell(table)
+    return table
 
 
 def law_of_lines(timing: Timing) -> str:
