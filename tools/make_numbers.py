@@ -2,7 +2,7 @@
 
 python tools/make_numbers.py FOLDER
 
-Rows are those that ``cornersmooth compare FILE --control fanuc --limits table-ac --feed 1800`` prints for tool vectors.
+Rows are those that ``cornersmooth compare FILE --control fanuc --machine table-ac --feed 1800`` prints.
 The folder holds the parts that are not among the samples; the picture shows the first poses of one of them.
 """
 
@@ -40,8 +40,8 @@ PARTS = {
 }
 PICTURE, FIRST = "hecc_point_zigzag.csv", 120
 HEAD = """\
-| part | poses | not smoothed | lines: time | blocks | curves (G6.2): time | blocks |
-|---|---|---|---|---|---|---|
+| part | poses | not smoothed | lines | blocks | lines in rotary words | blocks | curves (G6.2) | blocks |
+|---|---|---|---|---|---|---|---|---|
 """
 #: what is changed in the program of the sample, and how
 WRONG = {
@@ -67,9 +67,10 @@ def compared(part: Path) -> tuple[int, Table]:
     """Poses of a part, and its programs as they are written by default: short lines corner by corner, global curves."""
     program = cornersmooth.read(part).with_feed(FEED)
     default = {("g1", "proportional", "fine"), ("g6.2", "global", "")}
-    tried = candidates(load_control(CONTROL), Settings(), None)
+    machine = load_machine(MACHINE)
+    tried = candidates(load_control(CONTROL), Settings(), machine)
     tried = [one for one in tried if (one.form.name, one.settings.method, one.lines) in default]
-    return len(program), compare_programs(program, tried, load_machine(MACHINE))
+    return len(program), compare_programs(program, sorted(tried, key=lambda one: one.form.name), machine)
 
 
 def line_of(what: str, poses: int, found: Table) -> str:
@@ -96,6 +97,21 @@ def first_program() -> tuple[str, str, str]:
     shown = (said.getvalue().splitlines()[:OUTPUT], [*source.splitlines()[CL_LINES], "", *text.splitlines()[BLOCKS]])
     output, lines = ("```text\n" + "\n".join(one) + "\n...\n```\n" for one in shown)
     return output, lines, text
+
+
+def on_linuxcnc(part: Path) -> str:
+    """What LinuxCNC's planner makes of a part, in a sentence: its time smoothed, and as it is."""
+    with tempfile.TemporaryDirectory() as folder:
+        said, target = io.StringIO(), str(Path(folder) / "part.ngc")
+        with contextlib.redirect_stderr(said):
+            run(["smooth", str(part), "--control", "linuxcnc", "--machine", "xyzac-trt", "-o", target])
+    times = re.search(r"time .*?([\d.]+) s instead of ([\d.]+) s", said.getvalue())
+    assert times
+    after, before = map(float, times.groups())
+    told = f"{abs(after / before - 1.0):.0%}".replace("%", " %")
+    return (
+        f"The sample {'loses' if after > before else 'gains'} {told} there: {after:.1f} s, unsmoothed {before:.1f} s.\n"
+    )
 
 
 def wrong_programs(text: str) -> str:
@@ -161,6 +177,7 @@ def main(folder: Path) -> None:
     text = readme.read_text(encoding="utf-8")
     output, lines, part = first_program()
     made = {"output": output, "lines": lines, "numbers": HEAD + gains, "wrong": WRONG_HEAD + wrong_programs(part)}
+    made["linuxcnc"] = on_linuxcnc(SAMPLES / "impeller.cls")
     for name, what in made.items():
         text = place(name).sub(lambda found, what=what: what, text)
     readme.write_text(text, encoding="utf-8")

@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 
     from_poses = Program.from_poses
 
-__version__ = "0.2.0"
+__version__ = "0.3.0.dev0"
 
 #: module of each public name
 _HOME = {

@@ -1,4 +1,4 @@
-"""The table of features in docs/new-machine.md, each cell beside what the texts of today have."""
+"""The table of features in docs/dev/posts.md, each cell beside what the texts of today have."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from oracle.files import SAMPLES
 
-PAGE = SAMPLES.parent / "docs" / "new-machine.md"
+PAGE = SAMPLES.parent / "docs" / "dev" / "posts.md"
 MACHINES = dict.fromkeys(("fanuc", "mitsubishi", "siemens", "heidenhain", "generic"), "table-ac")
 MACHINES |= {"haas": "table-bc", "linuxcnc": "xyzac-trt"}
 
