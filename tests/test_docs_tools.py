@@ -46,6 +46,7 @@ RUN_BY = {
         "tests/filter/test_filter_on_a_controller.py"
     ),
     "pip install .": ".ci/packages",
+    "python tools/make_options.py": "tests/test_docs.py",
     "python tools/make_codes.py": "tests/test_codes.py",
     "python tools/make_words.py": "tests/verify/test_word_mutations.py",
     "python tools/run_examples.py docs/gallery.md docs": "tests/test_docs.py",
