@@ -15,11 +15,12 @@ import numpy as np
 
 import cornersmooth
 from cornersmooth import Program, Settings
-from cornersmooth.feedrate import Limits, TimeLaw, compare, plan, plan_text
+from cornersmooth.feedrate import Limits, TimeLaw, plan, plan_text
 from cornersmooth.kinematics import Machine, load_machine
 from cornersmooth.kinematics.machine_tables import machine_table, parse_machine
 from cornersmooth.nc import choose_form
 from cornersmooth.nc_reader import read_nc
+from cornersmooth.times.laws import compare
 
 ROOT = Path(__file__).resolve().parent.parent
 PATHS = {

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
     from cornersmooth.cl import read
     from cornersmooth.errors import CornersmoothError, Finding, VerdictError
-    from cornersmooth.feedrate import Limits, TimeLaw, compare, direct, plan
+    from cornersmooth.feedrate import Limits, TimeLaw, direct, plan
     from cornersmooth.filter import filter_program
     from cornersmooth.kinematics import load_machine
     from cornersmooth.model import Corners, Program, SmoothProgram, Statement
@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from cornersmooth.report.corners import corner_table
     from cornersmooth.settings import Settings
     from cornersmooth.smoothing.path_points import PathPoints, sample
+    from cornersmooth.times.laws import compare
     from cornersmooth.verify import Verification, verify
 
     from_poses = Program.from_poses
@@ -55,7 +56,7 @@ _HOME = {
     for module, names in {
         "cl": "read",
         "errors": "CornersmoothError Finding VerdictError",
-        "feedrate": "Limits TimeLaw compare direct plan",
+        "feedrate": "Limits TimeLaw direct plan",
         "filter": "filter_program",
         "kinematics": "load_machine",
         "model": "Corners Program SmoothProgram Statement from_poses",
@@ -65,6 +66,7 @@ _HOME = {
         "report": "report",
         "report.corners": "corner_table",
         "settings": "Settings",
+        "times.laws": "compare",
         "verdict": "Verdict",
         "verify": "Verification verify",
     }.items()

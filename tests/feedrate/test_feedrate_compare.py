@@ -11,12 +11,12 @@ import pytest
 from linear_programmes import reference_time
 
 from cornersmooth.cl import read
-from cornersmooth.feedrate import Limits, compare, direct, plan
-from cornersmooth.feedrate.compare import slowest
+from cornersmooth.feedrate import Limits, direct, plan
 from cornersmooth.feedrate.reached import peaks
 from cornersmooth.model import Program
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
+from cornersmooth.times.laws import compare, slowest
 from oracle.share import share
 
 TABLE_1 = Path(__file__).resolve().parents[2] / "samples" / "paper_table1.csv"

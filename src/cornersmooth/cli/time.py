@@ -13,8 +13,7 @@ from cornersmooth.cli.files import check_inputs, check_path, check_reports, read
 from cornersmooth.cli.options import Options
 from cornersmooth.cli.show import print_message, progress_bar, say
 from cornersmooth.errors import message
-from cornersmooth.feedrate import BlockLimits, Comparison, axis_peaks, compare, limiting, plan_text
-from cornersmooth.feedrate.compare import slowest, stops, turning_seconds
+from cornersmooth.feedrate import BlockLimits, axis_peaks, limiting, plan_text
 from cornersmooth.feedrate.reached import peaks
 from cornersmooth.kinematics import machine_names
 from cornersmooth.kinematics.machine import LINEAR
@@ -26,6 +25,7 @@ from cornersmooth.pipeline import read_back
 from cornersmooth.provenance import read_provenance
 from cornersmooth.report.verdict import limits_of, times_text
 from cornersmooth.times.comparing import law_of_lines
+from cornersmooth.times.laws import Comparison, compare, slowest, stops, turning_seconds
 from cornersmooth.times.saving import Timing, without_holes, written_text
 
 _TITLES = {

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from cornersmooth.feedrate.compare import Comparison, compare
 from cornersmooth.feedrate.planner import direct, plan
 from cornersmooth.feedrate.reached import AxisPeaks, axis_peaks, limiting
 from cornersmooth.feedrate.timelaw import States, TimeLaw
@@ -12,13 +11,11 @@ from cornersmooth.settings.limits import Limits
 __all__ = [
     "AxisPeaks",
     "BlockLimits",
-    "Comparison",
     "Limits",
     "States",
     "TimeLaw",
     "axis_peaks",
     "block_feeds",
-    "compare",
     "direct",
     "limiting",
     "plan",

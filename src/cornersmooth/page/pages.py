@@ -11,7 +11,7 @@ from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 from cornersmooth.errors import Finding
-from cornersmooth.feedrate import Comparison, Limits, TimeLaw
+from cornersmooth.feedrate import Limits, TimeLaw
 from cornersmooth.geometry.tool import Tool
 from cornersmooth.kinematics import Machine, with_dynamics
 from cornersmooth.model import Program
@@ -30,6 +30,7 @@ from cornersmooth.report.verdict import (
     trusted_blocks,
 )
 from cornersmooth.settings import Settings
+from cornersmooth.times.laws import Comparison
 from cornersmooth.times.saving import planned_saving
 from cornersmooth.verdict import Verdict
 from cornersmooth.verify import Verification

@@ -9,9 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cornersmooth.feedrate.planner import direct, plan
-from cornersmooth.feedrate.reached import axis_peaks, peaks
-from cornersmooth.feedrate.timelaw import TimeLaw
+from cornersmooth.feedrate import TimeLaw, axis_peaks, direct, plan
+from cornersmooth.feedrate.reached import peaks
 from cornersmooth.kinematics import Machine
 from cornersmooth.methods import METHODS
 from cornersmooth.model import Program
