@@ -25,7 +25,7 @@ def shown(text: str) -> str:
 def roles(entry: dict[str, Any], kind: str) -> str:
     """Where a word may stand, and what must hold."""
     said = []
-    if entry.get("first") == "motion":
+    if entry.get("first"):
         said.append("**must come before the first motion**")
     if entry.get("state") and not entry.get("follows"):
         said.append("the same wherever the tool moves")
@@ -48,7 +48,7 @@ def roles(entry: dict[str, Any], kind: str) -> str:
         said.append("may change from line to line")
     if entry.get("before"):
         said.append("before an arc")
-    if entry.get("rotary") == "zero":
+    if entry.get("zero"):
         said.append("only where the rotary axes are at zero")
     if entry.get("high"):
         said.append("only after a retract")

@@ -25,13 +25,13 @@ from cornersmooth.nc import Form, Frame, Written
 from cornersmooth.nc.program_frame import blend_word
 from cornersmooth.nc_reader import CONTROLS, NcProgram, read_nc
 from cornersmooth.nc_reader.elements import Element
-from cornersmooth.provenance import Provenance
+from cornersmooth.provenance import HEAD, Provenance, with_parts
 from cornersmooth.report import NcFile, report
 from cornersmooth.report.record import planned_times, sha256_of
 from cornersmooth.report.verdict import Judgement, Saving, judge, trusted_blocks
 from cornersmooth.settings import Settings
 from cornersmooth.system.memory import return_free_memory
-from cornersmooth.system.output import FAILED, Target, check_output, open_output, path_of
+from cornersmooth.system.output import FAILED, Output, Target, check_output, open_output, path_of
 from cornersmooth.verdict import Verdict
 from cornersmooth.verify import Verification, Verifier, useful_processes
 
@@ -235,6 +235,7 @@ def postprocess(
         _provenance(source, program, smoothed.settings, form),
         planned_feeds=plan_feeds is not None,
         work_offset=frame.named_offset(form.table),
+        parts=not unverified,
     )
     frame = replace(frame, provenance=provenance.lines())
     with (
@@ -271,6 +272,8 @@ def postprocess(
             _begin(progress, "verifying")
             with _timed(seconds, "verify"):
                 verification, unverified = _verified(verifier, form, frame)
+                if verification is not None:
+                    _put_parts(output, verification.parts)
         findings = (*smoothed.findings, *_remarks(program, smoothed.settings), *written.findings)
         if unverified:
             findings += (Finding("CS509", "warning", 0, f"NOT VERIFIED: {unverified}"),)
@@ -334,6 +337,14 @@ def _with_planned_feeds(text: bytes, program: Program, settings: Settings, form:
     return PlannedFeeds(line, feed, minutes, written.feed[element]).write(
         text, form, program.units, program.mm_per_unit
     )
+
+
+def _put_parts(output: Output, digests: str) -> None:
+    """Write the digests of the parts of a program into its head, which has room for them."""
+    with open(output.path, "rb") as text:
+        found = with_parts(text.read(HEAD), digests)
+    if found is not None:
+        output.stream.patch(output.path, *found)
 
 
 def _provenance(

@@ -14,6 +14,11 @@ HEAD = 1 << 13
 _LONGEST = 120
 
 _WORDS = re.compile(r"CORNERSMOOTH (?P<version>\S+): (?P<words>[^\r\n)]*)", re.IGNORECASE)
+#: parts of a text that have a digest each, and where these stand; zeros until the text is verified
+PARTS: Final = 8
+PARTS_WORD: Final = re.compile(r"\bPARTS=([0-9a-f.]+)", re.IGNORECASE)
+NO_PARTS: Final = ".".join(("000000",) * PARTS)
+
 _HASH = re.compile(r"\bSHA256=([0-9a-f]{64})\b", re.IGNORECASE)
 
 
@@ -39,6 +44,7 @@ class Provenance:
     #: With ``_`` for blanks; ``"none"`` where the text says none, empty for that of the control's own table.
     work_offset: str = ""
     extras: str = ""  #: functions of the control that are on
+    parts: bool = False  #: whether there is room for the digests of its parts (`nc_words.parts`)
     operation: int = 0  #: number of the operation of the CL file that it holds alone; 0 for all
 
     def lines(self) -> tuple[str, ...]:
@@ -51,7 +57,15 @@ class Provenance:
                 lines.append(mark)
             lines[-1] += f" {word}"
         lines.append(" ".join(([f"SHA256={self.sha256}"] if self.sha256 else []) + [f"CL={self.source}"]))
+        if self.parts:
+            lines.append(f"PARTS={NO_PARTS}")
         return tuple(lines)
+
+
+def with_parts(head: bytes, digests: str) -> tuple[int, bytes] | None:
+    """Where the digests of parts stand in the beginning of a text, and what to write there; None for no such place."""
+    at = head.find(f"PARTS={NO_PARTS}".encode())
+    return None if at < 0 else (at, f"PARTS={digests}{NO_PARTS[len(digests) :]}".encode())
 
 
 def read_provenance(text: bytes) -> Provenance | None:

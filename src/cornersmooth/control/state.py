@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -116,21 +116,29 @@ class State:
             self.or_not(before)
         return cuts
 
-    def _words(self, words: tuple[Word, ...]) -> bool:
+    def rows(self, words: Sequence[Word]) -> list[tuple[Word, str, Row]]:
+        """Words of a block that are none of the motion, with their names in the table, and what they do there."""
         given = {word.name: word.value for word in words}
         of_motion = {*self.axes, "F", *_AXES}
-        named = [name for name in map(_name, words) if name not in of_motion]
-        rows = [self.table.row(name, given, alone=len(words) == 1) for name in named]
+        named = [(word, name) for word in words if (name := _name(word)) not in of_motion]
+        return [(word, name, self.table.row(name, given, alone=len(words) == 1)) for word, name in named]
+
+    def _words(self, words: tuple[Word, ...]) -> bool:
+        given = {word.name: word.value for word in words}
+        named = self.rows(words)
+        rows = [row for _, _, row in named]
         does = {effect for row in rows for effect in self._set(row, words)}
         # what belongs to other words of the block, or to the motion that holds
         beside = self.table.arguments.get(self.groups["motion"] or "", frozenset[str]())
         beside = beside.union(*(row.beside for row in rows))
-        does |= {effect for name, row in zip(named, rows, strict=True) if name not in beside for effect in row.does}
+        does |= {effect for _, name, row in named if name not in beside for effect in row.does}
         if does & {"anything", "unknown"}:
             self.lose_all(frames="unknown" in does)
             return False
         if "dwell" in does:
             return False
+        if "stop" in does:
+            self.groups |= {name: None for name in ("spindle", "coolant") if self.groups[name] != "OFF"}
         if "F" not in beside and ("F" in given or "feed" in does):
             self.feed = given.get("F", math.nan)
         if "tool" in does and self.groups["tip"] != "off":

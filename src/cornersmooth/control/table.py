@@ -42,13 +42,14 @@ GROUPS: Final[Mapping[str, str]] = {
     "feed": "minute inverse revolution",
     "tip": "off angles vectors both",
     "compensation": "off on",
-    **dict.fromkeys(("offset", "path", "plane", "spindle", "coolant", "orientation", "coordinates"), ""),
+    **dict.fromkeys(("offset", "path", "plane", "spindle", "coolant", "orientation", "coordinates", "way"), ""),
 }
 
 #: what each effect leaves unknown
 LOSES: Final[Mapping[str, str]] = {
     "nothing": "",
     "dwell": "",  # and the other words of the block are no motion
+    "stop": "whether spindle and coolant are on: most machines stop them with the program",
     "axis": "as `length`, along the axis of the tool alone where the plane says which that is",
     "length": "XYZ count anew, those of the block already",
     "shift": "all axes count anew, those of the block already",
@@ -60,7 +61,7 @@ LOSES: Final[Mapping[str, str]] = {
 }
 
 #: what a word of `[means]` does by its kind, where it is not the group of the kind
-_OF_KIND: Final = {"stop": "nothing", "end": "anything", "register": "length", "offset": "length"}
+_OF_KIND: Final = {"stop": "stop", "end": "anything", "register": "length", "offset": "length"}
 _COMPENSATION: Final = {"OFF": "off", "LEFT": "on", "RIGHT": "on"}
 
 _REMEMBERED: Final = 4096

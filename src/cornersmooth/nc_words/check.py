@@ -15,6 +15,7 @@ from cornersmooth.nc_reader.word_tables import word_table
 from cornersmooth.nc_reader.words import Line, Table
 from cornersmooth.nc_words.blocks import NOT_LISTED, Ruled, WordRules
 from cornersmooth.nc_words.machine_positions import MachinePositions
+from cornersmooth.nc_words.parts import Parts
 from cornersmooth.nc_words.rules import UNLISTED, WordList, WordRule, any_of, shown, word_list, word_text
 from cornersmooth.nc_words.states import LINEAR, ROTARY, WordStates
 from cornersmooth.statements.comparison import KINDS
@@ -78,6 +79,7 @@ class WordCheck:
         kinds = KINDS & trusted
         self._moving = _own_table(kinds & _OF_MOTION)
         self.trusted += [(0, text) for text in _own_table(kinds - _OF_MOTION)]
+        self.parts = Parts(control)
         self._line = 0  # of the last block
         self._wanted = self.list.begin  # blocks of the begin that are still to come
         self._opening = ""
@@ -106,7 +108,7 @@ class WordCheck:
         told = [f"{block}, NC line {line}" for line, block in self.unsure[:_UNSURE_TOLD]]
         if more := len(self.unsure) - len(told):
             told.append(f"{more} more blocks of your own")
-        return "; ".join(told + self._moving)
+        return "; ".join(filter(None, (*told, *self._moving, self.parts.changed())))
 
     @property
     def work_offset(self) -> str:
@@ -130,6 +132,7 @@ class WordCheck:
         self._line = int(table.line[-1])
         self._follow(self._line, "", [])
         self._check_weights(table)
+        self.parts.table(table)
         self._positions.leave(table.columns.keys())
         rows = [len(table)]
         if self._states.attentive:
@@ -163,6 +166,7 @@ class WordCheck:
         number = line.number
         for comment in line.comments:
             self._states.comment(comment)
+            self.parts.comment(comment)
             if self.list.orders is not None and self.list.orders.match(comment):
                 self._wrong(NOT_LISTED, number, f"a comment that the control obeys: {comment[:40]}")
             if _CONTROL_CHARACTERS.search(comment):
@@ -174,6 +178,7 @@ class WordCheck:
             self._wrong(NOT_LISTED, number, "block skip: what the control does depends on a switch")
         if not words:
             return line
+        self.parts.line(line)
         before, ruled = len(self.problems), self._rules.of(words)
         self._functions(number, words, ruled)
         if not self._frames(number, text):
@@ -236,10 +241,10 @@ class WordCheck:
 
     def _move(self, line: int, given: Mapping[str, float], rules: Sequence[WordRule] = ()) -> None:
         """Look at where the words of a block send the axes; those beside a word that is alone do not move the tool."""
-        self._states.turn(line, given)
-        moves, drills = any(rule.moves for rule in rules), any(rule.cycle for rule in rules)
+        self._states.turn(given)
+        moves = any(rule.moves for rule in rules)
         if moves or (LINEAR & given.keys() and not any(rule.alone for rule in rules)):
-            self._states.motion(line, given, 1.0 if moves else self._code, drills=drills)
+            self._states.motion(line, given, 1.0 if moves else self._code)
 
     def _follow(self, line: int, text: str, ruled: Ruled) -> None:
         """Look at what a block and that before want of each other."""

@@ -43,28 +43,19 @@ class MachinePositions:
         Of the text.
     switches : bool
         `Dialect.switches`.
-    tcp : bool
-        Whether words are those of the tip.
     """
 
-    def __init__(
-        self, machine: Machine | None, mm_per_unit: float, *, switches: bool = False, tcp: bool = True
-    ) -> None:
+    def __init__(self, machine: Machine | None, mm_per_unit: float, *, switches: bool = False) -> None:
         home, change = ((), ()) if machine is None else (machine.home, machine.tool_change)
         units = dict.fromkeys("XYZ", mm_per_unit)
         self._home, self._change = (
             {axis: value / units.get(axis, 1.0) for axis, value in known} for known in (home, change)
         )
         self._at: dict[str, float] = {}
-        #: names of the machine's rotary axes
-        self.rotary: frozenset[str] = frozenset() if machine is None else frozenset(machine.names)
-        #: with its rotary axes
-        self.machine = machine if self.rotary else None
-        blocks = (machine.tip_control or ()) if machine is not None and self.rotary and switches else ()
+        self._axes = () if machine is None else machine.axes
+        blocks = (machine.tip_control or ()) if machine is not None and self._axes and switches else ()
         #: rules for words that switch tip control of the kinematics
         self.switch: tuple[WordRule, ...] = (*_switch(blocks[:1], ends=True), *_switch(blocks[1:], ends=False))
-        #: whether words are those of the tip without any that switches that on
-        self.keeps_tip = bool(switches and tcp and not blocks)
         #: rules for blocks that the control's own list need not have
         self.rules: tuple[WordRule, ...] = ()
         if home or change:
@@ -77,8 +68,7 @@ class MachinePositions:
 
     def away(self, angles: Mapping[str, float]) -> list[str]:
         """Names of axes that are not at zero, or at a full turn of an axis that turns without end."""
-        axes = () if self.machine is None else self.machine.axes
-        endless = {axis.name for axis in axes if axis.limits is None}
+        endless = {axis.name for axis in self._axes if axis.limits is None}
         turns = {name: math.remainder(angle, 360.0) if name in endless else angle for name, angle in angles.items()}
         return sorted(name for name, angle in turns.items() if abs(angle) > SAME)
 
@@ -134,8 +124,6 @@ def _switch(blocks: Sequence[str], *, ends: bool) -> Iterator[WordRule]:
             alone=True,
             follows=True,
             ends=ends,
-            rotary="next" if ends else "",
             off=not ends,
-            first="" if ends else "retract",
         )
         yield from (WordRule(other, "tip control", needs=word) for other in others)

@@ -28,12 +28,12 @@ from cornersmooth.nc_reader.words import Word
 _ENDS: Final = frozenset(("OFF", "ORIENT"))
 
 #: keys of a word that are regular expressions
-_PATTERNS: Final = frozenset(("is", "needs", "must", "after", "then", "behind", "down", "bars", "extra"))
+_PATTERNS: Final = frozenset(("is", "needs", "must", "after", "then", "behind", "extra"))
 
 
 @dataclass(frozen=True)
 class WordRule:
-    """What the list says of a word or a block. What programs of our own alone must keep is marked so."""
+    """What the list says of a word or a block."""
 
     pattern: re.Pattern[str]
     says: str = ""  #: what it means, for the documentation
@@ -62,19 +62,15 @@ class WordRule:
     cycle: bool = False  #: a hole cycle of the control, a tilted plane, cutter compensation
     late: bool = False  #: after a retract it may come as late as in the block that first moves Z
     compared: bool = False  #: others compare the word with the CL file
-    #: when one of its state must have been said: before the first ``"motion"``; in programs of our own before the first
-    #: ``"retract"``, or before another word of its state is ``"used"``
-    first: str = ""
-    preset: str = ""  #: in programs of our own: the one that is meant where the head names none
-    down: re.Pattern[str] | None = None  #: so, too: one must hold on the way down from a retract under such a word
+    first: bool = False  #: one of its state must come before the first motion
+    preset: str = ""  #: the usual one of these
     drops: str = ""  #: a state that the control forgets with it, and that must be said after it
 
     # until when it may hold
     off: bool = False  #: it switches the state off, which must hold at the end
     ends: bool = False  #: tool tip control: it must be switched off before the tool is changed
     outside: bool = False  #: it may not be said while a word that `ends` holds
-    tidy: bool = False  #: in programs of our own: it must be switched off before another tool and at the end
-    bars: re.Pattern[str] | None = None  #: so, too: states of which none that is `tidy` or `ends` may hold here
+    runs: bool = False  #: spindle or coolant is on with it
 
     # where the tool is
     #: the tool goes away, and none but an approach may follow, in which work offset or tool length are said again
@@ -82,9 +78,9 @@ class WordRule:
     high: bool = False  #: only after a retract; a control with such a word wants the tool high at the end, too
     moves: bool = False  #: the tool moves, though the block names no axis
     turns: bool = False  #: the control turns the rotary axes, and nobody says where to
-    #: where they must have been sent before: to ``"zero"``, as, where a parameter says so, the part program turns with
-    #: the angles of that moment; or, in programs of our own, where the ``"next"`` motion has them
-    rotary: str = ""
+    #: they must have been sent to zero before: where a parameter says so, the part program turns with the angles of
+    #: that moment
+    zero: bool = False
 
     @property
     def changes_tool(self) -> bool:
@@ -133,17 +129,14 @@ def _functions(means: Mapping[str, Sequence[str]]) -> Iterator[WordRule]:
     for word, parts in means.items():
         kind, last = parts[0], parts[-1]
         if kind in ("spindle", "coolant"):
-            states = {kind, *(state for state in apart if state.startswith(kind))}
             state = name if (name := f"{kind} {last}") in apart else kind
-            others = sorted(states - {state}) if len(parts) == 2 else ()
             yield WordRule(
                 re.compile(re.escape(word)),
                 f"{' '.join(parts)}: compared with the statements",
                 state=state,
                 follows=True,
                 compared=True,
-                tidy=parts[1] not in _ENDS,
-                bars=re.compile("|".join(others)) if others else None,
+                runs=parts[1] not in _ENDS,
             )
 
 

@@ -3,24 +3,20 @@
 A word sets a state to a value; its rule (`rules`) says when it must have been said, until when it may hold, and at
 which places of the program it may be: after a retract, on the way down, under tool tip control.
 
-Posts have many ways to begin, to change tools and to end, and most of them are right. A program whose head says how it
-was made goes the way of the control's table: what is missing there has been lost since (`WordStates._lost_since`).
+Posts have many ways to begin, to change tools and to end, and most of them are right. What has changed in a program
+whose head says how it was made, `parts` finds.
 """
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from typing import Final
 
-import numpy as np
-
 from cornersmooth.nc_reader.elements import Problem
-from cornersmooth.nc_reader.rotary import tool_vectors
 from cornersmooth.nc_words.blocks import NOT_LISTED, Ruled
-from cornersmooth.nc_words.machine_positions import SAME, MachinePositions
+from cornersmooth.nc_words.machine_positions import MachinePositions
 from cornersmooth.nc_words.rules import WordList, WordRule, any_of, shown
 
 #: a retract with the same tool, which only GOHOME of the CL file asks for
@@ -32,28 +28,16 @@ NOT_ESTABLISHED: Final = "CS572"
 #: name of the blocks around the motion, among what is left to the user
 FRAME: Final = "program frame"
 
-#: states that are spoken of by name; planes are those to which the control turns the rotary axes
+#: state that is spoken of by name
 _OFFSET: Final = "work offset"
-_LENGTH: Final = "tool length"
-_PLANES: Final = frozenset(("tilted plane", "swivelled plane"))
-_DYNAMIC: Final = "dynamic work offset"
-
-#: blocks that stop the program
-_STOPS: Final = ("M0", "M1", "STOP")
 
 #: comments that say how a program was made, and the words in them
 _MADE: Final = re.compile(r"CORNERSMOOTH \S+: \w+=", re.IGNORECASE)
 _MADE_WORDS: Final = re.compile(r"\b(\w+)=([\w.]*)")
 
-#: words of axes: linear and rotary ones; a tool vector; a second point on the axis, which tells nothing high up
+#: words of axes
 LINEAR: Final = frozenset("XYZ")
 ROTARY: Final = frozenset("ABC")
-_VECTOR: Final = frozenset("IJK")
-_POINT: Final = frozenset(("U", "V", "W", "XH", "YH", "ZH"))
-
-#: angles of a plane, and the cosine of the angle from Z beyond which a tool is tilted
-_DECIMAL: Final = re.compile(r"(?<![G\d])\d+\.\d*")
-_UPRIGHT: Final = 1.0 - 1e-6
 
 
 @dataclass(frozen=True)
@@ -93,15 +77,11 @@ class WordStates:
             _Held, tuple[str, str]
         ] = {}  # what holds and did not at the first motion, and what is wrong with it
         self._cycles = False  # whether the program has any, so that some states may differ from tool to tool
-        #: where the rotary axes have been sent, as far as that is said, and whether the control has turned them since
+        #: where the rotary axes have been sent, as far as that is said
         self.angles: dict[str, float] = {}
-        self._swivelled = False
-        self._tip_on: tuple[WordRule, dict[str, float]] | None = None  # where they were when tip control came on
         self._retract = 0  # line of a retract that no approach has followed
         self._high = False  # the tool has not moved since a retract
         self.above = False  # Z has not
-        self._over = False  # the tool has been sent over its place since, without tip control
-        self._unsaid_at_retract: list[str] | None = None  # what was missing before the first retract
         self._moved = 0  # line of the last motion
         self._changed = True  # words have been said since
         #: states that words have ended since, with these: they must be said again before the next motion
@@ -121,10 +101,6 @@ class WordStates:
         else:
             self.wrong(code, line, *texts)
 
-    def _lost_since(self, line: int, texts: Iterable[str]) -> None:
-        """Complain of what a program of our own has."""
-        self.unframed(NOT_LISTED, line, *(texts if self._made else ()))
-
     # what holds
 
     @property
@@ -136,11 +112,6 @@ class WordStates:
     def work_offset(self) -> str:
         """The work offset that holds, as it is written; empty for none."""
         return self._held[_OFFSET].text if _OFFSET in self._held else ""
-
-    def _running(self) -> list[str]:
-        """Words that are switched off after the last motion of a tool."""
-        on = [held for held in self._held.values() if held.rule.tidy]
-        return [held.text for held in on if not {held.rule.state, held.text} & self._left]
 
     @property
     def made(self) -> Mapping[str, str]:
@@ -180,8 +151,6 @@ class WordStates:
         for word, rule in ruled:
             self._set(line, word, rule, ruled)
         self._check_plane(line, ruled)
-        if any(rule.changes_tool for _, rule in ruled):
-            self._lost_since(line, [f"{' '.join(words)} under {word}" for word in self._running()])
 
     def _check_plane(self, line: int, ruled: Ruled) -> None:
         """Complain of words that are taken in another plane than theirs, and of that while the tool is compensated."""
@@ -198,55 +167,38 @@ class WordStates:
             if not before:
                 self.wrong(NOT_LISTED, line, f"{word} without {shown(rule.after)} before it")
             self._said -= before
-        if rule.rotary == "zero" and (not self.angles or self._positions.away(self.angles)):
+        if rule.zero and (not self.angles or self._positions.away(self.angles)):
             self.unframed(NOT_LISTED, line, f"{word} without the rotary axes at zero before it")
         if rule.high and not self._high:
             self.unframed(NOT_LISTED, line, f"{word} without a retract before it")
         if rule.turns:
-            self.angles, self._swivelled = {}, True
+            self.angles = {}
         if rule.retract:
-            if self._unsaid_at_retract is None:
-                self._unsaid_at_retract = [f"{wanted} must come before {word}" for _, wanted in self._unsaid("retract")]
-            self._retract, self._high, self.above, self._over = line, True, True, False
+            self._retract, self._high, self.above = line, True, True
         if rule.changes_tool or rule.outside:
             self._retract = 0
             tell = self.unframed if rule.changes_tool else self.wrong
             for tip in self._tip_control:
                 tell(NOT_LISTED, line, f"{word} under {tip}")
         spindle = self._held.get("spindle")
-        if rule.changes_tool and spindle is not None and spindle.rule.tidy and spindle.line > self._moved:
+        if rule.changes_tool and spindle is not None and spindle.rule.runs and spindle.line > self._moved:
             self.wrong(NOT_LISTED, line, f"{word} stops the spindle that was started before it")
 
     def _set(self, line: int, word: str, rule: WordRule, ruled: Ruled) -> None:
-        """Take over the state that a word sets, and complain of what a program of our own says around it."""
+        """Take over the state that a word sets."""
         if rule.drops in self._held:
             self._ended[rule.drops] = word
-        if word in _STOPS:  # ends spindle and coolant on most machines
-            on = [state for state, held in self._held.items() if held.rule.tidy and held.rule.compared]
-            self._ended = dict.fromkeys(on, word) | self._ended
         if rule.state:
             beside = [(other, its) for other, its in ruled if its.needs and its.needs.fullmatch(word)]
             more = [other for other, its in beside if not (its.compared or its.follows)]
             self._held[rule.state] = _Held(" ".join([word, *more]), rule, line)
             self._ended.pop(rule.state, None)
-            if not rule.off:
-                unsaid = self._unsaid("used", rule.state)
-                self._lost_since(line, [f"{wanted} must come before {word}" for _, wanted in unsaid])
-                if rule.state in self._approach:  # GOHOME: the same tool comes back as a new one does
-                    self._retract = 0
-        if rule.bars is not None:
-            barred = [held for held in self._held.values() if rule.bars.fullmatch(held.rule.state)]
-            self._lost_since(line, [f"{word} under {held.text}" for held in barred if held.rule.tidy or held.rule.ends])
-        if rule.rotary == "zero" or (rule.rotary and self._high):  # elsewhere they are where the last motion left them
-            self._tip_on = rule, dict(self.angles)
-        if rule.off and rule.state == _LENGTH and self._first is not None and self._retracts and not self.above:
-            self._lost_since(line, [f"{word} before the retract: it may move the tool by its length"])
-        if rule.ends and self._over:
-            self._lost_since(line, [f"{word} after the motion to where the tool comes down"])
+            if not rule.off and rule.state in self._approach:  # GOHOME: the same tool comes back as a new one does
+                self._retract = 0
 
-    def _unsaid(self, when: str, only: str = "") -> Iterator[tuple[str, str]]:
-        """States, and words of which one must have come before the first motion or retract, or before others of it."""
-        rules = [rule for rule in self._list.words if rule.first == when and only in ("", rule.state)]
+    def _unsaid(self) -> Iterator[tuple[str, str]]:
+        """States, and words of which one must have come before the first motion."""
+        rules = [rule for rule in self._list.words if rule.first]
         for state in dict.fromkeys(rule.state for rule in rules):
             wanted = [rule.pattern for rule in rules if rule.state == state]
             if not any(any_of(pattern, self._said) for pattern in wanted):
@@ -255,24 +207,16 @@ class WordStates:
 
     # where axes turn, and where the tool moves
 
-    def turn(self, line: int, words: Mapping[str, float]) -> None:
-        """Take over rotary words; they may not turn the axes alone where a retract has left the tool."""
+    def turn(self, words: Mapping[str, float]) -> None:
+        """Take over rotary words."""
         self.angles |= {name: words[name] for name in ROTARY & words.keys()}
-        if self.above and ROTARY & words.keys() and not LINEAR & words.keys():
-            self._lost_since(line, [f"the rotary axes turn under {word}" for word in self._tip_control])
 
-    def motion(self, line: int, words: Mapping[str, float], code: float, *, drills: bool) -> None:
-        """Look at what holds where the tool moves by the words of a block, and by the G word of group 01 in force.
-
-        `drills`: in a cycle of the control, so it does not go there at once.
-        """
+    def motion(self, line: int, words: Mapping[str, float], code: float) -> None:
+        """Look at what holds where the tool moves by the words of a block, and by the G word of group 01 in force."""
         for state, word in self._ended.items():
-            if state not in self._left and word in _STOPS:
-                self._lost_since(line, [f"{word} ends {self._held[state].text}, and the tool moves on without it"])
-            elif state not in self._left:
+            if state not in self._left:
                 self.unframed(NOT_ESTABLISHED, line, f"{state}: it must come after {word}, which deselects it")
-        if not drills:
-            self._lost_since(line, list(self._approached(words)))
+        self.above &= "Z" not in words
         late = set()
         if self.above and code == 0.0 and "Z" not in words:
             late = {state for state in self._late & self._held.keys() if self._held[state].off}
@@ -287,11 +231,9 @@ class WordStates:
     def _begin(self, line: int, late: Set[str]) -> dict[str, str]:
         """Look at what holds at the first motion, and return it."""
         self._retract = 0
-        self._lost_since(line, [*(self._unsaid_at_retract or ()), *self._wrong_offset()])
-        if self._retracts and not self._high:
-            self._lost_since(line, ["the first motion without a retract before it"])
+        self.unframed(NOT_LISTED, line, *self._wrong_offset())
         self._first = {state: "" if state in late else held.text for state, held in self._held.items()}
-        for state, wanted in self._unsaid("motion"):
+        for state, wanted in self._unsaid():
             if state not in self._left:
                 self.unframed(NOT_ESTABLISHED, line, f"{state}: {wanted} must come before the first motion")
         return self._first
@@ -308,62 +250,13 @@ class WordStates:
             if not held.rule.follows:
                 self._others.setdefault(held, (state, first.get(state, "nothing")))
 
-    def _approached(self, words: Mapping[str, float]) -> Iterator[str]:
-        """What is wrong with a motion of the words of a block, the first after a retract or after other words."""
-        comes_down = self.above and "Z" in words
-        self.above &= not comes_down
-        tip_control = self._positions.keeps_tip or bool(self._tip_control)
-        aside = bool(words.keys() & set("XY"))
-        self._over = self.above and (self._over or (aside and not tip_control))
-        if self._high and not words.keys() & _POINT:
-            tilted = self._tilted(words)
-            if tilted and not words.keys() >= LINEAR:
-                yield "a tilted tool does not come from a retract in one block of X Y Z"
-            if tilted is False and "Z" in words and (aside or words.keys() & ROTARY):
-                yield "the tool comes down from a retract before it is over its place"
-        if self._tip_on is not None:
-            (rule, angles), self._tip_on = self._tip_on, None
-            rotary = sorted(ROTARY & words.keys())
-            off = [name for name in rotary if not abs(angles.get(name, math.nan) - words[name]) <= SAME]
-            unknown = [name for name in rotary if name not in angles]
-            if off and rule.rotary == "next":
-                yield f"tool tip control comes on before {' and '.join(off)} stands where the next motion has it"
-            if unknown and rule.rotary == "zero":
-                yield f"tool tip control comes on before {' and '.join(unknown)} stands at zero"
-        if comes_down:
-            on = {held.rule.state: held.text for held in self._held.values() if not held.rule.off}
-            for rule in self._list.words:
-                if rule.down and rule.state not in on and any_of(rule.down, on.values()):
-                    yield f"the tool comes down from a retract without {shown(rule.pattern)}"
-            unknown = sorted(self._positions.rotary - self.angles.keys()) if "MACHINE" in self._made else []
-            if unknown and not (self._swivelled and not self.angles and on.keys() & _PLANES):
-                yield f"the tool comes down from a retract before {' and '.join(unknown)} is sent to where it belongs"
-
-    def _tilted(self, words: Mapping[str, float]) -> bool | None:
-        """Whether X and Y lie in another plane in the part than on the machine; None where that is not known."""
-        on = {held.rule.state: held.text for held in self._held.values() if not held.rule.off}
-        plane = [text for state, text in on.items() if state in _PLANES]
-        if plane:
-            return any(map(float, _DECIMAL.findall(plane[0])))
-        if not (self._positions.keeps_tip or self._tip_control or _DYNAMIC in on):
-            return False
-        if words.keys() >= _VECTOR:
-            axis = np.array([words[name] for name in "IJK"])
-            return bool(axis[2] < _UPRIGHT * np.linalg.norm(axis))
-        machine = self._positions.machine
-        if machine is None or not set(machine.names) <= self.angles.keys():
-            return None
-        given = [self.angles.get(axis.name, 0.0) for axis in machine.axes]
-        return bool(tool_vectors(machine, np.array([given]))[0, 2] < _UPRIGHT)
-
     def _wrong_offset(self) -> Iterator[str]:
         """What is wrong with the work offset, one for the whole program."""
         held = next((held for held in self._held.values() if held.rule.state == _OFFSET), None)
-        made_for = self._made.get("OFFSET", "")
-        if held is None or _OFFSET in self._left or made_for == "NONE":
+        wanted = self._made.get("OFFSET", "NONE")
+        if held is None or _OFFSET in self._left or wanted == "NONE":
             return
-        wanted = made_for or next((rule.preset for rule in self._list.words if rule.preset), "")
-        if wanted and re.split(r"=\+?", held.text)[-1].replace(" ", "_") != wanted:
+        if re.split(r"=\+?", held.text)[-1].replace(" ", "_") != wanted:
             yield f"{held.text}, where the program was made for {wanted.replace('_', ' ')}"
 
     def end(self, line: int) -> None:
@@ -378,10 +271,3 @@ class WordStates:
                 self.unframed(NOT_ESTABLISHED, line, text)
         if not self._high and self._retracts:
             self.unframed(NOT_ESTABLISHED, line, "the tool is not retracted at the end")
-        if self._first is None:
-            return
-        self._lost_since(line, [f"{word} still holds at the end" for word in self._running()])
-        away = self._positions.away(self.angles)
-        turned = bool(away) or (self._swivelled and not self.angles and "MACHINE" in self._made)
-        if turned and self._retracts and not self._positions.rules:
-            self._lost_since(line, [f"{' and '.join(away) or 'the rotary axes'} not at zero at the end"])

@@ -63,6 +63,7 @@ class Verification:
     rewinds: tuple[tuple[int, int], ...] = ()
     rounding: float = 0.0  #: mm: by how much the control may round on its own: it adds to what is measured
     offset: str = ""  #: work offset that nothing was compared with; empty for none
+    parts: str = ""  #: digests of the parts of the program (`nc_words.parts`); empty where its words were not looked at
     left_out: int = 0  #: holes that the text leaves out, as the caller allowed
     taken_from_head: tuple[str, ...] = ()  #: words of the program's own head that say how it is measured: ``E=0.04``
     #: whether tips and axis points were run beside their paths each on its own: not at common poses

@@ -195,7 +195,7 @@ class Verifier:
         reader = Reader(self._name, options, steps, lever)
         machine = self._machine if options.dialect.retracts else None
         scale, switches = self._program.mm_per_unit, options.dialect.switches
-        positions = MachinePositions(machine, scale, switches=switches, tcp=options.tcp)
+        positions = MachinePositions(machine, scale, switches=switches)
         own_axis, (tip, length) = self._axis_tolerance, (options.tolerance, options.axis_length)
         turn = math.degrees(tip / length) if own_axis is None else own_axis
         check = WordCheck(options.control, options.dialect.lexer, tip / scale, *self._own, positions, turn)
@@ -210,7 +210,7 @@ class Verifier:
         found = self._found(task, chunks, reader.events, reader.retracts.places, said)
         unlooked = check.unlooked if self._words else "words beside the motion, which a table of your own may define"
         found = replace(found.not_verified(unlooked), rounding=scale * check.rounding, offset=check.offset)
-        return replace(found, trusted=tuple(check.trusted))
+        return replace(found, trusted=tuple(check.trusted), parts=check.parts.digests if self._words else "")
 
     def _wrong_offset(self, found: str) -> list[Problem]:
         """What is wrong with the work offset of the text, where the CL file names one."""

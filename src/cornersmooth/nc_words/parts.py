@@ -1,0 +1,207 @@
+"""Digests of the parts of a program: what is not of the motion, and no statement of the CL file asks for.
+
+A *part* is what comes before the first cut, between a retract and the next cut, behind the last retract, or within
+cuts. Its digest is over the words that change what the control remembers, in order, with where the tool moves between
+them. Comments, block numbers, blanks, and words that set what holds anyway do not count; nor do feeds, planes, cutter
+compensation, tools, speeds, dwells and stops, which are compared with the CL file.
+
+`smooth` puts the digests of the program that it has verified into its head.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import re
+from dataclasses import dataclass, field
+from typing import Final
+
+from cornersmooth.control.state import CUTS, State
+from cornersmooth.control.table import FRAME, Row, table_of
+from cornersmooth.nc_reader.words import Line, Table
+from cornersmooth.provenance import PARTS, PARTS_WORD
+
+#: hexadecimal digits of a part
+_DIGITS: Final = 6
+
+#: groups that follow the CL file, and words that do
+_GROUPS: Final = frozenset(("motion", "feed", "plane", "path", "compensation"))
+_WORDS: Final = frozenset(("T", "S"))
+
+#: words that begin and end a program
+_FRAME: Final = re.compile("O$|(BEGIN|END) PGM")
+
+#: letters of places, and of axes that turn
+_PLACES: Final = frozenset("XYZABCIJKUVW")
+_ROTARY: Final = "ABC"
+
+#: blocks of an approach whose letters count, at most
+_APPROACH: Final = 8
+
+
+@dataclass
+class _Part:
+    """One part: the lines from which and to which it goes, and its words so far."""
+
+    first: int = 1
+    last: int = 1
+    words: list[str] = field(default_factory=list)
+
+    def add(self, line: int, word: str) -> None:
+        """Take a word."""
+        self.words.append(word)
+        self.last = line
+
+
+class Parts:
+    """Follows one program; lines are its blocks in order."""
+
+    def __init__(self, control: str) -> None:
+        self._state = State(table_of(control), ("X", "Y", "Z", *_ROTARY))
+        self._parts: list[_Part] = []
+        self._part = _Part()
+        self._cuts = False  # whether the part is within cuts
+        self._above = True  # Z has not moved since a retract
+        self._still = True  # nothing has moved since the last word that counts
+        self._wanted = ""  # digests of the head
+
+    # what the program says
+
+    def comment(self, text: str) -> None:
+        """Take the digests of the head."""
+        if match := PARTS_WORD.search(text):
+            self._wanted = self._wanted or match[1].lower()
+
+    def table(self, table: Table) -> None:
+        """Take a run of motion blocks."""
+        self._state.place |= table.last_before(len(table), _ROTARY)
+        rows = range(min(len(table), _APPROACH)) if self._above else range(1)
+        for row in rows if self._still or self._above else ():
+            self._moves(int(table.line[row]), set(table.row(row)))
+        cuts = table.column("G") > 0.0
+        if cuts.any() or (self._state.groups["motion"] in CUTS and not (table.column("G") == 0.0).any()):
+            self._cut(int(table.line[cuts.argmax()]))
+        code = table.last_before(len(table), "G").get("G")
+        if code is not None:
+            self._state.groups["motion"] = "rapid" if code == 0.0 else "line"
+
+    def line(self, line: Line) -> None:
+        """Take any other line."""
+        rows = self._state.rows(line.words)
+        does = {effect for _, _, row in rows for effect in row.does}
+        beside = frozenset[str]().union(*(row.beside for _, _, row in rows))
+        if "dwell" in does or any(_FRAME.match(name) for _, name, _ in rows):
+            return
+        beside |= _PLACES
+        rows = [(word, name, row) for word, name, row in rows if name not in beside and not _compared(name, row)]
+        if "machine" in does and self._cuts:
+            self._close(line.number, cuts=False)
+        before, turned = dict(self._state.groups), self._turned()
+        if rows or "stop" in does or any(word.name == "G" for word in line.words):
+            self._state.execute(line)
+        if any(row.sets == (("motion", None),) for _, _, row in rows):  # a hole cycle, or a curve: measured
+            self._cut(line.number)
+            return
+        for word, _, row in rows:
+            changed = any(
+                _value(before[group]) != _value(self._state.groups[group]) or group.startswith(FRAME)
+                for group, _ in row.sets
+            )
+            if row.does or changed:
+                own = [other.text for other in line.words if other.name in row.beside]
+                self._take(line.number, " ".join(("/" * line.skipped + word.text, *own)))
+        moved = {word.name for word in line.words} & _PLACES
+        if "machine" in does:
+            self._take(line.number, " ".join(sorted(word.text for word in line.words)))
+            self._above = True
+        elif moved:
+            self._state.place |= {word.name: word.value for word in line.words if word.name in _ROTARY}
+            self._moves(line.number, moved)
+            if self._state.groups["motion"] in CUTS:
+                self._cut(line.number)
+        if turned and (before["tip"] != self._state.groups["tip"] or does & {"anything", "tool"}):
+            self._take(line.number, turned)
+
+    def _turned(self) -> str:
+        """Where the rotary axes are."""
+        at = {name: self._state.place[name] for name in _ROTARY}
+        return " ".join(f"{name}{value:g}" for name, value in at.items() if not math.isnan(value))
+
+    def _take(self, line: int, word: str) -> None:
+        self._part.add(line, re.sub(r"\s+", " ", word))
+        self._still = True
+
+    def _moves(self, line: int, names: set[str]) -> None:
+        """Take a motion: on the way down from a retract with its letters, elsewhere the first behind a word alone."""
+        if self._above:
+            self._part.add(line, "".join(sorted(_PLACES & names)))
+            self._above = "Z" not in names
+        elif self._still and self._part.words:
+            self._part.add(line, ".")
+        self._still = False
+
+    def _cut(self, line: int) -> None:
+        self._above = False
+        if not self._cuts:
+            self._close(line, cuts=True)
+
+    def _close(self, line: int, *, cuts: bool) -> None:
+        """End the part: the next begins at a line."""
+        if self._part.words:
+            self._part.last = line
+            self._parts.append(self._part)
+        self._part, self._cuts = _Part(line, line), cuts
+
+    # what comes of it
+
+    @property
+    def _whole(self) -> list[_Part]:
+        """All parts; what is beyond the number that a head has is the last of them."""
+        parts = [*self._parts, self._part] if self._part.words else [*self._parts]
+        rest = parts[PARTS - 1 :]
+        if len(rest) > 1:
+            words = [word for part in rest for word in (*part.words, "|")]
+            parts[PARTS - 1 :] = [_Part(rest[0].first, rest[-1].last, words)]
+        return parts
+
+    @property
+    def digests(self) -> str:
+        """Digests for the head."""
+        return ".".join(_digest(part.words) for part in self._whole)
+
+    def changed(self) -> str:
+        """The lines whose parts are not what the head says; empty for none."""
+        wanted = [digest for digest in self._wanted.split(".") if digest.strip("0")]
+        parts = self._whole
+        found = [_digest(part.words) for part in parts]
+        if not wanted or found == wanted:
+            return ""
+        same = [one == other for one, other in zip(found, wanted, strict=False)]
+        first = same.index(False) if False in same else len(same)
+        back = [one == other for one, other in zip(found[:first:-1], wanted[:first:-1], strict=False)]
+        behind = len(found) - (back.index(False) if False in back else len(back))
+        middle = parts[first:behind]
+        if len(found) == len(wanted):
+            low, high = middle[0].first, middle[-1].last
+        else:  # parts are gone, or new
+            low = parts[first - 1].last if first else 1
+            high = parts[behind].first if behind < len(parts) else parts[-1].last if parts else low
+        return f"lines {low} to {high}, which were changed since the program was written"
+
+
+def _digest(words: list[str]) -> str:
+    """Digest of some words, never that of none."""
+    digest = hashlib.sha256("\n".join(words).encode()).hexdigest()[:_DIGITS]
+    return digest if digest.strip("0") else "0" * (_DIGITS - 1) + "1"
+
+
+def _compared(name: str, row: Row) -> bool:
+    """Whether a word is compared with what the CL file asks for."""
+    if name in _WORDS or name.startswith("TOOL DEF") or row.does & {"dwell", "stop"}:
+        return True
+    return bool(row.sets) and {group for group, _ in row.sets} <= _GROUPS and not row.does
+
+
+def _value(value: str | None) -> str | None:
+    """Value of a group; a spindle that is oriented does not turn."""
+    return "OFF" if value == "ORIENT" else value
