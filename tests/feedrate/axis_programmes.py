@@ -12,7 +12,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from cornersmooth.settings.limits import Limits
 from linear_programmes import NARROWEST, WIDEST, _crawl, _duration, after_step, node_caps
 from scipy.optimize import linprog
 from scipy.sparse import csr_array, diags_array, eye_array, hstack, vstack

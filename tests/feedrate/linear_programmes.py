@@ -14,7 +14,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from cornersmooth.settings.limits import Limits
 from scipy.optimize import linprog
 from scipy.sparse import csr_array, diags_array, vstack
 

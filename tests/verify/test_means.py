@@ -16,6 +16,7 @@ from cornersmooth.nc_words import rules
 from cornersmooth.pipeline import postprocess
 from cornersmooth.settings import Settings
 from cornersmooth.tables import Shelf
+from cornersmooth.verdict import Verdict
 from cornersmooth.verify import verify
 
 CL = """LOADTL/1
@@ -85,6 +86,10 @@ def _lines(control: str, cl: str) -> tuple[list[str], dict[str, object]]:
     return stream.getvalue().decode().splitlines(), how
 
 
+#: the end of a kind of coolant of its own is asked for by the digest of its part alone
+WRONG = (Verdict.FAILED, Verdict.NOT_VERIFIED)
+
+
 @pytest.mark.usefixtures("_with_air")
 @pytest.mark.parametrize("control", AIR)
 def test_a_new_coolant_of_a_control(control: str) -> None:
@@ -97,7 +102,7 @@ def test_a_new_coolant_of_a_control(control: str) -> None:
     for k in at:
         for other in ([], ["M7"]):
             text = "\n".join([*lines[:k], *other, *lines[k + 1 :]]) + "\n"
-            assert verify(program, text.encode(), **how).problems, (lines[k], other)
+            assert verify(program, text.encode(), **how).verdict in WRONG, (lines[k], other)
 
 
 @pytest.mark.usefixtures("_with_air")

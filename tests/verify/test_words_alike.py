@@ -30,7 +30,10 @@ THREE_AXES = Path(__file__).parents[2] / "samples" / "machines" / "three-axis.to
 
 
 def judged(folder: Path, control: str, old: str, new: str, *, cl: str = FIVE, more: tuple[str, ...] = ()) -> str:
-    """First line of ``verify`` for a program in which something has been replaced; the right one passes."""
+    """First line of ``verify`` for a program in which something has been replaced; the right one passes.
+
+    The changed one has no digests of its parts, as other posts and version 0.2.0 have none.
+    """
     on: tuple[object, ...] = ("-e", EPS, "-H", H, "--control", control)
     if control in ("linuxcnc", "haas"):
         on += ("--machine", THREE_AXES)
@@ -42,7 +45,7 @@ def judged(folder: Path, control: str, old: str, new: str, *, cl: str = FIVE, mo
     assert right.stdout.startswith(b"PASSED"), right.stdout
     changed, count = re.subn(old, new, text, flags=re.MULTILINE)
     assert count
-    (folder / "part.nc").write_text(changed)
+    (folder / "part.nc").write_text(re.sub("(?m)^.*PARTS=.*\n", "", changed))
     return run("verify", "part.cls", "part.nc", *on, cwd=folder).stdout.decode().splitlines()[0]
 
 
@@ -52,12 +55,12 @@ def judged(folder: Path, control: str, old: str, new: str, *, cl: str = FIVE, mo
         ("siemens", "ORIWKS", "ORIMKS", "FAILED"),
         ("siemens", "ORIVECT", "ORIAXES", "FAILED"),
         ("siemens", "ORIVECT", "ORIPLANE", "NOT VERIFIED: .*TRAORI ORIWKS ORIPLANE"),
-        ("siemens", "^(ORIWKS ORIVECT)", r"; \1", "FAILED"),
+        ("siemens", "^(ORIWKS ORIVECT)", r"; \1", "NOT VERIFIED: .*under TRAORI,"),
         ("siemens", "G710", "G71", "NOT VERIFIED: .*G71"),
         ("heidenhain", "FUNCTION TCPM F.*VECTOR", "M128", "NOT VERIFIED: .*M128"),
         ("heidenhain", r"^(\d+ LN .* F700)$", r"\1\n99 M6", "FAILED: .*M6"),
         ("heidenhain", r"^(\d+ LN .* F700)$", r"\1 M6", "FAILED: .*M6"),
-        ("heidenhain", "^(8 M3)$", r"\1\n99 M6", "FAILED: .*M6"),
+        ("heidenhain", "^(9 M3)$", r"\1\n99 M6", "FAILED: .*M6"),
     ],
 )
 def test_words_like_the_right_ones_do_not_pass(control: str, old: str, new: str, verdict: str, tmp_path: Path) -> None:
@@ -164,7 +167,7 @@ def test_what_the_control_rounds_is_added_when_it_is_written(tmp_path: Path) -> 
         ("mitsubishi", r"^(G43\.5 .*)$", r"G5 P10000\n\1"),
         ("haas", r"^(G54)$", r"\1\nG187 P3 E0.001"),
         ("siemens", "^TRAORI$", "CYCLE832(0.001,_FINISH,1)\nTRAORI"),
-        ("heidenhain", "^(9 FUNCTION.*)$", r"8 CYCL DEF 32.0 TOLERANCE\n8 CYCL DEF 32.1 T0.001\n\1"),
+        ("heidenhain", "^(10 FUNCTION.*)$", r"8 CYCL DEF 32.0 TOLERANCE\n8 CYCL DEF 32.1 T0.001\n\1"),
     ],
 )
 def test_functions_that_nobody_asked_for_are_to_check(control: str, old: str, new: str, tmp_path: Path) -> None:

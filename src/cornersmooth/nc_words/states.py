@@ -253,8 +253,8 @@ class WordStates:
     def _wrong_offset(self) -> Iterator[str]:
         """What is wrong with the work offset, one for the whole program."""
         held = next((held for held in self._held.values() if held.rule.state == _OFFSET), None)
-        wanted = self._made.get("OFFSET", "NONE")
-        if held is None or _OFFSET in self._left or wanted == "NONE":
+        wanted = self._made.get("OFFSET") or next((rule.preset for rule in self._list.words if rule.preset), "NONE")
+        if held is None or not self._made or _OFFSET in self._left or wanted == "NONE":
             return
         if re.split(r"=\+?", held.text)[-1].replace(" ", "_") != wanted:
             yield f"{held.text}, where the program was made for {wanted.replace('_', ' ')}"
