@@ -15,6 +15,7 @@ from cornersmooth.kinematics import Machine, parse_machine
 from cornersmooth.nc import Frame, choose_form
 from cornersmooth.pipeline import Result, postprocess
 from cornersmooth.settings import Settings
+from cornersmooth.verdict import Verdict
 from cornersmooth.verify import verify
 
 EPS = 0.01
@@ -147,7 +148,8 @@ def test_another_order_is_found(control: str, form: str, machine: str) -> None:
         if control == "heidenhain":
             changed = [f"{number} {line}" for number, line in enumerate(changed)]
         data = ("\n".join(changed) + "\n").encode()
-        assert not verify(program, data, control=control, machine=own, tolerance=EPS).passed, what
+        found = verify(program, data, control=control, machine=own, tolerance=EPS)
+        assert found.verdict in (Verdict.FAILED, Verdict.NOT_VERIFIED), what
 
 
 @pytest.mark.parametrize("control", ["siemens", "haas", "heidenhain"])
@@ -226,9 +228,10 @@ def test_motion_without_tip_control_of_the_kinematics_is_found() -> None:
     for changed, said in (
         ([line for line in lines if line not in ("M428", "M429")], "before any word of tip control"),
         ([*lines[:on], *lines[on + 1 :]], "under M429, where M428 must be in force"),
-        ([*lines[: off[1]], *lines[off[1] + 1 :]], "G53 G0 Z0 under M428"),
-        ([*lines[: off[0]], *lines[off[0] + 1 :]], "M429 must come before G53 G0 Z0"),
+        ([*lines[: off[1]], *lines[off[1] + 1 :]], "M6 under M428"),
+        ([*lines[: off[0]], *lines[off[0] + 1 :]], "changed since the program was written"),
         ([*lines[: off[-1]], *lines[off[-1] + 1 :]], "M428 of line"),
     ):
         found = verify(program, "\n".join([*changed, ""]).encode(), control="linuxcnc", machine=own, tolerance=EPS)
-        assert any(said in problem.text for problem in found.problems), (said, found.problems)
+        texts = [*(problem.text for problem in found.problems), found.unverified]
+        assert any(said in text for text in texts), (said, texts)
