@@ -55,7 +55,7 @@ WRONG_HEAD = "| changed in `part.nc` | the first line of `verify` |\n|---|---|\n
 
 
 #: what README.md shows of the first program: lines of its output, of the CL file, blocks
-OUTPUT, CL_LINES, BLOCKS = 5, slice(16, 20), slice(19, 23)
+OUTPUT, CL_LINES, BLOCKS = 5, slice(16, 20), slice(20, 24)
 
 
 def place(name: str) -> re.Pattern[str]:
