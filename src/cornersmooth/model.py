@@ -178,6 +178,11 @@ class Program:
         feed : (n,) array_like or float, mm/min
             Positive, NaN where there is none.
 
+        Returns
+        -------
+        Program
+            n poses in mm with unit axes; all of kind `Move.LINEAR` unless `kind` says otherwise.
+
         Raises
         ------
         InputError
@@ -207,15 +212,33 @@ class Program:
         )
 
     def with_feed(self, feed: float | None) -> Program:
-        """Return the program with a feed, mm/min, for moves that have none; as it is where none is given."""
+        """Return the program with a feed, mm/min, for moves that have none; as it is where none is given.
+
+        Returns
+        -------
+        Program
+            The same arrays but for `feed` (n,), mm/min.
+        """
         return self if feed is None else replace(self, feed=np.where(np.isnan(self.feed), feed, self.feed))
 
     def feed_at(self, pose: Ints) -> Floats:
-        """Feeds of the moves into some poses, mm/min; NaN for none, and per revolution."""
+        """Feeds of the moves into some poses, mm/min; NaN for none, and per revolution.
+
+        Returns
+        -------
+        Floats
+            (k,) mm/min for k poses.
+        """
         return np.where(self.feed_mode[pose] == FeedMode.PER_MINUTE, self.feed[pose], np.nan)
 
     def axis_steps(self, moves: Bools, limit: float) -> tuple[Ints, Floats]:
-        """Poses (k,) where those of `moves` (n,) end that turn the tool axis beyond a limit, and the turns; degrees."""
+        """Poses (k,) where those of `moves` (n,) end that turn the tool axis beyond a limit, and the turns; degrees.
+
+        Returns
+        -------
+        tuple of arrays
+            Poses (k,) ascending, and turns (k,) in degrees.
+        """
         axis, stated = self.axis, self.kind == Move.FROM
         far = moves[1:] & ~stated[1:] & ~stated[:-1]
         # a first look: the cosine is coarse

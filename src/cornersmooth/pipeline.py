@@ -79,6 +79,11 @@ class Result:
 
         `command` is the command line that made it, `loosened` what settings made looser than the default, `saving` the
         planned times, `limits` the machine whose limits these keep, in place of that of the form.
+
+        Returns
+        -------
+        dict
+            Plain values; keys carry their unit (`report/report.schema.json`).
         """
         form, own = self.form, len(self.smoothed.findings)
         return report(
@@ -118,6 +123,11 @@ def smooth(
         Called now and then with (corners done, corners in all).
     processes : int
         Processes that a method that takes long may work in; the result does not depend on it.
+
+    Returns
+    -------
+    SmoothProgram
+        Corners (k rows) with curves in mm, and runs where the method makes such.
 
     Raises
     ------
@@ -204,6 +214,11 @@ def postprocess(
         Processes to smooth and to verify with; by default as many as are useful. The result does not depend on it.
     progress : callable, optional
         Called now and then with the stage, what is done and all there is to do; 0 for that where it is not known.
+
+    Returns
+    -------
+    Result
+        The program, its curves, what was written, and the verification.
 
     Raises
     ------

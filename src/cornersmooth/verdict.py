@@ -17,7 +17,13 @@ class Verdict(StrEnum):
 
     @classmethod
     def of(cls, *, problems: int = 0, unverified: bool = False, left_out: int = 0) -> Verdict:
-        """Give the worst verdict that applies, of problems found, things not looked at, and things left out."""
+        """Give the worst verdict that applies, of problems found, things not looked at, and things left out.
+
+        Returns
+        -------
+        Verdict
+            FAILED, else NOT VERIFIED, else INCOMPLETE, else PASSED.
+        """
         if problems:
             return cls.FAILED
         if unverified:
@@ -26,6 +32,12 @@ class Verdict(StrEnum):
 
     @classmethod
     def worst(cls, verdicts: Iterable[Verdict]) -> Verdict:
-        """Give the worst of several; PASSED of none."""
+        """Give the worst of several; PASSED of none.
+
+        Returns
+        -------
+        Verdict
+            The one that counts for all.
+        """
         order = list(cls)
         return max(verdicts, key=order.index, default=cls.PASSED)

@@ -53,6 +53,11 @@ def plan(
     progress : callable, optional
         Called with (work done, work in all).
 
+    Returns
+    -------
+    TimeLaw
+        Of the whole program: seconds, mm, degrees.
+
     Raises
     ------
     SettingsError
@@ -90,6 +95,11 @@ def direct(
         Says which repeated poses are one.
     machine : Machine, optional
         Keep the limits of its five axes; at corners none jumps by more than its acceleration allows in one period.
+
+    Returns
+    -------
+    TimeLaw
+        Of the whole program: seconds, mm, degrees.
     """
     limits = Limits() if limits is None else limits
     settings = Settings() if settings is None else settings

@@ -75,7 +75,13 @@ class TimeLaw:
         return float(self.path.length[~self.path.turning].sum())
 
     def kinematics(self, t: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-        """Path coordinate, speed, acceleration and jerk at times t (m,)."""
+        """Path coordinate, speed, acceleration and jerk at times t (m,).
+
+        Returns
+        -------
+        tuple of arrays
+            (m,) each: mm (rad in pure turns), mm/s, mm/s² and mm/s³ along the path.
+        """
         t = self._clipped(t)
         if not len(self.speed):
             return (np.zeros_like(t),) * 4
@@ -108,7 +114,13 @@ class TimeLaw:
         return x, np.maximum(speed, 0.0), accel, j + rate * speed
 
     def times_at(self, way: Floats) -> Floats:
-        """Times at which path coordinates (m,) are reached, s."""
+        """Times at which path coordinates (m,) are reached, s.
+
+        Returns
+        -------
+        Floats
+            (m,) s, from 0 to `total`.
+        """
         way = np.clip(np.asarray(way, np.float64), self.way[0], self.way[-1])
         if not len(self.speed):
             return np.zeros_like(way)
@@ -135,7 +147,13 @@ class TimeLaw:
         return 0.5 * (low + high)
 
     def at(self, t: Floats) -> States:
-        """State at times t (m,), clipped to the duration."""
+        """State at times t (m,), clipped to the duration.
+
+        Returns
+        -------
+        States
+            m rows: tips in mm, unit axes, and speed, accelerations and jerk in mm and s.
+        """
         t, (x, v, a, j), path = self._clipped(t), self.kinematics(t), self.path
         if not len(path):
             nothing = np.zeros((len(t), 3))
@@ -152,6 +170,11 @@ class TimeLaw:
         """Position, speed, acceleration and jerk (m, 5) of the machine's axes at times t (m,), in mm, degrees and s.
 
         From exact derivatives. On all transitions the axis point is taken at the parameter of the tip.
+
+        Returns
+        -------
+        tuple of arrays
+            (m, 5) each, in the order of the names of the machine: mm and degrees, per s, s² and s³.
 
         Raises
         ------
@@ -171,7 +194,13 @@ class TimeLaw:
         return q, one * v, two * v * v + one * a, three * v**3 + 3.0 * two * v * a + one * j
 
     def every_period(self) -> Floats:
-        """Times at the multiples of the interpolation period, and the end, s."""
+        """Times at the multiples of the interpolation period, and the end, s.
+
+        Returns
+        -------
+        Floats
+            (m,) s, ascending from 0.
+        """
         period = self.limits.period
         steps = int(np.floor(self.total / period * (1.0 - 1e-12)))
         return np.append(np.arange(steps + 1) * period, self.total)

@@ -107,6 +107,11 @@ def filter_program(
         Whether the motions are given.
     processes : int
 
+    Returns
+    -------
+    Filtered
+        The new program in bytes, counts, why cuts were left, deviations in mm, seconds where `axes` are given.
+
     Raises
     ------
     SettingsError

@@ -34,6 +34,11 @@ def load_machine(name_or_path: str | Path) -> Machine:
 
     A text that ends in ``.toml`` or holds a path separator is a file; anything else is a name.
 
+    Returns
+    -------
+    Machine
+        Axes, travel and limits in mm, degrees and minutes or seconds as its fields name them.
+
     Raises
     ------
     SettingsError

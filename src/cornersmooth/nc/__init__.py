@@ -82,6 +82,11 @@ class Written:
 def fit_settings(settings: Settings, form: Form, units: Units) -> Settings:
     """Settings that know the digits and the abilities of the output form, so that ε holds for the written numbers.
 
+    Returns
+    -------
+    Settings
+        With `tip_resolution` and `axis_point_resolution` in mm, and the chord that the form asks for.
+
     Raises
     ------
     SettingsError
@@ -158,6 +163,11 @@ def write(
         Program name, block numbers, texts before and after.
     progress : callable, optional
         Called now and then with (poses done, poses in all).
+
+    Returns
+    -------
+    Written
+        The number of blocks, and what was noticed on the way.
 
     Raises
     ------

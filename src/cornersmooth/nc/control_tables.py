@@ -103,6 +103,11 @@ def load_control(name_or_path: str | Path) -> Control:
 
     A text that ends in ``.toml`` or holds a path separator is a file; anything else is a name.
 
+    Returns
+    -------
+    Control
+        Its digits, blocks, words and forms.
+
     Raises
     ------
     SettingsError

@@ -53,6 +53,11 @@ def choose_form(
     planes : bool
         Whether a tool that keeps a tilted axis between rapids is to run in a tilted plane of the control.
 
+    Returns
+    -------
+    Form
+        Control, form, machine and functions together, as `smooth`, `write` and `verify` take it.
+
     Raises
     ------
     SettingsError

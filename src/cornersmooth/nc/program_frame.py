@@ -62,7 +62,18 @@ class Frame(FrameSettings):
     """What a user wants around the motion, as blocks."""
 
     def values(self, form: Form, program: Program, settings: Settings) -> dict[str, str]:
-        """What stands for braces in blocks around the motion and in those of extras; refuses a program name (CS216)."""
+        """What stands for braces in blocks around the motion and in those of extras; refuses a program name (CS216).
+
+        Returns
+        -------
+        dict of str
+            For each name in braces what stands for it, as it is written.
+
+        Raises
+        ------
+        SettingsError
+            CS216: the control takes no such program name.
+        """
         table = form.table.program
         if self.program is not None and not re.fullmatch(table.name_pattern or ".*", self.program):
             raise SettingsError(
@@ -77,12 +88,24 @@ class Frame(FrameSettings):
         }
 
     def program_of(self, form: Form) -> str:
-        """Name or number of the program, given or from the name of the CL file."""
+        """Name or number of the program, given or from the name of the CL file.
+
+        Returns
+        -------
+        str
+            As it is given, or digits and letters of the file name that the control takes.
+        """
         table = form.table.program
         return self.program or name_of_file(self.stem, table) or table.name
 
     def kept_as(self, form: Form) -> str | None:
-        """Name or number by which the control keeps the program; None where only a comment says it."""
+        """Name or number by which the control keeps the program; None where only a comment says it.
+
+        Returns
+        -------
+        str or None
+            As the control lists its programs.
+        """
         blocks = [block for block in form.table.program.start if "{program}" in block]
         comment = form.table.layout.comment[0].strip()
         return self.program_of(form) if any(not block.startswith(comment) for block in blocks) else None
@@ -92,6 +115,16 @@ class Frame(FrameSettings):
 
         CS216: the control has no such work offset, no retract to go to or come from along the tool, or no step for
         header or footer; or a line of these has unknown braces or characters that an NC program cannot hold.
+
+        Returns
+        -------
+        dict of tuples of str
+            Blocks by the name of their step.
+
+        Raises
+        ------
+        SettingsError
+            CS216, as above.
         """
         table = form.table.program
         if (self.approach or self.retract) and not table.retract:
@@ -121,7 +154,13 @@ class Frame(FrameSettings):
         }
 
     def refuse_tool(self, form: Form, program: Program) -> None:
-        """Refuse a header that loads a tool where the program then takes the length of another (CS249)."""
+        """Refuse a header that loads a tool where the program then takes the length of another (CS249).
+
+        Raises
+        ------
+        SettingsError
+            CS249.
+        """
         moving = program.kind != Move.FROM
         loaded = any(not moving[:pose].any() for pose, _ in tool_loads(program))
         if loaded or not any("{offset}" in block for block in form.mode.on):
@@ -136,6 +175,16 @@ class Frame(FrameSettings):
         """Return the same with the work offset that a program asks for.
 
         CS216: the control has no such work offset. CS248: another is given.
+
+        Returns
+        -------
+        Frame
+            This one where the program asks for none.
+
+        Raises
+        ------
+        SettingsError
+            CS216 and CS248, as above.
         """
         number = work_offset_of(program)
         if number is None or self.work_offset == "":
@@ -150,13 +199,25 @@ class Frame(FrameSettings):
         return replace(self, work_offset=name)
 
     def named_offset(self, table: Control) -> str:
-        """Work offset for the head of a text; empty for that of the table that the control's is like."""
+        """Work offset for the head of a text; empty for that of the table that the control's is like.
+
+        Returns
+        -------
+        str
+            Such as ``"G55"``.
+        """
         offset = table.program.work_offset if self.work_offset is None else self.work_offset
         usual = load_control(table.dialect).program.work_offset if table.dialect in control_names() else ""
         return "" if offset == usual else offset.replace(" ", "_") or "none"
 
     def start(self, stream: Stream, form: Form) -> FramedText:
-        """One text, nothing written yet."""
+        """One text, nothing written yet.
+
+        Returns
+        -------
+        FramedText
+            Ready for the first block.
+        """
         layout = form.table.layout
         number = layout.block_number or ("N{number} " if self.block_numbers else "")
         end = LINE_ENDS[self.line_ends or layout.line_ends]

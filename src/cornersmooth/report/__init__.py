@@ -60,6 +60,11 @@ def report(
         As `record` has them.
     machine : Machine, optional
         Whose rotary axes accelerate at places that are listed.
+
+    Returns
+    -------
+    dict
+        Plain values; numbers in mm, degrees and s as their keys name them.
     """
     all_findings = (*smoothed.findings, *findings)
     program, corners = smoothed.program, smoothed.corners

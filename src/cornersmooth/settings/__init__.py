@@ -127,7 +127,13 @@ class Settings:
         return all(getattr(self, name) == value for name, value in METHODS[method].prescribed.items())
 
     def with_method(self, *, curves: bool = False) -> Settings:
-        """Put a method in the place of "auto": what suits lines, or curves."""
+        """Put a method in the place of "auto": what suits lines, or curves.
+
+        Returns
+        -------
+        Settings
+            The same where a method is named already.
+        """
         if self.method != AUTO:
             return self
         return self.but(method=CURVES_METHOD if curves and self._allows(CURVES_METHOD) else DEFAULT_METHOD)
@@ -217,11 +223,28 @@ class Settings:
         return 0.1 * self.tolerance
 
     def but(self, **changes: Any) -> Settings:
-        """Return a copy with some values changed."""
+        """Return a copy with some values changed.
+
+        Returns
+        -------
+        Settings
+            A new one; this one stays as it is.
+
+        Raises
+        ------
+        SettingsError
+            CS202 and others: a value out of its bounds.
+        """
         return replace(self, **changes)
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values in field order, for the report; keys carry their unit."""
+        """Plain values in field order, for the report; keys carry their unit.
+
+        Returns
+        -------
+        dict
+            Numbers in mm, degrees and s, words, and None for what is not set.
+        """
         return {key_of(item.name, item.metadata["unit"]): getattr(self, item.name) for item in fields(self)}
 
 

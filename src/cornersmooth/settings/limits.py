@@ -58,5 +58,11 @@ class Limits:
         return math.radians(self.angular_feed), math.radians(self.angular_accel), math.radians(self.angular_jerk)
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values with their units in the keys, for reports."""
+        """Plain values with their units in the keys, for reports.
+
+        Returns
+        -------
+        dict
+            Numbers, or None for no limit; feeds in mm/min, all else in mm, degrees and s.
+        """
         return {key_of(item.name, item.metadata["unit"]): self._value(item.name) for item in fields(self)}

@@ -33,6 +33,11 @@ def sample(smoothed: SmoothProgram, *, chord: float | None = None) -> PathPoints
     chord : float, mm, optional
         Largest distance between the curves and the lines through the points; that of the settings by default.
 
+    Returns
+    -------
+    PathPoints
+        m points in path order: tips (m, 3) in mm, unit axes (m, 3), and the pose (m,) each belongs to.
+
     Raises
     ------
     SettingsError

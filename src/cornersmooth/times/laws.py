@@ -125,6 +125,16 @@ def compare(
         Whose curves are planned.
     progress : callable, optional
         Called with (name of the law, work done, work in all).
+
+    Returns
+    -------
+    Comparison
+        Laws by name, their seconds, and what is saved.
+
+    Raises
+    ------
+    InputError, SettingsError
+        As of `plan`.
     """
     settings = Settings() if settings is None else settings
     limits = Limits() if limits is None else limits

@@ -86,11 +86,23 @@ class Verification:
         return Verdict.of(problems=self.problem_count, unverified=bool(self.unverified), left_out=self.left_out)
 
     def with_problem(self, problem: Problem) -> Verification:
-        """Return the same with one more problem, in front of the others."""
+        """Return the same with one more problem, in front of the others.
+
+        Returns
+        -------
+        Verification
+            A new one, with its count one higher.
+        """
         return replace(self, passed=False, problems=(problem, *self.problems), problem_count=self.problem_count + 1)
 
     def not_verified(self, *what: str) -> Verification:
-        """Return the same with more that was not looked at."""
+        """Return the same with more that was not looked at.
+
+        Returns
+        -------
+        Verification
+            A new one, whose `unverified` names both.
+        """
         return replace(self, unverified="; ".join(text for text in (self.unverified, *what) if text))
 
     @property
@@ -109,7 +121,13 @@ class Verification:
         return self.orientation.value
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values for JSON; keys carry their unit."""
+        """Plain values for JSON; keys carry their unit.
+
+        Returns
+        -------
+        dict
+            Numbers in mm and degrees, None for what was not measured; lines count from 1.
+        """
         places = {
             "max_tip_deviation_mm": self.tip,
             "max_axis_point_deviation_mm": self.axis_point,
@@ -154,7 +172,13 @@ class Verification:
 
     @classmethod
     def of(cls, found: Findings, poses: Floats, problems: list[Problem], task: Task, **counts: Any) -> Verification:
-        """Make it of what was found, of all poses (4, n) as in `Findings`, of all problems, and of what is counted."""
+        """Make it of what was found, of all poses (4, n) as in `Findings`, of all problems, and of what is counted.
+
+        Returns
+        -------
+        Verification
+            Deviations in mm and degrees, each with its places in both programs.
+        """
         kept: list[Problem] = []
         count: Counter[str] = Counter()
         for problem in sorted(problems, key=lambda problem: (problem.nc_line, problem.cl_line)):

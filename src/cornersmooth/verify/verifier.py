@@ -311,7 +311,18 @@ class Verifier:
 
 
 def verify(program: Program, nc: NcProgram | bytes | str | os.PathLike[str], **how: Any) -> Verification:
-    """Measure an NC text, that is whole, against the CL program it was made from; `how` and errors as in `Verifier`."""
+    """Measure an NC text, that is whole, against the CL program it was made from; `how` and errors as in `Verifier`.
+
+    Returns
+    -------
+    Verification
+        The verdict, problems in the order of the program, and the largest deviations in mm and degrees.
+
+    Raises
+    ------
+    InputError, SettingsError
+        The text cannot be read as a program, or a tolerance is out of its bounds.
+    """
     with Verifier(program, nc, **how) as verifier:
         return verifier.result()
 
