@@ -54,7 +54,6 @@ SPINDL/RPM,3000,CLW
 RAPID
 GOTO/0,0,50,0,0,1
 CYCLE/{},DEPTH,15,CLEAR,2
-GOTO/10,0,0
 GOTO/40,0,0
 CYCLE/OFF
 RAPID
@@ -169,3 +168,86 @@ def test_pecks_of_a_cycle_that_does_not_peck_are_not_understood(words: str) -> N
         right(text, "fanuc")
     plain = right(HOLES.format("DRILL,MMPM,100"), "fanuc", "native")
     assert not passes(text, "fanuc", plain)
+
+
+#: cycles, with the words of CL files that ask for them
+CYCLES = {
+    "drilling": "DRILL,MMPM,100",
+    "dwelling": "DRILL,DWELL,0.5,MMPM,100",
+    "deep": "DRILL,DEEP,STEP,3,MMPM,100",
+    "chips": "DRILL,BRKCHP,STEP,3,MMPM,100",
+    "tapping": "TAP,MMPR,1.5",
+    "boring": "BORE,MMPM,100",
+    "reaming": "REAM,DWELL,0.5,MMPM,100",
+}
+NATIVE = r"CYCLE8\d\(|G73|G8[1-59]|CYCL DEF 20\d"
+#: addresses that a block of ISO words might have, too
+LETTERS = "ABCDEFHIJKLPQRSUVW"
+
+
+#: what may be another number
+ALLOWED = "|".join(
+    (
+        r"CYCLE8\d\((49|55)|Q204=.(49|55)",  # the height in the end: any above that of the cycle
+        r"CYCLE84\(.*(,,,3,|,,3000)|CYCLE85\(.*,,,100|G84 [^P]*$",  # nothing for zero
+        r"CYCLE85\(.*,0\.013,|Q211=.0\.013",  # a dwell more
+        r"Q202=.16",  # one peck, deeper than the hole
+    )
+)
+
+
+def changed(number: str) -> list[str]:
+    """A number that is another one: a little, and by much, larger and smaller; zero; with the other sign."""
+    value = float(number)
+    others = {value * 1.1 + 0.013, value - 1.0} - {value}
+    return [f"{other:+.6f}" if number[0] == "+" else f"{other:.6f}".rstrip("0") for other in sorted(others)]
+
+
+def other_cycles(line: str, control: str) -> list[str]:
+    """A block with each of its numbers changed or taken out, and with others in all places that it leaves empty."""
+    found: list[str] = []
+    if control == "siemens":
+        name, args = line[:-1].split("(")
+        parts = args.split(",")
+        for k, part in enumerate(parts):
+            new = changed(part) if part else ["0.5", "-3"]
+            found += [
+                f"{name}({','.join([*parts[:k], value, *parts[k + 1 :]])})" for value in [*new, ""] if value != part
+            ]
+        return [*found, f"{line[:-1]},1)", f"{name}({','.join(parts[:-1])})"]
+    pattern = r"(Q\d+=)([-+]?[\d.]+)" if control == "heidenhain" else r"\b([A-FH-Z])([-+]?[\d.]+)"
+    for word in re.finditer(pattern, line):
+        before, after = line[: word.start()], line[word.end() :]
+        found += [f"{before}{word[1]}{value}{after}" for value in changed(word[2])] + [before.rstrip() + after]
+    if control == "heidenhain":
+        return [
+            *found,
+            *(f"{line} Q{number}=+1" for number in (208, 212, 213, 256, 351, 395) if f"Q{number}" not in line),
+        ]
+    return [*found, *(f"{line} {letter}{value}" for letter in LETTERS for value in ("1.", "0.5"))]
+
+
+def kinds_of_cycle(line: str, control: str) -> list[str]:
+    """The same hole by another cycle of the control."""
+    if control == "heidenhain":
+        names = {"200 DRILLING": 200, "201 REAMING": 201, "207 RIGID TAPPING NEW": 207}
+        return [re.sub("|".join(names), name, line) for name in names if name not in line]
+    if control == "siemens":
+        return [line.replace(line[:7], f"CYCLE8{k}") for k in range(1, 10) if f"CYCLE8{k}" not in line]
+    codes = [73, 74, 76, *range(81, 90)]
+    return [re.sub(r"G(73|8\d)", f"G{code}", line) for code in codes if f"G{code} " not in line]
+
+
+@pytest.mark.parametrize("cycle", CYCLES)
+@pytest.mark.parametrize("control", [*ISO, "heidenhain", "siemens"])
+def test_each_number_of_each_cycle_is_compared(control: str, cycle: str) -> None:
+    text = HOLES.format(CYCLES[cycle])
+    lines = right(text, control, "native")
+    found = [
+        k for k, line in enumerate(lines) if re.search(NATIVE, line) and line[:1] not in "(;" and "G21" not in line
+    ]
+    if not found:
+        pytest.skip("it is written as moves")
+    block, others = found[0], (*other_cycles(lines[found[0]], control), *kinds_of_cycle(lines[found[0]], control))
+    wrong = [line for line in others if passes(text, control, (*lines[:block], line, *lines[block + 1 :]))]
+    assert [line for line in wrong if not re.search(ALLOWED, line)] == []

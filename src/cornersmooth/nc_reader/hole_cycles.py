@@ -63,6 +63,8 @@ def drill(cycle: HoleCycle, x: float, y: float, line: Line, before: Modal, clamp
     if cycle.pitch is not None:
         yield Beside("G", 84.0)
         yield Modes({"per_revolution": True})
+        if cycle.dwell:
+            yield Wrong("CS506", "a tap that waits at the bottom of its thread")
     feed = {} if cycle.feed is None else {"F": cycle.feed}
     done = cycle.clearance if cycle.from_clearance else cycle.top
     while cycle.step and done - cycle.step > cycle.bottom + _ROUNDING:

@@ -47,7 +47,8 @@ class Drilling:
     retract: float = math.nan
     #: mm: pecks, the last one again and again; none where one feed leads to the bottom, or the statement leaves it open
     steps: tuple[float, ...] = ()
-    breaks_chips: bool = False  #: whether pecks stay in the hole
+    pecking: bool = False  #: whether there are pecks, though it may not be said of what depth
+    breaks_chips: bool = False  #: whether they stay in the hole
 
     @property
     def level(self) -> float:
@@ -109,7 +110,8 @@ def drilling(args: tuple[float | str, ...], program: Program, speed: float = 0.0
     retract = _height(values, _RETURNS, unit)
     found = Drilling(depth * unit, feed, per_revolution, dwell, clearance=above, retract=retract)
     if "TAP" not in kinds:
-        return replace(found, feed_out=bool(kinds & _AT_FEED), steps=steps, breaks_chips="BRKCHP" in kinds)
+        pecking, breaks = bool(kinds & _PECKING), "BRKCHP" in kinds
+        return replace(found, feed_out=bool(kinds & _AT_FEED), steps=steps, pecking=pecking, breaks_chips=breaks)
     if len(kinds) > 1 or steps or math.isnan(feed) or not (per_revolution or speed):
         return Drilling()
     return replace(found, feed=feed if per_revolution else feed / speed, per_revolution=True, tap=True, feed_out=True)

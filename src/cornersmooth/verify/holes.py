@@ -189,6 +189,9 @@ class HoleLines:
         after = next((k for k in height if k > deepest), deepest)
         if cycle.feed_out and not self.feeds(after):
             say("CS563", after, "a rapid leaves a hole that the tool is to leave at feed")
+        fed_out = next((k for k in feeds if height[k] > height.get(k - 1, math.inf) + self.room), 0)
+        if fed_out and not cycle.feed_out:
+            say("CS564", fed_out, "the tool goes up at feed in a hole that it is to leave in rapid")
         before = self.height(move, max(first - 1, 0))
         beside = math.isnan(before)
         low = [(last, cycle.level)] if move + 1 < len(self.tip) and not self.in_line(move, move + 1) else []
@@ -237,7 +240,7 @@ class HoleLines:
             above = here
         if above < -self.room:
             say("CS563", last, "the tool leaves a hole sideways", -above)
-        if cycle.steps:
+        if cycle.steps or not cycle.pecking:
             for k, text in self._wrong_pecks(height, cycle):
                 say("CS562", k, text)
         return found, False
@@ -256,6 +259,8 @@ class HoleLines:
                 pecks[len(pecks) - fed :] = [(k, -here, pecks[-1][2] if fed else top if pecks else above)]
             top = here if feeds or top == math.inf else max(top, here)
             fed, above = feeds, here
+        if not cycle.steps:
+            yield from ((k, "a hole is drilled in pecks that the cycle does not have") for k, _, _ in pecks[1:2])
         done, steps = 0.0, [*cycle.steps, *cycle.steps[-1:] * len(pecks)]
         for number, ((k, depth, before), step) in enumerate(zip(pecks, steps, strict=False)):
             last, peck = number == len(pecks) - 1, depth - done

@@ -127,7 +127,9 @@ class Heidenhain(Dialect):
             cycle = replace(cycle, step=given[202])
         if number == 201:
             cycle = replace(cycle, feed_out=True)
-        wrong = (number == 200 and (given[210] != 0.0 or not given[202] > 0.0)) or depth < 0.0
+        wrong = (
+            (number == 200 and (given[210] != 0.0 or not given[202] > 0.0)) or depth < 0.0 or given.get(211, 0.0) < 0.0
+        )
         if wrong or given.get(208, given.get(206)) != given.get(206) or given.get(239, 1.0) <= 0.0:
             raise refused(line, f"CYCL DEF {number} with values that are not understood", "see its parameters")
         state.cycle = cycle

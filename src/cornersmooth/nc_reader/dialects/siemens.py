@@ -125,24 +125,31 @@ class Siemens(Dialect):
         if state.tip_control:
             yield Wrong("CS506", f"a hole cycle under {state.tip_control}")
         whole = [value if value is not None else 0.0 for value in args] + [0.0] * 12
-        travel, top, setup, bottom, depth, fifth = whole[:6]
+        travel, top, setup, bottom, _, fifth = whole[:6]
         known = HoleCycle(travel, top + setup, bottom, top=top, from_clearance=False)
+        wanted = "DP without DPR, and SDIS and DTB that are not negative"
+        right = args[4:5] in ([], [None]) and setup >= 0.0 and (name == "CYCLE83" or fifth >= 0.0)
         if name == "CYCLE82":
             known = replace(known, dwell=1000.0 * fifth)
         elif name == "CYCLE83":
-            if depth or fifth or whole[7:11] != [0.0, 0.0, 0.0, 1.0] or not whole[6] > 0.0:
-                raise refused(line, f"{words[0].text} is not understood", "give pecks of one depth (FDPR) alone")
-            known = replace(known, step=whole[6], chip=whole[11] == 0.0)
+            right &= (
+                args[5] is None and args[7:11] == [0.0, 0.0, 0.0, 1.0] and args[11] in (0.0, 1.0) and whole[6] > 0.0
+            )
+            wanted = "pecks of one depth (FDPR) alone"
+            known = replace(known, step=whole[6], chip=args[11] == 0.0)
         elif name == "CYCLE84":
-            if args[6:8] != [3.0, None] or not whole[8] > 0.0 or whole[10] != whole[11]:
-                raise refused(line, f"{words[0].text} is not understood", "give a pitch, SDAC 3 and one speed")
-            known = replace(known, pitch=whole[8], feed=whole[8], dwell=1000.0 * fifth)
+            right &= fifth == 0.0 and args[6:8] == [3.0, None] and whole[8] > 0.0
+            right &= args[9] in (None, 0.0) and whole[10] == whole[11]
+            wanted = "a pitch, SDAC 3, POSS 0, no DTB and one speed"
+            known = replace(known, pitch=whole[8], feed=whole[8])
             if state.speed != whole[10]:
                 yield Wrong("CS506", f"CYCLE84 at {whole[10]:g} revolutions, where S says otherwise")
         elif name == "CYCLE85":
-            if whole[6] != whole[7] or not whole[6] > 0.0:
-                raise refused(line, f"{words[0].text} is not understood", "give one feed for both ways")
+            right &= whole[6] == whole[7] and whole[6] > 0.0
+            wanted = "one feed for both ways"
             known = replace(known, feed=whole[6], feed_out=True, dwell=1000.0 * fifth)
+        if not right:
+            raise refused(line, f"{words[0].text} is not understood", f"give {wanted}")
         yield from drill(known, state.modal.tip[0], state.modal.tip[1], line, state.modal, state.clamped)
 
     def _plane(self, line: Line, state: ModalState) -> Acts:
