@@ -61,6 +61,28 @@ def test_bash_is_left_to_complete_files(tmp_path: Path) -> None:
         assert complete(*words, folder=tmp_path) == ["compopt -o default", ""]
 
 
+def answers(folder: Path, line: str, word: str) -> list[str]:
+    """What the script of PowerShell gets for a line whose last word is completed; an empty word is no variable."""
+    asked = {"_CORNERSMOOTH_COMPLETE": "powershell_complete", "COMP_WORDS": line} | (
+        {"COMP_CWORD": word} if word else {}
+    )
+    done = subprocess.run([SCRIPT], capture_output=True, cwd=folder, env=os.environ | asked, text=True, check=False)
+    assert done.stderr == ""
+    return [row.split("\t")[0] for row in done.stdout.split("\n") if row]
+
+
+def test_powershell_completes(tmp_path: Path) -> None:
+    assert answers(tmp_path, "cornersmooth smooth --work", "--work") == ["--work-offset"]
+    line = "cornersmooth smooth 'C:\\my parts\\part.cls' --control siemens -f "
+    assert answers(tmp_path, line, "") == ["bspline", "g1", "poly"]
+    assert answers(tmp_path, 'cornersmooth smooth "C:\\a b.cls" --control si', "si")[0] == "siemens"
+    assert answers(tmp_path, "cornersmooth smooth pa", "pa") == []  # PowerShell completes files then
+    script = run("completion", "powershell").stdout.decode()
+    assert script.startswith("Register-ArgumentCompleter -Native -CommandName cornersmooth")
+    assert script.count("{") == script.count("}") == 4
+    assert "%" not in script
+
+
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_every_shell_has_a_script(shell: str) -> None:
     result = run("completion", shell)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 from cornersmooth.cli.options import Options
+from cornersmooth.cli.powershell import ASKED, add_powershell
 
 
 def run_completion(given: Options) -> int:
@@ -13,7 +14,8 @@ def run_completion(given: Options) -> int:
 
     from cornersmooth.cli.group import cli
 
+    add_powershell()
     kind = get_completion_class(str(given.name))
     assert kind is not None
-    click.echo(kind(cli, {}, "cornersmooth", "_CORNERSMOOTH_COMPLETE").source().rstrip())
+    click.echo(kind(cli, {}, "cornersmooth", ASKED).source().rstrip())
     return 0

@@ -14,6 +14,7 @@ import click
 from cornersmooth import __version__
 from cornersmooth.cli.command import write_part
 from cornersmooth.cli.commands import COMMANDS, GROUPS
+from cornersmooth.cli.powershell import add_powershell, asked_by_powershell
 from cornersmooth.cli.show import print_message, say_json
 from cornersmooth.cli.shutdown import Shutdown
 from cornersmooth.errors import EXIT_INTERNAL, CornersmoothError, SettingsError, internal_error, message
@@ -80,6 +81,8 @@ def cli() -> None:
 
 def run(args: list[str] | None, ending: Shutdown) -> int:
     """Run the command line with the given arguments; returns the exit code."""
+    if asked_by_powershell():
+        add_powershell()
     try:
         result: Any = cli.main(args=args, standalone_mode=False, obj=ending)
         return result if isinstance(result, int) else 0
