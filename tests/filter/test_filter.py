@@ -23,7 +23,7 @@ def form_of(control: str, machine: str, form: str = "g1") -> cs.nc.Form:
     return cs.choose_form(control, form, machine=cs.load_machine(machine) if machine else None)
 
 
-def filtered(control: str, machine: str, text: str, *, form: str = "g1", lines: str | None = None) -> Filtered:
+def filtered(control: str, machine: str, text: str, *, form: str = "g1", lines: str | None = "dense") -> Filtered:
     settings = cs.Settings(tolerance=EPS, lines=lines)
     return filter_program(text.encode("latin-1"), form_of(control, machine, form), settings)
 
@@ -65,7 +65,7 @@ def test_smooths_what_smooth_has_written(path: Path) -> None:
     if control not in FILTERED:
         return
     form = cs.choose_form(control, "g1", machine=cs.load_machine(machine) if machine else None, tcp=not axes)
-    found = filter_program(path.read_bytes(), form, cs.Settings(tolerance=EPS))
+    found = filter_program(path.read_bytes(), form, cs.Settings(tolerance=EPS, lines="dense"))
     assert found.verdict is Verdict.PASSED, found.checked
     assert found.smoothed > found.cuts / 2
     stays = ("a single cut", "an arc", "the tip stays")
@@ -88,10 +88,10 @@ def test_modes_are_put_back() -> None:
     assert lines[lines.index("G93") + 1] == "G94"
     assert lines[-6:-3] == ["G93", "G94", "G0 Z50."]
     control, machine, text = PROGRAMS["linuxcnc, G64, an arc inside"]
-    lines = filtered(control, machine, text).data.decode().splitlines()
+    lines = filtered(control, machine, text, lines="long").data.decode().splitlines()
     assert lines[lines.index("G2 X60 Y5 I5 J0") - 1] == "G64 P0.02 Q0.01"
     control, machine, text = PROGRAMS["linuxcnc, G91"]
-    lines = filtered(control, machine, text).data.decode().splitlines()
+    lines = filtered(control, machine, text, lines="long").data.decode().splitlines()
     assert lines[lines.index("G91 G1 F1000") + 1] == "G90"
     assert lines[-5:-3] == ["G91", "G90"]
 
@@ -275,12 +275,13 @@ def test_commands_know_programs(tmp_path: Path) -> None:
     control, machine, text = PROGRAMS["linuxcnc, G64, an arc inside"]
     (tmp_path / "part.ngc").write_text(text)
     on = ("--control", control, "--machine", machine)
-    made = run("filter", "part.ngc", *on, "-o", "new.ngc", cwd=tmp_path)
+    dense = ("--lines", "dense")
+    made = run("filter", "part.ngc", *on, *dense, "-o", "new.ngc", cwd=tmp_path)
     assert made.returncode == DONE
     assert made.stderr.decode().startswith("PASSED  new.ngc  linuxcnc g1, xyzac-trt, ")
     assert "\n        24 of 25 cuts smoothed in 2 runs within 0.01 mm" in made.stderr.decode()
     assert re.search(r"1 +\d+  an arc\n", made.stderr.decode())
-    assert run("filter", "-", *on, data=text.encode(), cwd=tmp_path).stdout == (tmp_path / "new.ngc").read_bytes()
+    assert run("filter", "-", *on, *dense, data=text.encode(), cwd=tmp_path).stdout == (tmp_path / "new.ngc").read_bytes()
     found = run("verify", "part.ngc", "new.ngc", *on, cwd=tmp_path)
     assert found.returncode == DONE
     assert found.stdout.startswith(b"PASSED: within 0.01 mm")
@@ -299,14 +300,14 @@ def test_commands_know_programs(tmp_path: Path) -> None:
 
 def test_without_words_for_tip_control_it_has_to_be_said() -> None:
     text = PROGRAMS["linuxcnc, G91"][2].replace("M428\n", "").replace("M429\n", "").encode()
-    form, settings = form_of("linuxcnc", "xyzac-trt"), cs.Settings(tolerance=EPS)
+    form, settings = form_of("linuxcnc", "xyzac-trt"), cs.Settings(tolerance=EPS, lines="dense")
     assert filter_program(text, form, settings).data == text
     assert filter_program(text, form, settings, tip_from_start=True).smoothed == 20
 
 
 def test_verify_finds_what_is_wrong_with_a_program_of_anybody() -> None:
     control, machine, text = PROGRAMS["fanuc words"]
-    form, settings, old = form_of(control, machine), cs.Settings(tolerance=EPS), text.encode()
+    form, settings, old = form_of(control, machine), cs.Settings(tolerance=EPS, lines="dense"), text.encode()
     good = filter_program(old, form, settings).data
     assert verify_programs(old, good, form, settings).verdict is Verdict.PASSED
     assert verify_programs(old, old, form, settings).verdict is Verdict.PASSED
@@ -329,7 +330,7 @@ def test_verify_finds_what_is_wrong_with_a_program_of_anybody() -> None:
 def test_says_the_time_of_what_has_changed(tmp_path: Path) -> None:
     control, machine, count = "fanuc", "table-ac", 8
     text = ISO.format(on="G43.4 H1", start="A20. C30.", cuts=cuts(WORDS, feed="F1000.", last=count))
-    form, settings, axes = form_of(control, machine), cs.Settings(tolerance=EPS), cs.load_machine(machine)
+    form, settings, axes = form_of(control, machine), cs.Settings(tolerance=EPS, lines="dense"), cs.load_machine(machine)
     # so slow that no axis has to brake: the length over the feed, and 19 mm down to the first place
     length = np.linalg.norm(np.diff(np.column_stack((X, Y, Z))[:count], axis=0), axis=1).sum()
     slow = filter_program(text.replace("F1000.", "F6.").encode(), form, settings, axes=axes)
@@ -340,7 +341,7 @@ def test_says_the_time_of_what_has_changed(tmp_path: Path) -> None:
     assert slow.seconds[0] - 2 * count * EPS / 0.1 < slow.seconds[1] < slow.seconds[0]
     (tmp_path / "part.nc").write_text(text)
     on = ("--control", control, "--machine", machine, "--limits", machine, "-e", EPS)
-    told = run("filter", "part.nc", *on, "-o", "new.nc", cwd=tmp_path).stderr.decode()
+    told = run("filter", "part.nc", *on, "--lines", "dense", "-o", "new.nc", cwd=tmp_path).stderr.decode()
     fast = re.search(r"time of the runs (\d+\.\d) s instead of (\d+\.\d) s \(", told)
     assert fast
     assert float(fast[1]) < float(fast[2]) < 0.1 * slow.seconds[0]
@@ -368,6 +369,6 @@ def test_tool_vectors_are_judged_with_the_whole_tolerance(control: str, name: st
     )
     text = ISO.format(on="G43.5 H1", start="I0.173648 J0. K0.984808", cuts=f"G1 Z10. F800.\n{body}")
     data = PROGRAMS[name][2] if name else text
-    found = filter_program(data.encode("latin-1"), form_of(control, ""), cs.Settings(tolerance=eps))
+    found = filter_program(data.encode("latin-1"), form_of(control, ""), cs.Settings(tolerance=eps, lines="dense"))
     assert found.verdict is Verdict.PASSED, found.left
     assert found.smoothed == found.cuts

@@ -24,7 +24,7 @@ def three_axes(text: str | bytes, control: str) -> bytes:
     """Text that the filter makes for a machine without rotary axes."""
     data = text.encode() if isinstance(text, str) else text
     form = cs.choose_form(control, "g1", machine=cs.load_machine(THREE_AXES))
-    return filter_program(data, form, cs.Settings(tolerance=EPS)).data
+    return filter_program(data, form, cs.Settings(tolerance=EPS, lines="dense")).data
 
 
 # small programs, each with what another reader would do otherwise
@@ -234,7 +234,7 @@ def test_plain_readers_find_the_same_outside_of_runs_in_seeded_programs(control:
 @pytest.mark.parametrize("name", [name for name in PROGRAMS if "linuxcnc" not in name])
 def test_plain_readers_find_the_same_in_programs_of_each_control(name: str) -> None:
     control, machine, text = PROGRAMS[name]
-    new = filter_program(text.encode(), form_of(control, machine), cs.Settings(tolerance=EPS)).data
+    new = filter_program(text.encode(), form_of(control, machine), cs.Settings(tolerance=EPS, lines="dense")).data
     assert new != text.encode()
     scale = 25.4 if "inch" in name else 1.0
     assert difference(by_words(text.encode()), by_words(new), EPS / scale) == ""
@@ -243,13 +243,13 @@ def test_plain_readers_find_the_same_in_programs_of_each_control(name: str) -> N
 @pytest.mark.parametrize("name", ["linuxcnc_boat-xyzac.ngc", "linuxcnc_impeller-7bl-xyzac.ngc"])
 def test_linuxcnc_finds_the_same_in_real_programs(name: str, corpus: Path, tmp_path: Path) -> None:
     text = (corpus / "nc" / name).read_bytes()
-    new = filter_program(text, form_of("linuxcnc", "xyzac-trt"), cs.Settings(tolerance=EPS)).data
+    new = filter_program(text, form_of("linuxcnc", "xyzac-trt"), cs.Settings(tolerance=EPS, lines="dense")).data
     assert new != text
     assert difference(by_rs274(text, tmp_path), by_rs274(new, tmp_path), EPS) == ""
 
 
 def test_plain_readers_find_the_same_in_a_real_program(corpus: Path) -> None:
     text = (corpus / "nc" / "nx_haas_umc750_inch_head.nc").read_bytes()
-    new = filter_program(text, form_of("haas", "table-bc"), cs.Settings(tolerance=EPS)).data
+    new = filter_program(text, form_of("haas", "table-bc"), cs.Settings(tolerance=EPS, lines="dense")).data
     assert new != text
     assert difference(by_words(text), by_words(new), EPS / 25.4) == ""

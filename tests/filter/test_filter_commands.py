@@ -41,7 +41,7 @@ def test_time_of_a_program_as_it_is_and_smoothed(how: tuple[str, ...], tmp_path:
     assert seconds["as_written"] > 0.0
     # 24 turns to and fro: who need not brake at them is faster; LinuxCNC blends lines itself
     assert seconds["as_written"] < (1.1 if how is LINUXCNC else 0.95) * seconds["unsmoothed"]
-    assert run("filter", part, *how, *EPS, "-o", new).returncode == DONE
+    assert run("filter", part, *how, *EPS, "--limits", how[3], "-o", new).returncode == DONE
     beside = json.loads(run("time", part, "--text", new, *how, *EPS, "--json").stdout)
     assert beside["seconds"] == pytest.approx(seconds)
     assert b"as it is" in run("time", part, *how, *EPS).stdout
@@ -117,7 +117,7 @@ def test_compare_looks_at_a_part_of_a_long_program(tmp_path: Path, monkeypatch: 
 
 def test_page_shows_runs_before_and_after(tmp_path: Path) -> None:
     part, new, page = written(tmp_path, "fanuc words"), tmp_path / "new.nc", tmp_path / "page.html"
-    for command in (("filter", part, "-o", new), ("verify", part, new)):
+    for command in (("filter", part, *DENSE, "-o", new), ("verify", part, new)):
         assert run(*command, *FANUC, *EPS, "--report", page, "--force").returncode == DONE
         text = page.read_text()
         assert '"origin": "old"' in text
@@ -145,6 +145,7 @@ def test_options_of_cl_files_are_refused(tmp_path: Path) -> None:
     assert b"--limits" in told.stderr
 
 
+DENSE = ("--lines", "dense")
 PLAIN = "G21 G90 G94 G17\nG0 X0. Y0. Z5.\nG1 Z-1. F200.\n{}G0 Z5.\nM30\n"
 CUTS = "X10. Y0.\nX20. Y5.\nX30. Y0.\n"
 THREE_AXES = Path(__file__).parents[2] / "samples" / "machines" / "three-axis.toml"
@@ -175,7 +176,7 @@ def test_a_batch_counts_what_became_of_its_programs(tmp_path: Path) -> None:
     (tmp_path / "arc.nc").write_text(PLAIN.format("G2 X10. R9.\n"))
     (tmp_path / "cuts.nc").write_text(PLAIN.format(CUTS))
     (tmp_path / "part.cls").write_text("PARTNO A\nUNITS/MM\nGOTO/0,0,0\nGOTO/1,0,0\nFINI\n")
-    made = run("filter", "arc.nc", "cuts.nc", "part.cls", "--machine", THREE_AXES, "-d", "out", cwd=tmp_path)
+    made = run("filter", "arc.nc", "cuts.nc", "part.cls", "--machine", THREE_AXES, *DENSE, "-d", "out", cwd=tmp_path)
     assert made.returncode == BAD_INPUT
     assert made.stderr.decode().splitlines()[-1] == "3 programs: 1 NOT SMOOTHED, 1 PASSED, 1 error"
 
@@ -203,7 +204,7 @@ def test_a_cl_file_is_no_program_to_filter(text: str, tmp_path: Path) -> None:
 def test_jumps_of_programs_are_no_statements_of_cl_files(tmp_path: Path) -> None:
     """GOTO of FANUC's macros, and RAPID as the name of a subprogram."""
     (tmp_path / "part.nc").write_text(PLAIN.format(CUTS + "GOTO 5\nN5 G0 Z5.\n") + "RAPID\n")
-    made = run("filter", "part.nc", "--machine", THREE_AXES, "-o", "new.nc", cwd=tmp_path)
+    made = run("filter", "part.nc", "--machine", THREE_AXES, *DENSE, "-o", "new.nc", cwd=tmp_path)
     assert made.returncode == DONE
     assert made.stderr.startswith(b"PASSED")
     assert b"an NC program" in run("info", "part.nc", cwd=tmp_path).stdout
@@ -215,7 +216,7 @@ def test_jumps_of_programs_are_no_statements_of_cl_files(tmp_path: Path) -> None
 def test_blending_of_the_program_is_added_in_the_first_line(word: str, total: str, tmp_path: Path) -> None:
     (tmp_path / "part.ngc").write_text(f"{word}\n" + PLAIN.format(CUTS))
     on = ("--control", "linuxcnc", "--machine", THREE_AXES, "-e", 0.01)
-    report = json.loads(run("filter", "part.ngc", *on, "-o", "new.ngc", "--json", cwd=tmp_path).stdout)
+    report = json.loads(run("filter", "part.ngc", *on, *DENSE, "-o", "new.ngc", "--json", cwd=tmp_path).stdout)
     more = f"; {total} mm with G64 P of the program" * bool(total)
     assert report["verdict"] == "PASSED"
     assert re.search(r"tip [\d.e-]+ mm, axis point [\d.e-]+ mm(.*)$", report["verdict_text"])[1] == more

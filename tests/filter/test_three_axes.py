@@ -43,7 +43,7 @@ PROGRAMS = {
 def filtered(folder: Path, text: str, *options: object) -> tuple[str, bytes]:
     """First line of what ``filter`` says, and the program."""
     (folder / "part.nc").write_text(text)
-    made = run("filter", "part.nc", "-e", EPS, *options, "-o", "new.nc", "--force", cwd=folder)
+    made = run("filter", "part.nc", "-e", EPS, "--lines", "dense", *options, "-o", "new.nc", "--force", cwd=folder)
     assert made.returncode == DONE, made.stderr
     told = [line for line in made.stderr.decode().splitlines() if "warning" not in line]
     return told[0] + told[1], (folder / "new.nc").read_bytes()

@@ -54,7 +54,8 @@ class Text:
         return len(self.start) - 1
 
     def lines(self, first: int, stop: int) -> bytes:
-        """Bytes of lines that follow one another, from 0."""
+        """Bytes of lines that follow one another, from 0; nothing beyond the end."""
+        first, stop = min(first, len(self)), min(stop, len(self))
         return self.data[int(self.start[first]) : int(self.start[stop])]
 
 

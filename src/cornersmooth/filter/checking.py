@@ -13,7 +13,7 @@ import numpy as np
 from cornersmooth.arrays.vectors import unit
 from cornersmooth.control.state import State
 from cornersmooth.errors import CornersmoothError
-from cornersmooth.filter.motion import Job, Stretch, motion, motion_of_runs, program_of
+from cornersmooth.filter.motion import Job, Stretch, motion, motion_of_runs, plane_of, program_of, says_motion
 from cornersmooth.filter.runs import Reading, Run
 from cornersmooth.model import Program
 from cornersmooth.nc_reader import NcProgram, Problem
@@ -103,7 +103,8 @@ def check(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> Check
     share = _SHARE if set("ABC") & set(job.reader.axes) else 1.0
     largest = [0.0, 0.0]
     for place in where:
-        text = _left_otherwise(place.run, new.at[place.stop])
+        following = old.lines(place.run.stop, place.run.stop + 1)
+        text = _left_otherwise(job, place.run, new.at[place.stop], following)
         if text:
             wrong.append(Problem("CS592", 0, place.stop, f"the program goes on otherwise after the run: {text}"))
     for own in shared(old, new, where):
@@ -164,8 +165,11 @@ def measure(
     return program, after, found
 
 
-def _left_otherwise(run: Run, state: State) -> str:
-    """Say what holds after the blocks of a run that does not after the run; empty where all is the same."""
+def _left_otherwise(job: Job, run: Run, state: State, following: bytes) -> str:
+    """Say what holds after the blocks of a run that does not after the run; empty where all is the same.
+
+    The kind of motion may be another one where the line behind says its own, or every line does.
+    """
     place = [state.place[letter] for letter in state.axes]
     there, wanted = np.array(place), run.place[-1].copy()
     room = np.full(len(there), _SAME)
@@ -174,10 +178,14 @@ def _left_otherwise(run: Run, state: State) -> str:
     if not (np.abs(there - wanted) <= room).all():
         return f"the run ends at {_told(state.axes, place)}, not at {_told(state.axes, run.place[-1].tolist())}"
     wanted_groups = run.state.groups | {"motion": "line"}
+    if says_motion(following) or "code" not in job.form.mode.motion.modal:
+        del wanted_groups["motion"]
+    if plane_of(state) == plane_of(run.state) != 0:
+        wanted_groups.pop("plane", None)
     if other := [name for name, value in wanted_groups.items() if state.groups[name] != value]:
         return f"{', '.join(other)} is another one after the run"
-    if run.state.groups["feed"] == "minute" and not math.isclose(state.feed, run.feed, rel_tol=1e-9):
-        return f"the feed after the run is {state.feed:g}, not {run.feed:g}"
+    if run.state.groups["feed"] == "minute" and not math.isclose(state.feed, run.feeds[-1], rel_tol=1e-9):
+        return f"the feed after the run is {state.feed:g}, not {run.feeds[-1]:g}"
     return ""
 
 

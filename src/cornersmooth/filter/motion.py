@@ -6,9 +6,11 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 
+from cornersmooth.control.state import PRESET, State
 from cornersmooth.errors import InputError
 from cornersmooth.filter.runs import ProgramReader, Reading, Run
 from cornersmooth.filter.spelling import Spelling
@@ -18,6 +20,9 @@ from cornersmooth.nc_reader import NcProgram
 from cornersmooth.nc_reader.elements import Element
 from cornersmooth.pipeline import read_back
 from cornersmooth.settings import Settings
+
+#: a block with G0 to G3 before anything that may be no word
+_SAYS_MOTION: Final = re.compile(rb"(?i)[ \t]*(?:[NGXYZABCFSM][ \t]*[-+]?[\d.]+[ \t]*)*?G[ \t]*0?[0-3](?![\d.])")
 
 
 @dataclass(frozen=True)
@@ -38,6 +43,17 @@ class Stretch:
     run: Run  #: says the state before the blocks
     text: bytes  #: whole lines
     line: int  #: number of the first, from 1
+
+
+def plane_of(state: State) -> int:
+    """Plane of arcs that holds, 0 where that is not known; a mill begins in G17."""
+    plane = state.groups.get("plane", PRESET)
+    return 17 if plane == PRESET else int((plane or "G0")[1:])
+
+
+def says_motion(line: bytes) -> bool:
+    """Whether a line, which no operator may skip, says by itself how it moves."""
+    return _SAYS_MOTION.match(line) is not None
 
 
 def motion_of_runs(job: Job, reading: Reading, runs: Sequence[Run]) -> NcProgram:
@@ -115,6 +131,8 @@ def _start(job: Job, run: Run, form: Form, before: str) -> bytes:
     lines = [_block(job, run, run.start, form, rapid=True)]
     if 2 in words and mode != before:
         lines.append(words[2 if mode == "inverse" else 0].encode())
+    if state.groups.get("plane", PRESET) != PRESET and plane_of(state):  # that of arcs in its place
+        lines.append(b"G%d" % plane_of(state))
     feed = b" F%.9f" % state.feed if mode != "inverse" and not math.isnan(state.feed) else b""
     if state.groups["motion"] == "line" or feed:  # a whole block, though nothing moves: it is read with those around it
         lines.append(_block(job, run, run.start, form, rapid=False) + feed)

@@ -12,6 +12,7 @@ import numpy as np
 
 from cornersmooth.errors import CornersmoothError, InputError, SettingsError
 from cornersmooth.filter.checking import Checked, Place, check, pair, places
+from cornersmooth.filter.fewest import fewest
 from cornersmooth.filter.motion import Job
 from cornersmooth.filter.runs import Left, ProgramReader, Reading
 from cornersmooth.filter.spelling import SAMPLE, Spelling
@@ -124,7 +125,8 @@ def filter_program(
     job, old = read_program(data, form, settings, tip_from_start=tip_from_start, inch=inch, processes=processes)
     if most is not None:
         left_all_but(old, most)
-    texts, why = smoothed(job, old)
+    auto, again = settings.lines is None, set[int]()
+    texts, why = fewest(job, old, old.runs) if auto else smoothed(job, old)
     return_free_memory()  # verification takes as much again
     for run in old.runs:
         if texts.get(run.first) == old.lines(run.first, run.stop):
@@ -139,6 +141,9 @@ def filter_program(
         if not bad:
             return _result(job, old, after, where, why, checked if verify else None, axes, paths=paths)
         texts = {p.run.first: after.lines(p.first, p.stop) for p in where if p.run.first not in bad}
+        once = [p.run for p in where if p.run.first in bad and p.run.first not in again and auto]
+        again |= bad.keys()
+        texts |= fewest(job, old, once, arcs=False)[0]
         why |= {first: f"verification found: {text}" for first, text in bad.items()}
 
 
@@ -184,7 +189,7 @@ def read_program(
     old = reader.read(data)
     cuts = (old.lines(k, k + 1) for run in old.runs for k in range(run.first, run.stop))
     spelling = Spelling.of(islice(cuts, SAMPLE), len(reader.axes))
-    if old.runs:
+    if old.runs and settings.lines is not None:
         spelling = _fine(spelling, form, settings, inch=old.runs[0].state.unit != 1.0)
     return Job(reader, form, spelling, settings, processes), old
 

@@ -52,12 +52,8 @@ class Run:
     first: int  #: first, stop: lines, from 0; the latter excluded
     stop: int
     state: State  #: before the first
-    #: (n, c) words at the end of each cut, in units of the program: all cuts where the program says distances (G91),
-    #: else the last one only
-    place: Floats
-    low: Floats  #: low, high: (c,) least and largest of them, start included
-    high: Floats
-    feed: float  #: as written, of the last
+    place: Floats  #: (n, c) words at the end of each cut, in units of the program
+    feeds: Floats  #: (n,) as written
 
     def __len__(self) -> int:
         return self.stop - self.first
@@ -66,6 +62,11 @@ class Run:
     def start(self) -> Floats:
         """(c,) where the machine is before the run."""
         return np.array([self.state.place[letter] for letter in self.state.axes])
+
+    @property
+    def places(self) -> Floats:
+        """(n + 1, c) words at the start and at the end of each cut."""
+        return np.concatenate((self.start[None], self.place))
 
 
 @dataclass(frozen=True)
@@ -191,11 +192,9 @@ class ProgramReader:
                 why[a:b] = found.number("a single cut between other blocks: it has no corner")
                 continue
             why[a:b] = _CUT
-            own, state = rows.place[a : b + 1], rows.after(a)
-            kept = own[1:] if state.groups["distance"] == "incremental" else own[-1:]
-            low, high, first = own.min(axis=0), own.max(axis=0), rows.first
-            found.runs.append(Run(first + a, first + b, state, kept.copy(), low, high, float(rows.feed[b - 1])))
-        found.why[here] = why
+            here, first = slice(a, b), rows.first
+            found.runs.append(Run(first + a, first + b, rows.after(a), rows.place[a + 1 : b + 1], rows.feed[here]))
+        found.why[rows.first : rows.first + count] = why
 
 
 def why_not(state: State, wanted: str) -> str:

@@ -7,11 +7,15 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Final
 
-from cornersmooth.nc.control import Digits, Mode
+from cornersmooth.nc.control import Digits, Mode, Motion
 from cornersmooth.nc.form import Form
+from cornersmooth.text import format_number
 
 #: cuts that are looked at
 SAMPLE: Final = 5000
+
+#: digits of a feed, at most
+_FEED_DIGITS: Final = 9
 
 _NUMBER: Final = rb"[-+]?(?:\d+\.?\d*|\.\d+)"
 _WORD: Final = re.compile(rb"(T[XYZ]|[A-Z]+\d?[ \t]*=|[A-Z])[ \t]*(" + _NUMBER + rb")")
@@ -32,6 +36,7 @@ class Spelling:
     trailing_zeros: bool
     feed_point: bool
     modal: bool  #: whether words that repeat are left out
+    codes: bool  #: whether most blocks say that they are lines
     line: str  #: the word of lines, such as ``G01``; empty where none is said
     numbered: bool  #: whether most blocks have numbers
     end: bytes  #: line end
@@ -64,6 +69,7 @@ class Spelling:
             trailing_zeros=len(set(tips)) < 2 and len(set(others)) < 2,
             feed_point=not feeds or any(b"." in number for number in feeds),
             modal=2 * missing > len(raw),
+            codes=2 * sum(any(word == b"G" for word, _ in block) for block in blocks) > len(raw),
             line=line,
             numbered=2 * sum(head is not None for head in heads) > len(raw),
             end=b"\r\n" if raw and raw[-1].endswith(b"\r\n") else b"\n",
@@ -93,19 +99,30 @@ class Spelling:
         return replace(self, tip=tip, other=max(self.other, digits.angle))
 
     def _mode(self, mode: Mode) -> Mode:
-        motion = replace(
-            mode.motion,
+        motion = self.motion(mode.motion)
+        return replace(mode, on=(), off=(), within_on=(), within_off=(), begin=None, tool_end=None, motion=motion)
+
+    def motion(self, motion: Motion) -> Motion:
+        """Give the words of a control as these blocks have them."""
+        own = replace(
+            motion,
             signs=self.signs,
             spaces=self.spaces,
             leading_zeros=self.leading_zeros,
             trailing_zeros=self.trailing_zeros,
             feed_point=self.feed_point,
             with_z="",
-            modal=mode.motion.modal or (),
         )
-        if mode.motion.line == "G1" and self.line:
-            motion = replace(motion, line=self.line)
-        return replace(mode, on=(), off=(), within_on=(), within_off=(), begin=None, tool_end=None, motion=motion)
+        if motion.line != "G1" or not self.line:
+            return own
+        zero = self.line[1:-1]
+        return replace(own, line=self.line, clockwise=f"G{zero}2", counterclockwise=f"G{zero}3")
+
+    def feed_text(self, feed: float) -> str:
+        """Number of a feed in the digits of the program, or in as many as it has."""
+        digits = next((k for k in range(self.feed, _FEED_DIGITS) if float(f"{feed:.{k}f}") == feed), _FEED_DIGITS)
+        text = format_number(feed, digits, trim=True)
+        return text if self.feed_point else text.rstrip(".")
 
 
 def _decimals(number: bytes) -> int:

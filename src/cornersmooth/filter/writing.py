@@ -48,8 +48,14 @@ def _turns(machine: Machine | None, runs: Sequence[Run]) -> list[tuple[float, ..
         return [()] * len(runs)
     angles = np.array([run.start[3:] for run in runs])
     off = np.abs((solutions(machine, tool_axis(machine, angles)).angles - angles[:, None] + 180.0) % 360.0 - 180.0)
-    turns = np.round([(run.low[3:] + run.high[3:]) / 720.0 for run in runs])
+    turns = np.round([sum(_ends(run)) / 720.0 for run in runs])
     return [tuple(row) for row in np.column_stack((np.argmin(off.max(axis=2), axis=1), turns)).tolist()]
+
+
+def _ends(run: Run) -> tuple[Floats, Floats]:
+    """Least and largest words of the tool axis in a run."""
+    places = run.places[:, 3:]
+    return places.min(axis=0), places.max(axis=0)
 
 
 def _attempt(job: Job, reading: Reading, runs: Sequence[Run], made: dict[int, bytes], why: dict[int, str]) -> None:
@@ -89,8 +95,8 @@ def _within(machine: Machine, runs: Sequence[Run], settings: Settings) -> Machin
     """Machine whose rotary axes go no further than in some runs: so turn and solution are those of the program."""
     # by ε the axis may leave that of the program, and by as much its own angles near the pole
     slack = 2 * math.degrees(settings.tolerance / settings.axis_scale)
-    low = np.min([run.low[3:] for run in runs], axis=0) - slack
-    high = np.max([run.high[3:] for run in runs], axis=0) + slack
+    ends = [_ends(run) for run in runs]
+    low, high = np.min([low for low, _ in ends], axis=0) - slack, np.max([high for _, high in ends], axis=0) + slack
     limits = dict(zip(machine.names, zip(low.tolist(), high.tolist(), strict=True), strict=True))
     axes = tuple(
         replace(axis, limits=limits[axis.name], modulo=False) if axis.name in limits else axis for axis in machine.axes
@@ -143,7 +149,7 @@ def _split(job: Job, form: Form, text: bytes, runs: Sequence[Run]) -> Iterator[l
             kept[said] += (b" " if look.spaces else b"") + feed_before
         tail = [own] if mode != own else []
         if mode == _INVERSE and own == _MINUTE:
-            tail.append(f"{look.feed}{run.feed:.10g}".encode())
+            tail.append(f"{look.feed}{run.feeds[-1]:.10g}".encode())
         if rounding and run.state.rounding:
             tail.append(run.state.rounding.encode())
         yield [*head, *kept, *tail, *([] if run.state.groups["distance"] == "absolute" else [b"G91"])]

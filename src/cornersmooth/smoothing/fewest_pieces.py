@@ -1,0 +1,347 @@
+"""A polyline in as few lines and arcs as ε allows, which turn no more than it does where they meet.
+
+From every vertex the piece goes to the farthest vertex that a line, or an arc in a main plane, reaches within ε. The
+third coordinate of an arc runs evenly with its angle, as in a helix. Ends are vertices, so no number is new but radii.
+
+Where pieces meet they turn by at most `KINK`, or by what the polyline turns there. A piece must leave room for the edge
+behind its end. So a search never fails: the edge of the polyline itself is always allowed.
+
+An arc through two points has one number: half of its turn, β. A point sees the chord, of length L, under the angle of
+the arc that goes through it. That gives the β of each vertex, and of each edge where it is nearest to the centre. To be
+off by d there changes β by d·L/(r₁·r₂), with the distances r₁ and r₂ from the ends. So each point leaves an interval of
+β, and each tangent where pieces meet another one. What is chosen is measured once more with the written radius.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from cornersmooth.geometry.ragged import spread, starts
+from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.vectors import dot, norm, unit
+
+#: rad; by how much pieces may turn where they meet and the polyline does not
+KINK: Final = math.radians(1.9)
+
+#: rows after which a piece ends in any case; so many parts are worked on side by side
+LANE: Final = 512
+
+#: points that are measured at once: intermediate arrays fit the processor's cache
+_TOGETHER: Final = 1 << 16
+
+#: axes of G17, G18 and G19 in the order in which a right-handed turn about the third goes round, and the first plane
+AXES: Final = np.array([[0, 1, 2], [2, 0, 1], [1, 2, 0]])
+FIRST: Final = 17
+
+#: half of the largest turn of an arc: near half a turn the rounding of the radius moves its middle too far
+_LARGEST: Final = math.radians(75.0)
+
+#: vertices before the farthest that are tried where the piece to it turns too much at its end
+_BACK: Final = 6
+
+#: share of a tangent's room that is planned with: the rest is for the rounding of the radius
+_PLANNED: Final = 0.98
+
+#: kinds of pieces while they are looked for
+_LINE, _ARC = 0, 1
+
+
+@dataclass(frozen=True)
+class Polyline:
+    """Parts of a path that follow one another, r vertices."""
+
+    point: Floats  #: (r, 3) mm
+    fixed: Bools  #: (r,): a piece ends here in any case
+    begins: Bools  #: (r,): a part begins here, no piece leads here
+
+
+@dataclass(frozen=True)
+class PieceLimits:
+    """What pieces must keep."""
+
+    tolerance: float  #: mm
+    planes: tuple[int, ...] = ()  #: of 17, 18 and 19, those in which arcs may lie; none for lines alone
+    flat: bool = False  #: whether arcs have no rise
+    step: float = 1e-3  #: mm; step of written radii
+    largest: float = 5000.0  #: mm; largest radius
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Lines and arcs, q of them in path order."""
+
+    start: Ints  #: (q,) start, end: vertices
+    end: Ints
+    plane: Ints  #: (q,) 0 for a line, else 17, 18 or 19
+    radius: Ints  #: (q,) in steps; negative where it goes clockwise
+
+
+@dataclass(frozen=True)
+class _Found:
+    """What was found of q pieces that were tried."""
+
+    near: Bools  #: (q,) whether they keep the tolerance
+    good: Bools  #: (q,) and the tangents at both ends, too
+    plane: Ints
+    radius: Ints
+    leaves: Floats  #: (q, 3) direction at the end
+
+    @classmethod
+    def none(cls, count: int) -> _Found:
+        """Make room for some."""
+        no = np.zeros(count, np.bool_)
+        return cls(no, no.copy(), np.zeros(count, np.int64), np.zeros(count, np.int64), np.zeros((count, 3)))
+
+    def put(self, at: Ints | Bools, other: _Found) -> None:
+        """Take over what was found of some."""
+        for name, values in vars(other).items():
+            getattr(self, name)[at] = values
+
+
+class _Search:
+    """All parts of a polyline between fixed vertices, side by side."""
+
+    def __init__(self, path: Polyline, limits: PieceLimits) -> None:
+        self.point, self.limits = path.point, limits
+        count, edge = len(path.point), np.diff(path.point, axis=0)
+        edge[path.begins[1:]] = 0.0
+        lanes = path.fixed | path.begins
+        lanes[-1:] = True
+        whole = lanes | np.append(path.begins[1:], True)
+        apart = whole.copy()
+        lanes = whole.copy()
+        lanes[::LANE] = True
+        #: (r, 3) direction of the edge behind each vertex; no number where there is none
+        self.ahead = np.full((count, 3), np.nan)
+        self.ahead[:-1] = unit(edge)
+        self.ahead[np.append(path.begins[1:], True)] = np.nan
+        behind = np.full((count, 3), np.nan)
+        behind[1:] = self.ahead[:-1]
+        turn = np.arccos(np.clip(dot(self.ahead, behind), -1.0, 1.0))
+        #: (r,) rad: by how much pieces may turn at each vertex
+        self.room = np.maximum(np.nan_to_num(turn), KINK)
+        self.room[lanes & ~apart] /= 2.0  # parts on both sides are worked on at once
+        rows = np.flatnonzero(lanes)
+        goes = ~path.begins[rows[1:]]
+        self.begin, self.stop = rows[:-1][goes], rows[1:][goes]
+
+    def pieces(self) -> Pieces:
+        """Find the pieces of all parts."""
+        made: list[tuple[Ints, ...]] = []
+        at, stop = self.begin.copy(), self.stop
+        count = len(at)
+        enters = np.where(np.isnan(self.ahead[at]), np.nan, self.ahead[at])
+        enters[self.room[at] >= KINK] = np.nan  # no piece before it that has to be met
+        kind, near, beyond = np.zeros(count, np.int64), at + 1, stop + 1
+        best, tried = at + 1, _Found.none(count)  # the farthest good end, and what leads there
+        tried.leaves[:] = self.ahead[at]
+        back = np.zeros(count, np.int64)
+        arcs = bool(self.limits.planes)
+        while len(at):
+            done = (beyond - near <= 1) & ((best >= near) | (back >= _BACK) | (near - back <= best))
+            turns = done & (kind == _LINE) & arcs & (stop - at > 1)
+            ended = done & ~turns
+            if turns.any():  # arcs are worth a look where they reach farther than lines
+                kind[turns], back[turns] = _ARC, 0
+                near[turns] = np.maximum(best[turns], at[turns] + 1)
+                beyond[turns] = stop[turns] + 1
+                ended |= turns & (near >= stop)
+            if ended.any():
+                made.append((at[ended], best[ended], tried.plane[ended], tried.radius[ended]))
+                at[ended], enters[ended] = best[ended], tried.leaves[ended]
+                going = at < stop
+                kind[ended], back[ended] = _LINE, 0
+                near[ended], beyond[ended], best[ended] = at[ended] + 1, stop[ended] + 1, at[ended] + 1
+                fresh = ended & going
+                tried.plane[fresh] = tried.radius[fresh] = 0
+                tried.leaves[fresh] = self.ahead[at[fresh]]
+                if not going.all():
+                    at, stop, enters, kind = at[going], stop[going], enters[going], kind[going]
+                    near, beyond, best, back = near[going], beyond[going], best[going], back[going]
+                    tried = _Found(*(values[going] for values in vars(tried).values()))
+                continue
+            searching = beyond - near > 1
+            doubled = np.minimum(np.maximum(2 * near - at, near + 1), stop)
+            target = np.where(beyond > stop, doubled, (near + beyond) // 2)
+            back[~searching] += 1
+            target = np.where(searching, target, near - back)
+            found = self._try(at, target, enters, kind)
+            near = np.where(searching & found.near, target, near)
+            beyond = np.where(searching, np.where(found.near, beyond, target), beyond)
+            beyond = np.where(searching & (near == stop), stop + 1, beyond)
+            better = found.good & (target > best)
+            best = np.where(better, target, best)
+            tried.put(better, _Found(*(values[better] for values in vars(found).values())))
+        none = np.zeros(0, np.int64)
+        whole = [np.concatenate((none, *some)) for some in zip(*made, strict=True)] or [none] * 4
+        order = np.argsort(whole[0], kind="stable")
+        return Pieces(*(values[order] for values in whole))
+
+    def _try(self, at: Ints, end: Ints, enters: Floats, kind: Ints) -> _Found:
+        """Try lines or arcs from some vertices to others."""
+        found = _Found.none(len(at))
+        for which, attempt in ((_LINE, self._lines), (_ARC, self._arcs)):
+            asked = np.flatnonzero(kind == which)
+            size = np.cumsum(end[asked] - at[asked])
+            for part in np.split(asked, np.searchsorted(size, np.arange(_TOGETHER, size[-1:].sum(), _TOGETHER))):
+                if len(part):
+                    found.put(part, attempt(at[part], end[part], enters[part]))
+        return found
+
+    def _lines(self, at: Ints, end: Ints, enters: Floats) -> _Found:
+        line, place = spread(end - at - 1)
+        row = at[line] + 1 + place
+        way = self.point[end] - self.point[at]
+        length = norm(way)
+        direction = unit(way)
+        gone = self.point[row] - self.point[at][line]
+        along = dot(gone, direction[line])
+        off = norm(gone - along[:, None] * direction[line])
+        bad = np.bincount(line[off > self.limits.tolerance], minlength=len(at)) > 0
+        # in order: never back, and never beyond the ends
+        follows = line[1:] == line[:-1]
+        back = line[1:][follows & (np.diff(along) < 0.0)]
+        bad |= np.bincount(back, minlength=len(at)) > 0
+        bad |= np.bincount(line[(along < 0.0) | (along > length[line])], minlength=len(at)) > 0
+        near = ~bad & (length > 0.0)
+        good = near & self._meets(at, end, enters, direction, direction)
+        none = np.zeros(len(at), np.int64)
+        return _Found(near, good, none, none.copy(), direction)
+
+    def _meets(self, at: Ints, end: Ints, enters: Floats, leaves: Floats, ends: Floats) -> Bools:
+        """Whether pieces turn no more than they may, at their start and at their end."""
+        ahead = self.ahead[end]
+        starts_well = np.isnan(enters[:, 0]) | (dot(enters, leaves) >= np.cos(self.room[at]) - 1e-12)
+        ends_well = np.isnan(ahead[:, 0]) | (dot(ahead, ends) >= np.cos(self.room[end]) - 1e-12)
+        return starts_well & ends_well
+
+    def _arcs(self, at: Ints, end: Ints, enters: Floats) -> _Found:
+        limits, count = self.limits, len(at)
+        a, b = self.point[at], self.point[end]
+        middle = self.point[(at + end) // 2]
+        normal = np.abs(np.cross(middle - a, b - middle))
+        closed = [axis for axis, plane in ((2, 17), (1, 18), (0, 19)) if plane not in limits.planes]
+        normal[:, closed] = -1.0
+        plane = 2 - np.argmax(normal, axis=1)
+        first, second, third = AXES[plane].T
+        own = np.arange(count)
+
+        def local(vectors: Floats, which: Ints) -> tuple[Floats, Floats, Floats]:
+            rows = np.arange(len(vectors))
+            return vectors[rows, first[which]], vectors[rows, second[which]], vectors[rows, third[which]]
+
+        across, up, rise = local(b - a, own)
+        length = np.hypot(across, up)
+        fit = (length > 20.0 * limits.step) & (end - at > 1)
+        if limits.flat:
+            fit &= rise == 0.0
+        safe = np.where(fit, length, 1.0)
+        cosine, sine = across / safe, up / safe
+        line, place = spread(end - at)  # edges, and vertices at their ends
+
+        def seen(values: Floats) -> tuple[Floats, Floats, Floats]:
+            u, v, w = local(values - a[line], line)
+            return u * cosine[line] + v * sine[line], v * cosine[line] - u * sine[line], w
+
+        row = at[line] + place
+        x, y, w = (np.column_stack(pair) for pair in zip(seen(self.point[row]), seen(self.point[row + 1]), strict=True))
+        begin = starts(end - at)[:-1]
+        edges = [np.concatenate((values[:, 1], values.mean(axis=1))) for values in (x, y)]
+        sees, per = _seen(edges[0], edges[1], np.tile(safe[line], 2))
+        weight, sees = (per**2).reshape(2, -1).sum(axis=0), (sees * per**2).reshape(2, -1).sum(axis=0)
+        mean = np.add.reduceat(sees, begin) / np.maximum(np.add.reduceat(weight, begin), 1e-300)
+        fit &= np.abs(mean) <= _LARGEST
+        mean = np.where(fit, mean, 0.0)
+        dx, dy = np.diff(x)[:, 0], np.diff(y)[:, 0]
+        squared = np.where(dx**2 + dy**2 > 0.0, dx**2 + dy**2, 1.0)
+
+        def nearest(beta: Floats) -> Floats:
+            """Parts of the edges where they are nearest to the centre."""
+            centre = (safe / (2.0 * np.tan(np.where(beta == 0.0, 1e-9, beta))))[line]
+            return np.clip(((safe[line] / 2.0 - x[:, 0]) * dx + (centre - y[:, 0]) * dy) / squared, 0.0, 1.0)
+
+        # in order: x never falls, and stays between the ends
+        wrong = (dx < 0.0) | (x[:, 0] < 0.0) | (x[:, 1] > safe[line] * (1.0 + 1e-12))
+        lowest, highest = np.full(count, -_LARGEST), np.full(count, _LARGEST)
+
+        def points(beta: Floats) -> Iterator[tuple[Floats, Floats, Floats]]:
+            """Vertices, and where edges are nearest to the centre: along the chord, off it, and height off the arc."""
+            for part in (np.ones_like(dx), nearest(beta)):
+                here, off, high = (values[:, 0] + part * np.diff(values)[:, 0] for values in (x, y, w))
+                yield here, off, high - rise[line] * _share(here / safe[line], beta[line])
+
+        for here, off, high in points(mean):
+            sees, per = _seen(here, off, safe[line])
+            left = limits.tolerance**2 - high**2
+            wrong |= left <= 0.0
+            with np.errstate(divide="ignore"):
+                width = np.sqrt(np.maximum(left, 1e-300)) / per
+            lowest = np.maximum(lowest, np.maximum.reduceat(sees - width, begin))
+            highest = np.minimum(highest, np.minimum.reduceat(sees + width, begin))
+        fit &= np.bincount(line[wrong], minlength=count) == 0
+        fit &= lowest <= highest
+        slope = np.arctan2(rise, safe * mean / np.where(mean == 0.0, 1.0, np.sin(mean)) + (mean == 0.0) * safe)
+
+        def window(direction: Floats, room: Floats) -> tuple[Floats, Floats]:
+            """Angle from the chord to a direction in the plane, and how far a tangent may be off it."""
+            du, dv, dw = local(direction, own)
+            turned = np.arctan2(dv * cosine - du * sine, du * cosine + dv * sine)
+            off = np.abs(np.arcsin(np.clip(dw, -1.0, 1.0)) - slope)
+            half = np.sqrt(np.maximum((_PLANNED * room) ** 2 - off**2, 0.0)) / np.cos(slope)
+            free = np.isnan(du)
+            return np.where(free, 0.0, turned), np.where(free, np.inf, np.where(off > room, -1.0, half))
+
+        turned, half = window(enters, self.room[at])
+        low_in, high_in = np.maximum(lowest, -turned - half), np.minimum(highest, -turned + half)
+        near = fit & (low_in <= high_in)
+        turned, half = window(self.ahead[end], self.room[end])
+        low_out, high_out = np.maximum(low_in, turned - half), np.minimum(high_in, turned + half)
+        whole = low_out <= high_out
+        beta = np.clip(mean, np.where(whole, low_out, low_in), np.where(whole, high_out, high_in))
+        size = safe / (2.0 * np.maximum(np.abs(np.sin(beta)), 1e-12))
+        ticks = np.rint(np.minimum(size, 2.0 * limits.largest) / limits.step)
+        size = ticks * limits.step
+        reachable = near & (size <= limits.largest) & (2.0 * size > safe)
+        beta = np.sign(beta) * np.arcsin(np.where(reachable, safe / (2.0 * np.where(reachable, size, 1.0)), 0.0))
+        written = reachable & (np.abs(beta) <= _LARGEST + 1e-3)
+        across = (safe / (2.0 * np.tan(np.where(written, beta, 1.0))))[line]
+        for here, off, high in points(beta):
+            round_ = np.hypot(here - safe[line] / 2.0, off - across) - size[line]
+            far = round_**2 + high**2 > limits.tolerance**2
+            written &= np.bincount(line[far], minlength=count) == 0
+        tangents = []
+        for angle in (-beta, beta):
+            flat = np.zeros((count, 3))
+            flat[own, first] = np.cos(angle) * cosine - np.sin(angle) * sine
+            flat[own, second] = np.cos(angle) * sine + np.sin(angle) * cosine
+            flat[own, third] = np.tan(slope)
+            tangents.append(unit(flat))
+        good = written & whole & self._meets(at, end, enters, *tangents)
+        radius = np.where(good, np.sign(beta) * ticks, 0.0).astype(np.int64)
+        return _Found(near, good, plane + FIRST, radius, tangents[1])
+
+
+def _seen(x: Floats, y: Floats, length: Floats) -> tuple[Floats, Floats]:
+    """β of the arcs over a chord through some points, and the way that a change of β moves them by there."""
+    rest = length - x
+    per = np.hypot(x, y) * np.hypot(rest, y) / length
+    ends = per < 1e-12
+    return np.where(ends, 0.0, np.arctan2(-y, rest) - np.arctan2(y, x)), np.where(ends, 0.0, per)
+
+
+def _share(along: Floats, beta: Floats) -> Floats:
+    """Part of an arc's turn at a part of its chord."""
+    sine = np.sin(beta)
+    angle = np.arcsin(np.clip((2.0 * along - 1.0) * sine, -1.0, 1.0))
+    bent = np.abs(beta) > 1e-6
+    return np.where(bent, (angle / np.where(bent, beta, 1.0) + 1.0) / 2.0, along)
+
+
+def fewest_pieces(path: Polyline, limits: PieceLimits) -> Pieces:
+    """Find as few lines and arcs as reach along a polyline within a tolerance, in order."""
+    return _Search(path, limits).pieces()
