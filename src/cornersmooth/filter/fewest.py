@@ -11,6 +11,7 @@ from typing import Final
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import square, unit
 from cornersmooth.filter.motion import Job, plane_of, says_motion
 from cornersmooth.filter.runs import ANGLES, NONE, VECTOR, Reading, Run
 from cornersmooth.filter.spelling import numbered, numbers_of
@@ -23,7 +24,6 @@ from cornersmooth.nc_reader.block_tables import CHUNK
 from cornersmooth.smoothing.fewest_pieces import PieceLimits, Pieces, Polyline, fewest_pieces
 from cornersmooth.smoothing.long_lines import Vertices, fewest_lines
 from cornersmooth.text import RowFormat, interleave, to_ticks
-from cornersmooth.vectors import square, unit
 
 #: part of ε that is used: the rest is for the proof, and for the rounding of radii
 _USED: Final = 0.97

@@ -21,9 +21,9 @@ from typing import Final
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import dot, norm, unit
 from cornersmooth.geometry.ragged import spread, starts
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.vectors import dot, norm, unit
 
 #: rad; by how much pieces may turn where they meet and the polyline does not
 KINK: Final = math.radians(1.9)
