@@ -51,6 +51,7 @@ def by_radius(start: np.ndarray, end: np.ndarray, radius: float, plane: int, clo
     rise = np.sqrt(max(radius**2 - chord @ chord / 4, 0.0)) / np.hypot(*chord)
     return a + chord / 2 + (-rise if clockwise else rise) * np.array([-chord[1], chord[0]])
 
+
 #: what the interpreter does not take without the running controller, and the title of other controls
 _LEFT_OUT = re.compile(rb"(?m)^((N\d+ )?T\d+ M6|G43 H\d+(?: (?=G|Z))?|M42[89]|M6|O\d+$|T\d+$)")
 
@@ -100,7 +101,9 @@ def by_words(text: bytes) -> list[Row]:
         codes = [f"{float(value):g}" for letter, value in words if letter == "G"]
         arc = code in ("2", "3") or {"2", "3"} & set(codes)
         aside_letters = "XYZABCF" + "IJKR" * bool(arc)
-        others = [word for word in words if word[0] not in aside_letters and f"{word[0]}{float(word[1]):g}" not in _OF_RUNS]
+        others = [
+            word for word in words if word[0] not in aside_letters and f"{word[0]}{float(word[1]):g}" not in _OF_RUNS
+        ]
         for value in codes:
             absolute = absolute if value not in ("90", "91") else value == "90"
             plane = int(value) if value in ("17", "18", "19") else plane

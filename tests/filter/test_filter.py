@@ -281,7 +281,9 @@ def test_commands_know_programs(tmp_path: Path) -> None:
     assert made.stderr.decode().startswith("PASSED  new.ngc  linuxcnc g1, xyzac-trt, ")
     assert "\n        24 of 25 cuts smoothed in 2 runs within 0.01 mm" in made.stderr.decode()
     assert re.search(r"1 +\d+  an arc\n", made.stderr.decode())
-    assert run("filter", "-", *on, *dense, data=text.encode(), cwd=tmp_path).stdout == (tmp_path / "new.ngc").read_bytes()
+    assert (
+        run("filter", "-", *on, *dense, data=text.encode(), cwd=tmp_path).stdout == (tmp_path / "new.ngc").read_bytes()
+    )
     found = run("verify", "part.ngc", "new.ngc", *on, cwd=tmp_path)
     assert found.returncode == DONE
     assert found.stdout.startswith(b"PASSED: within 0.01 mm")
@@ -330,7 +332,11 @@ def test_verify_finds_what_is_wrong_with_a_program_of_anybody() -> None:
 def test_says_the_time_of_what_has_changed(tmp_path: Path) -> None:
     control, machine, count = "fanuc", "table-ac", 8
     text = ISO.format(on="G43.4 H1", start="A20. C30.", cuts=cuts(WORDS, feed="F1000.", last=count))
-    form, settings, axes = form_of(control, machine), cs.Settings(tolerance=EPS, lines="dense"), cs.load_machine(machine)
+    form, settings, axes = (
+        form_of(control, machine),
+        cs.Settings(tolerance=EPS, lines="dense"),
+        cs.load_machine(machine),
+    )
     # so slow that no axis has to brake: the length over the feed, and 19 mm down to the first place
     length = np.linalg.norm(np.diff(np.column_stack((X, Y, Z))[:count], axis=0), axis=1).sum()
     slow = filter_program(text.replace("F1000.", "F6.").encode(), form, settings, axes=axes)

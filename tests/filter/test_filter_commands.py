@@ -37,10 +37,11 @@ def test_time_of_a_program_as_it_is_and_smoothed(how: tuple[str, ...], tmp_path:
     assert told.returncode == DONE, told.stderr
     times = json.loads(told.stdout)
     seconds = times["seconds"]
-    assert times["smoothed"] == times["cuts"] > 20
+    assert times["cuts"] > 20
     assert seconds["as_written"] > 0.0
     # 24 turns to and fro: who need not brake at them is faster; LinuxCNC blends lines itself
-    assert seconds["as_written"] < (1.1 if how is LINUXCNC else 0.95) * seconds["unsmoothed"]
+    assert times["smoothed"] == (0 if how is LINUXCNC else times["cuts"])
+    assert seconds["as_written"] <= (1.0 if how is LINUXCNC else 0.95) * seconds["unsmoothed"]
     assert run("filter", part, *how, *EPS, "--limits", how[3], "-o", new).returncode == DONE
     beside = json.loads(run("time", part, "--text", new, *how, *EPS, "--json").stdout)
     assert beside["seconds"] == pytest.approx(seconds)
@@ -54,7 +55,7 @@ def test_time_beside_a_program_that_is_another_one(tmp_path: Path) -> None:
     assert told.returncode == 1
     assert b"CS591" in told.stderr
     arc = tmp_path / "arc.nc"
-    arc.write_text(PROGRAMS["linuxcnc, G64, an arc inside"][2])
+    arc.write_text(PROGRAMS["linuxcnc, G64, an arc inside"][2].replace("G2 X60 Y5 I5 J0", "G33 X60 K1"))
     told = run("time", arc, *LINUXCNC)
     assert told.returncode == BAD_INPUT
     assert f"{arc}:16: error[CS264]".encode() in told.stderr
@@ -97,7 +98,7 @@ def test_time_of_a_program_in_which_nothing_can_be_smoothed(tmp_path: Path) -> N
 
 def test_errors_of_times_say_the_file_and_the_line(tmp_path: Path) -> None:
     arc, new = tmp_path / "arc.nc", tmp_path / "new.nc"
-    arc.write_text(PROGRAMS["linuxcnc, G64, an arc inside"][2])
+    arc.write_text(PROGRAMS["linuxcnc, G64, an arc inside"][2].replace("G2 X60 Y5 I5 J0", "G33 X60 K1"))
     told = run("filter", arc, *LINUXCNC, "--limits", "xyzac-trt", "-o", new)
     assert told.returncode == BAD_INPUT
     assert f"{arc}:16: error[CS264]".encode() in told.stderr

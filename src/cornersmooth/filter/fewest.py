@@ -198,7 +198,7 @@ def _blocks(
     repeats = np.where(first, begins_in_line & (code == 0), code == before) & (
         "code" in look.modal and not spelling.codes
     )
-    repeats &= ~arc | ~says_plane
+    repeats &= ~arc  # R and its like are read beside the code alone
     words = [look.line, look.clockwise, look.counterclockwise]
     heads = [f"{said}{word}{gap}" for said in ("", f"G17{gap}", f"G18{gap}", f"G19{gap}") for word in words] + [""]
     head_id = np.where(repeats, len(heads) - 1, code + 3 * np.where(says_plane, plane - 16, 0))

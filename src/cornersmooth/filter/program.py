@@ -16,7 +16,7 @@ from cornersmooth.filter.fewest import fewest
 from cornersmooth.filter.motion import Job
 from cornersmooth.filter.runs import Left, ProgramReader, Reading
 from cornersmooth.filter.spelling import SAMPLE, Spelling
-from cornersmooth.filter.times import by_own_law, no_runs, planned_times, time_as_it_is
+from cornersmooth.filter.times import by_own_law, no_runs, planned_times, run_times, time_as_it_is
 from cornersmooth.filter.writing import smoothed
 from cornersmooth.kinematics import Machine
 from cornersmooth.nc import fit_settings
@@ -35,6 +35,9 @@ THREE_AXES: Final = Machine("three axes", ())
 
 #: how many times more cuts than poses of CL files are looked at where times need no plan
 _BY_LAW: Final = 10
+
+#: by what part planned times may differ that are the same
+_EQUAL: Final = 1e-3
 
 #: words that let LinuxCNC blend
 _BLENDING: Final = re.compile(rb"(?i)G64[ \t]*P[ \t]*(\d*\.?\d+)(?:[ \t]*Q[ \t]*(\d*\.?\d+))?")
@@ -125,13 +128,39 @@ def filter_program(
     job, old = read_program(data, form, settings, tip_from_start=tip_from_start, inch=inch, processes=processes)
     if most is not None:
         left_all_but(old, most)
-    auto, again = settings.lines is None, set[int]()
-    texts, why = fewest(job, old, old.runs) if auto else smoothed(job, old)
+    ways = [_way(job, old, *fewest(job, old, old.runs), verify=verify)] if settings.lines is None else []
+    if not ways:
+        ways = [_way(job, old, *smoothed(job, old), verify=verify)]
+    elif axes is not None and old.runs:
+        rows = replace(job, spelling=_fine(job.spelling, form, settings, inch=old.runs[0].state.unit != 1.0))
+        ways.append(_way(rows, old, *smoothed(rows, old), verify=verify))
+    best = ways[0] if len(ways) == 1 or axes is None else _way(job, old, *_best(job, old, ways, axes), verify=verify)
+    return _result(job, old, best, axes, paths=paths)
+
+
+@dataclass(frozen=True)
+class _Way:
+    """Texts in the place of runs, read and compared."""
+
+    after: Reading
+    where: list[Place]
+    why: dict[int, str]  #: why other runs are left, by their first line
+    checked: Checked | None
+
+    def text(self, place: Place) -> bytes:
+        """Blocks in the place of a run."""
+        return self.after.lines(place.first, place.stop)
+
+
+def _way(job: Job, old: Reading, texts: dict[int, bytes], why: dict[int, str], *, verify: bool) -> _Way:
+    """Read and compare a program with some texts; where that fails, a run has lines alone, or stays as it is."""
     return_free_memory()  # verification takes as much again
+    why = dict(why)
     for run in old.runs:
         if texts.get(run.first) == old.lines(run.first, run.stop):
             del texts[run.first]
             why[run.first] = "nothing in it is to be rounded"
+    again = set[int]()
     while True:
         new, where = _spliced(old, texts)
         texts.clear()  # as long as the new program
@@ -139,12 +168,34 @@ def filter_program(
         checked = check(job, old, after, where) if verify else Checked(())
         bad = {p.run.first: one.text for p in where for one in checked.wrong if p.first < one.nc_line <= p.stop}
         if not bad:
-            return _result(job, old, after, where, why, checked if verify else None, axes, paths=paths)
+            return _Way(after, where, why, checked if verify else None)
         texts = {p.run.first: after.lines(p.first, p.stop) for p in where if p.run.first not in bad}
-        once = [p.run for p in where if p.run.first in bad and p.run.first not in again and auto]
+        once = [p.run for p in where if p.run.first in bad.keys() - again and job.settings.lines is None]
         again |= bad.keys()
         texts |= fewest(job, old, once, arcs=False)[0]
         why |= {first: f"verification found: {text}" for first, text in bad.items()}
+
+
+def _best(job: Job, old: Reading, ways: Sequence[_Way], axes: Machine) -> tuple[dict[int, bytes], dict[int, str]]:
+    """Of each run the fastest text; of those that take as long, the one with the fewest blocks."""
+    found: dict[int, list[tuple[float, int, bytes | None]]] = {}
+    for way in ways:
+        times = run_times(job, old, way.after, way.where, axes)
+        for place, (before, after) in zip(way.where, times.tolist(), strict=True):
+            some = found.setdefault(place.run.first, [(before, len(place.run), None)])
+            some.append((after, place.stop - place.first, way.text(place)))
+    texts: dict[int, bytes] = {}
+    why = dict(ways[0].why)
+    for first, some in found.items():
+        fastest = min(seconds for seconds, _, _ in some)
+        text = min((blocks, k) for k, (seconds, blocks, _) in enumerate(some) if seconds <= fastest * (1.0 + _EQUAL))
+        chosen = some[text[1]][2]
+        if chosen is None:
+            why[first] = "nothing makes it faster"
+        else:
+            texts[first] = chosen
+            why.pop(first, None)
+    return texts, why
 
 
 def verify_programs(
@@ -165,7 +216,8 @@ def verify_programs(
     where, wrong = places(before, job.reader.read(new))
     after = job.reader.read(new, [place.stop for place in where])
     checked = Checked(tuple(wrong)) if wrong else check(job, before, after, where)
-    found = _result(job, before, after, where, {}, checked, None if wrong else axes, paths=paths and not wrong)
+    way = _Way(after, where, {}, checked)
+    found = _result(job, before, way, None if wrong else axes, paths=paths and not wrong)
     return replace(found, compared=True)
 
 
@@ -231,18 +283,9 @@ def left_all_but(reading: Reading, most: int) -> None:
     reading.runs[:] = reading.runs[first:stop]
 
 
-def _result(
-    job: Job,
-    old: Reading,
-    new: Reading,
-    where: list[Place],
-    why: dict[int, str],
-    checked: Checked | None,
-    axes: Machine | None,
-    *,
-    paths: bool,
-) -> Filtered:
+def _result(job: Job, old: Reading, way: _Way, axes: Machine | None, *, paths: bool) -> Filtered:
     """What became of a program; how long its runs take, and what the control does in them, as far as asked for."""
+    new, where, why = way.after, way.where, way.why
     for run in old.runs:
         if run.first in why:
             old.why[run.first : run.stop] = old.number(why[run.first])
@@ -255,7 +298,7 @@ def _result(
         smoothed=sum(len(place.run) for place in where),
         runs=len(where),
         left=old.left(),
-        checked=checked,
+        checked=way.checked,
         units_said="units" in old.said,
         seconds=planned_times(job, old, new, where, axes) if axes is not None and where else None,
         motions=pair(job, old, new, drawn) if paths and where else None,

@@ -13,6 +13,7 @@ from cornersmooth.filter.checking import Place, pair, shared
 from cornersmooth.filter.motion import Job, motion_of_runs
 from cornersmooth.filter.runs import Reading
 from cornersmooth.kinematics import Machine
+from cornersmooth.model import Floats
 from cornersmooth.nc_reader import NcProgram
 from cornersmooth.times.saving import LINUXCNC
 
@@ -21,24 +22,46 @@ def planned_times(job: Job, old: Reading, new: Reading, where: Sequence[Place], 
     """Time of what has changed, before and after, s, under the limits of the axes of a machine.
 
     On LinuxCNC it is that of the whole program, by the law of its planner. Errors: a pose out of reach; CS264: a
-    program for LinuxCNC has arcs; CS263: the machine does not say how fast its axes may go.
+    program for LinuxCNC has motion of a kind whose law is not known; CS263: the machine does not say how fast its axes
+    may go.
     """
     if by_own_law(job):
-        return _on_linuxcnc(old, axes), _on_linuxcnc(new, axes)
-    pairs = (pair(job, old, new, some) for some in shared(old, new, where))
-    before, after = np.sum([[_planned(job, nc, axes) for nc in both] for both in pairs], axis=0).tolist()
+        return float(_on_linuxcnc(old, axes)[-1]), float(_on_linuxcnc(new, axes)[-1])
+    before, after = run_times(job, old, new, where, axes).sum(axis=0).tolist()
     return before, after
+
+
+def run_times(job: Job, old: Reading, new: Reading, where: Sequence[Place], axes: Machine) -> Floats:
+    """(p, 2) time of each place before and after, s; errors as of `planned_times`."""
+    if by_own_law(job):
+        lines = [(place.run.first, place.run.stop) for place in where], [(place.first, place.stop) for place in where]
+        ends = [np.concatenate(([0.0], _on_linuxcnc(reading, axes))) for reading in (old, new)]
+        return np.column_stack([[end[b] - end[a] for a, b in own] for end, own in zip(ends, lines, strict=True)])
+    found = {}
+    for some in shared(old, new, where):
+        for place, own in zip(some, _pair_times(job, old, new, some, axes), strict=True):
+            found[place.run.first] = own
+    return np.array([found[place.run.first] for place in where]).reshape(-1, 2)
+
+
+def _pair_times(job: Job, old: Reading, new: Reading, where: Sequence[Place], axes: Machine) -> Floats:
+    """(p, 2) planned times of places: all at once where a rapid leads to each."""
+    times = [_stretch_times(job, nc, axes) for nc in pair(job, old, new, where)]
+    if all(len(own) == len(where) for own in times):
+        return np.column_stack(times)
+    apart = ([_stretch_times(job, nc, axes).sum() for nc in pair(job, old, new, [place])] for place in where)
+    return np.array(list(apart))
 
 
 def time_as_it_is(job: Job, reading: Reading, axes: Machine) -> float:
     """Time of all runs of a program, s; on LinuxCNC and errors as `planned_times`, and CS266: it has no runs."""
     if by_own_law(job):
-        return _on_linuxcnc(reading, axes)
+        return float(_on_linuxcnc(reading, axes)[-1])
     if not reading.runs:
         raise no_runs()
     groups = shared(reading, reading, [Place(run, run.first, run.stop) for run in reading.runs])
     parts = (motion_of_runs(job, reading, [place.run for place in own]) for own in groups)
-    return sum(_planned(job, nc, axes) for nc in parts)
+    return float(sum(_stretch_times(job, nc, axes).sum() for nc in parts))
 
 
 def no_runs() -> SettingsError:
@@ -52,11 +75,17 @@ def by_own_law(job: Job) -> bool:
     return job.form.table.lines.planner == LINUXCNC
 
 
-def _planned(job: Job, nc: NcProgram, axes: Machine) -> float:
+def _stretch_times(job: Job, nc: NcProgram, axes: Machine) -> Floats:
+    """Time between rapids, s."""
     law = plan_text(nc, settings=job.settings, machine=axes)
-    return float(np.diff(law.times_at(law.edge))[~law.path.rapid].sum())
+    rapid, taken = law.path.rapid, np.diff(law.times_at(law.edge))
+    total: Floats = np.bincount(np.cumsum(rapid), np.where(rapid, 0.0, taken)).astype(np.float64)
+    return total
 
 
-def _on_linuxcnc(reading: Reading, axes: Machine) -> float:
-    lines = program_lines(reading.data.decode("utf-8", "replace"))
-    return float(line_times(lines, axis_limits(axes))[1][-1])
+def _on_linuxcnc(reading: Reading, axes: Machine) -> Floats:
+    """(l,) when each line of a program ends, s."""
+    moves = program_lines(reading.data.decode("utf-8", "replace"))
+    ends = np.zeros(len(reading))
+    ends[moves.number - 1] = line_times(moves, axis_limits(axes))[1]
+    return np.maximum.accumulate(ends) if len(ends) else np.zeros(1)

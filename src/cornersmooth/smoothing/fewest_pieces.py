@@ -3,8 +3,8 @@
 From every vertex the piece goes to the farthest vertex that a line, or an arc in a main plane, reaches within ε. The
 third coordinate of an arc runs evenly with its angle, as in a helix. Ends are vertices, so no number is new but radii.
 
-Where pieces meet they turn by at most `KINK`, or by what the polyline turns there. A piece must leave room for the edge
-behind its end. So a search never fails: the edge of the polyline itself is always allowed.
+Where pieces meet they turn by at most `KINK`, or by what the polyline turns there; at a `CORNER` by `KINK` more. A piece
+must leave room for the edge behind its end. So a search never fails: the edge of the polyline itself is always allowed.
 
 An arc through two points has one number: half of its turn, β. A point sees the chord, of length L, under the angle of
 the arc that goes through it. That gives the β of each vertex, and of each edge where it is nearest to the centre. To be
@@ -28,6 +28,9 @@ from cornersmooth.model import Bools, Floats, Ints
 #: rad; by how much pieces may turn where they meet and the polyline does not
 KINK: Final = math.radians(1.9)
 
+#: rad; a vertex that turns by more is a corner of the part
+CORNER: Final = math.radians(8.0)
+
 #: rows after which a piece ends in any case; so many parts are worked on side by side
 LANE: Final = 512
 
@@ -46,6 +49,9 @@ _BACK: Final = 6
 
 #: share of a tangent's room that is planned with: the rest is for the rounding of the radius
 _PLANNED: Final = 0.98
+
+#: rad; where a piece may turn by more, its tangent is measured but not chosen
+_WIDE: Final = 0.5
 
 #: kinds of pieces while they are looked for
 _LINE, _ARC = 0, 1
@@ -124,7 +130,7 @@ class _Search:
         behind[1:] = self.ahead[:-1]
         turn = np.arccos(np.clip(dot(self.ahead, behind), -1.0, 1.0))
         #: (r,) rad: by how much pieces may turn at each vertex
-        self.room = np.maximum(np.nan_to_num(turn), KINK)
+        self.room = np.maximum(np.nan_to_num(turn), KINK) + np.where(turn > CORNER, KINK, 0.0)
         self.room[lanes & ~apart] /= 2.0  # parts on both sides are worked on at once
         rows = np.flatnonzero(lanes)
         goes = ~path.begins[rows[1:]]
@@ -293,7 +299,7 @@ class _Search:
             turned = np.arctan2(dv * cosine - du * sine, du * cosine + dv * sine)
             off = np.abs(np.arcsin(np.clip(dw, -1.0, 1.0)) - slope)
             half = np.sqrt(np.maximum((_PLANNED * room) ** 2 - off**2, 0.0)) / np.cos(slope)
-            free = np.isnan(du)
+            free = np.isnan(du) | (room > _WIDE)
             return np.where(free, 0.0, turned), np.where(free, np.inf, np.where(off > room, -1.0, half))
 
         turned, half = window(enters, self.room[at])

@@ -1,0 +1,160 @@
+"""As few lines and arcs as ε allows: what becomes of programs in many short lines, by readers that share no code."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cornersmooth as cs
+from cornersmooth.filter import Filtered, filter_program, verify_programs
+from cornersmooth.filter.program import THREE_AXES
+from cornersmooth.verdict import Verdict
+from filter.fine_programs import HEAD, PROGRAMS, program
+from filter.foreign import by_rs274, by_words, difference
+
+EPS = 0.01
+
+#: blocks by a greedy count of lines and plain arcs, each with both ends at vertices, within 0.0095 mm
+COUNTS = {
+    "relief": 52,
+    "coarse relief": 76,
+    "mould": 30,
+    "mould, turned": 63,
+    "mould, coarse": 54,
+    "carving": 144,
+    "fine": 19,
+}
+
+
+def few(text: str | bytes, control: str = "fanuc", **options: object) -> Filtered:
+    """What the filter makes of a program in its default way."""
+    form = cs.choose_form(control, "g1", machine=THREE_AXES)
+    data = text.encode() if isinstance(text, str) else text
+    return filter_program(data, form, cs.Settings(tolerance=EPS), **options)  # type: ignore[arg-type]
+
+
+def blocks(text: str | bytes) -> int:
+    """Cutting blocks of a program."""
+    data = text.decode() if isinstance(text, bytes) else text
+    return len(re.findall(r"(?m)^(?:G1[789] )?(?:G[123] )?[XYZ].*$", data))
+
+
+@pytest.mark.parametrize("control", ["fanuc", "haas", "mitsubishi"])
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_few_blocks_say_the_same_motion(name: str, control: str) -> None:
+    text = PROGRAMS[name]
+    found = few(text, control)
+    assert found.verdict is Verdict.PASSED
+    assert difference(by_words(text.encode()), by_words(found.data), EPS) == ""
+    assert blocks(found.data) < blocks(text)
+    assert b"R" in found.data
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_blocks_are_near_a_greedy_count(name: str) -> None:
+    assert blocks(few(PROGRAMS[name]).data) <= 1.3 * COUNTS[name]
+
+
+@pytest.mark.linuxcnc
+@pytest.mark.skipif(shutil.which("rs274") is None, reason="LinuxCNC is not installed")
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_linuxcnc_takes_the_arcs(name: str, tmp_path: Path) -> None:
+    text = PROGRAMS[name].replace("%\nO1\n", "").replace("%\n", "")
+    found = few(text, "linuxcnc")
+    assert found.verdict is Verdict.PASSED
+    assert difference(by_rs274(text.encode(), tmp_path), by_rs274(found.data, tmp_path), EPS) == ""
+
+
+def turns(rows: list[tuple[str, tuple[float, ...]]]) -> list[float]:
+    """Degrees by which neighbouring cuts turn, of a program that another reader has read; arcs are many cuts."""
+    place = np.array([numbers[:3] for kind, numbers in rows if kind == "feed"])
+    way = np.diff(place, axis=0)
+    way = way[np.linalg.norm(way, axis=1) > 1e-9]
+    way /= np.linalg.norm(way, axis=1)[:, None]
+    return np.degrees(np.arccos(np.clip((way[1:] * way[:-1]).sum(axis=1), -1.0, 1.0))).tolist()
+
+
+def test_a_smooth_path_stays_smooth() -> None:
+    """No corner of 2 degrees is made where the program has none; what is read as chords adds half of what they turn."""
+    text = program([np.column_stack((t := np.arange(0.0, 9.0, 0.05), 3 * np.sin(0.3 * t), np.cos(0.4 * t)))])
+    assert max(turns(by_words(text.encode()))[2:-2]) < 2.5
+    assert max(turns(by_words(few(text).data))[2:-2]) < 2.3
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_what_is_filtered_again_stays(name: str) -> None:
+    once = few(PROGRAMS[name])
+    again = few(once.data)
+    assert again.new_lines <= once.new_lines
+    assert blocks(again.data) >= 0.97 * blocks(once.data)
+
+
+def test_arcs_of_klartext_and_siemens() -> None:
+    """XY alone: the length of the tool acts across the plane, and CR has two axes."""
+    t = np.linspace(0.0, 3.0, 200)
+    ring = [(9 * np.cos(a), 9 * np.sin(a)) for a in t]
+    klartext = (
+        "0 BEGIN PGM A MM\n1 TOOL CALL 3 Z S3000\n2 L X+9 Y+0 Z+5 R0 FMAX M3\n3 L Z-1 F300\n"
+        + "".join(f"{k + 4} L X{x:+.3f} Y{y:+.3f}\n" for k, (x, y) in enumerate(ring))
+        + "900 L Z+50 R0 FMAX\n901 M30\n902 END PGM A MM\n"
+    )
+    found = few(klartext, "heidenhain")
+    assert re.findall(rb"(?m)^\d+ CR X\S+ Y\S+ R\+(9.00)\d DR\+", found.data) == [b"9.00"] * 2
+    assert difference(by_words(klartext.encode()), by_words(found.data), EPS) == ""
+    siemens = "G17 G90 G94 G710\nG54\nG0 X9 Y0 Z20 S900 M3\nG1 Z-1 F350\n{}G0 Z20\nM30\n"
+    siemens = siemens.format("".join(f"X{x:.3f} Y{y:.3f}\n" for x, y in ring))
+    found = few(siemens, "siemens")
+    assert re.findall(rb"X\S+ Y\S+ CR=(9.00)", found.data) == [b"9.00"] * 2
+    assert few(siemens.replace("G17", "G18"), "siemens").data.count(b"CR=") == 0
+
+
+def test_plane_and_motion_are_put_back() -> None:
+    x = np.arange(0.0, 8.0, 0.1)
+    run = "".join(f"X{a:.3f} Z{np.sin(a):.3f}\n" for a in x)
+    for behind, restored in (("G0 Z20.\n", ["G17"]), ("X30.\nG0 Z20.\n", ["G17 G1"]), ("M8\nX30.\n", ["G17 G1"])):
+        text = HEAD + "G1 Z0. F300.\n" + run + behind.replace("X30.\n", "(A)\nX30.\n") + "G0 Z20.\nM30\n%\n"
+        found = few(text)
+        assert found.verdict is Verdict.PASSED
+        lines = found.data.decode().splitlines()
+        assert [line for line in lines if re.fullmatch("G17( G1)?", line)] == restored
+        assert difference(by_words(text.encode()), by_words(found.data), EPS) == ""
+    text = HEAD + "G18\nG1 Z0. F300.\n" + run + "G0 Z20.\nM30\n%\n"
+    assert re.findall(rb"G1[789]", few(text).data) == [b"G17", b"G18"]
+
+
+def test_arcs_that_are_off_are_found() -> None:
+    text = PROGRAMS["fine"].encode()
+    new = few(text).data
+    form = cs.choose_form("fanuc", "g1", machine=THREE_AXES)
+    assert verify_programs(text, new, form, cs.Settings(tolerance=EPS)).verdict is Verdict.PASSED
+    for old, other in ((rb"R(\d+)\.", b"R1\\1."), (rb"G2 ", b"G3 "), (rb"G18 G", b"G17 G")):
+        wrong = re.sub(old, other, new, count=1)
+        if wrong != new:
+            found = verify_programs(text, wrong, form, cs.Settings(tolerance=EPS))
+            assert found.verdict is Verdict.FAILED
+
+
+def test_each_cut_keeps_its_feed() -> None:
+    x = np.arange(0.0, 8.0, 0.1)
+    run = "".join(f"X{a:.3f} Z{np.sin(a):.3f} F{300 if a < 4 else 500}.\n" for a in x)
+    text = HEAD + "G1 Z0. F300.\n" + run + "G0 Z20.\nM30\n%\n"
+    lines = few(text).data.decode().splitlines()
+    k = next(k for k, line in enumerate(lines) if "F500" in line)
+    assert "X4.000 " not in lines[k]  # the cut to 4.0 is the first at 500
+    assert "X3.900 " in lines[k - 1]
+
+
+def test_the_fastest_is_taken_where_times_are_known() -> None:
+    machine = cs.load_machine(Path(__file__).parents[2] / "samples" / "machines" / "three-axis.toml")
+    text = PROGRAMS["relief"].replace("%\nO1\n", "").replace("%\n", "").replace("F300", "F3000")
+    found = few(text, "linuxcnc", axes=machine)
+    assert found.seconds is not None
+    assert found.seconds[1] < 0.6 * found.seconds[0]
+    zigzag = "".join(f"X{2 * k} Y{k % 2}\n" for k in range(1, 9))
+    text = "G21 G90 G94 G17\nG61\nG0 X0 Y0 Z5\nG1 Z0 F300\n" + zigzag + "G0 Z5\nM2\n"
+    found = few(text, "linuxcnc", axes=machine)
+    assert found.seconds is None or found.seconds[1] < found.seconds[0]
