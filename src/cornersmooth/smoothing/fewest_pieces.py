@@ -3,8 +3,8 @@
 From every vertex the piece goes to the farthest vertex that a line, or an arc in a main plane, reaches within ε. The
 third coordinate of an arc runs evenly with its angle, as in a helix. Ends are vertices, so no number is new but radii.
 
-Where pieces meet they turn by at most `KINK`, or by what the polyline turns there; at a `CORNER` by `KINK` more. A piece
-must leave room for the edge behind its end. So a search never fails: the edge of the polyline itself is always allowed.
+Where pieces meet they turn by at most `KINK`, or by what the polyline turns there, at a `CORNER` by `KINK` more. They
+must leave room for the edge behind their end. So a search never fails: the edge of the polyline itself is allowed.
 
 An arc through two points has one number: half of its turn, β. A point sees the chord, of length L, under the angle of
 the arc that goes through it. That gives the β of each vertex, and of each edge where it is nearest to the centre. To be
