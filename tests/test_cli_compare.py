@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from cornersmooth.times.comparing import Row, Table
+from cornersmooth.times.comparing import EQUAL, ROUGH, Row, Table, _leading
 from oracle.command import run
 
 #: a winding cut of a tool that turns, from a rapid
@@ -44,6 +44,7 @@ def test_every_row_is_a_program_and_the_best_is_marked_with_its_command(part: Pa
     assert all(row["tip"] <= 0.02 and row["axis_point"] <= 0.02 for row in rows)
     assert all(row["seconds"] + row["saved"] == pytest.approx(found["unsmoothed_seconds"]) for row in rows)
     (best,) = (row for row in rows if row["best"])
+    assert not best["about"]  # only what cannot be the best keeps the time of a rough plan
     least = min(row["seconds"] for row in rows)
     equal = [row for row in rows if row["seconds"] <= 1.03 * least]
     assert best["bytes"] == min(row["bytes"] for row in equal)
@@ -122,3 +123,18 @@ def test_gains_are_those_that_a_plan_can_tell() -> None:
     assert table(10.0, 12.0, 9.0, wider=8.9).wider_gain == 0.0
     failed = replace(table(10.0, 9.0, wider=6.0).rows[0], verdict="FAILED")
     assert replace(table(10.0, 9.0, wider=6.0), wider=failed).wider_gain == 0.0
+
+
+def test_rows_that_may_be_the_best_are_planned_closely() -> None:
+    row = Row("g1", "vectors", "global", "fine", (), "PASSED", seconds=10.0, about=True)
+    least, most = 10.0, 10.0 * EQUAL * (1.0 + ROUGH)
+    rows = [
+        row,
+        replace(row, seconds=most),
+        replace(row, seconds=most * 1.001),
+        replace(row, lines="", seconds=9.0),
+        replace(row, verdict="FAILED", seconds=1.0),
+        replace(row, seconds=None),
+        replace(row, seconds=least, about=False),
+    ]
+    assert _leading(rows) == [0, 1, 3]

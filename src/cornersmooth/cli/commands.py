@@ -138,9 +138,10 @@ COMPARE = new_command(
     Write the CL file IN in every form, method and line density that the control can run, and compare the times.
 
     Every program is verified and planned as it is written, under the limits of the axes of --limits, or of --machine.
-    The best row is the fastest that keeps the tolerance; the command that writes it follows. Of parts of more than
-    2,000 poses whole runs from the middle are compared. -v states by which law lines are planned. The method zhang2016
-    is left out: it is there as published. IN may be a finished NC program: every way in which filter can smooth it.
+    Rows appear as they are ready. A time with ~ is that of a rough plan, up to 6 % too long; the best are planned
+    closely. The best row is the fastest that keeps the tolerance; the command that writes it follows, and that of the
+    best in lines. Of parts of more than 2,000 poses whole runs from the middle are compared. -v states by which law
+    lines are planned. IN may be a finished NC program: every way in which filter can smooth it.
 
     \b
     Examples:

@@ -140,7 +140,7 @@ def _cells(row: Row) -> tuple[str, ...]:
         row.lines,
         f"{row.blocks:,}",
         f"{row.bytes / 1000.0:.0f}",
-        f"{row.seconds:.1f}",
+        f"{'~' * row.about}{row.seconds:.1f}",
         f"{round(share)}",
         f"{row.tip:.4f}",
         "" if row.axis_point is None else f"{row.axis_point:.4f}",

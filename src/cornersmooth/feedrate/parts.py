@@ -16,14 +16,12 @@ from cornersmooth.feedrate.machine_axes import MachineAxes
 from cornersmooth.feedrate.path import Path
 from cornersmooth.feedrate.planner import Progress, plan_along
 from cornersmooth.feedrate.reached import limiting
-from cornersmooth.feedrate.resolution import FINER, Resolution
+from cornersmooth.feedrate.resolution import FINER, ROUGHLY
 from cornersmooth.feedrate.scurve import stopping_distance
 from cornersmooth.model import Ints
 from cornersmooth.settings.limits import Limits
 from cornersmooth.system.processes import map_in_processes
 
-#: coarse cells, and one round
-ROUGHLY = Resolution(0.2, 0.8, fewest=10, curve=2, line=1, even=0.1, varied=0.25, rounds=0, gap=5e-3, rough=0.2)
 #: elements of a part, and around it at least and at most
 PART, BESIDE, MOST_BESIDE = 512, 16, 256
 #: parts that are planned at all at most, and standard error of the ratio with which no more are planned closely

@@ -29,3 +29,5 @@ class Resolution:
 PLAIN = Resolution()
 #: where more is limited than the way itself
 FINER = Resolution(part=0.03, growth=0.1)
+# coarse cells, and one round
+ROUGHLY = Resolution(0.2, 0.8, fewest=10, curve=2, line=1, even=0.1, varied=0.25, rounds=0, gap=5e-3, rough=0.2)

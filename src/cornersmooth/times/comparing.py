@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from cornersmooth import nc
 from cornersmooth.arrays.slices import some_poses
 from cornersmooth.errors import CornersmoothError, SettingsError
 from cornersmooth.feedrate import BlockLimits
+from cornersmooth.feedrate.resolution import ROUGHLY, Resolution
 from cornersmooth.kinematics import Machine, with_dynamics
 from cornersmooth.methods import CURVES_METHOD, DEFAULT_METHOD, PAPERS_METHOD
 from cornersmooth.model import Move, Program
@@ -28,6 +29,9 @@ MOST_POSES = 2000
 
 #: Times over the least that count as that: plans are 0.6 to 3 % above linear programmes (docs/feedrate.md).
 EQUAL = 1.03
+
+#: Most by which rough plans are too long: 0.9 to 5.1 % on the sample and the zigzag, in all forms.
+ROUGH = 0.06
 
 #: block time that leaves the number of lines to the chord tolerance, s
 _BY_CHORD = 1.0
@@ -64,6 +68,8 @@ class Row:
     tip: float | None = None
     axis_point: float | None = None
     limits: tuple[tuple[str, float], ...] = ()  #: What the program reaches the longest
+    about: bool = False  #: Whether the time is that of a rough plan, up to `ROUGH` too long
+    text: Any = field(default=b"", repr=False)  #: The program, where its time is rough
 
     @classmethod
     def of(cls, candidate: Candidate) -> Row:
@@ -71,6 +77,10 @@ class Row:
         form, settings = candidate.form, candidate.settings
         words = f"rotary words of {form.machine.name}" if form.rotary and form.machine is not None else "vectors"
         return cls(form.name, words, settings.method, candidate.lines, candidate.options, verdict="")
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values, without the program."""
+        return {name: value for name, value in asdict(self).items() if name != "text"}
 
     @property
     def usable(self) -> bool:
@@ -123,7 +133,7 @@ class Table:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values."""
-        rows = [asdict(row) | {"best": number == self.best} for number, row in enumerate(self.rows)]
+        rows = [row.as_dict() | {"best": number == self.best} for number, row in enumerate(self.rows)]
         return {
             "schema": "cornersmooth-compare/1",
             "unsmoothed_seconds": self.unsmoothed,
@@ -132,7 +142,7 @@ class Table:
             "law": self.law,
             "gains": self.gains,
             "rows": rows,
-        } | ({} if self.wider is None else {"twice_tolerance": asdict(self.wider)})
+        } | ({} if self.wider is None else {"twice_tolerance": self.wider.as_dict()})
 
 
 def candidates(control: Control, settings: Settings, machine: Machine | None) -> list[Candidate]:
@@ -206,14 +216,30 @@ def compare_programs(
     def work(candidate: Candidate) -> Row:
         return _row(part, candidate, unsmoothed, axes, blocks)
 
+    def closely(number: int) -> Row:
+        timing, row = _timing(part, tried[number], axes, blocks), table.rows[number]
+        assert timing is not None
+        return _planned(row, timing, row.text, part, unsmoothed)
+
     begun = Table(unsmoothed, against, len(part) / max(len(program), 1), law_of_lines(timing), ())
     table = with_rows(begun, tried, work, processes, watch)
+    leading = _leading(table.rows)
+    rows = dict(zip(leading, map_in_processes(closely, leading, _processes(processes)), strict=True))
+    table = replace(table, rows=tuple(rows.get(number, row) for number, row in enumerate(table.rows)))
     if not wider or table.best is None or tried[table.best].settings.tolerance > BOUNDS["tolerance"][1] / 2.0:
         return table
     best = tried[table.best]
-    return replace(
-        table, wider=work(replace(best, settings=best.settings.but(tolerance=2.0 * best.settings.tolerance)))
-    )
+    looser = replace(best, settings=best.settings.but(tolerance=2.0 * best.settings.tolerance))
+    return replace(table, wider=_row(part, looser, unsmoothed, axes, blocks, roughly=False))
+
+
+def _leading(rows: Sequence[Row]) -> list[int]:
+    """Rows of rough times that may be the best of all, or of those in lines."""
+    found = set[int]()
+    for some in ([*enumerate(rows)], [(number, row) for number, row in enumerate(rows) if row.lines]):
+        times = {number: row.seconds for number, row in some if row.usable and row.seconds is not None}
+        found |= {one for one, seconds in times.items() if seconds <= EQUAL * (1.0 + ROUGH) * min(times.values())}
+    return sorted(number for number in found if rows[number].about)
 
 
 def with_rows(
@@ -224,13 +250,16 @@ def with_rows(
     watch: Callable[[Table], None] | None,
 ) -> Table:
     """Add the row of every candidate, by as many processes as are useful where no number is given."""
-    count = (useful_processes() if processes is None else processes) if can_fork() else 1
     tell = watch or (lambda table: None)
     tell(table)
-    for row in map_in_processes(work, tried, count):
+    for row in map_in_processes(work, tried, _processes(processes)):
         table = replace(table, rows=(*table.rows, row))
         tell(table)
     return table
+
+
+def _processes(wanted: int | None) -> int:
+    return (useful_processes() if wanted is None else wanted) if can_fork() else 1
 
 
 def law_of_lines(timing: Timing) -> str:
@@ -258,32 +287,47 @@ def _middle(program: Program) -> Program:
 
 
 def _row(
-    program: Program, candidate: Candidate, unsmoothed: float, axes: Machine | None, blocks: BlockLimits | None
+    program: Program,
+    candidate: Candidate,
+    unsmoothed: float,
+    axes: Machine | None,
+    blocks: BlockLimits | None,
+    *,
+    roughly: bool = True,
 ) -> Row:
-    form, settings = candidate.form, candidate.settings
-    row = Row.of(candidate)
+    settings, row = candidate.settings, Row.of(candidate)
     try:
         stream = io.BytesIO()
-        result = postprocess(program, stream, settings, form=form, processes=1)
-        fitted = nc.fit_settings(settings, form, program.units)
-        timing = Timing.of(form, fitted, axes=axes, blocks=blocks)
-        found = result.verification
+        result = postprocess(program, stream, settings, form=candidate.form, processes=1)
+        timing, found = _timing(program, candidate, axes, blocks), result.verification
         if timing is None or found is None:
             return replace(row, verdict="no limits of axes are known")
-        seconds, limits = timing.written(stream.getvalue(), program)
+        row = replace(
+            row,
+            verdict=str(result.verdict),
+            blocks=result.written.blocks,
+            bytes=len(stream.getvalue()),
+            tip=found.max_tip_deviation_mm,
+            axis_point=None if settings.axis_tolerance is not None else found.max_axis_point_deviation_mm,
+        )
+        return _planned(row, timing, stream.getvalue(), program, unsmoothed, ROUGHLY if roughly else None)
     except CornersmoothError as failure:
-        return replace(row, verdict=getattr(failure, "what", str(failure)))
-    return replace(
-        row,
-        verdict=str(result.verdict),
-        blocks=result.written.blocks,
-        bytes=len(stream.getvalue()),
-        seconds=seconds,
-        saved=unsmoothed - seconds,
-        tip=found.max_tip_deviation_mm,
-        axis_point=None if settings.axis_tolerance is not None else found.max_axis_point_deviation_mm,
-        limits=limits,
-    )
+        return replace(Row.of(candidate), verdict=getattr(failure, "what", str(failure)))
+
+
+def _timing(program: Program, candidate: Candidate, axes: Machine | None, blocks: BlockLimits | None) -> Timing | None:
+    fitted = nc.fit_settings(candidate.settings, candidate.form, program.units)
+    return Timing.of(candidate.form, fitted, axes=axes, blocks=blocks)
+
+
+def _planned(
+    row: Row, timing: Timing, text: bytes, program: Program, unsmoothed: float, resolution: Resolution | None = None
+) -> Row:
+    """Row with the time of its program; the law of a control takes no rough plan."""
+    about = resolution is not None and not timing.form.table.lines.planner
+    seconds, limits = timing.written(text, program, resolution=resolution)
+    kept = text if about else b""
+    return replace(row, seconds=seconds, saved=unsmoothed - seconds, limits=limits, about=about, text=kept)
 
 
 def limits_machine(limits: Machine | None, machine: Machine | None) -> Machine | None:

@@ -15,6 +15,7 @@ from cornersmooth.feedrate.linuxcnc import axis_limits, line_times, program_line
 from cornersmooth.feedrate.machine_axes import follow
 from cornersmooth.feedrate.parts import time_of_parts
 from cornersmooth.feedrate.path import Path, build_path
+from cornersmooth.feedrate.resolution import Resolution
 from cornersmooth.feedrate.written import text_path
 from cornersmooth.kinematics import Machine, endless, tool_axis, with_dynamics
 from cornersmooth.model import Floats, Ints, Move, Program
@@ -58,11 +59,16 @@ class Timing:
         return cls(form, settings, limits or Limits(), machine, blocks or BlockLimits())
 
     def written(
-        self, text: bytes, program: Program, progress: Progress | None = None
+        self,
+        text: bytes,
+        program: Program,
+        progress: Progress | None = None,
+        resolution: Resolution | None = None,
     ) -> tuple[float, tuple[tuple[str, float], ...]]:
         """Time of a program from the first to the last pose it goes to, s, and the limits that are reached the longest.
 
         Its way from and to the retract is not counted: the CL file, which it was made of, does not have it.
+        `resolution` is as of `plan_text`.
         """
         if _linuxcnc(self.form):
             return self._on_linuxcnc(text, program), ()
@@ -73,6 +79,7 @@ class Timing:
             settings=self.settings,
             machine=self.machine,
             blocks=self.blocks,
+            resolution=resolution,
             progress=stage_of(progress, "planning as written"),
         )
         moves = law.path.program
