@@ -260,8 +260,8 @@ def _decoder(data: bytes) -> Decode:
     return lambda line: line.decode("utf-8")
 
 
-def _program(state: ReaderState, asked: Units | None) -> Program:
-    units, said = _units(state, asked)
+def _program(state: ReaderState, wanted: Units | None) -> Program:
+    units, unit_findings = _units(state, wanted)
     scale = MM_PER_UNIT[units]
     tip = state.tips()
     axis, axis_findings = state.axes()
@@ -293,7 +293,7 @@ def _program(state: ReaderState, asked: Units | None) -> Program:
         statements=tuple(state.statements),
         units=units,
         source=Source(state.file, "apt", state.dialect.name),
-        findings=(*said, *state.findings.values(), *axis_findings, *arc_findings, *along, *jumps),
+        findings=(*unit_findings, *state.findings.values(), *axis_findings, *arc_findings, *along, *jumps),
     )
 
 
@@ -308,25 +308,25 @@ def _fed_from_elsewhere(tip: Floats, kind: NDArray[np.uint8]) -> Ints:
     return np.flatnonzero(stated & feeds & away & (stands >= 0))
 
 
-def _units(state: ReaderState, asked: Units | None) -> tuple[Units, list[Finding]]:
-    """Units of the file: as asked for, as stated, as the feeds suggest, or as the dialect has them."""
+def _units(state: ReaderState, wanted: Units | None) -> tuple[Units, list[Finding]]:
+    """Units of the file: as wanted, as stated, as the feeds suggest, or as the dialect has them."""
     stated = state.stated_units
     guess, why = state.dialect.units, f"as usual for {state.dialect.name} files"
     if state.feed_units:
         guess, why = state.feed_units[0], "as in its feeds"
     before = stated[0][1] if stated and not stated[0][2] else guess
     for line, now, pose in stated:
-        if pose and now != before and not asked:
+        if pose and now != before and not wanted:
             raise error("CS116", state.file, line, word="UNITS", new=now, old=before)
         before = now
-    if asked:
-        other = [line for line, now, _ in stated if now != asked]
+    if wanted:
+        other = [line for line, now, _ in stated if now != wanted]
         if other:
-            text = {"stated": "inch" if asked == "mm" else "mm", "units": asked}
-            return asked, [finding("CS133", other[0], len(other), **text)]
-        if not stated and state.feed_units and asked not in state.feed_units:
-            return asked, [finding("CS180", 0, feeds=state.feed_units[0], units=asked)]
-        return asked, []
+            text = {"stated": "inch" if wanted == "mm" else "mm", "units": wanted}
+            return wanted, [finding("CS133", other[0], len(other), **text)]
+        if not stated and state.feed_units and wanted not in state.feed_units:
+            return wanted, [finding("CS180", 0, feeds=state.feed_units[0], units=wanted)]
+        return wanted, []
     if stated:
         return stated[-1][1], []
     return guess, [finding("CS132", 0, units=guess, why=why)]

@@ -102,8 +102,8 @@ def one_operation(program: Program, which: str) -> Program:
     statements = program.statements[own.first_statement : own.last_statement]
     first_move = own.first + int(np.argmax(program.kind[own.first : own.stop] != Move.FROM))
     at_once = [statement for statement in statements if statement.pose <= first_move]
-    held, unknown = _held(program.statements[: own.first_statement], at_once)
-    if any(statement.word == "CUTCOM" for statement in held):
+    lasting, unknown = _held(program.statements[: own.first_statement], at_once)
+    if any(statement.word == "CUTCOM" for statement in lasting):
         raise InputError(
             "CS169",
             f"operation {own.called} begins under cutter compensation",
@@ -127,7 +127,7 @@ def one_operation(program: Program, which: str) -> Program:
     return replace(
         some_poses(program, own.first, own.stop),
         statements=tuple(
-            replace(statement, pose=max(statement.pose - own.first, 0)) for statement in (*held, *statements)
+            replace(statement, pose=max(statement.pose - own.first, 0)) for statement in (*lasting, *statements)
         ),
         findings=tuple(findings),
         source=replace(program.source, operation=own.number, operation_name=own.name),
@@ -211,7 +211,7 @@ def _chosen(program: Program, operations: Sequence[Operation], which: str) -> Op
 def _held(before: Sequence[Statement], at_once: Sequence[Statement]) -> tuple[list[Statement], list[Statement]]:
     """Statements that hold on where an operation begins, in order, and those of which nobody knows whether they do.
 
-    What the operation says itself before its first move, `at_once`, takes the place of what held.
+    What the operation says itself before its first move, `at_once`, takes the place of what was in force.
     """
     last: dict[str, int] = {}
     spindle: list[int] = []
@@ -228,13 +228,13 @@ def _held(before: Sequence[Statement], at_once: Sequence[Statement]) -> tuple[li
             coolant = [] if _switches_off(statement) else [*coolant, number]
         elif statement.word not in _PASSING:
             unknown.append(statement)
-    said = {_LASTING[statement.word] for statement in at_once if statement.word in _LASTING}
+    replaced = {_LASTING[statement.word] for statement in at_once if statement.word in _LASTING}
     again = [statement for statement in at_once if statement.word == "SPINDL"]
     cooled = [statement.args for statement in at_once if statement.word == "COOLNT"]
-    kept = [number for key, number in last.items() if key not in said and not _switches_off(before[number])]
+    kept = [number for key, number in last.items() if key not in replaced and not _switches_off(before[number])]
     if not ((again and _starts(again[0])) or (off and not again)):
         kept += spindle
-    kept += [number for number in coolant if not (cooled and "tool" in said) and before[number].args not in cooled]
+    kept += [number for number in coolant if not (cooled and "tool" in replaced) and before[number].args not in cooled]
     return [before[number] for number in sorted(kept)], unknown
 
 

@@ -244,11 +244,11 @@ def _over(
 
 def _distances(rows: _Rows, distance: Floats) -> list[Finding]:
     mean, low, high = float(distance.mean()), float(distance.min()), float(distance.max())
-    said = [finding("CS171", 0, mean=mean)]
+    findings = [finding("CS171", 0, mean=mean)]
     if high - low > DISTANCE_SPREAD * mean:
         farthest = np.abs(distance - mean)
-        said.append(finding("CS172", rows.at(farthest == farthest.max()), low=low, high=high))
-    return said
+        findings.append(finding("CS172", rows.at(farthest == farthest.max()), low=low, high=high))
+    return findings
 
 
 def _feed(rows: _Rows, kind: NDArray[np.uint8], lenient: bool) -> tuple[Floats, list[Finding]]:
@@ -259,12 +259,12 @@ def _feed(rows: _Rows, kind: NDArray[np.uint8], lenient: bool) -> tuple[Floats, 
     if rows.columns.rapid is not None:
         feed[kind == Move.RAPID] = np.nan
     wrong = feed <= 0
-    said = []
+    findings = []
     if wrong.any():
         value = float(feed[wrong.argmax()])
         if not lenient:
             raise error("CS158", rows.file, rows.at(wrong), feed=value)
-        said.append(finding("CS175", rows.at(wrong), int(wrong.sum()), feed=value))
+        findings.append(finding("CS175", rows.at(wrong), int(wrong.sum()), feed=value))
     given = np.where(np.isnan(feed) | wrong, -1, np.arange(len(feed)))
     last = np.maximum.accumulate(given)
-    return np.where(last >= 0, feed[last], np.nan), said
+    return np.where(last >= 0, feed[last], np.nan), findings

@@ -135,11 +135,11 @@ def _flags(read: tuple[Floats, Ints] | None, columns: Columns) -> tuple[Floats, 
     """Rows with `RAPID` or `FED` in the column of rapids; None where its numbers do not say."""
     if read is None or columns.rapid is None:
         return read
-    said = read[0][:, columns.rapid]
-    if columns.rapid_as == "word" or not np.isin(said, (0.0, 1.0)).all():
+    rapids = read[0][:, columns.rapid]
+    if columns.rapid_as == "word" or not np.isin(rapids, (0.0, 1.0)).all():
         return None
     if columns.rapid_as == "flag":
-        said[:] = 1.0 - said
+        rapids[:] = 1.0 - rapids
     return read
 
 

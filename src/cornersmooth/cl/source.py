@@ -24,7 +24,7 @@ LARGEST: Final = 2 << 30
 _LARGEST_RATIO: Final = 200
 _ALWAYS: Final = 1 << 26
 
-#: bytes that are read at once: Python sets memory aside for all that it is asked for, which Windows takes from others
+#: bytes that are read at once: Python sets memory aside for all that a call may read, which Windows takes from others
 _PIECE: Final = 16 << 20
 
 #: DOS end of file, still written by old posts
@@ -113,7 +113,7 @@ def without_card_columns(data: bytes, file: str) -> tuple[bytes, str | None]:
     """Return a text without what stands beside its statements, and the code of the note about it.
 
     Punched cards and listings have numbers in columns 73 to 80, or in front. They are cut where every line has them and
-    they ascend; where only some lines have them they cannot be told from the statement (InputError CS189).
+    they ascend; where only some lines have them they cannot be distinguished from the statement (InputError CS189).
     """
     head = data[: data.find(b"\n") + 1]
     if _IN_FRONT.match(head) and (cut := _without_front(data.split(b"\n"))) is not None:

@@ -1,11 +1,11 @@
-"""The fastest profiles under the limits of quantities, and which of these are held where.
+"""The fastest profiles under the limits of quantities, and which of these are kept where.
 
 Rows of the problem hold the limits of some quantities at the ends and the middle of each cell: those that come nearest
 to their limits there. All quantities are then measured, at the quarters of cells too. Where a plan is beyond a limit,
-one more quantity is held, limits of that cell are made stricter by as much, and the cells around it are planned again
+one more quantity is kept, limits of that cell are made stricter by as much, and the cells around it are planned again
 (an exchange method for semi-infinite programmes: Hettich and Kortanek 1993). What is still beyond after the last round
 is slowed down run by run, so that every plan keeps every limit. The first profile is that of a problem of the way
-alone, under limits that let quantities all but keep theirs.
+alone, under limits that let quantities nearly keep their own.
 
 Long runs are solved window by window, so that the time is linear in the length of the program and the working memory is
 bounded. A window ends with a crawl that can be kept up over all that follows, so there always is a way on; of its
@@ -30,7 +30,7 @@ from cornersmooth.model import Floats, Ints
 
 #: limits solved together, cells times rows: the arrays of one window stay in the processor's cache
 WINDOW = 50_000
-#: quantities that are held in the first round, and cells around that count when they are chosen
+#: quantities that are kept in the first round, and cells around that count when they are chosen
 _HELD, _NEAR = 2, 5
 #: how much stricter than seen limits are made
 _STRICTER = 1.003
@@ -64,9 +64,9 @@ def fastest(
     solve_runs(batch, grid, c, gap=resolution.rough, most=_STEPS)
     most, stricter, first, last = _used(batch, c, grid, derivatives, bounds), np.ones(len(c)), grid.first, grid.last
     for number in range(max(resolution.rounds, 1)):
-        held = np.argsort(-maximum_filter1d(most, _NEAR, axis=1), axis=0)[: _HELD + number]
+        holding = np.argsort(-maximum_filter1d(most, _NEAR, axis=1), axis=0)[: _HELD + number]
         own = (
-            np.take_along_axis(part, held[index], axis=1)
+            np.take_along_axis(part, holding[index], axis=1)
             for part, index in ((derivatives, np.s_[None, ..., None]), (bounds, np.s_[None]))
         )
         batch = problem_of(grid, next(own), _USED * next(own)).tightened(stricter)
@@ -82,7 +82,7 @@ def fastest(
         if not len(beyond):
             break
         most = np.maximum(most, used)
-        of_held = np.take_along_axis(used, held, axis=0).max(axis=0) / _USED
+        of_held = np.take_along_axis(used, holding, axis=0).max(axis=0) / _USED
         stricter = stricter * np.where(of_held > 1.0, _STRICTER * of_held, 1.0)
         first, last = _around(beyond, batch, grid)
     return batch, _within(c, share, grid)

@@ -129,14 +129,14 @@ def path_limits(
 ) -> Intervals:
     """Limits of speed, and what else is limited."""
     quantities = Quantities.of(path, machine_axes)
-    asked = _curved(path, limits.centripetal_accel) | quantities.counts.any(axis=0)
+    divisible = _curved(path, limits.centripetal_accel) | quantities.counts.any(axis=0)
     joined = np.flatnonzero(np.isfinite(path.junction_speed[:-1]) & (path.junction_speed[:-1] > 0.0))
-    whole = np.flatnonzero(~asked)
+    whole = np.flatnonzero(~divisible)
     fastest = path.speed**2
     arc = np.flatnonzero((path.kind == Kind.ARC) & ~path.turning)
     kappa = curvature(arc_series(path.program, path.move[arc], 0.0))
     fastest[arc] = np.minimum(fastest[arc], limits.centripetal_accel / kappa)
-    parts = _divided(quantities, asked, fastest, limits.centripetal_accel, resolution)
+    parts = _divided(quantities, divisible, fastest, limits.centripetal_accel, resolution)
     for element, high, width, cap, agile in (
         (whole, 1.0, path.length[whole], fastest[whole], np.inf),
         (joined, 0.0, 0.0, path.junction_speed[joined] ** 2, 0.0),  # the junction before each element
@@ -158,12 +158,12 @@ def path_limits(
 
 
 def _divided(
-    quantities: Quantities, asked: Bools, fastest: Floats, centripetal: float, resolution: Resolution
+    quantities: Quantities, divisible: Bools, fastest: Floats, centripetal: float, resolution: Resolution
 ) -> list[Floats]:
-    """Intervals of the elements that are asked for: element, low, high, width, middle, cap, agile (7, p) of each."""
+    """Intervals of the elements that may be divided: element, low, high, width, middle, cap, agile (7, p) of each."""
     path, start = quantities.path, []
     for bent in (False, True):
-        element = np.flatnonzero(asked & (path.bent == bent))
+        element = np.flatnonzero(divisible & (path.bent == bent))
         borders = np.tile(np.linspace(0.0, 1.0, (resolution.curve if bent else resolution.line) + 1), (len(element), 1))
         if bent and not len(quantities):
             borders = rational_curves.interval_borders(path.curves.half[path.row[element]])

@@ -56,8 +56,8 @@ def time_of_parts(
     accel, jerk = np.array(limits.accel), np.array(limits.jerk)
     brake = 2.0 * float(stopping_distance(path.speed.max(keepdims=True), accel, jerk)[0])
 
-    def work(asked: tuple[int, bool]) -> tuple[float, list[tuple[str, float]]]:
-        number, closely = asked
+    def work(item: tuple[int, bool]) -> tuple[float, list[tuple[str, float]]]:
+        number, closely = item
         begin, end = int(border[number]), int(border[number + 1])
         low, high = np.searchsorted(edge, (edge[begin] - brake, edge[end] + brake)).tolist()
         low = max(0, begin - min(max(begin - low, BESIDE), MOST_BESIDE))

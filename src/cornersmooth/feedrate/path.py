@@ -288,8 +288,8 @@ def _junction_speeds(
         return speeds
     feeding = (program.kind[moves] == Move.LINEAR) | (program.kind[moves] == Move.ARC)
     # a statement that acts may be anywhere between the end of the last move and the end of this one
-    told = np.concatenate(([0], np.cumsum(program.acted)))
-    quiet = told[moves[1:] + 1] == told[moves[:-1] + 1]
+    acts = np.concatenate(([0], np.cumsum(program.acted)))
+    quiet = acts[moves[1:] + 1] == acts[moves[:-1] + 1]
     joined = feeding[1:] & feeding[:-1] & quiet
     if corners is not None:
         reversal = np.zeros(len(program), np.bool_)

@@ -43,7 +43,7 @@ class RotaryPath:
     """Rotary words of n poses."""
 
     angles: Floats  #: (n, 2), degrees; in the order of `Machine.axes`, unwrapped but for rewinds in rapids
-    #: (n,), degrees; angle between the axis that the angles give and the one asked for: within the tolerance, 0 but at
+    #: (n,), degrees; angle between the axis that the angles give and the given one: within the tolerance, 0 but at
     #: the pole
     deviation: Floats
     branch: NDArray[np.int8]  #: (n,) which of `Solutions.angles` they are, -1 at the pole

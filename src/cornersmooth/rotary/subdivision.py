@@ -177,7 +177,7 @@ class RuledMotion:
     max_step: float | None
 
     def segments(self, angles: Floats, segment: Ints, *, branches: bool) -> Intervals:
-        """Whole segments, if asked for with the branches of their ends: -1 in the cone of the pole."""
+        """Whole segments, on request with the branches of their ends: -1 in the cone of the pole."""
         branch = np.full((2, len(segment)), -1)
         for side, pose in enumerate((segment, segment + 1) if branches else ()):
             found = solutions(self.machine, self.axis[pose])

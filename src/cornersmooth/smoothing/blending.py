@@ -96,16 +96,16 @@ def largest_blends(rows: Vertices, kept: Ints, limits: LineLimits, most: float, 
     enough = np.minimum(corners.half[:, 0] * corners.bend / _REACH, most)  # more makes no difference
     enough[~moving] = 0.0
     found = np.full(len(moving), most)
-    asked = np.flatnonzero(moving)
+    open_rows = np.flatnonzero(moving)
     for _ in range(_ROUNDS):
-        off = _deviation(rows, limits, some_rows(corners, asked), found[asked])
+        off = _deviation(rows, limits, some_rows(corners, open_rows), found[open_rows])
         far = off > deviation
-        asked = asked[far]
-        if not len(asked):
+        open_rows = open_rows[far]
+        if not len(open_rows):
             break
-        found[asked] = np.minimum(found[asked], enough[asked]) * (_SURELY * deviation / off[far])
+        found[open_rows] = np.minimum(found[open_rows], enough[open_rows]) * (_SURELY * deviation / off[far])
     least = _LEAST * most
-    found[asked] = least
+    found[open_rows] = least
     found = np.maximum(most * _STEP ** np.floor(np.log(np.maximum(found, least) / most) / np.log(_STEP) + 1e-9), least)
     found = np.where(moving, _carried(found, enough), limits.blend)
     blends[1:-1] = np.where(rows.fixed[kept[1:-1]], np.minimum(found, limits.blend), found)

@@ -192,9 +192,9 @@ class _Search:
         """Try lines or arcs from some vertices to others."""
         found = _Found.none(len(at))
         for which, attempt in ((_LINE, self._lines), (_ARC, self._arcs)):
-            asked = np.flatnonzero(kind == which)
-            size = np.cumsum(end[asked] - at[asked])
-            for part in np.split(asked, np.searchsorted(size, np.arange(_TOGETHER, size[-1:].sum(), _TOGETHER))):
+            rows = np.flatnonzero(kind == which)
+            size = np.cumsum(end[rows] - at[rows])
+            for part in np.split(rows, np.searchsorted(size, np.arange(_TOGETHER, size[-1:].sum(), _TOGETHER))):
                 if len(part):
                     found.put(part, attempt(at[part], end[part], enters[part]))
         return found

@@ -70,7 +70,7 @@ class LineLimits:
 def segments_of_rows(move: Ints, begin: int, end: int) -> tuple[Ints, Bools]:
     """Pose that the segment of each row starts from, -1 before the first, and whether it is the last row of its move.
 
-    `move` (n,) is that of all rows; the rows from `begin` to `end` are asked for.
+    `move` (n,) is that of all rows; the rows from `begin` to `end` are chosen.
     """
     end = min(end, len(move))
     before = max(int(np.searchsorted(move, move[begin])) - 1, 0)  # last row of the move before
@@ -125,13 +125,13 @@ def _fixed(smoothed: SmoothProgram, move: Ints, at_pose: Bools) -> Bools:
     exact[corners.pose[np.isin(corners.status, Status.having(Trait.PASSED_BY))]] = False
     spoken = np.zeros(n + 1, np.int64)
     np.add.at(spoken, [min(statement.pose, n) for statement in program.statements], 1)
-    said = np.concatenate(([0], np.cumsum(spoken)))  # statements before pose i stand in said[i + 1]
+    statements_before = np.concatenate(([0], np.cumsum(spoken)))  # row i + 1: those before pose i
     after = np.append(move[1:], move[-1:])
     fixed = (program.kind[move] != Move.LINEAR) | (program.kind[after] != Move.LINEAR)
     feed, next_feed = program.feed[move], program.feed[after]
     changed = (feed != next_feed) & ~(np.isnan(feed) & np.isnan(next_feed))
     changed |= program.feed_mode[move] != program.feed_mode[after]
-    fixed |= changed | (at_pose & (exact[move] | (said[after + 1] > said[move + 1])))
+    fixed |= changed | (at_pose & (exact[move] | (statements_before[after + 1] > statements_before[move + 1])))
     fixed[:1] = fixed[-1:] = True
     return fixed
 
@@ -202,9 +202,9 @@ def _reaches(rows: Vertices, limits: LineLimits, start: Ints, end: Ints) -> Bool
     """(q,) bool: whether lines from some rows to others keep the limits."""
     good = np.abs(rows.words[end] - rows.words[start]).max(axis=1) <= limits.turn
     good |= end == start + 1
-    asked = np.flatnonzero(good & (end > start + 1))
-    between = np.cumsum(end[asked] - start[asked] - 1)
-    for part in np.split(asked, np.searchsorted(between, np.arange(_TOGETHER, between[-1:].sum(), _TOGETHER))):
+    long_enough = np.flatnonzero(good & (end > start + 1))
+    between = np.cumsum(end[long_enough] - start[long_enough] - 1)
+    for part in np.split(long_enough, np.searchsorted(between, np.arange(_TOGETHER, between[-1:].sum(), _TOGETHER))):
         if len(part):
             good[part] = _keeps(rows, limits, start[part], end[part])
     return good

@@ -51,7 +51,7 @@ def keep(length: Floats, rows: Ints, measure: Callable[[Floats, Ints], Floats], 
     return length[rows]
 
 
-class Wanted:
+class CornerLengths:
     """What g corners ask for, and how far transitions are from the original motion as functions of their length, mm.
 
     Methods take the lengths of all corners, or of some with their rows.
@@ -124,7 +124,7 @@ class Wanted:
         return largest
 
 
-def _largest_in_the_middle(asked: Wanted, length: Floats, turned: Floats) -> NDArray[np.bool_]:
+def _largest_in_the_middle(lengths: CornerLengths, length: Floats, turned: Floats) -> NDArray[np.bool_]:
     """Rows whose deviation at constant H is surely largest at u = ½; `turned` is (Q−P)−(B−A) there, mm.
 
     The deviation where the original motion is at σ, as in `cornersmooth.geometry.nurbs`, is at most f(σ)·(E + G·σ),
@@ -132,12 +132,12 @@ def _largest_in_the_middle(asked: Wanted, length: Floats, turned: Floats) -> NDA
     while f·(1 + σ·G/E) ≤ 1. With all weights 1, f is (1−σ)³ and G may be up to 3E; with any other
     weights f is convex and falls from 1 to 0, so it is at most 1−σ and G may be up to E.
     """
-    legs = asked.legs
-    turn = np.maximum(norm(legs.turn_in) * (1.0 / asked.length_in), norm(legs.turn_out) * (1.0 / asked.length_out))
-    turn *= length / asked.axis_length
-    paper = asked.settings.weights == (1.0, 1.0)
+    legs = lengths.legs
+    turn = np.maximum(norm(legs.turn_in) * (1.0 / lengths.length_in), norm(legs.turn_out) * (1.0 / lengths.length_out))
+    turn *= length / lengths.axis_length
+    paper = lengths.settings.weights == (1.0, 1.0)
     tilt = 2.0 * turn * turned
-    return (tilt <= (_TILT_PAPER if paper else _TILT_ANY) * asked.middle(length)) & (turn < 0.5)
+    return (tilt <= (_TILT_PAPER if paper else _TILT_ANY) * lengths.middle(length)) & (turn < 0.5)
 
 
 class Proportional(Construction):
@@ -145,22 +145,22 @@ class Proportional(Construction):
 
     def place(self, legs: Legs, settings: Settings) -> Placed:
         """Give every corner the length that the tolerances and its segments allow: half of the shorter one at most."""
-        asked = Wanted(legs, settings)
-        room, status, per_tip, per_turn = asked.room, asked.status, asked.per_tip, asked.per_turn
-        limited_by = np.where(asked.by_tolerance <= room, LimitedBy.TOLERANCE, LimitedBy.SEGMENT).astype(np.uint8)
-        length = np.minimum(room, asked.by_tolerance)
+        lengths = CornerLengths(legs, settings)
+        room, status, per_tip, per_turn = lengths.room, lengths.status, lengths.per_tip, lengths.per_turn
+        limited_by = np.where(lengths.by_tolerance <= room, LimitedBy.TOLERANCE, LimitedBy.SEGMENT).astype(np.uint8)
+        length = np.minimum(room, lengths.by_tolerance)
 
         # The construction runs on chords of the sphere, the tolerance is about b = tip + H·axis at constant H.
         # The bound |b′−b| ≤ |A′−A| + H|O′−O| proves most corners; the others are shortened until they keep it.
         axis_length, allowed = settings.axis_length, settings.axis_point_tolerance + legs.spare(settings)
-        shortest_lever = axis_length * asked.half_cosine - length * per_turn  # below |B−A| of both motions
+        shortest_lever = axis_length * lengths.half_cosine - length * per_turn  # below |B−A| of both motions
         bound = length * (per_tip + divide(axis_length * per_turn, np.maximum(shortest_lever, 0.0)))
         doubtful = (status == Status.SMOOTHED) & (bound > allowed * (1.0 + EXACT))
-        peaks = _largest_in_the_middle(asked, length, length * per_turn)
+        peaks = _largest_in_the_middle(lengths, length, length * per_turn)
         probed = np.flatnonzero(doubtful & ~peaks)
         for rows, measure, share in (
-            (np.flatnonzero(doubtful & peaks), asked.middle, 1.0),
-            (probed, asked.probe, 1.0 - BETWEEN_PROBES),
+            (np.flatnonzero(doubtful & peaks), lengths.middle, 1.0),
+            (probed, lengths.probe, 1.0 - BETWEEN_PROBES),
         ):
             shortened = keep(length, rows, measure, share * allowed)
             limited_by[rows[shortened < length[rows]]] = LimitedBy.TOLERANCE
@@ -169,10 +169,10 @@ class Proportional(Construction):
 
         sharp = status != Status.SMOOTHED
         length[sharp], limited_by[sharp] = 0.0, LimitedBy.NOTHING
-        axis_error = asked.middle(length)
-        axis_error[probed] = np.maximum(axis_error[probed], asked.probe(length[probed], probed))
-        trims = length / asked.length_in, length / asked.length_out
-        return Placed(status, limited_by, *trims, *trims, per_tip * length, axis_error, asked.middle_turn(length))
+        axis_error = lengths.middle(length)
+        axis_error[probed] = np.maximum(axis_error[probed], lengths.probe(length[probed], probed))
+        trims = length / lengths.length_in, length / lengths.length_out
+        return Placed(status, limited_by, *trims, *trims, per_tip * length, axis_error, lengths.middle_turn(length))
 
     def points(self, smoothed: SmoothProgram, rows: Ints, u: Floats) -> tuple[Floats, Floats]:
         """Both curves at the same parameters."""

@@ -14,7 +14,7 @@ from cornersmooth.arrays.vectors import angle_between
 from cornersmooth.geometry.arcs import arc_tangents
 from cornersmooth.model import Floats, Ints, Move, Program, SmoothProgram, Status, Trait
 from cornersmooth.smoothing.construction import BATCH, STRAIGHT_ON, legs_at
-from cornersmooth.smoothing.proportional import Wanted
+from cornersmooth.smoothing.proportional import CornerLengths
 
 
 def sharp_rows(smoothed: SmoothProgram) -> Ints:
@@ -29,7 +29,7 @@ def sharp_rows(smoothed: SmoothProgram) -> Ints:
     straight = [np.zeros(0, np.bool_)]
     for part in np.split(known, np.arange(BATCH, len(known), BATCH)):
         legs = legs_at(program, settings.axis_length, corners.pose[part], corners.before[part], corners.after[part])
-        measured = Wanted(legs, settings)
+        measured = CornerLengths(legs, settings)
         straight.append(measured.status == Status.STRAIGHT)
     turns[turns] = ~np.concatenate(straight)
     return rows[turns]

@@ -172,8 +172,8 @@ def solve_blocks(bands: Floats, right: Floats, coupled: Floats) -> Floats:
     """
     bands *= coupled[:, :, None]
     bands[:, 0, :3] += 1.0 - coupled[:, :1]
-    held = np.ascontiguousarray((right * coupled[:, 0]).T).reshape(-1, 1)
-    return np.ascontiguousarray(_cholesky(lambda: _lower(bands), held).reshape(-1, 3).T)
+    kept = np.ascontiguousarray((right * coupled[:, 0]).T).reshape(-1, 1)
+    return np.ascontiguousarray(_cholesky(lambda: _lower(bands), kept).reshape(-1, 3).T)
 
 
 def _lower(bands: Floats) -> Floats:
