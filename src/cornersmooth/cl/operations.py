@@ -80,7 +80,7 @@ def find_operations(program: Program) -> tuple[Operation, ...]:
         for statement in statements[taken:end]:
             if statement.pose > first_move:
                 break
-            asking.take(statement, float(statement.pose))
+            asking.take(statement, statement.pose)
             taken += 1
         lines = [*(one.line for one in statements[start:end]), *program.line[[first, stop - 1]].tolist()]
         tool = int(asking.tool) if asking.tool >= 0 else None

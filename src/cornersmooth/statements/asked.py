@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -13,7 +12,7 @@ import numpy as np
 
 from cornersmooth.model import Ints, Move, Program, Statement
 from cornersmooth.nc_reader.word_tables import Means
-from cornersmooth.statements.tokens import PAUSES, SPEED_DECIMALS, Token, of_m
+from cornersmooth.statements.tokens import SPEED_DECIMALS, Token, of_m
 from cornersmooth.statements.work_offsets import work_offset_of
 
 #: cutting speeds in mm per minute
@@ -68,9 +67,9 @@ class Asking:
         self.tokens: list[Token] = []
         self.not_understood: list[Statement] = []  #: nothing is compared with them
         self.in_part: list[Statement] = []  #: what is understood of them is compared
-        self.place, self.line, self.moment = 0.0, 0, 0
+        self.place, self.line = 0, 0
         self.running, self.speed, self.diameter = "CLW", 0.0, 0.0
-        self.tool, self.offset, self.offset_at = -1.0, 1.0, (-1, 0)
+        self.tool, self.offset = -1.0, 1.0
         said = {statement.word for statement in program.statements}
         sides = [one for one in program.statements if one.word == "CUTCOM"]
         #: CUTCOM/ON right before that with a side, as Autodesk's CAMplete post writes it
@@ -110,23 +109,20 @@ class Asking:
         """(m,) poses that are moved to."""
         return np.flatnonzero(self.program.kind != Move.FROM)
 
-    def take(self, statement: Statement, place: float) -> None:
+    def take(self, statement: Statement, place: int) -> None:
         """Note one statement."""
         if statement.word in NOTHING and not turns(statement):
             return
         handler = self.handlers.get(statement.word)
         numbers = [value for value in statement.args if isinstance(value, float)]
         words = [value for value in statement.args if isinstance(value, str) and value]
-        if place != self.place:
-            self.moment += 1
         self.place, self.line = place, statement.line
         if handler is None or turns(statement) or not handler(words, numbers, statement):
             self.not_understood.append(statement)
 
     def say(self, kind: str, value: float | str) -> None:
         """Note a token."""
-        self.tokens.append(Token(kind, value, self.place, self.line, moment=self.moment))
-        self.moment += kind in PAUSES
+        self.tokens.append(Token(kind, value, self.place, self.line))
 
     def load(self, words: list[str], numbers: list[float], statement: Statement) -> bool:
         """Change the tool; ADJUST or OSETNO, or the last number of Autodesk's, names another length register."""
@@ -151,9 +147,7 @@ class Asking:
         offset = next((number for number in registers if number is not None), numbers[0])
         self.tool, self.offset = numbers[0], offset if _whole(offset) else numbers[0]
         self.say("tool", self.tool)
-        self.idle_from(statement.pose)
         self.say("offset", self.offset)
-        self.offset_at = len(self.tokens) - 1, statement.pose
         # CATIA: LOADTL/tool,correction, where 1 is the first one of the tool (NC Manufacturing, NC_COMPENSATION)
         first = numbers[1:] in ([], [1.0], numbers[:1])
         return _whole(offset) and (statement.word == "TOOLNO" or (first and not rest))
@@ -161,12 +155,6 @@ class Asking:
     def toolno(self, words: list[str], numbers: list[float], statement: Statement) -> bool:
         """Describe the tool that another statement loads; load it where there is no such statement."""
         return not self.loads_alone or self.load(words, numbers, statement)
-
-    def idle_from(self, pose: int) -> None:
-        """Let the last offset be optional if nothing moves with its tool before a pose."""
-        at, loaded = self.offset_at
-        if at >= 0 and np.searchsorted(self.moving, loaded) == np.searchsorted(self.moving, pose):
-            self.tokens[at] = replace(self.tokens[at], optional=True)
 
     def select(self, words: list[str], numbers: list[float], statement: Statement) -> bool:
         """Bring the next tool near."""
@@ -297,7 +285,7 @@ def statements_not_understood(program: Program, *, at_all: bool = False) -> list
     """CL statements that are not understood: neither compared, nor words that ask for nothing; or only in part."""
     asking = Asking(program)
     for statement in program.statements:
-        asking.take(statement, float(statement.pose))
+        asking.take(statement, statement.pose)
     wholly = asking.not_understood
     both = {id(statement): statement for statement in (*wholly, *asking.in_part)}
     return wholly if at_all else sorted(both.values(), key=lambda statement: statement.line)
@@ -311,31 +299,23 @@ def not_understood_text(program: Program) -> str:
     return f"not understood: {', '.join(named)}{more}" if found else ""
 
 
-def asked(
-    program: Program,
-    places: Sequence[float],
-    end: float,
-    means: Means,
-    dwells: Sequence[Token] = (),
-) -> list[Token]:
+def asked(program: Program, places: Sequence[int], end: int, means: Means) -> list[Token]:
     """What the CL statements ask for.
 
     Parameters
     ----------
-    places : sequence of float, mm
-        Of the statements, along the path, whose length is `end`.
+    places : sequence of int
+        The moves that the statements stand before, of which there are `end`.
     means : mapping
         What words of the control say, as of `means_of`.
-    dwells : sequence of Token
-        What the cycles of holes ask for, in order.
     """
-    asking = Asking(program, means)
+    asking, homes = Asking(program, means), list[Token]()
     for statement, place in zip(program.statements, places, strict=True):
         asking.take(statement, place)
-    asking.idle_from(len(program.kind))
+        if statement.word == "GOHOME" and not statement.args and place not in [one.place for one in homes[-1:]]:
+            homes.append(Token("home", "", place, statement.line))
     line = max((item.line for item in program.statements if item.word in ("FINI", "END")), default=0)
-    tokens = sorted([*dwells, *asking.tokens], key=lambda token: (token.place, token.line)) if dwells else asking.tokens
-    return [*tokens, Token("end", "", end, line)]
+    return [*sorted([*asking.tokens, *homes], key=lambda token: token.place), Token("end", "", end, line)]
 
 
 def _behind(statement: Statement, word: str) -> float | None:

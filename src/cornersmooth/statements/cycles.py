@@ -178,7 +178,7 @@ def drillings(program: Program, poses: list[int]) -> list[Drilling]:
         while k < len(cycles) and cycles[k].pose <= pose:
             words = [value for value in cycles[k].args if isinstance(value, str) and value]
             if cycles[k].word != "CYCLE":
-                asking.take(cycles[k], 0.0)
+                asking.take(cycles[k], 0)
             elif words != ["INIT"]:
                 on = words[:1] not in (["OFF"], ["NOMORE"])
                 args = _goes_on(args, cycles[k].args, fixed=fixed) if on else args

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 from cornersmooth.nc_reader.elements import Event
 from cornersmooth.nc_reader.word_tables import Means
@@ -21,34 +20,14 @@ class Token:
     """One change of state, or one action."""
 
     #: ``"tool"``, ``"spindle"``, ``"speed"``, ``"coolant"``, ``"compensation"``, ``"stop"``, ``"dwell"``, ``"tap"``,
-    #: ``"end"``
+    #: ``"home"``, ``"end"``
     kind: str
     value: float | str  #: a number; or the word of the CL file that says the same: ``"FLOOD"``, ``"OFF"``
-    place: float  #: mm: path length from the start of the original motion
+    place: int  #: the move of the CL file, or the element of the program, that it is said before
     line: int  #: CL or NC line
-    #: mm: how far the place is uncertain beyond what printed digits account for: rotary words near the pole
-    room: float = 0.0
-    #: tokens of one moment have no motion, stop or dwell between them: of a state only the last one counts
-    moment: int = 0
-    #: whether it may be missing: an optional stop right before another tool, the offset of a tool that never moves
+    #: of an action: whether it may be missing in the other file, as an optional stop of the post before another tool
     optional: bool = False
-    others: tuple[float, ...] = ()  #: mm: other places that it may have, where the path goes to and fro
-    #: mm: how much farther along it may be, too: what the CL file has there leaves nothing in the text
-    reach: float = 0.0
-    element: int = -1  #: element of the text that it stands before; -1 in the CL file
 
-
-class Place(NamedTuple):
-    """Where a word of the program is, as in `Token`."""
-
-    at: float
-    room: float = 0.0
-    reach: float = 0.0
-    others: tuple[float, ...] = ()
-
-
-#: kinds during which a state matters although nothing moves
-PAUSES = ("stop", "dwell")
 
 #: what G words mean that the reader says for all controls
 _CODES: dict[float, tuple[str, float | str]] = {
@@ -61,7 +40,8 @@ _CODES: dict[float, tuple[str, float | str]] = {
 #: what posts write before another tool on their own
 _BEFORE_TOOLS = (("stop", "OPSTOP"), ("spindle", "ORIENT"))
 
-_ENDINGS = ("OFF", "ORIENT")
+#: what a spindle does that does not turn
+ENDINGS = ("OFF", "ORIENT")
 
 #: word that takes another tool
 _CHANGE = ("M", 6.0)
@@ -72,30 +52,26 @@ def of_m(value: float, means: Means) -> tuple[str, float | str]:
     return means.get(f"M{value:g}", ("auxiliary", value))
 
 
-def said(events: Sequence[Event], places: Sequence[Place], means: Means) -> list[Token]:
-    """What the words of the NC program do, each at its place; `means` as of `means_of`."""
+def said(events: Sequence[Event], means: Means) -> list[Token]:
+    """What the words of the NC program do, each before its element; `means` as of `means_of`."""
     tokens: list[Token] = []
     chosen: float | None = None
-    moment = element = 0
     words = [(event.letter, event.value) for event in events]
-    elements = [event.element for event in events]
-    changes = frozenset(words) & {_CHANGE}
-    ends = [word == _CHANGE or (word[0] == "M" and of_m(word[1], means)[0] == "end") for word in words]
+    changes = _CHANGE in words
     # R0 of M91, and what ends with the tool
-    idle = [word == ("G", 40.0) or (word[0] == "M" and of_m(word[1], means)[1] in _ENDINGS) for word in words]
-    for k, (event, place) in enumerate(zip(events, places, strict=True)):
-        letter, value = words[k]
-        moment, element = moment + (event.element != element), event.element
+    idle = [word == ("G", 40.0) or (word[0] == "M" and of_m(word[1], means)[1] in ENDINGS) for word in words]
+    for k, (event, word) in enumerate(zip(events, words, strict=True)):
+        letter, value = word
         meaning: tuple[str, float | str] | None = None
         if letter == "T":
             chosen = value
             if words[k + 1 : k + 2] != [_CHANGE]:
                 meaning = "next tool", value
-        elif words[k] == _CHANGE:
+        elif word == _CHANGE:
             meaning = None if chosen is None else ("tool", chosen)
         elif letter == "M":
             meaning = of_m(value, means)
-        elif (letter, value) == ("G", 4.0):
+        elif word == ("G", 4.0):
             meaning = "dwell", round(float(event.text))
         elif letter == "G" and value in _CODES:
             meaning = _CODES[value]
@@ -106,16 +82,11 @@ def said(events: Sequence[Event], places: Sequence[Place], means: Means) -> list
         if meaning is None:
             continue
         # without M6 the control may take the tool with T alone
-        optional = meaning[0] == "dwell" or (meaning[0] == "next tool" and _CHANGE in changes)
+        optional = meaning[0] == "dwell" or (meaning[0] == "next tool" and changes)
         if meaning in _BEFORE_TOOLS:  # and nothing moves between
             after = next((j for j in range(k + 1, len(words)) if not idle[j]), None)
             tool = after is not None and (words[after][0] == "T" or words[after] == _CHANGE)
-            another = tool and elements[after or 0] == element
+            another = tool and events[after or 0].element == event.element
             optional = another and any(letter == "T" for letter, _ in words[:k])
-        elif letter == "H":  # nothing moves before the next tool, or the end
-            after = next((j for j in range(k + 1, len(words)) if ends[j]), None)
-            optional = after is not None and elements[after] == element
-        at, room, reach, others = place
-        tokens.append(Token(*meaning, at, event.line, room, moment, optional, others, reach, element))
-        moment += meaning[0] == "dwell" or (meaning[0] in PAUSES and not optional)
+        tokens.append(Token(*meaning, event.element, event.line, optional))
     return tokens

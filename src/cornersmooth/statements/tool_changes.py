@@ -27,7 +27,7 @@ class ToolChanges:
         self._events, self._read = events, 0
         asking = Asking(program)
         for statement in program.statements:
-            asking.take(statement, float(statement.pose))
+            asking.take(statement, statement.pose)
         tools = [token for token in asking.tokens if token.kind == "tool"]
         changes = [k for k, token in enumerate(tools) if not k or token.value != tools[k - 1].value]
         self._asked = [tools[k].value for k in changes]

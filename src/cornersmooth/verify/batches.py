@@ -25,7 +25,7 @@ from cornersmooth.verify.feeds import feed_at, out_of_hole
 from cornersmooth.verify.motions import written_motion
 from cornersmooth.verify.nearest import COLUMNS, largest_square, nearest_places
 from cornersmooth.verify.passage import AROUND, LONGER
-from cornersmooth.verify.stops import BEFORE, Part, Stops
+from cornersmooth.verify.stops import BEFORE, Hole, Part, Stops
 from cornersmooth.verify.task import ARITHMETIC, Task
 
 #: elements in a batch
@@ -49,15 +49,11 @@ class Batches:
     def __init__(self, task: Task, events: Sequence[Event], retracts: Sequence[int]) -> None:
         self.task, self._events, self.retracts = task, events, retracts
         self.problems: list[Problem] = []
-        #: stops that are reached, three numbers for each: the element, and the CL path lengths where it is and where it
-        #: begins
-        self.stops = array("d")
         #: as of `Stops`
-        self.holes = array("q")
-        self.dwells: list[tuple[int, float]] = []
-        self.leaving: list[tuple[int, int]] = []
-        self.taps: list[int] = []
+        self.acts = array("q")
+        self.holes: list[Hole] = []
         self.left_out: list[Problem] = []
+        self.moves_left_out: set[int] = set()
         #: as of `AlongTool`
         self.rewinds: list[tuple[int, int]] = []
         self.still: set[int] = set()
@@ -78,8 +74,8 @@ class Batches:
             along = AlongTool(ahead, self.retracts, self._events)
             stops = Stops(self.task, ahead, ToolChanges(original.program, self._events), along)
             self.rewinds, self.still = along.rewinds, along.still
-            self.holes, self.dwells, self.leaving = stops.elements, stops.dwells, stops.leaving
-            self.taps, self.left_out = stops.taps, stops.left_out
+            self.acts, self.holes, self.left_out = stops.acts, stops.holes, stops.left_out
+            self.moves_left_out = stops.moves_left_out
             for part in stops.parts():
                 yield from self._take(part)
             yield from self._close(len(original.pose) - 1, ahead.count - 1)
@@ -113,7 +109,7 @@ class Batches:
     def _open(self, move: int, element: int) -> None:
         """Begin a stretch at a stop."""
         task, nc, at = self.task, self._ahead.nc, element - self._ahead.base
-        original, path, last_vertex = task.original, task.path, task.original.trail.last
+        original = task.original
         kind = int(original.program.kind[original.pose[move]])
         if move == 0 and nc.kind[at] != Element.RAPID:
             text = "the first rapid is written as a feed move"
@@ -121,11 +117,9 @@ class Batches:
             rapid = Problem("CS532", line, int(nc.line[at]), text)
             self.problems += [rapid] if kind == Move.RAPID else feed_at(task, nc, at, move, 0.0)
         # out of a hole the way begins anywhere
-        place = out_of_hole(task, nc, at, move) if kind == Move.HOLE else float(last_vertex[move])
+        place = out_of_hole(task, nc, at, move) if kind == Move.HOLE else float(original.trail.last[move])
         self._move, self._element, self._place = move, element, np.full(3, place)
         self._continued = self._guessed = self._told = False
-        before = last_vertex[max(move - (kind == Move.RAPID), 0)]
-        self.stops.extend((element, path.length_at(place), float(path.length[before])))
 
     def _close(self, move_last: int, element_last: int) -> Iterator[Batch]:
         """End the stretch."""
@@ -206,8 +200,15 @@ class Batches:
             stretches=table,
             continued=bool(lead),
             goes_on=goes_on,
-            words=elements_with_words(self._events, begin + lead, last),
+            words=self._with_words(begin + lead, last),
         )
+
+    def _with_words(self, first: int, last: int) -> Ints:
+        """Elements from `first` to `last` with words or a retract behind them, ascending, each once."""
+        low = bisect_left(self._events, first + 1, key=lambda event: event.element)
+        high = bisect_right(self._events, last + 1, key=lambda event: event.element)
+        retracts = self.retracts[bisect_left(self.retracts, first + 1) : bisect_right(self.retracts, last + 1)]
+        return np.unique(np.array([*(event.element for event in self._events[low:high]), *retracts], np.int64)) - 1
 
     def _stands(self, move_last: int, element_last: int, *, theirs: bool) -> None:
         """Say if between two stops one motion leaves the place where the other stands: CS535, CS536."""
@@ -230,10 +231,3 @@ class Batches:
             element = min(self._element + 1 - base, len(nc) - 1)
             line = int(original.program.line[original.pose[move]])
             self.problems.append(Problem(code, line, int(nc.line[element]), text, amount))
-
-
-def elements_with_words(events: Sequence[Event], first: int, last: int) -> Ints:
-    """Elements from `first` to `last` with words behind them, ascending, each once."""
-    low = bisect_left(events, first + 1, key=lambda event: event.element)
-    high = bisect_right(events, last + 1, key=lambda event: event.element)
-    return np.unique(np.array([event.element - 1 for event in events[low:high]], np.int64))

@@ -46,13 +46,13 @@ def check_feeds(match: Match, found: Findings) -> None:
         limits = np.where(guessed, 0, match.low[own]), match.high[own]
         six = match.six[own], match.six[end[rows]]
         from_, to = (where[rows] for where in place)
-        latest, earliest = _reach(task, six[0], from_, limits, 1), _reach(task, six[1], to, limits, -1)
+        latest, earliest = reach(task, six[0], from_, limits, 1), reach(task, six[1], to, limits, -1)
         between = latest + _HAIR < earliest - _HAIR
         runs = _runs_between(task, latest, earliest)
         wrong[rows] = np.where(between, _misfit(task, nc, element[rows], *runs), -1)
         if len(some := np.flatnonzero(~between)):
             limits, rows = (limits[0][some], limits[1][some]), rows[some]
-            around = (_reach(task, six[k][some], (from_, to)[k][some], limits, 2 * k - 1) for k in (0, 1))
+            around = (reach(task, six[k][some], (from_, to)[k][some], limits, 2 * k - 1) for k in (0, 1))
             runs = _runs_between(task, *around)
             wrong[rows] = np.where(_fits_any(task, nc, element[rows], *runs), -1, first[rows])
         good = wrong < 0
@@ -103,7 +103,7 @@ def _fits(original: Original, nc: Elements, element: Ints | int, move: Ints) -> 
     return np.isnan(asked) | nc.carry(element, asked, mode)
 
 
-def _reach(task: Task, six: Floats, place: Floats, limits: tuple[Ints, Ints], way: int) -> Floats:
+def reach(task: Task, six: Floats, place: Floats, limits: tuple[Ints, Ints], way: int) -> Floats:
     """(k,) last places up to which the CL path stays within the tolerance of points (k, 6), from places on.
 
     Forward or back, as `way` is 1 or -1; `limits`: the first and the last segment (k,) that may be reached.
@@ -146,7 +146,7 @@ def feed_at(task: Task, nc: Elements, element: int, move: int, place: float) -> 
             (np.zeros(1, np.int64), np.array([task.path.segments - 1])),
         )
         six = task.six(tip, directions(nc, tip, nc.second[[element]]))
-        first, last = _runs_between(task, *(_reach(task, six, at, limits, way) for way in (-1, 1)))
+        first, last = _runs_between(task, *(reach(task, six, at, limits, way) for way in (-1, 1)))
     if (
         _fits(task.original, nc, element, np.array([move])).any()
         or _fits_any(task, nc, np.array([element]), first, last)[0]

@@ -69,6 +69,18 @@ def problems_of(violations: list[Violation]) -> list[Problem]:
     return [Problem(one.code, *one[2:4], _TEXT[one.code].format(one.amount), one.amount) for one in worst]
 
 
+class Spot(NamedTuple):
+    """Where an element ends on the CL path, beside a word."""
+
+    move: int  #: on which move
+    named: frozenset[int]  #: moves at whose ends it may be, and that it names to the printed digits
+    near: frozenset[int]  #: all moves at whose ends it may be
+
+    def joined(self, other: Spot) -> Spot:
+        """Those of both."""
+        return Spot(self.move, self.named | other.named, self.near | other.near)
+
+
 @dataclass
 class Runs:
     """Problems of runs of elements; a run that goes on in the next batch is one problem."""
@@ -96,9 +108,7 @@ class Findings:
     #: axis, rad; NC lines
     poses: list[Floats] = field(default_factory=list)
     unlooked: list[tuple[int, str]] = field(default_factory=list)  #: what was not looked at, and the NC line
-    #: by element of the whole text with words behind it: the CL path length, mm, at its place, and those at other poses
-    #: that it names and may stand for as well, where the path goes to and fro
-    words: dict[int, tuple[float, tuple[float, ...]]] = field(default_factory=dict)
+    words: dict[int, Spot] = field(default_factory=dict)  #: by element of the whole text with words behind it
 
     def note(self, name: str, values: Floats, cl_lines: Ints, nc_lines: Ints) -> None:
         """Take the largest of (k,) values, if it is larger than what was met."""
@@ -120,6 +130,5 @@ class Findings:
         self.feeds.follow(other.feeds)
         self.poses += other.poses
         self.unlooked += other.unlooked
-        for element, (length, others) in other.words.items():
-            known = self.words.get(element, (length, others))
-            self.words[element] = known[0], known[1] or others
+        for element, spot in other.words.items():
+            self.words[element] = spot.joined(self.words.get(element, spot))

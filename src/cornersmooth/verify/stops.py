@@ -55,6 +55,15 @@ class Step(NamedTuple):
     last: int  #: last move before the next stop
 
 
+class Hole(NamedTuple):
+    """A hole that is drilled."""
+
+    move: int
+    first: int  #: the first element that belongs to it
+    leaves: int  #: the element with which the tool leaves it
+    cycle: Drilling
+
+
 class Part(NamedTuple):
     """Elements that are certain: up to `stop`, that excluded."""
 
@@ -90,17 +99,12 @@ class Stops:
     def __init__(self, task: Task, ahead: Ahead, changes: ToolChanges, along: AlongTool) -> None:
         self._task, self._ahead, self._changes, self._along = task, ahead, changes, along
         self.lines = HoleLines(task.original, ahead, task.axis_length, task.tolerance)
-        #: elements that belong to holes, ascending, three numbers for each: its own, the first move that it may belong
-        #: to, and the last: over holes that are not drilled the tool may be there for the next
-        self.elements = array("q")
-        #: moves of the holes at whose bottom the tool waits, and for how many ms
-        self.dwells: list[tuple[int, float]] = []
-        #: moves of the holes, and the element with which the tool leaves each
-        self.leaving: list[tuple[int, int]] = []
-        #: moves of the holes to be tapped in which something is fed
-        self.taps: list[int] = []
+        #: rapids, holes and feeds out of holes, two numbers for each: the move and the element that begin it
+        self.acts = array("q")
+        self.holes: list[Hole] = []
         #: CS561 for holes that the program leaves out and may leave out if asked
         self.left_out: list[Problem] = []
+        self.moves_left_out: set[int] = set()
         #: CS531 a rapid goes elsewhere, CS532 one is missing, CS533 one too many; CS536 a feed move too many; of holes
         self.problems: list[Problem] = []
         self._steps: list[Step] = []
@@ -426,31 +430,32 @@ class Stops:
         trace.back, trace.problems = None, ()
 
     def _open(self, trace: _Trace) -> None:
-        last = self._move[trace.stop + 1] - 1
-        self._steps.append(Step(self._move[trace.stop], trace.begin, True, last))
+        last, move, before = self._move[trace.stop + 1] - 1, self._move[trace.stop], trace.begin - 1
+        if self._hole[trace.stop]:  # the first move that leads anywhere from where the hole is left
+            leads = (one for one in range(move + 1, last) if not self.lines.at(one, before))
+            self.acts.extend((next(leads, last), trace.begin))
+        elif not self._is_way_out(trace.begin):
+            self.acts.extend((move, trace.begin))
+        self._steps.append(Step(move, trace.begin, True, last))
+
+    def _is_way_out(self, element: int) -> bool:
+        """Whether an element belongs to the block with which the tool leaves the last hole."""
+        if not self.holes:
+            return False
+        leaves, lines = self.holes[-1].leaves, self.lines
+        return element <= leaves or (leaves >= self._ahead.base and lines.nc_line(element) == lines.nc_line(leaves))
 
     def _drilled(self, trace: _Trace, end: int, *, left: bool) -> None:
         """Take down a hole."""
-        lines, k = self.lines, trace.stop
-        move = self._move[k]
-        cycle = self._cycles[move]
+        lines, move = self.lines, self._move[trace.stop]
         group = [one for one in range(trace.begin, end) if lines.over(move, one)]
-        fed = any(lines.feeds(one) for one in group)
-        if inside := [one for one in group if lines.height(move, one) < -lines.room]:
-            self.leaving.append((move, inside[-1] + 1))
-        for one in group:  # of several in one hole the first: what follows may leave nothing in the program
-            if one > (self.elements[-3] if self.elements else -1) and not lines.stands(one):
-                last = k
-                while not fed and self._hole[last + 1] and (last == k or self._may_be_left_out(last)):
-                    if not self._over(last + 1, one):
-                        break
-                    last += 1
-                self.elements.extend((one, move, self._move[last]))
         if left:
+            cycle = self._cycles[move]
             text = f"a hole of the CL file is not {'tapped' if cycle.tap else 'drilled'}"
             self.left_out.append(lines.problem("CS561", move, group[0] if group else -1, text))
-            return
-        if group and cycle.dwell:
-            self.dwells.append((move, cycle.dwell))
-        if cycle.tap:
-            self.taps.append(move)
+            self.moves_left_out.add(move)
+        elif group:
+            fed = [one for one in group if lines.feeds(one)]
+            inside = [one + 1 for one in group if lines.height(move, one) < -lines.room] or fed[-1:] or group[:1]
+            self.holes.append(Hole(move, group[0], min(inside[-1], end), self._cycles[move]))
+            self.acts.extend((move, group[0]))

@@ -1,90 +1,94 @@
-"""Where on the CL path the words beside the motion stand, and whether they say there what the CL file asks for.
+"""Where the words beside the motion stand, and whether they say there what the CL file asks for.
 
-A word stands between two elements of the text: behind the end of one, and before the next one begins.
+Between two acts that both files have, a rapid, a hole or the way out of it, they belong together. Within a run of feed
+moves a word stands at a pose that is passed exactly.
 """
 
 from __future__ import annotations
 
-import math
-from bisect import bisect_right
-from collections.abc import Iterable, Set
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterable, Sequence, Set
 from dataclasses import replace
-from itertools import count
 from typing import Final
 
 import numpy as np
 
-from cornersmooth.model import Floats, Ints
+from cornersmooth.model import Ints, Move
 from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem
 from cornersmooth.nc_reader.tool import leads_somewhere
 from cornersmooth.nc_reader.word_tables import Means
 from cornersmooth.statements.asked import asked
-from cornersmooth.statements.comparison import compare, without_word
-from cornersmooth.statements.tokens import TAP, Place, Token, said
-from cornersmooth.verify.batches import Batches, elements_with_words
-from cornersmooth.verify.findings import Findings
+from cornersmooth.statements.comparison import Comparison, without_word
+from cornersmooth.statements.tokens import Token, said
+from cornersmooth.verify.batches import Batches
+from cornersmooth.verify.feeds import reach
+from cornersmooth.verify.findings import Findings, Spot
 from cornersmooth.verify.match import Match
+from cornersmooth.verify.motions import digit_errors
 from cornersmooth.verify.passage import AROUND
+from cornersmooth.verify.stops import Hole
 
-#: CL path length of what stands before the first motion, mm
-_BEFORE: Final = -1.0
+#: places nearer to a vertex of the CL path are at it, in segments
+_HAIR: Final = 1e-9
 
 
 def place_words(match: Match, found: Findings) -> None:
-    """Take down where the elements with words behind them are, as far as they are known to be in a batch."""
-    first, last = match.first + match.offset, match.motion.last
-    vertex = last[match.words - first]
+    """Take down where the elements with words behind them end.
+
+    A vertex may be anywhere around its place as long as the path does not leave the tolerance, or on another turn.
+    """
+    task, trail, path = match.task, match.original.trail, match.path
+    vertex = match.motion.last[match.words - match.first - match.offset]
     element, vertex = match.words[match.on[vertex]], vertex[match.on[vertex]]
-    length, path = match.path.lengths_at(match.place[vertex]), match.path.length
-    for one, here, at in zip(element.tolist(), vertex.tolist(), length.tolist(), strict=True):
-        named = path[_named(match, here, at)]
-        # a word belongs to the pose that the vertex names, not to the place beside it that is as near: both within ε
-        close = named[np.abs(named - at) <= 2.0 * match.tolerance + match.margin]
-        at = close[np.argmin(np.abs(close - at))] if len(close) else at
-        beside = named[np.abs(named - at) > match.margin]
-        if len(beside):
-            beside = beside[match.may_be_at(here, np.searchsorted(path, beside))]
-        found.words[one] = float(at), tuple(beside.tolist())
-
-
-def _named(match: Match, vertex: int, length: float) -> Ints:
-    """Vertices of the CL path around its place that a written vertex names, up to the printed digits."""
-    path, around = match.path, AROUND * match.tolerance
-    low, high = np.searchsorted(path.length, (length - around, length + around)).tolist()
-    away = (path.points[low:high] - match.six[vertex]).reshape(-1, 2, 3)
-    return low + np.flatnonzero((np.linalg.norm(away, axis=2) <= match.margin).all(axis=1))
+    if not len(vertex):
+        return
+    place, six = match.place[vertex], match.six[vertex]
+    limits = np.where(match.continued & (match.section[vertex] == 0), 0, match.low[vertex]), match.high[vertex]
+    low, high = (reach(task, six, place, limits, way) for way in (-1, 1))
+    program, pose = match.original.program, match.original.pose
+    for k, one in enumerate(element.tolist()):
+        here, around = path.length_at(float(place[k])), AROUND * task.tolerance
+        window = np.arange(*np.searchsorted(path.length, (here - around, here + around)))
+        window = window[trail.fraction[window] == 1.0]
+        move = trail.owner[window]
+        own = np.full(len(move), one - match.offset)
+        exact, _ = digit_errors(match.nc, own, program.tip[pose[move]], program.axis[pose[move]], task.axis_length)
+        near = (low[k] - _HAIR <= window) & (window <= high[k] + _HAIR)
+        if len(other := np.flatnonzero(exact & ~near)):
+            near[other] = match.may_be_at(int(vertex[k]), window[other])
+        on = int(trail.owner[min(int(np.ceil(place[k])), len(trail) - 1)])
+        found.words[one] = Spot(on, frozenset(move[exact & near].tolist()), frozenset(move[near].tolist()))
 
 
 class WordPlaces:
-    """Takes down what is known of the elements that have words behind them as they are read; then compares these."""
+    """Takes down which elements lead nowhere behind words as they are read; then compares the words."""
 
     def __init__(self, batches: Batches, events: list[Event]) -> None:
         self._batches, self._task, self._events = batches, batches.task, events
-        self.margin = 0.0  # what printed digits account for, mm
-        self._rooms: dict[int, float] = {}  # how far the lengths at the ends of elements are uncertain, mm
-        self._still: set[int] = set()  # rapids that lead nowhere
-        # CL path lengths, mm, where elements end and begin, as far as they are known
-        self._ends: dict[int, float] = {}
-        self._begins: dict[int, float] = {}
-        self._others: dict[int, tuple[float, ...]] = {}  # at other poses that elements may stand for
+        self._room = 0.0  # what printed digits account for, mm
+        self._still: set[int] = set()  # elements behind words that lead nowhere
+        self._looked = 0  # words so far
 
     def watch(self, chunks: Iterable[Elements]) -> Iterable[Elements]:
-        """Give out the elements of a text, and take down how sure those with words behind them are."""
-        offset = 0
-        before = np.full((1, 6), np.inf)
+        """Give out the elements of a text, and take down those behind words that lead nowhere."""
+        offset, before, waiting = 0, np.full((1, 6), np.inf), np.zeros(0, np.int64)
         for nc in chunks:
-            self.margin = self._task.margin(nc)
+            axis_step = nc.second_step * (self._task.axis_length if nc.second_is == "vector" else 1.0)
+            self._room = min(nc.tip_step + axis_step, self._task.tolerance)
             six = np.concatenate((before, np.hstack((nc.tip, nc.second))))
-            rapid = np.flatnonzero(nc.kind == Element.RAPID)
-            ways = np.hsplit(six[rapid + 1] - six[rapid], 2)
-            self._still.update((offset + rapid[~leads_somewhere(nc, *ways)]).tolist())
+            new = [event.element for event in self._events[self._looked :]]
+            self._looked = len(self._events)
+            rows = np.unique(np.append(waiting, np.array(new, np.int64))) - offset
+            waiting = rows[rows >= len(nc)] + offset
+            rows = rows[rows < len(nc)]
+            while len(rows):
+                straight = (nc.kind[rows] == Element.RAPID) | (nc.kind[rows] == Element.LINE)
+                rows = rows[straight & ~leads_somewhere(nc, *np.hsplit(six[rows + 1] - six[rows], 2))]
+                self._still.update((offset + rows).tolist())
+                rows = rows + 1
+                waiting = np.append(waiting, rows[rows == len(nc)] + offset)
+                rows = rows[rows < len(nc)]
             before = six[-1:]
-            if len(nc) and (nc.rotary or nc.tip_room.any()):
-                last = offset + len(nc) - 1
-                # words behind the last are still to come
-                for element in {*elements_with_words(self._events, offset, last).tolist(), last}:
-                    row = element - offset
-                    self._rooms[element] = self._task.axis_length * float(nc.second_room[row]) + float(nc.tip_room[row])
             offset += len(nc)
             yield nc
 
@@ -103,81 +107,123 @@ class WordPlaces:
         some kinds of statements in words of his `own`. M words that clamp a rotary axis or let it turn stand where the
         machine wants them, not where AUXFUN has them. GOHOME asks for a retract, where the program can have `retracts`.
         """
-        batches, path, original = self._batches, self._task.path, self._task.original
-        still = batches.still
-        self._still |= still
-        program = original.program
-        length = float(path.length[-1]) if len(original.pose) else 0.0
-        # CL path lengths where the moves end; before the first, `_BEFORE`
-        moves = np.append(_BEFORE, path.length[original.trail.last])
-        hole, move, after = np.frombuffer(batches.holes, np.int64).reshape(-1, 3).T.copy()
-        stop, there, begin = np.frombuffer(batches.stops).reshape(-1, 3).T.copy()
-        # what is known best comes last
-        self._ends = {element: at for element, (at, _) in found.words.items()}
-        # an element that reaches several stops is at the first of them, and where the next begins at the last
-        self._ends |= _by_element(stop[::-1], there[::-1]) | _by_element(hole, moves[move + 1])
-        self._begins = _by_element(stop + 1, there) | _by_element(hole, moves[np.maximum(after, 1)])
-        self._begins |= _by_element(stop, begin) | {batches.elements: length}
-        self._others = {element: others for element, (_, others) in found.words.items() if others}
-        self._ended, self._holes = sorted(self._ends), frozenset(hole.tolist())
-        statements = moves[np.searchsorted(original.pose, [one.pose for one in program.statements])].tolist()
-        theirs = asked(program, statements, length, means, self._of_holes(moves))
-        theirs = [token for token in theirs if token.kind != "auxiliary" or token.value not in clamps]
-        here = list(map(self._of, self._events))
-        # behind a rapid that leads nowhere they belong with those before it
-        of = [replace(one, element=one.element - 1) if one.element - 1 in still else one for one in self._events]
-        ours = said(of, here, means)
-        drilled = [(int(program.line[original.pose[at]]), element) for at, element in batches.leaving]
-        wrong = compare(theirs, ours, self.margin, means, path.way_apart, own, drilled)
-        homes = {at: one for at, one in zip(statements, program.statements, strict=True) if one.word == "GOHOME"}
-        up = [self._retract(element, length) for element in batches.retracts] if homes else []
-        for home, statement in homes.items() if retracts else ():
-            room = [self.margin + place.room for place in up]
-            found_there = (-near <= home - at.at <= at.reach + near for at, near in zip(up, room, strict=True))
-            if not statement.args and not any(found_there):
-                text = "GOHOME of the CL file is missing: the tool does not go up to a retract"
-                wrong.append(Problem("CS532", statement.line, 0, text))
-        at_home = {
-            event.line
-            for event, place in zip(self._events, here, strict=True)
-            for room in [self.margin + place.room]
-            if any(-room <= home - place.at <= place.reach + room for home in homes)
-        }
-        return wrong, at_home, without_word(theirs, ours, means, own)
+        batches, original = self._batches, self._task.original
+        program, moves = original.program, len(original.pose)
+        self._still |= batches.still
+        # statements by the first move behind them that leads anywhere, words and retracts by the first such element
+        places = np.searchsorted(original.pose, [one.pose for one in program.statements]).tolist()
+        leading = self._leading(np.unique(np.array(places, np.int64)))
+        theirs = [
+            replace(one, place=leading.get(one.place, one.place))
+            for one in asked(program, places, moves, means)
+            if (one.kind != "auxiliary" or one.value not in clamps) and (one.kind != "home" or retracts)
+        ]
+        events = [replace(one, element=self._moving(one.element)) for one in self._events]
+        up = [Token("home", "", self._moving(element), 0, optional=True) for element in batches.retracts]
+        ours = sorted([*said(events, means), *up], key=lambda one: one.place)
+        spots: dict[int, Spot] = {}
+        for element in {*(one.element for one in self._events), *batches.retracts}:
+            if (spot := found.words.get(element - 1)) is not None:
+                begin = self._moving(element)
+                spots[begin] = spot.joined(spots.get(begin, spot))
+        homes = {leading[place] for place, one in zip(places, program.statements, strict=True) if one.word == "GOHOME"}
+        behind: dict[int, set[int]] = {}
+        for place, lead in leading.items():  # the moves that end where statements are
+            behind.setdefault(lead, set()).update(range(place - 1, lead))
+        # that of those no element names is said
+        missed = {int(original.trail.owner[int(one.place)]) for one in found.violations if one.code == "CS524"}
 
-    def _of(self, event: Event) -> Place:
-        """Where a word is: at the end of the element before it; that of a tap at the hole that is fed next.
+        holes = {self._moving(one.first): (one, _within(ours, one)) for one in batches.holes}
+        inside = {id(one) for _, some in holes.values() for one in some if one.kind in ("dwell", "tap")}
+        comparison = Comparison(theirs, [one for one in ours if id(one) not in inside], means, own)
+        acts = np.append(np.frombuffer(batches.acts, np.int64).reshape(-1, 2), [[moves, batches.elements]], axis=0)
+        # what leads nowhere in the program is no act: a rapid to where the tool is, or the same element again
+        rapid = program.kind[original.pose[np.minimum(acts[:, 0], moves - 1)]] == Move.RAPID
+        first = np.array([self._moving(one) for one in acts[:, 1].tolist()])
+        kept = (~rapid | (first == acts[:, 1])) & (np.diff(first, prepend=-1) > 0)
+        acts = np.maximum.accumulate(np.column_stack((acts[:, 0], first))[kept])
+        cl_places = np.array(sorted({one.place for one in theirs} | homes), np.int64)
+        nc_places = np.array(sorted({one.place for one in ours}), np.int64)
+        cl_act, nc_act = np.searchsorted(acts[:, 0], cl_places), np.searchsorted(acts[:, 1], nc_places)
+        of_cycles = [first for first, (one, some) in holes.items() if some or one.cycle.dwell or one.cycle.tap]
+        wanted = {*cl_act.tolist(), *nc_act.tolist(), *np.searchsorted(acts[:, 1], of_cycles).tolist()}
+        at_home: set[int] = set()
+        before = -1, -1
+        for act in sorted(one for one in wanted if one < len(acts)):
+            end = int(acts[act, 0]), int(acts[act, 1])
+            meetings: list[tuple[int, int]] = []
+            if not act or int(acts[act - 1, 1]) not in holes:  # else there is no run between: moves lead nowhere
+                there = cl_places[cl_act == act].tolist(), nc_places[nc_act == act].tolist()
+                meetings = _within_run(*there, behind, spots, missed)
+                lost = [place for place in there[1] if place < end[1] and place not in spots]
+                if lost and not (batches.moves_left_out or batches.problems or found.breaks):
+                    line = next((one.line for one in events if one.element == lost[0]), 0)
+                    found.unlooked.append((line, "where the words stand on the path"))
+            for move, element in [*(one for one in meetings if one[0] < end[0] and one[1] < end[1]), end]:
+                comparison.meet(move, element, moves=(move, element) != (moves, batches.elements))
+                if not homes.isdisjoint(range(before[0] + 1, move + 1)):
+                    at_home |= {one.line for one in events if before[1] < one.element <= element}
+                before = move, element
+            if end[1] in holes and act + 1 < len(acts):
+                hole, some = holes[end[1]]
+                line = int(program.line[original.pose[hole.move]])
+                comparison.in_hole(line, some, hole.cycle.dwell, tap=hole.cycle.tap)
+        return comparison.problems, at_home, without_word(theirs, ours, means, own)
 
-        Between that and where the next element that leads somewhere begins, at the latest, the program may have passed
-        all that leaves nothing in it. An element that leads nowhere, as a second rapid to the same place does, is one
-        with that before it.
-        """
-        before = event.element - 1
-        known = bisect_right(self._ended, before)
-        before = self._ended[known - 1] if known else before
-        at = self._ends.get(before, _BEFORE)
-        if (event.letter, event.value) == ("G", TAP) and event.element in self._holes:
-            at = self._ends[event.element]
-        following = next(k for k in count(event.element) if k not in self._still)
-        reach = max(self._begins.get(following, -math.inf) - at, 0.0)
-        return Place(at, self._rooms.get(before, 0.0), reach, self._others.get(before, ()))
+    def _leading(self, places: Ints) -> dict[int, int]:
+        """The first moves from some on that lead anywhere, and are no holes that are left out."""
+        original, left_out = self._task.original, self._batches.moves_left_out
+        pose, program = original.pose, original.program
+        first, moves = pose[np.maximum(places - 1, 0)], places.copy()
+        rows = np.flatnonzero(places < len(pose))
+        while len(rows):
+            here, before = pose[moves[rows]], pose[np.maximum(moves[rows] - 1, 0)]
+            ways = (values[here] - values[first[rows]] for values in (program.tip, program.axis))
+            way, turn = (np.linalg.norm(one, axis=1) for one in ways)
+            leads = (np.maximum(way, self._task.axis_length * turn) > self._room) | (moves[rows] == 0)
+            leads |= (program.kind[here] == Move.HOLE) | (program.kind[before] == Move.HOLE)
+            rows = rows[~leads | np.isin(moves[rows], list(left_out))]
+            moves[rows] += 1
+            rows = rows[moves[rows] < len(pose)]
+        return dict(zip(places.tolist(), moves.tolist(), strict=True))
 
-    def _retract(self, element: int, end: float) -> Place:
-        """Place of a retract; after a run whose end is not located, up to what is located next."""
-        place, known = self._of(Event(element, 0, "", math.nan)), bisect_right(self._ended, element - 1)
-        if element - 1 in self._ends:
-            return place
-        following = self._ends[self._ended[known]] if known < len(self._ended) else end
-        return place._replace(reach=max(place.reach, following - place.at))
-
-    def _of_holes(self, moves: Floats) -> list[Token]:
-        """What the cycles of holes ask for: to wait at the bottom, and to tap."""
-        original = self._task.original
-        asked_for = [("dwell", float(time), move) for move, time in self._batches.dwells]
-        asked_for += [("tap", TAP, move) for move in self._batches.taps]
-        line = original.program.line[original.pose]
-        return [Token(kind, value, float(moves[move + 1]), int(line[move])) for kind, value, move in asked_for]
+    def _moving(self, element: int) -> int:
+        """The first element from one on that leads anywhere."""
+        while element in self._still:
+            element += 1
+        return element
 
 
-def _by_element(elements: Ints | Floats, lengths: Floats) -> dict[int, float]:
-    return dict(zip(elements.astype(np.int64).tolist(), lengths.tolist(), strict=True))
+def _within_run(
+    cl_places: list[int], nc_places: list[int], behind: dict[int, set[int]], spots: dict[int, Spot], missed: set[int]
+) -> list[tuple[int, int]]:
+    """Where both files say something within a run of feed moves: places of both up to which it belongs together.
+
+    Of `missed` poses it is enough that a word is near them. From a word on of which nothing is known, as over holes
+    that are left out, they are not told apart.
+    """
+    found: list[tuple[int, int]] = []
+    i, move, element = 0, -1, -1
+    for place in nc_places:
+        if (spot := spots.get(place)) is None:
+            return found
+        ends = spot.named | (spot.near & missed)
+        there = (k for k in range(i, len(cl_places)) if not ends.isdisjoint(behind.get(cl_places[k], ())))
+        same = next(there, None)
+        while i < len(cl_places) and (cl_places[i] <= spot.move if same is None else i < same):
+            move, i = cl_places[i], i + 1
+            found.append((move, element))
+        if same is not None:
+            move, i = cl_places[same], same + 1
+        element = place
+        found.append((move, element))
+    return [*found, *((one, element) for one in cl_places[i:])]
+
+
+def _within(tokens: Sequence[Token], hole: Hole) -> list[Token]:
+    """Tokens that are said within a hole; a tap is said before it begins."""
+    first, stop = (
+        side(tokens, place, key=lambda one: one.place)
+        for side, place in ((bisect_left, hole.first), (bisect_right, hole.leaves))
+    )
+    return [one for one in tokens[first:stop] if one.place > hole.first or one.kind == "tap"]

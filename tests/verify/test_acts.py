@@ -1,0 +1,119 @@
+"""States where the tool moves, actions between two motions: what is said late, early, in a hole or for nothing."""
+
+from __future__ import annotations
+
+import io
+import re
+from functools import cache
+
+import pytest
+
+from cornersmooth.cl import read
+from cornersmooth.model import Program
+from cornersmooth.nc import Frame, choose_form
+from cornersmooth.pipeline import postprocess
+from cornersmooth.settings import Settings
+from cornersmooth.verify import Verification, verify
+
+RUN = """LOADTL/3
+SPINDL/RPM,3000,CLW
+RAPID
+GOTO/0,0,50,0,0,1
+RAPID
+GOTO/0,0,0
+FEDRAT/MMPM,500
+GOTO/10,0,0
+COOLNT/ON
+GOTO/10,10,0
+GOTO/0,10,0
+COOLNT/OFF
+GOTO/0,0,0
+RAPID
+GOTO/0,0,50
+FINI
+"""
+#: the same place twice, and holes in one line
+TWICE = RUN.replace("GOTO/0,10,0\n", "GOTO/10,0,0\nOPSTOP\nGOTO/0,10,0\n")
+HOLES = """LOADTL/3
+SPINDL/RPM,3000,CLW
+RAPID
+GOTO/0,0,50,0,0,1
+CYCLE/DRILL,DEPTH,10,MMPM,100,CLEAR,2
+GOTO/0,0,0
+GOTO/0,0,-10
+CYCLE/OFF
+SPINDL/OFF
+RAPID
+GOTO/0,0,80
+FINI
+"""
+
+
+@cache
+def program(text: str) -> Program:
+    """A CL file."""
+    return read(text.encode(), name="part.cls")
+
+
+@cache
+def right(text: str, control: str = "fanuc") -> tuple[str, ...]:
+    """The lines of a right program."""
+    stream = io.BytesIO()
+    frame = Frame(cycles="moves")
+    postprocess(program(text), stream, Settings(tolerance=0.02), form=choose_form(control), frame=frame, verify=False)
+    lines = tuple(stream.getvalue().decode().splitlines())
+    assert found(text, lines, control).passed
+    return lines
+
+
+def found(text: str, lines: tuple[str, ...], control: str = "fanuc") -> Verification:
+    """What is found in a program."""
+    return verify(program(text), ("\n".join(lines) + "\n").encode(), tolerance=0.02, control=control)
+
+
+def moved(lines: tuple[str, ...], word: str, by: int) -> tuple[str, ...]:
+    """A program in which a word stands some lines farther on."""
+    k = next(k for k, line in enumerate(lines) if re.fullmatch(rf"(\d+ )?{word}", line))
+    rest = (*lines[:k], *lines[k + 1 :])
+    return *rest[: k + by], lines[k], *rest[k + by :]
+
+
+@pytest.mark.parametrize("control", ["fanuc", "siemens", "heidenhain"])
+@pytest.mark.parametrize("word", ["M8", "M9"])
+def test_a_word_within_a_run_stands_at_its_pose_alone(control: str, word: str) -> None:
+    """One block before or behind is another place, though it is within ε of the pose, too."""
+    lines = right(RUN, control)
+    for by in (-2, -1, 1, 2):
+        assert {one.code for one in found(RUN, moved(lines, word, by), control).problems} == {"CS553"}, by
+
+
+def test_a_pose_met_twice_counts_once() -> None:
+    lines = right(TWICE)
+    k = lines.index("M8")
+    again = lines.index("M1")
+    late = (*lines[:k], *lines[k + 1 : again + 1], "M8", *lines[again + 1 :])
+    assert lines[again - 1] == lines[k - 1].removesuffix(" F500.")
+    assert "CS553" in {one.code for one in found(TWICE, late).problems}
+
+
+def test_nothing_but_a_dwell_and_a_tap_is_said_in_a_hole() -> None:
+    """Also in the last of several holes in one line, and on the way out of it."""
+    lines = right(HOLES)
+    off = lines.index("M5")
+    first = next(k for k, line in enumerate(lines) if re.search(r"Z-20", line))
+    rest = (*lines[:off], *lines[off + 1 :])
+    for at in (first, first + 1):
+        assert "CS552" in {one.code for one in found(HOLES, (*rest[:at], "M5", *rest[at:])).problems}
+    for word in ("M1", "M8", "S2000", "M4"):
+        assert found(HOLES, (*lines[: first + 1], word, *lines[first + 1 :])).problems, word
+    assert found(HOLES, (*lines[: first + 1], "M3", *lines[first + 1 :])).passed  # it turns already
+
+
+def test_what_does_not_change_anything_may_be_said() -> None:
+    lines = right(RUN)
+    k = next(k for k, line in enumerate(lines) if line.startswith("G1"))
+    for word in ("M3", "M9", "S3000", "G4 P100"):
+        assert found(RUN, (*lines[:k], word, *lines[k:])).passed, word
+    for word in ("M4", "M8", "S2000", "M5"):
+        assert len(found(RUN, (*lines[:k], word, *lines[k:])).problems) <= 2, word
+        assert not found(RUN, (*lines[:k], word, *lines[k:])).passed, word
