@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence, Set
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from cornersmooth.model import Bools, Ints
+from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.dialects.base import Dialect
 from cornersmooth.nc_reader.elements import Element, Elements, Problem
 from cornersmooth.nc_reader.modal_state import ModalState
+from cornersmooth.nc_reader.rotary import tool_vectors
 from cornersmooth.nc_reader.words import BY_WORD, NURBS, Table
 
 if TYPE_CHECKING:
@@ -21,6 +23,9 @@ CONTROL_WORDS: Final = "CS506"
 
 #: degrees that a rotary axis turns at most in one feed move: a mistake beyond
 MOST_TURN: Final = 360.0
+
+#: degrees that a rotary axis may turn at feed while the tool axis stands
+MOST_IDLE: Final = 180.0
 
 #: degrees at which a rotary axis counts as at zero
 _ZERO: Final = 1e-9
@@ -105,6 +110,28 @@ def turn_problems(run: Elements, before: Sequence[float], machine: Machine) -> I
         for degrees in turn[turn > MOST_TURN][:1].tolist():
             text = f"{axis.name} turns by {degrees:.0f} deg in one feed move"
             yield from first_wrong("CS526", turn > MOST_TURN, run.line, text)
+
+
+def idle_turns(
+    run: Elements, before: Sequence[float], machine: Machine, step: float, turned: Floats
+) -> Iterator[tuple[int, str]]:
+    """Where rotary axes turn by half a turn or more at feed while the tool axis stands along them, and what is said.
+
+    From there a quarter of a turn leads to any other axis, or half a turn where limits leave one way to reach it. More
+    swings part or head around the tool, which the CL file does not ask for. `step` is the last printed digit, degrees;
+    `turned` (2,) how far each axis has turned so up to the run: it goes on.
+    """
+    angles = np.vstack((before, run.second))[:, : len(machine.axes)]
+    axis = tool_vectors(machine, angles)
+    turn = np.abs(np.diff(angles, axis=0))
+    stands = (run.kind == Element.LINE) & (np.abs(np.diff(axis, axis=0)).max(axis=1) <= 2.0 * math.radians(step))
+    whole = np.cumsum(np.where(stands[:, None], turn, 0.0), axis=0) + turned
+    begun = np.maximum.accumulate(np.where(stands[:, None], 0.0, whole), axis=0)
+    found = whole - begun
+    turned[:] = found[-1]
+    for column, name in enumerate(machine.names):
+        far = np.flatnonzero(found[:, column] >= MOST_IDLE - step)
+        yield from ((line, f"{name} turns while the tool axis stands along it") for line in run.line[far[:1]].tolist())
 
 
 def take_clamp(word: float, machine: Machine, state: ModalState) -> bool:

@@ -22,6 +22,7 @@ from cornersmooth.nc_reader.needed_states import (
     clamp_problems,
     control_problems,
     first_wrong,
+    idle_turns,
     kinematics_problems,
     take_clamp,
     turn_problems,
@@ -60,6 +61,7 @@ class Reader:
         clamped = {axis.name: True for axis in clamps if axis.clamp is not None}
         self.state = ModalState(Modal(rotary="" if rotary is None else rotary.names), rotary, clamped=clamped)
         self._tool = -1.0  # that has been chosen
+        self._idle = np.zeros(2)  # degrees that rotary axes have turned while the tool axis stands
         self._left_at: Floats | None = None  # where a tool of another length has left
         self.waiting: list[Table | tuple[int, dict[str, float]]] = []
         self.ready: list[Elements] = []
@@ -180,6 +182,8 @@ class Reader:
                     self._tell_once(kinematics_problems(run, machine, self.state, tip_control=tip_control))
                 run = replace(run, second=rotary.unwrapped(run.second, before.second))
                 self.problems += turn_problems(run, before.second, machine)
+                if machine.names:
+                    self.unlooked += idle_turns(run, before.second, machine, rotary.angle_step, self._idle)
                 self._check_turned(run, before)
                 if self.dialect.retracts:
                     text = "rotary axes swing the tilted tool in a rapid that is not above a retract"
