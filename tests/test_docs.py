@@ -22,6 +22,7 @@ import cornersmooth as cs
 from cornersmooth import read
 from cornersmooth.cli import compare
 from cornersmooth.cli.commands import COMMANDS
+from cornersmooth.cli.declared import GONE
 from cornersmooth.kinematics import parse_machine
 from cornersmooth.nc import parse_control
 from oracle.command import DONE, SCRIPT, SMALL, run
@@ -85,7 +86,7 @@ def help_text(name: str) -> str:
 
 
 #: what test_docs_tools.py and test_cli_cluster.py run: lines of a script, batches on other machines
-ELSEWHERE = ("$file", "{}", "SCHEDULER")
+ELSEWHERE = ("$file", "{}", "SCHEDULER", "Out-String")
 SHOWN = {page.name: list(commands(page.read_text())) for page in PAGES if page.name not in STORIES}
 HELPS = {name: list(commands(help_text(name))) for name in COMMANDS}
 
@@ -302,7 +303,7 @@ def test_what_the_declarations_of_options_make_is_here() -> None:
 
 def test_every_flag_that_a_help_or_a_page_names_exists() -> None:
     known = {flag for command in COMMANDS.values() for param in command.params for flag in param.opts}
-    known |= {"--help", "--help-all", "--version"}
+    known |= {"--help", "--help-all", "--version", *GONE}
     texts = {name: run(name, "--help-all").stdout.decode() for name in COMMANDS}
     texts |= {page.name: page.read_text() for page in (ROOT / "docs").glob("*.md")}
     #: of other programs

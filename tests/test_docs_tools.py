@@ -66,8 +66,8 @@ RUN_BY = {
     "python -m verify.hole_mutations": "test_hole_mutations_are_scored",
     # needs the network
     "cd web && npm ci && npm run bundle && npm run check": "test_scripts_of_the_page_are_there",
-    "dask scheduler --scheduler-file /shared/scheduler.json &": "tests/test_cli_cluster.py",
-    "dask worker --scheduler-file /shared/scheduler.json --nthreads 1 --nworkers 16 &": "tests/test_cli_cluster.py",
+    "dask scheduler --scheduler-file /shared/scheduler.json &": "tests/cli/test_cli_cluster.py",
+    "dask worker --scheduler-file /shared/scheduler.json --nthreads 1 --nworkers 16 &": "tests/cli/test_cli_cluster.py",
     "cd /shared/job": "test_parallel_does_all_files",
     "find cl -name '*.cls' | parallel --joblog made.log --resume-failed -j 4 --sshlogin host1,host2 --workdir . \\": (
         "test_parallel_does_all_files"

@@ -46,7 +46,7 @@ _ARGUMENTS: Final[dict[str, tuple[str, dict[str, Any]]]] = {
     "[CONTROL]": ("name", {"type": get_args(ControlName)[1], "required": False, "metavar": "[NAME|FILE]"}),
     "[MACHINE]": ("name", {"type": get_args(MachineName)[1], "required": False, "metavar": "[NAME|FILE]"}),
     "[CODE]": ("name", {"required": False}),
-    "SHELL": ("name", {"type": click.Choice(["bash", "zsh", "fish", "powershell"]), "metavar": None}),
+    "SHELL": ("name", {"type": click.Choice(["bash", "zsh", "fish", "powershell"])}),
 }
 
 

@@ -318,7 +318,8 @@ COMPLETION = new_command(
     "SHELL",
     "",
     """
-    Print what makes SHELL complete commands, options, names of controls, machines and forms, and files.
+    Print what makes SHELL (bash, zsh, fish, powershell) complete commands, options, names of controls, machines and
+    forms, and files.
 
     \b
     Examples:

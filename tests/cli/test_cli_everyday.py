@@ -56,7 +56,7 @@ def test_the_wrong_kind_of_input_is_named_before_the_output(part: Path, command:
 
 def test_axis_of_linuxcnc_opens_a_cl_file(part: Path) -> None:
     """Run the command of docs/linuxcnc.md as AXIS does: by a shell, with the file behind it."""
-    page = (Path(__file__).parents[1] / "docs" / "linuxcnc.md").read_text()
+    page = (Path(__file__).parents[2] / "docs" / "linuxcnc.md").read_text()
     command = next(line.split(" = ")[1] for line in page.splitlines() if line.strip().startswith("cls = "))
     around = environment(AXIS_PROGRESS_BAR="1", PATH=f"{SCRIPT.parent}{os.pathsep}{os.environ['PATH']}")
 

@@ -12,7 +12,7 @@ from cornersmooth.cli.commands import COMMANDS
 from cornersmooth.errors import InputError
 from oracle.messages import one_line
 
-SAMPLE = Path(__file__).resolve().parent.parent / "samples" / "impeller.cls"
+SAMPLE = Path(__file__).resolve().parents[2] / "samples" / "impeller.cls"
 
 
 def run(*args: str, data: bytes = b"") -> str:

@@ -17,7 +17,7 @@ from cornersmooth.nc import control_aliases, control_names, load_control
 from oracle.command import DONE, SMALL, USAGE, run, seen_on_a_terminal
 from oracle.messages import one_line
 
-SAMPLES = Path(__file__).resolve().parent.parent / "samples"
+SAMPLES = Path(__file__).resolve().parents[2] / "samples"
 IMPELLER = SAMPLES / "impeller.cls"
 
 
@@ -84,7 +84,7 @@ def test_one_is_not_several(tmp_path: Path) -> None:
     assert run("smooth", IMPELLER, "-o", out).returncode == DONE
     out.write_bytes(out.read_bytes().replace(b"F250.", b"F251.", 1))
     said = run("verify", IMPELLER, out).stdout.decode()
-    assert said.startswith("FAILED: 1 problem, first in NC line 19: ")
+    assert said.startswith("FAILED: 1 problem, first in NC line 20: ")
 
 
 @pytest.mark.parametrize(

@@ -29,7 +29,7 @@ from oracle.messages import one_line
 FILES = 5
 
 
-PAGE = Path(__file__).resolve().parent.parent / "docs" / "batch.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "batch.md"
 
 
 def shown(start: str) -> list[str]:
