@@ -82,3 +82,18 @@ def test_the_glossary_has_one_name_for_each_thing() -> None:
     ][1:]
     assert len(names) == len(set(names)) == 25
     assert sum(line[:3].rstrip(". ").isdigit() for line in text.split("\n")) == 15
+
+
+#: lines of `src` with such a word in code, comments or docstrings; lower it when you take some out
+LINES_WITH_SUCH_WORDS = 320
+
+
+def test_code_names_the_thing_and_not_the_speaker() -> None:
+    words = re.compile(r"\b(?:said|told|asked|held|ours|theirs)\b")
+    found = [
+        f"{path.name}:{number}"
+        for path in (ROOT / "src").rglob("*.py")
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
+        if words.search(line)
+    ]
+    assert len(found) <= LINES_WITH_SUCH_WORDS, found

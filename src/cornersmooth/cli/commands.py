@@ -326,7 +326,7 @@ COMPLETION = new_command(
       eval "$(cornersmooth completion bash)"    # in ~/.bashrc
       eval "$(cornersmooth completion zsh)"     # in ~/.zshrc, behind compinit
       cornersmooth completion fish | source     # in ~/.config/fish/config.fish
-      cornersmooth completion powershell | Out-String | Invoke-Expression   # in $PROFILE
+      cornersmooth completion powershell | Out-String | Invoke-Expression
     """,
 )
 
