@@ -18,13 +18,18 @@ What else is in them, rules and where words may stand, is explained in `nc_words
     What words say beside the motion, as `statements` has it: the kind, then the word of the CL file. What is no value
     here the control has no word for. A third part says of what kind alone a word is the end
     (``M89 = "coolant OFF THRU"``). ``""``: not the word of a control that this one is like.
+``[words]``, ``[blocks]``
+    The closed list of verification, a row a word: ``EFFECTS: LETTERS; RULES; WHAT IT IS`` (`nc_words.rules`).
 ``[does]``
-    What words do to what the control remembers, a row a word: `control.table` explains it. Each key may name several
-    words; here each has its own.
+    What other words do to what the control remembers, a row a word: ``EFFECTS: LETTERS`` (`control.table`); those of
+    `[words]` are among them here.
+
+Each key may name several words; here each has its own. ``""`` takes a row of a control back that this one is like.
 """
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Mapping
 from functools import cache
@@ -44,17 +49,33 @@ CONTROLS: Final = tuple(sorted(item.name.removesuffix(".toml") for item in _LIST
 def word_table(control: str) -> Mapping[str, Any]:
     """Table of a control, with what it takes over of the control that it is like."""
     table = tomllib.loads(_LISTS.joinpath(f"{control}.toml").read_text(encoding="utf-8"))
-    does = {word: row for words, row in table.pop("does", {}).items() for word in words.split(" | ")}
+    rows = {key: _one_by_one(table.pop(key, {})) for key in ("words", "blocks", "does")}
+    effects = {_name(word): _effects(row) for word, row in rows["words"].items() if not row or _effects(row)}
+    rows["does"] = effects | rows["does"]
     if "like" in table:
         base = word_table(table.pop("like"))
-        does |= {word: row for word, row in base["does"].items() if word not in does}
-        table = {
-            **base,
-            **table,
-            "means": base["means"] | table.get("means", {}),
-            **{key: [*table.get(key, ()), *base[key]] for key in ("word", "block")},
+        rows = {
+            key: own | {word: row for word, row in base[key].items() if word not in own} for key, own in rows.items()
         }
-    return table | {"does": does}
+        table = {**base, **table, "means": base["means"] | table.get("means", {})}
+    return table | rows
+
+
+def _one_by_one(rows: Mapping[str, str]) -> dict[str, str]:
+    """Rows with a word each."""
+    return {word: row for words, row in rows.items() for word in (words.split(" | ") if words[0] != "/" else [words])}
+
+
+def _name(word: str) -> str:
+    """Name of a word of the list: of one with a number of its own (``T\\d+``) the letter."""
+    return word if re.match(r"/|[GM][\d.]+$|[A-Z_]{2}|.*[*]$", word) else word[0]
+
+
+def _effects(row: str) -> str:
+    """What a row of the list says for `[does]`: its effects, and the letters of the words that belong to them."""
+    effects, _, letters = row.partition(";")[0].partition(":")
+    names = sorted({re.match(r"[A-Za-z]*", letter)[0].upper() for letter in letters.split()})  # type: ignore[index]
+    return f"{effects}: {' '.join(names)}" if names else effects
 
 
 @cache

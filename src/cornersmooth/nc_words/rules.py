@@ -8,15 +8,24 @@ They are data of TOML tables (`nc_reader.word_tables`), with the manual that the
     What may stand before that: a mark of the transfer.
 ``orders``
     What a comment begins with that the control would obey.
-``[[word]]``, ``[[block]]``
-    Words, and blocks that count as a whole: ``is``, blanks left out, and the fields of `WordRule`. Those of spindle and
-    coolant follow from ``[means]``.
+``[words]``
+    A row a word: ``"WORDS" = "EFFECTS: LETTERS; RULES; WHAT IT IS"``. WORDS and EFFECTS are as in `control.table`;
+    ``/.../`` is a pattern of the text of the word, blanks left out, and ``T\\d+`` one that begins with its letter.
+    LETTERS are those of words that may be beside it, with a pattern of what comes behind the letter: ``H\\d+``. Behind
+    it, ``!`` says that one such word must be there, ``=`` that it is compared with the CL file, ``~`` that it may
+    change from block to block. Small letters only belong to it: they are not on the list. RULES are fields of
+    `WordRule`: ``alone``, ``plane=17``, with ``_`` for blanks. Those of a group are the same for all controls:
+    `_OF_GROUPS`; ``-first`` takes one back.
+``[blocks]``
+    Blocks that count as a whole: ``"PATTERN" = "RULES; WHAT IT IS"``; no other words stand beside one.
+
+Words of spindle and coolant follow from ``[means]``.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, Final
@@ -27,8 +36,33 @@ from cornersmooth.nc_reader.words import Word
 #: values that end a state, or do not begin one
 _ENDS: Final = frozenset(("OFF", "ORIENT"))
 
-#: keys of a word that are regular expressions
-_PATTERNS: Final = frozenset(("is", "needs", "must", "after", "then", "behind", "extra"))
+#: rules that are the same for all words of a group, whatever the control
+_OF_GROUPS: Final[Mapping[str, str]] = {
+    "units": "state=units first",
+    "distance": "state=positions first",
+    "feed": "state=feed_mode first follows",
+    "plane": "state=plane first follows before=arc",
+    "compensation": "state=cutter_compensation follows",
+    "offset": "state=work_offset first",
+    "path": "state=path_control first",
+    "way": "state=ways_of_rotary_axes",
+    "orientation": "state=interpolation_of_the_tool_axis",
+    "coordinates": "state=coordinates_of_the_tool_axis",
+    "frame": "follows outside",
+}
+
+#: states of frames that verification accepts
+_FRAMES: Final = {"rotation": "tilted plane", "dynamic": "dynamic work offset"}
+
+#: a number, where a row has a letter alone
+_NUMBER: Final = r"[-+]?[\d.]+"
+
+#: rules that are no text
+_KINDS: Final[Mapping[str, Callable[[str], Any]]] = {
+    **dict.fromkeys(("needs", "must", "after", "then", "behind", "extra"), re.compile),
+    "share": float,
+    "plane": int,
+}
 
 
 @dataclass(frozen=True)
@@ -45,7 +79,6 @@ class WordRule:
     #: what the numbers in its groups may be of the tolerance: ``length`` of ε, ``angle`` of that of the tool axis
     share: float | None = None
     extra: re.Pattern[str] | None = None  #: words of its block that switch on what somebody must have asked for
-    numbers: str = ""  #: what is done with its numbers, where they have no share and are not `compared`
     never: bool = False  #: the control has no such word
 
     # blocks before and after
@@ -111,7 +144,8 @@ def word_list(control: str) -> WordList:
     table = word_table(control)
     means = {word: text.split() for word, text in table["means"].items() if text}
     words: dict[tuple[str, re.Pattern[str] | None], WordRule] = {}
-    for rule in (*_functions(means), *map(_rule, table["word"])):
+    rows = (rule for word, row in table["words"].items() for rule in _rules(word, row))
+    for rule in (*_functions(means), *rows):
         words.setdefault((rule.pattern.pattern, rule.needs), rule)
     return WordList(
         begin=tuple(map(re.compile, table["begin"])),
@@ -119,7 +153,7 @@ def word_list(control: str) -> WordList:
         header=re.compile(table["header"]) if "header" in table else None,
         orders=re.compile(table["orders"], re.IGNORECASE) if "orders" in table else None,
         words=tuple(words.values()),
-        blocks=tuple(_rule({"alone": True, **entry}) for entry in table["block"]),
+        blocks=tuple(_block(pattern, row) for pattern, row in table["blocks"].items() if row),
     )
 
 
@@ -140,9 +174,64 @@ def _functions(means: Mapping[str, Sequence[str]]) -> Iterator[WordRule]:
             )
 
 
-def _rule(entry: dict[str, Any]) -> WordRule:
-    values: dict[str, Any] = {key: re.compile(value) if key in _PATTERNS else value for key, value in entry.items()}
-    return WordRule(values.pop("is"), **values)
+def _rules(word: str, row: str) -> Iterator[WordRule]:
+    """Rules of a row: of its word, and of those that may be beside it."""
+    if not row:
+        return
+    head, rules, says = (part.strip() for part in row.split(";", 2))
+    effects, _, letters = head.partition(":")
+    fields: dict[str, Any] = {"share": None}
+    for group, _, value in (effect.partition("=") for effect in effects.split()):
+        fields |= _of_group(group, value)
+    fields |= _fields(rules)
+    share = fields["share"]
+    is_own = re.fullmatch(r"[GM][\d.]+|[A-Z_]{2,}\d*", word)
+    pattern = word[1:-1] if word[0] == "/" else re.escape(word) if is_own else word
+    needed = []
+    for letter in letters.split():
+        plain, marks = letter.rstrip("!=~"), letter[len(letter.rstrip("!=~")) :]
+        if plain[0].islower():
+            continue
+        text = f"{plain}{_NUMBER}" if len(plain) == 1 else plain
+        needed += [text] * ("!" in marks)
+        yield WordRule(
+            re.compile(text),
+            says,
+            needs=re.compile(pattern),
+            share=share if "(?P<" in text else None,
+            compared="=" in marks,
+            follows="~" in marks,
+        )
+    if needed:
+        fields["must"] = re.compile("|".join(needed))
+    yield WordRule(re.compile(pattern), says, **fields | {"share": share if "(?P<" in pattern else None})
+
+
+def _block(pattern: str, row: str) -> WordRule:
+    rules, _, says = row.partition(";")
+    return WordRule(re.compile(pattern), says.strip(), **{"alone": True} | _fields(rules))
+
+
+def _of_group(group: str, value: str) -> dict[str, Any]:
+    """What holds for each word that sets a group to a value."""
+    frame = group.partition(".")
+    fields = _fields(_OF_GROUPS.get("frame" if frame[1] else group, ""))
+    if frame[1]:
+        fields |= {"state": _FRAMES[frame[2]], **_fields("off" if value == "off" else "cycle")}
+    return fields
+
+
+def _fields(rules: str) -> dict[str, Any]:
+    """Fields of `WordRule`, written as words."""
+    fields: dict[str, Any] = {}
+    for name, given, text in (rule.partition("=") for rule in rules.split()):
+        value = text.replace("_", " ")
+        if not given:
+            fields[name.removeprefix("-")] = not name.startswith("-")
+        else:
+            kind = _KINDS.get(name)
+            fields[name] = value if kind is None else kind(value)
+    return fields
 
 
 def word_text(word: Word) -> str:
