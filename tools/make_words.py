@@ -9,11 +9,12 @@ import re
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
 LISTS = ROOT / "src" / "cornersmooth" / "nc_reader" / "word_lists"
 PAGE = ROOT / "docs" / "dev" / "words.md"
+#: behind a word that must stand beside another
+NEEDED = " (needed)"
 BEGIN, END = "<!-- made by make_words.py -->\n", "<!-- end -->\n"
 
 
@@ -22,43 +23,15 @@ def shown(text: str) -> str:
     return f"`{text}`".replace("|", "\\|")
 
 
-def roles(entry: dict[str, Any], kind: str) -> str:
-    """Where a word may stand, and what must hold."""
-    said = []
-    if entry.get("first"):
-        said.append("**must come before the first motion**")
-    if entry.get("state") and not entry.get("follows"):
-        said.append("the same wherever the tool moves")
-    if entry.get("off"):
-        said.append("must hold at the end")
-    if entry.get("alone"):
-        said.append("in a block of its own")
-    for key, text in (
-        ("needs", "only beside {}"),
-        ("must", "only with {}"),
-        ("after", "{} before it"),
-        ("then", "{} in the next block"),
-        ("behind", "only after {}"),
-    ):
-        if key in entry:
-            said.append(text.format(shown(entry[key])))
-    if "share" in entry:
-        said.append(f"at most {entry['share']:g} ε")
-    if entry.get("needs") and entry.get("follows"):
-        said.append("may change from line to line")
-    if entry.get("before"):
-        said.append("before an arc")
-    if entry.get("zero"):
-        said.append("only where the rotary axes are at zero")
-    if entry.get("high"):
-        said.append("only after a retract")
-    if entry.get("retract"):
-        said.append("before the first motion, before an approach or at the end")
-    if entry.get("late"):
-        said.append("after a retract, as late as in the block that first moves Z")
-    if entry.get("never"):
-        said.append("refused")
-    return "; ".join(said) or ("anywhere" if kind == "word" else "")
+def cells(row: str, *, block: bool) -> str:
+    """What a row says, as cells of a table: what the word is, what it does, what is beside it, and its rules."""
+    head, rules, says = ("", *row.split(";", 1)) if block else row.split(";", 2)
+    effects, _, letters = head.partition(":")
+    beside = [
+        shown(letter.rstrip("!=~")) + NEEDED * ("!" in letter) for letter in letters.split() if letter[0].isupper()
+    ]
+    known = " ".join(effects.split()), " ".join(beside), rules.replace("_", " ").replace("|", "\\|").strip()
+    return f"{says.strip()} | {known[0]} | {known[1]} | {known[2]}"
 
 
 def section(control: str) -> Iterator[str]:
@@ -82,11 +55,14 @@ def section(control: str) -> Iterator[str]:
         yield "the motion:\n"
         yield "| word | meaning |\n|---|---|"
         yield from (f"| {shown(word)} | {text or 'nothing'} |" for word, text in said.items())
-    rows = [(entry, kind) for kind in ("word", "block") for entry in table.get(kind, ())]
-    if rows:
-        yield "\n| word | what it is | state | where it may stand |\n|---|---|---|---|"
-    for entry, kind in rows:
-        yield f"| {shown(entry['is'])} | {entry.get('says', '')} | {entry.get('state', '')} | {roles(entry, kind)} |"
+    if table.keys() & {"words", "blocks"}:
+        yield "\n| word | what it is | what it sets or does | beside it | rules |\n|---|---|---|---|---|"
+    for key in ("words", "blocks"):
+        for words, row in table.get(key, {}).items():
+            name = " ".join(
+                map(shown, [words.strip("/")] if words[0] == "/" or key == "blocks" else words.split(" | "))
+            )
+            yield f"| {name} | {cells(row, block=key == 'blocks') if row else 'the control has no such words | | |'} |"
     yield ""
 
 

@@ -20,6 +20,8 @@ from cornersmooth.filter.runs import ProgramReader
 from cornersmooth.nc_reader import word_tables
 from cornersmooth.nc_reader.dialects import dialect_of
 from cornersmooth.nc_reader.word_tables import CONTROLS
+from cornersmooth.nc_words.blocks import WordRules
+from cornersmooth.nc_words.rules import UNLISTED, word_list
 
 GOLDEN = sorted((Path(__file__).parents[1] / "nc" / "golden").glob("*.nc"))
 AXES = ("X", "Y", "Z", "A", "C")
@@ -108,15 +110,25 @@ def test_a_table_that_is_like_another_has_its_rows_and_takes_some_back(
     lists = Path(str(word_tables._LISTS))
     shutil.copytree(lists, tmp_path / "lists")
     (tmp_path / "lists" / "shop.toml").write_text(
-        'like = "haas"\n[grammar]\n[does]\n"G43.4" = "tip=angles length: H"\n"M321" = "nothing"\n"G254" = ""\n'
+        'like = "haas"\n[grammar]\n[words]\n"G254" = ""\n"M321" = "nothing; alone; the pallet"\n'
+        '"G43.4" = "tip=angles length: H\\\\d+!=; state=tool_length ends; tip control"\n'
     )
     monkeypatch.setattr(word_tables, "_LISTS", tmp_path / "lists")
     word_tables.word_table.cache_clear()
     try:
         shop, haas = table_of.__wrapped__("shop"), table_of("haas")
+        listed, others = word_list.__wrapped__("shop"), word_list("haas")
     finally:
         word_tables.word_table.cache_clear()
         word_tables.means_of.cache_clear()
+    rules = [WordRules(words, (), dialect_of("haas").lexer, 0.01) for words in (listed, others)]
+    (mine, _), (theirs, _) = (one.of(["G43.4", "H1"]) for one in rules)
+    assert mine[1].ends
+    assert theirs[1] is UNLISTED
+    ((_, pallet),), ((_, any_function),) = (one.of(["M321"]) for one in rules)
+    assert pallet.alone
+    assert any_function.compared
+    assert [one.of(["G254"])[0][1] is UNLISTED for one in rules] == [True, False]
     assert haas.row("G43.4") is UNKNOWN
     assert shop.row("G43.4") == Row.of("G43.4", "tip=angles length: H")
     assert shop.row("G234") == haas.row("G234")

@@ -1,8 +1,9 @@
 """What each word of a control does to what the control remembers: a row a word.
 
-The rows are `[does]` of the control's table in ``nc_reader/word_lists``. A row is ``"WORDS" = "EFFECTS: LETTERS"``::
+The rows are `[words]` and `[does]` of the control's table in ``nc_reader/word_lists``: words that verification accepts,
+and others. A row begins with ``"WORDS" = "EFFECTS: LETTERS"``; what comes behind it, `nc_words.rules` explains::
 
-    "G43.4" = "tip=angles length: H"
+    "G44" = "tip=off axis: H"
 
 WORDS
     Words with `` | `` between them, as the control's lexer names them: ``G1``, ``M6``, ``T``, ``TRAORI``, a whole block

@@ -250,10 +250,10 @@ class WordCheck:
         """Look at what a block and that before want of each other."""
         number, before, theirs = self._before
         for _, rule in theirs:
-            if rule.then is not None and not rule.then.fullmatch(text):
-                self._wrong(NOT_LISTED, number, f"{shown(rule.pattern)} without {shown(rule.then)} after it")
+            if rule.next is not None and not rule.next.fullmatch(text):
+                self._wrong(NOT_LISTED, number, f"{shown(rule.pattern)} without {shown(rule.next)} after it")
         for word, rule in ruled:
-            if rule.behind is not None and not rule.behind.fullmatch(before):
+            if rule.previous is not None and not rule.previous.fullmatch(before):
                 self._wrong(NOT_LISTED, line, f"{word} does not follow what it belongs to")
         self._before = line, text, ruled
 

@@ -59,7 +59,7 @@ _NUMBER: Final = r"[-+]?[\d.]+"
 
 #: rules that are no text
 _KINDS: Final[Mapping[str, Callable[[str], Any]]] = {
-    **dict.fromkeys(("needs", "must", "after", "then", "behind", "extra"), re.compile),
+    **dict.fromkeys(("needs", "must", "after", "next", "previous", "extra"), re.compile),
     "share": float,
     "plane": int,
 }
@@ -83,8 +83,8 @@ class WordRule:
 
     # blocks before and after
     after: re.Pattern[str] | None = None  #: a word that must have been said since the last time
-    behind: re.Pattern[str] | None = None  #: the block before
-    then: re.Pattern[str] | None = None  #: the next block
+    previous: re.Pattern[str] | None = None  #: the block before
+    next: re.Pattern[str] | None = None  #: the next block
     plane: int = 0  #: the G word of planes that must be in force where it is taken
     before: str = ""  #: ``"arc"``: the next motion must be one, but for the word that held at first
 
