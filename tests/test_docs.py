@@ -222,6 +222,10 @@ def test_the_figures_of_the_readme_are_those_that_come_out() -> None:
         made = numbers.line_of(numbers.PARTS[part], *numbers.compared(ROOT / "samples" / part))
         (row,) = (line for line in shown["numbers"].split("\n") if numbers.PARTS[part] in line)
         assert figures(made) == pytest.approx(figures(row), rel=0.05)
+        told = numbers.by_the_paper(ROOT / "samples" / part)
+        assert figures(told) == pytest.approx(figures(numbers.PAPER.search(text)[0]), rel=0.05)
+        told = numbers.on_linuxcnc(ROOT / "samples" / part)
+        assert figures(told) == pytest.approx(figures(numbers.place("linuxcnc").search(text)[0]), rel=0.05)
 
 
 def figures(text: str) -> list[float]:
