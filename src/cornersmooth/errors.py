@@ -21,7 +21,7 @@ EXIT_INTERNAL = 70
 
 #: numbers of warnings that say nothing of the metal: how the input is spelt, what options choose, what costs time, what
 #: the verdict says already
-_BESIDE_THE_METAL = frozenset((133, 134, 139, 174, 184, 325, 371, 509))
+_BESIDE_THE_METAL = frozenset((133, 134, 139, 174, 184, 325, 371, 396, 509))
 
 #: numbers of warnings of what an option leaves out of the program
 _LEFT_OUT = frozenset((315,))

@@ -41,6 +41,11 @@ FINDINGS: Final[dict[str, tuple[Severity, str]]] = {
         "axis points U V W in G6.2 need the option of dual NURBS interpolation (a second curve for the tool axis); see "
         "that the control has it, else it stops with an alarm, or use -f g1",
     ),
+    "CS396": (
+        "warning",
+        "rounded corners are many short lines, and a control that does not look ahead slows down on them; "
+        "give --with {name}, unless the machine has such a function on",
+    ),
     "CS339": ("warning", "{name} was asked for: {warning}"),
     "CS313": ("note", "arc written as circular blocks"),
     "CS314": ("note", "arc written as lines"),

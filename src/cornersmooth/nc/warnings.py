@@ -45,6 +45,12 @@ def add_warnings(form: Form, smoothed: SmoothProgram, circles: Circles, upright:
         findings.note("CS394", 0, control=form.control, method=CURVES_METHOD, default=DEFAULT_METHOD)
     if form.curve == "g6.2" and form.orientation == "point" and not (upright | (program.kind == Move.FROM)).all():
         findings.note("CS395", 0)
+    rounded = bool(smoothed.corners.smoothed.any()) or smoothed.runs is not None
+    if rounded and not form.curves and smoothed.settings.lines == "dense" and not form.extras:
+        for name, extra in form.table.extras.items():
+            if not extra.forms or form.name in extra.forms:
+                findings.note("CS396", 0, name=name)
+                break
     for extra in form.extras:
         if extra.warning:
             findings.note("CS339", 0, name=extra.name, warning=extra.warning)
