@@ -159,7 +159,7 @@ def test_frame_of_the_text(tmp_path: Path) -> None:
     lines = lines_of(*options)
     assert lines[1:5] == ["O0815", "N10 G21 G90 G94 G17 G40 G49 G80", "N20 G91 G28 Z0.", "N30 G90"]
     assert lines[5].startswith("N40 (CORNERSMOOTH ")
-    assert lines[7:9] == ["N60 (O0815 IN G21)", "N70 G54"]
+    assert lines[8:10] == ["N70 (O0815 IN G21)", "N80 G54"]
     assert [line.partition(" ")[2] for line in lines[-3:-1]] == ["G91 G28 Z0.", "M30"]
 
 

@@ -13,6 +13,7 @@ from cornersmooth.nc import Frame, choose_form, fit_settings, write
 from cornersmooth.pipeline import postprocess
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
+from cornersmooth.verdict import Verdict
 from cornersmooth.verify import verify
 from nc.writing import codes, lines_of, text_of_cl
 
@@ -228,7 +229,7 @@ def test_coolant_through_the_spindle_of_haas_has_its_own_end() -> None:
                 found = verify(
                     program, text.encode(), tolerance=0.01, axis_length=10, control="haas", machine=form.machine
                 )
-                assert found.problems, (k, line, other)
+                assert found.verdict in (Verdict.FAILED, Verdict.NOT_VERIFIED), (k, line, other)
 
 
 def test_insert_with_nc_words_is_not_passed_through() -> None:
@@ -399,7 +400,8 @@ def test_what_a_stop_ends_is_said_again_before_the_tool_moves() -> None:
             if lines[j] in ("S900 M3", "S700 M3", "M8"):
                 text = "\n".join([*lines[:j], *lines[j + 1 :]]) + "\n"
                 how = {"control": "fanuc", "machine": form.machine, "tolerance": 0.01, "axis_length": 10}
-                assert verify(program, text.encode(), **how).problems, lines[j]
+                found = verify(program, text.encode(), **how)
+                assert found.verdict in (Verdict.FAILED, Verdict.NOT_VERIFIED), lines[j]
 
 
 def test_the_way_back_along_the_tool_is_a_motion_behind_a_stop() -> None:
