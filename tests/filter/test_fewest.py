@@ -158,3 +158,71 @@ def test_the_fastest_is_taken_where_times_are_known() -> None:
     text = "G21 G90 G94 G17\nG61\nG0 X0 Y0 Z5\nG1 Z0 F300\n" + zigzag + "G0 Z5\nM2\n"
     found = few(text, "linuxcnc", axes=machine)
     assert found.seconds is None or found.seconds[1] < found.seconds[0]
+
+
+WAVE = "".join(f"X{a:.3f} Y{np.sin(a):.3f}\n" for a in np.arange(0.1, 8.0, 0.1))
+KLARTEXT = "".join(f"L {line.replace('X', 'X+').replace('Y', 'Y+').replace('+-', '-')}\n" for line in WAVE.splitlines())
+START = "G21 G90 G94 G17 G40 G49 G80\nG54 G0 X0. Y0.\n{}\nG0 X0. Y0. Z5.\nG1 Z0. F300.\n"
+
+
+@pytest.mark.parametrize(
+    ("control", "words", "smoothed"),
+    [
+        ("fanuc", "A90.", True),
+        ("haas", "G0 A90. B10.", True),
+        ("fanuc", "G68.2 X0. Y0. Z0. I0. J30. K0.\nG53.1", True),
+        ("fanuc", "G68 X0. Y0. R30.", True),
+        ("fanuc", "G51.1 X0.", True),
+        ("fanuc", "G51 X0. Y0. Z0. P2.", False),
+        ("fanuc", "G66 P9000", False),
+        ("siemens", "TRANS X10\nAROT X30", True),
+        ("siemens", 'CYCLE800(0,"",0,57,0,0,0,30,0,0,0,0,0,-1)', True),
+        ("siemens", "SCALE X2\nAROT X30", False),
+        ("siemens", "SCALE X2\nTRANS", True),
+        ("heidenhain", "CYCL DEF 19.0 WORKING PLANE\nCYCL DEF 19.1 A+30 B+0 C+0", True),
+        ("heidenhain", "PLANE SPATIAL SPA+30 SPB+0 SPC+0 TURN FMAX", True),
+        ("heidenhain", "CYCL DEF 11.0 SCALING\nCYCL DEF 11.1 SCL0.9\nCYCL DEF 19.1 A+30 B+0 C+0", False),
+    ],
+)
+def test_what_stands_still_under_a_run_is_no_hindrance(control: str, words: str, smoothed: bool) -> None:
+    text = START.format(words) + WAVE + "G0 Z50.\nM30\n"
+    if control == "siemens":
+        text = text.replace("G21", "G710").replace(" G49 G80", "")
+    if control == "heidenhain":
+        text = f"BEGIN PGM A MM\nTOOL CALL 3 Z S3000\n{words}\nL X+0 Y+0 Z+5 R0 FMAX\nL Z+0 R0 F300\n"
+        text += KLARTEXT + "L Z+50 R0 FMAX\nM30\nEND PGM A MM\n"
+    found = few(text, control)
+    assert (found.smoothed > 70) is smoothed, found.left
+    if smoothed:
+        assert found.verdict is Verdict.PASSED
+        assert found.new_lines < 40
+    else:
+        assert "scaled or called by a macro" in found.left[0].reason
+
+
+def test_cuts_in_which_an_axis_turns_ask_for_the_machine() -> None:
+    text = START.format("A0.") + "".join(f"X{k}. A{k}.\n" for k in range(1, 9)) + WAVE + "G0 Z50.\nM30\n"
+    found = few(text)
+    assert found.left[0].reason == "an axis turns in it: name the machine"
+    assert found.left[0].count == 8
+    assert found.smoothed > 70
+
+
+def test_an_axis_that_is_never_named_stands_still() -> None:
+    text = START.replace("Y0.", "").format("G43 H1") + WAVE.replace("Y", "Z") + "G0 Z50.\nM30\n"
+    found = few(text)
+    assert found.verdict is Verdict.PASSED
+    assert found.smoothed > 70
+    assert b"Y" not in found.data
+    assert b"G18 G" in found.data
+    assert difference(by_words(text.encode()), by_words(found.data), EPS) == ""
+
+
+def test_a_feed_in_a_line_of_its_own_is_no_end_of_a_run() -> None:
+    lines = WAVE.splitlines(keepends=True)
+    text = START.format("") + "".join(lines[:40]) + "F500.\n" + "".join(lines[40:]) + "F600.\nG0 Z50.\nM30\n"
+    found = few(text)
+    assert found.runs == 1
+    assert found.verdict is Verdict.PASSED
+    assert re.findall(rb"F\d+", found.data) == [b"F300", b"F500", b"F600"]
+    assert difference(by_words(text.encode()), by_words(found.data), EPS) == ""

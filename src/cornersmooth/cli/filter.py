@@ -47,7 +47,7 @@ from cornersmooth.filter.times import time_as_it_is
 from cornersmooth.kinematics import Machine
 from cornersmooth.nc import Form
 from cornersmooth.nc_reader import Problem
-from cornersmooth.nc_reader.recognition import is_cl_file, names_rotary_axes, needs_its_control, recognise_control
+from cornersmooth.nc_reader.recognition import is_cl_file, names_tip_control, needs_its_control, recognise_control
 from cornersmooth.provenance import HEAD
 from cornersmooth.report import NcFile, report_json
 from cornersmooth.report.record import Kind, planned_times, record, sha256_of
@@ -306,7 +306,7 @@ def options_for(data: bytes, name: str, given: Options) -> Options:
     if default and not recognise_control(data[:HEAD]) and needs_its_control(data[:HEAD]):
         what = f"{name} does not say its control, and has numbers without a point or comments after a semicolon"
         raise SettingsError("CS267", what, "name it: --control linuxcnc (for grbl and Mach, too), siemens or another")
-    alone = not head.given.machine and not names_rotary_axes(data)
+    alone = not head.given.machine and not names_tip_control(data)
     return replace(head.given, machine=THREE_AXES) if alone else head.given
 
 

@@ -33,6 +33,9 @@ _UNITS: Final = {"mm": 1.0, "inch": 25.4}
 #: what a change of a group does beside
 _CHANGES: Final = {"units": ("length", "feed"), "feed": ("feed",), "offset": ("shift",), "tip": ("length",)}
 
+#: axes of the length of a tool by the plane that holds
+_ALONG: Final = {PRESET: "Z", "G17": "Z", "G18": "YZ", "G19": "XZ"}
+
 #: motions that cut
 CUTS: Final = ("line", "arc")
 
@@ -175,8 +178,9 @@ class State:
     def _go(self, given: Mapping[str, float], axes: Iterable[str], does: set[str]) -> None:
         """Take the places of a block."""
         if does & {"length", "shift", "axis"}:
-            alone = self.groups.get("plane") == "G17" and "length" not in does
-            self.lose_place(None if "shift" in does else "Z" if alone else "XYZ")
+            # by its settings a control takes Z, or the axis across the plane
+            alone = _ALONG.get(self.groups.get("plane", PRESET) or "", "XYZ") if "length" not in does else "XYZ"
+            self.lose_place(None if "shift" in does else alone)
         named, distance = set(axes), self.groups["distance"]
         for letter in named:
             added = self.place[letter] if distance == "incremental" and letter not in VECTOR else 0.0

@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.arrays.vectors import square, unit
+from cornersmooth.control.state import State
 from cornersmooth.filter.motion import Job, plane_of, says_motion
 from cornersmooth.filter.runs import ANGLES, NONE, VECTOR, Reading, Run
 from cornersmooth.filter.spelling import numbered, numbers_of
@@ -48,6 +49,7 @@ class _Group:
     unit: float  #: mm per unit
     plane: int  #: that holds, 0 where it is not known
     mode: Mode | None  #: of the table, where the tool does not turn; None where it does
+    planes: tuple[int, ...]  #: in which arcs may lie
 
 
 def fewest(
@@ -56,17 +58,23 @@ def fewest(
     """Texts of runs with fewer blocks, and why others are left, by the first line of each."""
     made: dict[int, bytes] = {}
     why: dict[int, str] = {}
-    groups: dict[tuple[int, float, int, bool], list[Run]] = {}
+    groups: dict[tuple[int, float, int, bool, tuple[int, ...]], list[Run]] = {}
     for run in runs:
         if run.state.groups["feed"] == "inverse":
             why[run.first] = TIMED
             continue
         stays = bool((run.place[:, 3:] == run.start[3:]).all())
-        key = (int(reading.start[run.first]) // CHUNK, run.state.unit, plane_of(run.state), stays)
+        key = (
+            int(reading.start[run.first]) // CHUNK,
+            run.state.unit,
+            plane_of(run.state),
+            stays,
+            _planes(job, run.state),
+        )
         groups.setdefault(key, []).append(run)
-    for (_, unit_, plane, stays), own in groups.items():
+    for (_, unit_, plane, stays, planes), own in groups.items():
         mode = _mode(job) if stays else None
-        texts = _texts(job, reading, _Group(own, unit_, plane if arcs else 0, mode))
+        texts = _texts(job, reading, _Group(own, unit_, plane, mode, planes if arcs else ()))
         for run, text in zip(own, texts, strict=True):
             if text is None:
                 why[run.first] = NO_FEWER
@@ -82,15 +90,15 @@ def _mode(job: Job) -> Mode:
     return upright if job.reader.wanted == NONE and upright is not None else form.mode
 
 
-def _piece_limits(job: Job, group: _Group, step: float) -> PieceLimits:
-    mode, tolerance = group.mode, _USED * job.settings.tolerance
-    assert mode is not None
-    circles = mode.circles and group.plane and job.reader.wanted != ANGLES
-    flat = bool(mode.motion.arc_directions)
-    planes: tuple[int, ...] = (17, 18, 19) if circles else ()
-    if flat or mode.circles_in_xy:
-        planes = (17,) if circles and group.plane == 17 else ()
-    return PieceLimits(tolerance, planes, flat, step)
+def _planes(job: Job, state: State) -> tuple[int, ...]:
+    """Planes in which arcs may lie: none under tip control of rotary axes, that which holds under a frame."""
+    mode, plane, frames = _mode(job), plane_of(state), state.frames
+    axes = [frame for frame in frames or () if frame.startswith("axis ")]
+    if not mode.circles or not plane or job.reader.wanted == ANGLES or (axes and state.groups["tip"] != "off"):
+        return ()
+    if mode.motion.arc_directions or mode.circles_in_xy:
+        return (17,) if plane == 17 else ()
+    return (17, 18, 19) if frames is not None and len(frames) == len(axes) else (plane,)
 
 
 def _texts(job: Job, reading: Reading, group: _Group) -> list[bytes | None]:
@@ -108,17 +116,18 @@ def _texts(job: Job, reading: Reading, group: _Group) -> list[bytes | None]:
     decimals = _decimals(job, place)
     digits = max(decimals[0], _RADIUS_DIGITS[group.unit != 1.0])
     if group.mode is not None:
-        limits = _piece_limits(job, group, group.unit * 10.0**-digits)
+        flat = bool(group.mode.motion.arc_directions)
+        limits = PieceLimits(_USED * job.settings.tolerance, group.planes, flat, group.unit * 10.0**-digits)
         pieces = fewest_pieces(Polyline(group.unit * place[:, :3], fixed, begins), limits)
     else:
         pieces = _lines(job, group, place, fixed, begins)
     own = np.searchsorted(begin, pieces.end, side="right") - 1  # run of each piece
-    saved = np.bincount(own, minlength=len(runs)) < count - 1
+    saved = np.bincount(own, minlength=len(runs)) < [run.lines for run in runs]
     if not saved.any():
         return [None] * len(runs)
     keep = saved[own]
     pieces = Pieces(*(values[keep] for values in vars(pieces).values()))
-    blocks = _blocks(job, group, pieces, place, feed, begins, decimals, digits)
+    blocks = _blocks(job, group, pieces, place, feed, begins, decimals, digits, reading.absent)
     return _shared_out(job, reading, group, pieces, own[keep], saved, blocks)
 
 
@@ -169,6 +178,7 @@ def _blocks(
     begins: Bools,
     decimals: Sequence[int],
     digits: int,
+    absent: Sequence[str],
 ) -> list[bytes]:
     """A block for each piece, without line ends."""
     spelling, mode = job.spelling, group.mode or job.form.mode
@@ -187,6 +197,7 @@ def _blocks(
     if "tip" not in look.modal:
         left_out[:, :3] = False
     left_out[left_out.all(axis=1)] = False
+    left_out[:, [job.reader.axes.index(letter) for letter in absent]] = True
     # codes: those of lines, and of arcs both ways with the plane where it is another one
     code = np.where(arc, np.where(pieces.radius < 0, 1, 2), 0)
     plane = np.where(arc, pieces.plane, 0)
@@ -229,7 +240,8 @@ def _blocks(
         if axes == 3:
             third = np.array([2, 1, 0])[plane[arc] - 17]
             own = np.arange(len(out))
-            out[own, third] = (ticks[pieces.end[arc]] == ticks[pieces.start[arc]])[own, third] & leaves
+            same = (ticks[pieces.end[arc]] == ticks[pieces.start[arc]])[own, third]
+            out[own, third] = same & (leaves | np.isin(third, ["XYZ".index(letter) for letter in absent]))
         numbers = np.column_stack((ticks[pieces.end[arc], :axes], np.abs(pieces.radius[arc])))
         turns = [f"{gap}{turn}" for turn in look.arc_directions] or [""]
         letters = [*names[:axes], look.radius]
@@ -268,7 +280,7 @@ def _shared_out(
         lines = [*([b"G90"] if incremental else []), *lines, *([" ".join(back).encode()] if back else [])]
         lines += [b"G91"] if incremental else []
         old = reading.lines(run.first, run.stop)
-        if len(lines) >= len(run):
+        if len(lines) >= run.lines:
             texts.append(None)
             continue
         if job.spelling.numbered:

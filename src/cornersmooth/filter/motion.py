@@ -62,9 +62,8 @@ def motion_of_runs(job: Job, reading: Reading, runs: Sequence[Run]) -> NcProgram
     for run in runs:
         text = reading.lines(run.first, run.stop)
         if run.state.groups["distance"] == "incremental":  # in places, with their own feeds
-            feeds = [re.search(rb"F[ \t]*[\d.]+", line.upper()) for line in text.splitlines()]
-            pairs = zip(in_places(job, run), feeds, strict=True)
-            text = b"".join(block + b" " + (feed[0] if feed else b"") + b"\n" for block, feed in pairs)
+            pairs = zip(in_places(job, run), run.feeds.tolist(), strict=True)
+            text = b"".join(b"%b F%.9f\n" % pair for pair in pairs)
         stretches.append(Stretch(run, text, run.first + 1))
     return motion(job, stretches, job.form)
 

@@ -131,7 +131,7 @@ def filter_program(
     ways = [_way(job, old, *fewest(job, old, old.runs), verify=verify)] if settings.lines is None else []
     if not ways:
         ways = [_way(job, old, *smoothed(job, old), verify=verify)]
-    elif axes is not None and old.runs:
+    elif axes is not None and old.runs and not old.absent:
         rows = replace(job, spelling=_fine(job.spelling, form, settings, inch=old.runs[0].state.unit != 1.0))
         ways.append(_way(rows, old, *smoothed(rows, old), verify=verify))
     best = ways[0] if len(ways) == 1 or axes is None else _way(job, old, *_best(job, old, ways, axes), verify=verify)
@@ -182,7 +182,7 @@ def _best(job: Job, old: Reading, ways: Sequence[_Way], axes: Machine) -> tuple[
     for way in ways:
         times = run_times(job, old, way.after, way.where, axes)
         for place, (before, after) in zip(way.where, times.tolist(), strict=True):
-            some = found.setdefault(place.run.first, [(before, len(place.run), None)])
+            some = found.setdefault(place.run.first, [(before, place.run.lines, None)])
             some.append((after, place.stop - place.first, way.text(place)))
     texts: dict[int, bytes] = {}
     why = dict(ways[0].why)
@@ -279,7 +279,7 @@ def left_all_but(reading: Reading, most: int) -> None:
     first = min(int(np.searchsorted(ends, (ends[-1] - most) / 2)), max(len(reading.runs) - 1, 0))
     stop = max(int(np.searchsorted(ends, ends[first] + most, side="right")) - 1, first + 1)
     for run in (*reading.runs[:first], *reading.runs[stop:]):
-        reading.why[run.first : run.stop] = reading.number("it was not asked for")
+        reading.leave(run, "it was not asked for")
     reading.runs[:] = reading.runs[first:stop]
 
 
@@ -288,7 +288,7 @@ def _result(job: Job, old: Reading, way: _Way, axes: Machine | None, *, paths: b
     new, where, why = way.after, way.where, way.why
     for run in old.runs:
         if run.first in why:
-            old.why[run.first : run.stop] = old.number(why[run.first])
+            old.leave(run, why[run.first])
     drawn = [place for place in where if place.run.state.unit == where[0].run.state.unit]
     return Filtered(
         data=new.data,

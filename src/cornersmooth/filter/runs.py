@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.control.program import Stream, Text
+from cornersmooth.control.program import Act, Stream, Text
 from cornersmooth.control.rows import Rows
 from cornersmooth.control.state import PRESET, State
-from cornersmooth.control.table import table_of
+from cornersmooth.control.table import FRAME, table_of
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import Bools, Floats
 from cornersmooth.nc_reader.dialects import dialect_of
@@ -38,6 +38,17 @@ _HALF_TURN: Final = 180.0
 #: cuts of a run, at least: one alone has no corner
 _LEAST: Final = 2
 
+#: frames that change lengths, or call a macro for each block
+_NOT_RIGID: Final = ("scale", "macro", "polar", "cylinder")
+
+#: a word of an axis that the machine of a program with three axes has not
+_TURNS: Final = re.compile(rb"(?i)(?<![A-Z])[ABC][ \t]*=?[ \t]*[-+]?[\d.]")
+
+#: a word that may name a linear axis
+_NAMED: Final = {axis: re.compile(rb"(?i)(?<![A-Z])%b" % axis.encode()) for axis in "XYZ"}
+
+_FEED_ALONE: Final = re.compile(rb"(?i)\s*(?:N\s*\d+)?\s*F\s*[\d.]+\s*")
+
 #: what `Reading.why` says of lines that are no cuts, and of plain cuts
 _NO_CUT, _CUT = 0, 1
 
@@ -52,10 +63,16 @@ class Run:
     first: int  #: first, stop: lines, from 0; the latter excluded
     stop: int
     state: State  #: before the first
-    place: Floats  #: (n, c) words at the end of each cut, in units of the program
+    #: (n, c) words at the end of each cut, in units of the program; lines between that say a feed alone are no cuts
+    place: Floats
     feeds: Floats  #: (n,) as written
 
     def __len__(self) -> int:
+        return len(self.place)
+
+    @property
+    def lines(self) -> int:
+        """Lines, cuts and others."""
         return self.stop - self.first
 
     @property
@@ -88,6 +105,7 @@ class Reading(Text):
     reasons: list[str] = field(default_factory=list)
     at: dict[int, State] = field(default_factory=dict)  #: before the lines that were asked for
     said: frozenset[str] = frozenset()  #: groups that the program has set (`State.said`)
+    absent: tuple[str, ...] = ()  #: linear axes that the program never names
 
     def __post_init__(self) -> None:
         self.why = np.zeros(len(self), np.uint16)
@@ -101,6 +119,11 @@ class Reading(Text):
     def cuts(self) -> int:
         """Cuts, plain or not."""
         return int((self.why > _NO_CUT).sum())
+
+    def leave(self, run: Run, reason: str) -> None:
+        """Say why the cuts of a run stay."""
+        own = self.why[run.first : run.stop]
+        own[own > _NO_CUT] = self.number(reason)
 
     def number(self, reason: str) -> int:
         """Value of `why` for a reason."""
@@ -142,19 +165,26 @@ class ProgramReader:
     def read(self, data: bytes, stops: Iterable[int] = ()) -> Reading:
         """Read a program, whatever it is; remember the state before some lines."""
         found = Reading(**vars(Text.of(data)))
+        found.absent = tuple(
+            letter for letter in "XYZ" if re.search(rb"(?i)(?<![A-Z])%b" % letter.encode(), data) is None
+        )
+        still: dict[str, float] = dict.fromkeys(found.absent if self.wanted == ANY else (), 0.0)
         stream, asked, last = self.stream(found), sorted(set(stops), reverse=True), self._first
         corners = _near([number for number, line in stream.others if _CORNER_WORDS.search(line)], len(found))
-        for item in stream:
+        for item in _over_feeds(stream):
             first, count = (item.first, len(item)) if isinstance(item, Rows) else (item.line, 1)
             if isinstance(item, Rows):
-                self._take_rows(found, item, corners)
+                self._take_rows(found, _with_places(item, still) if still else item, corners)
             elif item.cuts:
-                found.why[first] = found.number(why_not(item.after, self.wanted) or item.cuts)
+                turns = self.wanted == ANY and _TURNS.search(item.text)
+                reason = "an axis turns in it: name the machine" if turns else item.cuts
+                found.why[first] = found.number(why_not(item.after, self.wanted) or reason)
             while asked and asked[-1] < first + count:
                 stop = asked.pop()
                 found.at[stop] = item.after(stop - first) if isinstance(item, Rows) and stop > first else item.before
             last = item.after(count) if isinstance(item, Rows) else item.after
         found.at |= dict.fromkeys(asked, last)
+        found.at = {line: replace(state, place=state.place | still) for line, state in found.at.items()}
         found.said = last.said
         return found
 
@@ -168,7 +198,9 @@ class ProgramReader:
             np.abs(np.diff(rows.place, axis=0)),
         )
         plain = cut & ~rows.lost & (known[1:] & known[:-1]).all(axis=1)
-        why = np.where(cut, found.number("the place before or after it is not known"), _NO_CUT).astype(np.uint16)
+        never = f": {found.absent[0]} is never given" if found.absent else ""
+        unknown = found.number(f"the place before or after it is not known{never}")
+        why = np.where(cut, unknown, _NO_CUT).astype(np.uint16)
         why[plain & ~np.isfinite(rows.feed)] = found.number("its feed is not known")
         plain &= np.isfinite(rows.feed) & (rows.feed > 0.0)
         left = np.zeros(count, np.bool_)
@@ -186,15 +218,80 @@ class ProgramReader:
         if reason := why_not(rows.before, self.wanted):
             why[cut | arc] = found.number(reason)
             plain[:] = False
-        edges = np.flatnonzero(np.diff(plain, prepend=False, append=False))
+        quiet = (rows.code == 1.0) & ~rows.moves & ~rows.odd  # a feed alone, and the like
+        edges = np.flatnonzero(np.diff(_bridged(plain, quiet), prepend=False, append=False))
         for a, b in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
-            if b - a < _LEAST:
-                why[a:b] = found.number("a single cut between other blocks: it has no corner")
+            own, first = a + np.flatnonzero(plain[a:b]), rows.first
+            if len(own) < _LEAST:
+                why[own] = found.number("a single cut between other blocks: it has no corner")
                 continue
-            why[a:b] = _CUT
-            here, first = slice(a, b), rows.first
-            found.runs.append(Run(first + a, first + b, rows.after(a), rows.place[a + 1 : b + 1], rows.feed[here]))
+            why[own] = _CUT
+            found.runs.append(Run(first + a, first + b, rows.after(a), rows.place[own + 1], rows.feed[own]))
         found.why[rows.first : rows.first + count] = why
+
+
+def _over_feeds(stream: Iterable[Rows | Act]) -> Iterator[Rows | Act]:
+    """Items of a stream; motion blocks with nothing but feeds in lines of their own between them are one item."""
+    held: list[Rows | Act] = []
+    for item in stream:
+        quiet = isinstance(item, Act) and _FEED_ALONE.fullmatch(item.text) is not None
+        if not (quiet or isinstance(item, Rows)) or (held and _stop(held[-1]) != _first(item)):
+            yield from _one_item(held)
+            held = []
+        held.append(item)
+        if not (quiet or isinstance(item, Rows)):
+            yield held.pop()
+    yield from _one_item(held)
+
+
+def _one_item(items: Sequence[Rows | Act]) -> Iterator[Rows | Act]:
+    """Items that follow one another as one; feeds before the first motion block and behind the last on their own."""
+    at = [k for k, item in enumerate(items) if isinstance(item, Rows)]
+    if len(at) < 2:
+        yield from items
+        return
+    yield from items[: at[0]]
+    parts = [item if isinstance(item, Rows) else _feed_row(item) for item in items[at[0] : at[-1] + 1]]
+    code, feed, moves, odd, lost = (
+        np.concatenate([getattr(part, name) for part in parts]) for name in ("code", "feed", "moves", "odd", "lost")
+    )
+    place = np.concatenate([parts[0].place, *(part.place[1:] for part in parts[1:])])
+    yield Rows(parts[0].first, parts[0].before, code, place, feed, moves, odd, lost)
+    yield from items[at[-1] + 1 :]
+
+
+def _feed_row(item: Act) -> Rows:
+    """A feed in a line of its own as a motion block that names no axis."""
+    code = {"rapid": 0.0, "line": 1.0, "arc": 2.0}.get(item.before.groups["motion"] or "", np.nan)
+    place = np.tile([item.after.place[letter] for letter in item.after.axes], (2, 1))
+    no = np.zeros(1, np.bool_)
+    return Rows(item.line, item.before, np.array([code]), place, np.array([item.after.feed]), no, no, no)
+
+
+def _with_places(rows: Rows, still: dict[str, float]) -> Rows:
+    """Motion blocks under which some axes stand still."""
+    place = rows.place.copy()
+    place[:, [rows.before.axes.index(letter) for letter in still]] = list(still.values())
+    return replace(rows, before=replace(rows.before, place=rows.before.place | still), place=place)
+
+
+def _first(item: Rows | Act) -> int:
+    return item.first if isinstance(item, Rows) else item.line
+
+
+def _stop(item: Rows | Act) -> int:
+    return item.first + len(item) if isinstance(item, Rows) else item.line + 1
+
+
+def _bridged(plain: Bools, quiet: Bools) -> Bools:
+    """Plain rows, and quiet ones between them."""
+    index = np.arange(len(plain))
+    other = ~(plain | quiet)
+    last = np.maximum.accumulate(np.where(plain, index, -1))
+    broken = np.maximum.accumulate(np.where(other, index, -1))
+    following = np.minimum.accumulate(np.where(plain, index, len(plain))[::-1])[::-1]
+    breaks = np.minimum.accumulate(np.where(other, index, len(plain))[::-1])[::-1]
+    return plain | (quiet & (last > broken) & (following < breaks))
 
 
 def why_not(state: State, wanted: str) -> str:
@@ -202,7 +299,8 @@ def why_not(state: State, wanted: str) -> str:
 
     `wanted` is the kind of tool tip control that must be on; `NONE` where it must be off, `ANY` for either.
     """
-    groups, frames, tip = state.groups, state.frames, state.groups["tip"]
+    groups, tip = state.groups, state.groups["tip"]
+    frames = state.frames if wanted != ANY else _not_rigid(state)
     if frames:
         return f"places of the part are turned, scaled or called by a macro ({', '.join(sorted(frames))})"
     if tip is None and wanted != ANY:
@@ -225,6 +323,16 @@ def why_not(state: State, wanted: str) -> str:
     if frames is None:
         return "it is not known whether places of the part are turned, scaled or called by a macro"
     return "feed per revolution (G95)" if groups["feed"] == "revolution" else ""
+
+
+def _not_rigid(state: State) -> tuple[str, ...] | None:
+    """Words under which lengths of the part are not those of the program, as in `State.frames`.
+
+    All other frames turn, mirror and shift, and so do axes that the machine has not: a run keeps its shape under them.
+    """
+    values = [state.groups.get(f"{FRAME}{name}", "off") for name in _NOT_RIGID]
+    on = tuple(value for value in values if value not in (None, "off"))
+    return None if None in values and not on else on
 
 
 def _near(lines: Sequence[int], count: int) -> Bools:

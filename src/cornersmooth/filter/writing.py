@@ -30,6 +30,8 @@ _FEED: Final = re.compile(rb"F([\d.]+)$")
 
 def smoothed(job: Job, reading: Reading) -> tuple[dict[int, bytes], dict[int, str]]:
     """Blocks for runs, and why others are left, by the first line of each."""
+    if reading.absent:
+        return {}, {run.first: f"{reading.absent[0]} is never given" for run in reading.runs}
     made: dict[int, bytes] = {}
     why: dict[int, str] = {}
     groups: dict[tuple[object, ...], list[Run]] = {}

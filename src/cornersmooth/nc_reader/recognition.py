@@ -40,6 +40,11 @@ _TURNS: Final = re.compile(
     rb"(?i)(?<![A-Z_,#<])[ABC]\d?[ \t]*(?:=[ \t]*(?:[AID]C|AC[PN])\b|=?[ \t]*[-+]?[ \t]*[\d.#\[])"
     rb"|(?<![A-Z])T[XYZ][-+]?[\d.]|\b(?:TRAORI|FUNCTION TCPM|M128|M428|G43\.[45]|G234|PLANE|CYCLE800|G68\.[234])"
 )
+#: of these, vectors and tip control: what a machine of three axes does not explain
+_TIP: Final = re.compile(
+    rb"(?i)(?<![A-Z_,#<])[ABC]3[ \t]*=|(?<![A-Z])T[XYZ][-+]?[\d.]"
+    rb"|\b(?:TRAORI|FUNCTION TCPM|M128|M428|G43\.[45]|G234)"
+)
 _ASIDE: Final = re.compile(rb"\([^()\n]*\)|;.*|\"[^\"\n]*\"|\b(BEGIN|END) PGM.*")
 #: numbers of axes without a point, and comments of those who need none; what no FANUC would run as it is meant
 _NO_POINT: Final = re.compile(rb"(?i)(?<![A-Z])[XYZ][ \t]*[-+]?\d*[1-9]\d*(?![\d.])")
@@ -49,10 +54,19 @@ _SEMICOLON: Final = re.compile(rb";[ \t]*[^\s]")
 
 def names_rotary_axes(data: bytes) -> bool:
     """Whether an NC program has words of rotary axes, of tool vectors, or of tilted planes."""
-    for match in _TURNS.finditer(data):
+    return _has(_TURNS, data)
+
+
+def names_tip_control(data: bytes) -> bool:
+    """Whether an NC program has tool vectors, or words of tool tip control."""
+    return _has(_TIP, data)
+
+
+def _has(words: re.Pattern[bytes], data: bytes) -> bool:
+    for match in words.finditer(data):
         start = data.rfind(b"\n", 0, match.start()) + 1
         end = data.find(b"\n", start)
-        if _TURNS.search(_ASIDE.sub(b"", data[start : len(data) if end < 0 else end])):
+        if words.search(_ASIDE.sub(b"", data[start : len(data) if end < 0 else end])):
             return True
     return False
 
