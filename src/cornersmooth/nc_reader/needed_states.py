@@ -66,7 +66,8 @@ def control_problems(
         line = table.line[rows]
         need = " or ".join(word or "no tool tip control" for word in wanted)
         text = f"{_KINDS[kind]} under {state.tip_control or 'no tool tip control'}, where {need} must be in force"
-        wrong = list(first_wrong(CONTROL_WORDS, ~np.isin(line, list(approach)), line, text))
+        turned = [] if state.rotary is None else list(approach)
+        wrong = list(first_wrong(CONTROL_WORDS, ~np.isin(line, turned), line, text))
         if state.tip_control in dialect.unsure.get(kind, ()):
             unlooked += [(problem.nc_line, problem.text) for problem in wrong]
         else:
