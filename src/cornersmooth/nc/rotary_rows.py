@@ -9,6 +9,7 @@ import numpy as np
 
 from cornersmooth.arrays.slices import some_rows
 from cornersmooth.arrays.vectors import norm
+from cornersmooth.geometry.ragged import spread
 from cornersmooth.kinematics import Machine, inverse_time, machine_position, tool_axis
 from cornersmooth.methods import METHODS
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program, SmoothProgram
@@ -19,8 +20,9 @@ from cornersmooth.nc.messages import Findings
 from cornersmooth.nc.rotary_words import RotaryWay, machine_of
 from cornersmooth.nc.tools import ToolTravel
 from cornersmooth.rotary import FilledPath, fill, insertions, rapid_moves
-from cornersmooth.settings import Settings
+from cornersmooth.settings import TIMED_POSES, Settings
 from cornersmooth.smoothing.long_lines import LineLimits, Vertices, fewest_lines, segments_of_rows, vertices
+from cornersmooth.smoothing.outside_lines import lines_outside
 from cornersmooth.smoothing.sampling import Rows
 from cornersmooth.text import to_ticks
 
@@ -42,6 +44,9 @@ _MERGED_SHARE, _MERGED_TURN = 0.8, 5.0
 
 #: decimals of F of inverse time: FANUC takes 0.001 to 9999.999
 INVERSE_TIME_DECIMALS = 3
+
+#: parts of a long step at whose ends lines may end, and how long it is beside the longer one of its neighbours
+_STATIONS, _LONG_STEP = 4, 0.1
 
 #: turns below this many degrees are none
 _NO_TURN = 1e-9
@@ -94,9 +99,13 @@ def rotary_rows(
         chunk = _Chunk(move, start, at_pose, held, left, None if timed is None else timed[here])
         blend = None
         if long:
+            # in long programs as many lines take too long to find
+            outside = form.table.lines.rounding and limits.tip_of is None and len(program) <= TIMED_POSES
+            if outside:
+                filled = _with_stations(filled, limits)
             found = chunk.vertices(filled, smoothed)
-            kept = fewest_lines(found, limits)
-            filled = some_rows(filled, kept)
+            found, kept = lines_outside(found, limits) if outside else (found, fewest_lines(found, limits))
+            filled = some_rows(replace(filled, tip=found.tip, angles=found.words), kept)
             usual = way.free[here][filled.pose] | _beside_arcs(move[filled.pose], program)
             blend = corner_blends(found, kept, usual, limits, settings, form)
         own = slice(1 if begin else 0, None)
@@ -158,6 +167,24 @@ class _Chunk:
         at_pose = self.at_pose[row] & own
         found = vertices(smoothed, filled.tip, filled.axis, filled.angles, self.move[row], self.start[row], at_pose)
         return replace(found, fixed=found.fixed | (self.held[row] & own))
+
+
+def _with_stations(filled: FilledPath, limits: LineLimits) -> FilledPath:
+    """The path with places on its long steps at which lines may end, too."""
+    length = np.pad(norm(np.diff(filled.tip, axis=0)), 1)
+    number = np.ones(len(length) - 1, np.int64)
+    number[1:][length[1:-1] > _LONG_STEP * np.maximum(length[:-2], length[2:])] = _STATIONS
+    row, place = spread(number)
+    part, added = ((place + 1.0) / number[row])[:, None], place + 1 < number[row]
+
+    def between(values: Floats) -> Floats:
+        before = values[np.maximum(row - 1, 0)]
+        return np.where(added[:, None], before + part * (values[row] - before), values[row])
+
+    angles = between(filled.angles)
+    return FilledPath(
+        filled.pose[row], added | filled.inserted[row], between(filled.tip), limits.axis_of(angles), angles
+    )
 
 
 def _timed(

@@ -25,7 +25,7 @@ _LEAST_BEND = 1e-300
 _REACH = 4.8
 
 #: where a blend is looked at: where both lines are as far from the corner, 0, and before and after that, -1 and 1
-_PLACES = (-0.35, 0.0, 0.35)
+_PLACES = (-0.6, -0.4, -0.2, 0.0, 0.2, 0.4, 0.6)
 
 #: Degrees by which rotary axes may speed up while linear ones do by one mm: machines differ, the largest ratio counts.
 _TURNS = (0.1, 0.4, 1.0)

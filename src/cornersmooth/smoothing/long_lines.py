@@ -46,6 +46,7 @@ class Vertices:
     parameter: Floats  #: (r,) mm: never decreasing
     fixed: Bools  #: (r,): a line ends here in any case
     position: Floats | None = None  #: (r, 3) mm: of the linear axes, where these run straight and not the tip
+    room: Floats | None = None  #: (r,) how many times the limits a line may be off here; once where it is None
 
 
 @dataclass(frozen=True)
@@ -136,8 +137,8 @@ def _fixed(smoothed: SmoothProgram, move: Ints, at_pose: Bools) -> Bools:
     return fixed
 
 
-def fewest_lines(rows: Vertices, limits: LineLimits) -> Ints:
-    """Rows at which lines end, ascending, the first and the last row among them.
+def fewest_lines(rows: Vertices, limits: LineLimits, lane: int = LANE) -> Ints:
+    """Rows at which lines end, ascending, the first and the last row among them, and each after `lane` others.
 
     The farthest row from each vertex is found by doubling and halving, in all parts between fixed rows at once.
     """
@@ -145,7 +146,7 @@ def fewest_lines(rows: Vertices, limits: LineLimits) -> Ints:
     if count < 3:
         return np.arange(count)
     ends = rows.fixed.copy()
-    ends[::LANE] = True
+    ends[::lane] = True
     begin = np.flatnonzero(ends)
     at, stop = begin[:-1].copy(), begin[1:].copy()
     kept = ends
@@ -245,6 +246,8 @@ def _off(rows: Vertices, limits: LineLimits, start: Ints, end: Ints, count: Ints
     lever = at(rows.original_axis_point) - original_tip
     lever *= (limits.axis_length / np.maximum(norm(lever), np.finfo(np.float64).tiny))[:, None]
     off = np.maximum(norm(tip - original_tip) / limits.tip, norm(axis_point - original_tip - lever) / limits.axis_point)
+    if rows.room is not None:
+        off /= at(rows.room)
     return np.maximum.reduceat(off, starts(count)[:-1])
 
 
