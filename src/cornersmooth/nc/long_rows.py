@@ -71,15 +71,10 @@ def corner_blends(
     style = form.table.lines
     if not style.rounding:
         return None
-<<<<<<< HEAD
-    found = largest_blends(rows, kept, limits, settings.tolerance, style.executed_share * settings.tolerance)
-    return np.where(usual, limits.blend, found)
-=======
     deviation = style.executed_share * settings.tolerance
     # ends of lines are off the path to one side by no more than the limits, and what is executed to the other
     found = largest_blends(rows, kept, limits, deviation + limits.tip, deviation)
-    return np.where(rapid, limits.blend, found)
->>>>>>> 2ae86ddb (wip: LinuxCNC: ends of lines beside the path)
+    return np.where(usual, limits.blend, found)
 
 
 def long_rows(rows: Rows, smoothed: SmoothProgram, form: Form) -> Iterator[Rows]:
