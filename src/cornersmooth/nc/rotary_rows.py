@@ -102,7 +102,8 @@ def rotary_rows(
             # in long programs as many lines take too long to find
             outside = form.table.lines.rounding and limits.tip_of is None and len(program) <= TIMED_POSES
             if outside:
-                filled = _with_stations(filled, limits)
+                cut = (program.kind[move] == Move.LINEAR) & ~way.free[here]
+                filled = _with_stations(filled, cut[filled.pose], limits)
             found = chunk.vertices(filled, smoothed)
             found, kept = lines_outside(found, limits) if outside else (found, fewest_lines(found, limits))
             filled = some_rows(replace(filled, tip=found.tip, angles=found.words), kept)
@@ -169,11 +170,11 @@ class _Chunk:
         return replace(found, fixed=found.fixed | (self.held[row] & own))
 
 
-def _with_stations(filled: FilledPath, limits: LineLimits) -> FilledPath:
-    """The path with places on its long steps at which lines may end, too."""
+def _with_stations(filled: FilledPath, cut: Bools, limits: LineLimits) -> FilledPath:
+    """The path with places on the long steps of cuts, (m,) of its rows, at which lines may end, too."""
     length = np.pad(norm(np.diff(filled.tip, axis=0)), 1)
     number = np.ones(len(length) - 1, np.int64)
-    number[1:][length[1:-1] > _LONG_STEP * np.maximum(length[:-2], length[2:])] = _STATIONS
+    number[1:][cut[1:] & (length[1:-1] > _LONG_STEP * np.maximum(length[:-2], length[2:]))] = _STATIONS
     row, place = spread(number)
     part, added = ((place + 1.0) / number[row])[:, None], place + 1 < number[row]
 
