@@ -71,9 +71,7 @@ def corner_blends(
     style = form.table.lines
     if not style.rounding:
         return None
-    deviation = style.executed_share * settings.tolerance
-    # ends of lines are off the path to one side by no more than the limits, and what is executed to the other
-    found = largest_blends(rows, kept, limits, deviation + limits.tip, deviation)
+    found = largest_blends(rows, kept, limits, settings.tolerance, style.executed_share * settings.tolerance)
     return np.where(usual, limits.blend, found)
 
 

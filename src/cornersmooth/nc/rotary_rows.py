@@ -45,7 +45,8 @@ _MERGED_SHARE, _MERGED_TURN = 0.8, 5.0
 #: decimals of F of inverse time: FANUC takes 0.001 to 9999.999
 INVERSE_TIME_DECIMALS = 3
 
-#: parts of a long step at whose ends lines may end, and how long it is beside the longer one of its neighbours
+#: parts of a long step at whose ends lines may end, and how long it is beside the longer one of its
+#: neighbours, and beside what the axis turns at the axis point
 _STATIONS, _LONG_STEP = 4, 0.1
 
 #: turns below this many degrees are none
@@ -174,7 +175,9 @@ def _with_stations(filled: FilledPath, cut: Bools, limits: LineLimits) -> Filled
     """The path with places on the long steps of cuts, (m,) of its rows, at which lines may end, too."""
     length = np.pad(norm(np.diff(filled.tip, axis=0)), 1)
     number = np.ones(len(length) - 1, np.int64)
-    number[1:][cut[1:] & (length[1:-1] > _LONG_STEP * np.maximum(length[:-2], length[2:]))] = _STATIONS
+    turn = limits.axis_length * norm(np.diff(filled.axis, axis=0))
+    long = length[1:-1] > _LONG_STEP * np.maximum(np.maximum(length[:-2], length[2:]), turn)
+    number[1:][cut[1:] & long] = _STATIONS
     row, place = spread(number)
     part, added = ((place + 1.0) / number[row])[:, None], place + 1 < number[row]
 
