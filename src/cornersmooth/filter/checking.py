@@ -13,8 +13,9 @@ import numpy as np
 from cornersmooth.arrays.vectors import unit
 from cornersmooth.control.state import State
 from cornersmooth.errors import CornersmoothError
+from cornersmooth.filter.meaning import Meanings
 from cornersmooth.filter.motion import Job, Stretch, motion, motion_of_runs, plane_of, program_of, says_motion
-from cornersmooth.filter.runs import Reading, Run
+from cornersmooth.filter.runs import PLAIN_CUT, ProgramReader, Reading, Run
 from cornersmooth.model import Program
 from cornersmooth.nc_reader import NcProgram, Problem
 from cornersmooth.nc_reader.block_tables import CHUNK
@@ -51,46 +52,79 @@ class Checked:
     axis_point: float = 0.0  #: NaN where the tool axis has a tolerance of its own
 
 
-def places(old: Reading, new: Reading) -> tuple[list[Place], list[Problem]]:
-    """Find the runs of a program in another one, between lines that must be the same."""
-    firsts = [*(run.first for run in old.runs), len(old.why)]
-    head = old.lines(0, firsts[0])
-    if not new.data.startswith(head) or (not old.runs and new.data != head):
-        return [], [_first_other(old, new)]
+def places(old: Reading, new: Reading, reader: ProgramReader) -> tuple[list[Place], list[Problem]]:
+    """Find the runs of a program in another one, between lines that must say the same; within them all is motion."""
+    meanings = Meanings.of(reader, old)
+    head, tail = (old.runs[0].first, old.runs[-1].stop) if old.runs else (len(old), len(old))
+    begin, at, wrong = _at_begin(old, new, meanings, head)
+    if wrong or not old.runs:
+        left = [line for line in range(at, len(new)) if meanings.of_line(new.lines(line, line + 1))]
+        return [], wrong or [_changed(line, "there is more than in the old program") for line in left[:1]]
     found: list[Place] = []
-    at = len(head)
-    for run, following in zip(old.runs, firsts[1:], strict=True):
-        after = old.lines(run.stop, following)
-        end = _found(new, after, at, last=following == len(old.why))
-        if end is None:
-            what = f"the lines after line {run.stop} of the old program are not there"
-            return found, [_changed(_line(new, at), what)]
-        if new.data[at:end] != old.lines(run.first, run.stop):
-            found.append(Place(run, _line(new, at), _line(new, end)))
-        at = end + len(after)
+    for run, following in zip(old.runs, [*(run.first for run in old.runs[1:]), len(old)], strict=True):
+        begin, stop, wrong = _found(old, new, meanings, range(run.stop, following), at, last=run.stop == tail)
+        if wrong:
+            return found, wrong
+        if new.lines(at, begin) != old.lines(run.first, run.stop):
+            found.append(Place(run, at, begin))
+            others = np.flatnonzero(new.why[at:begin] != PLAIN_CUT) + at
+            more = [line for line in others.tolist() if not meanings.is_motion(new.lines(line, line + 1))]
+            if more:
+                return found, [_changed(more[0], "within a run the program does more than to move")]
+        at = stop
     return found, []
 
 
-def _line(new: Reading, at: int) -> int:
-    return int(np.searchsorted(new.start, at))
+def _at_begin(old: Reading, new: Reading, meanings: Meanings, stop: int) -> tuple[int, int, list[Problem]]:
+    """Lines of the new program up to which it says what the old one says before a line; and what is another."""
+    if new.data.startswith(old.lines(0, stop)) and len(new) >= stop:
+        return 0, stop, []
+    at = 0
+    for line in range(stop):
+        if not (wanted := meanings.of_line(old.lines(line, line + 1))):
+            continue
+        while at < len(new) and not meanings.of_line(new.lines(at, at + 1)):
+            at += 1
+        if at == len(new) or meanings.of_line(new.lines(at, at + 1)) != wanted:
+            return 0, 0, [_changed(at, f"line {line + 1} of the old program, outside of runs, is another one")]
+        at += 1
+    return 0, at, []
 
 
-def _found(new: Reading, text: bytes, at: int, *, last: bool) -> int | None:
-    """Where whole lines begin in the rest of a program; at its end if they are the last."""
-    if last:
-        end = len(new.data) - len(text)
-        return end if end >= at and new.data.endswith(text) else None
-    end = new.data.find(text, at)
-    while end > 0 and new.data[end - 1 : end] != b"\n":
-        end = new.data.find(text, end + 1)
-    return None if end < 0 else end
-
-
-def _first_other(old: Reading, new: Reading) -> Problem:
-    for line in range(len(old.why)):
-        if line >= len(new.why) or old.lines(line, line + 1) != new.lines(line, line + 1):
-            return _changed(line, f"line {line + 1} of the old program, outside of runs, is another one")
-    return _changed(len(old.why), "there is more than in the old program")
+def _found(
+    old: Reading, new: Reading, meanings: Meanings, lines: range, at: int, *, last: bool
+) -> tuple[int, int, list[Problem]]:
+    """Where the new program says, from a line on, what lines of the old one say; those at its end must end it."""
+    text = old.lines(lines.start, lines.stop)
+    begin = len(new.data) - len(text) if last else new.data.find(text, int(new.start[at]))
+    while not last and begin > 0 and new.data[begin - 1 : begin] != b"\n":
+        begin = new.data.find(text, begin + 1)
+    if begin >= new.start[at] and new.data.startswith(text, begin) and (text or last):
+        line = int(np.searchsorted(new.start, begin))
+        if new.start[line] == begin:
+            return line, line + len(lines), []
+    wanted = [(line, said) for line in lines if (said := meanings.of_line(old.lines(line, line + 1)))]
+    # plain cuts are looked at only where the first line is one
+    first = [line for line in lines if wanted and line == wanted[0][0] and old.why[line] == PLAIN_CUT]
+    there = [k for k in range(at, len(new)) if first or new.why[k] != PLAIN_CUT]
+    best = (-1, at, 0)
+    for k in there:
+        if not wanted or meanings.of_line(new.lines(k, k + 1)) != wanted[0][1]:
+            continue
+        stop, count = k, 0
+        while stop < len(new) and count < len(wanted):
+            said = meanings.of_line(new.lines(stop, stop + 1))
+            if said and said != wanted[count][1]:
+                break
+            count, stop = count + bool(said), stop + 1
+        ends = not last or not any(meanings.of_line(new.lines(j, j + 1)) for j in range(stop, len(new)))
+        if count == len(wanted) and ends:
+            return k, stop, []
+        best = max(best, (count, stop, k))
+    if 0 < best[0] < len(wanted):
+        what = f"line {wanted[best[0]][0] + 1} of the old program, outside of runs, is another one"
+        return 0, 0, [_changed(best[1], what)]
+    return 0, 0, [_changed(at, f"the lines after line {lines.start} of the old program are not there")]
 
 
 def _changed(line: int, text: str) -> Problem:

@@ -213,7 +213,7 @@ def verify_programs(
     """Compare a program with the one that it was made from, whoever made it; parameters as of `filter_program`."""
     settings = Settings() if settings is None else settings
     job, before = read_program(old, form, settings, tip_from_start=tip_from_start, inch=inch, processes=processes)
-    where, wrong = places(before, job.reader.read(new))
+    where, wrong = places(before, job.reader.read(new), job.reader)
     after = job.reader.read(new, [place.stop for place in where])
     checked = Checked(tuple(wrong)) if wrong else check(job, before, after, where)
     way = _Way(after, where, {}, checked)

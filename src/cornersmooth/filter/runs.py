@@ -50,7 +50,7 @@ _NAMED: Final = {axis: re.compile(rb"(?i)(?<![A-Z])%b" % axis.encode()) for axis
 _FEED_ALONE: Final = re.compile(rb"(?i)\s*(?:N\s*\d+)?\s*F\s*[\d.]+\s*")
 
 #: what `Reading.why` says of lines that are no cuts, and of plain cuts
-_NO_CUT, _CUT = 0, 1
+NO_CUT, PLAIN_CUT = 0, 1
 
 #: words beside an end that shape the corner there: it belongs to the blocks on both sides
 _CORNER_WORDS: Final = re.compile(rb"(?i),\s*[RC]\s*[\d.]|\b(?:RNDM?|CHF|CHR|FRCM?)\b")
@@ -112,18 +112,18 @@ class Reading(Text):
 
     def left(self) -> tuple[Left, ...]:
         """Why cuts are left, the most first."""
-        found = Counter(self.why[self.why > _CUT].tolist())
+        found = Counter(self.why[self.why > PLAIN_CUT].tolist())
         return tuple(Left(self.reasons[k - 2], int(np.argmax(self.why == k)) + 1, n) for k, n in found.most_common())
 
     @property
     def cuts(self) -> int:
         """Cuts, plain or not."""
-        return int((self.why > _NO_CUT).sum())
+        return int((self.why > NO_CUT).sum())
 
     def leave(self, run: Run, reason: str) -> None:
         """Say why the cuts of a run stay."""
         own = self.why[run.first : run.stop]
-        own[own > _NO_CUT] = self.number(reason)
+        own[own > NO_CUT] = self.number(reason)
 
     def number(self, reason: str) -> int:
         """Value of `why` for a reason."""
@@ -157,6 +157,11 @@ class ProgramReader:
         self._first = State(table_of(control), self.axes)
         self._first.groups |= {"units": "inch"} if inch else {}
         self._first.groups |= {"tip": self.wanted} if tip_from_start else {}
+
+    @property
+    def start(self) -> State:
+        """What holds where a program begins."""
+        return self._first.copy()
 
     def stream(self, text: Text) -> Stream:
         """Read a program as a stream."""
@@ -200,7 +205,7 @@ class ProgramReader:
         plain = cut & ~rows.lost & (known[1:] & known[:-1]).all(axis=1)
         never = f": {found.absent[0]} is never given" if found.absent else ""
         unknown = found.number(f"the place before or after it is not known{never}")
-        why = np.where(cut, unknown, _NO_CUT).astype(np.uint16)
+        why = np.where(cut, unknown, NO_CUT).astype(np.uint16)
         why[plain & ~np.isfinite(rows.feed)] = found.number("its feed is not known")
         plain &= np.isfinite(rows.feed) & (rows.feed > 0.0)
         left = np.zeros(count, np.bool_)
@@ -225,7 +230,7 @@ class ProgramReader:
             if len(own) < _LEAST:
                 why[own] = found.number("a single cut between other blocks: it has no corner")
                 continue
-            why[own] = _CUT
+            why[own] = PLAIN_CUT
             found.runs.append(Run(first + a, first + b, rows.after(a), rows.place[own + 1], rows.feed[own]))
         found.why[rows.first : rows.first + count] = why
 
