@@ -37,6 +37,8 @@ FAILED = ".failed"
 
 #: hash of what is written: many processors have instructions of their own for it
 _HASH: Final = "sha256"
+#: bytes that are hashed at once
+_AT_ONCE: Final = 1 << 20
 
 #: extended attribute that holds the mark of a file
 _MARK = "user.cornersmooth"
@@ -126,19 +128,29 @@ class HashedStream:
         return self._hash.hexdigest()
 
     def patch(self, path: str, place: int, data: bytes) -> None:
-        """Write other bytes over some that are in the file already."""
+        """Write other bytes over some that are in the file already (OutputError CS407, as `check`)."""
         self._stream.flush()
+        before, after = hashlib.new(_HASH), hashlib.new(_HASH)
         with open(path, "r+b") as file:
+            head = file.read(place + len(data))
+            before.update(head)
+            after.update(head[:place] + data)
+            while more := file.read(_AT_ONCE):
+                before.update(more)
+                after.update(more)
+            self._compare(before.hexdigest(), path)
             file.seek(place)
             file.write(data)
-            file.seek(0)
-            self._hash = hashlib.file_digest(file, _HASH)
+        self._hash = after
 
     def check(self, path: str) -> None:
         """Compare what a file holds with what was written (OutputError CS407: somebody else has changed it)."""
         with open(path, "rb") as file:
-            if hashlib.file_digest(file, _HASH).hexdigest() != self.digest:
-                raise OutputError("CS407", "the program was changed before it took its place", "try again", file=path)
+            self._compare(hashlib.file_digest(file, _HASH).hexdigest(), path)
+
+    def _compare(self, digest: str, path: str) -> None:
+        if digest != self.digest:
+            raise OutputError("CS407", "the program was changed before it took its place", "try again", file=path)
 
 
 @dataclass
