@@ -43,14 +43,14 @@ def lines_outside(rows: Vertices, limits: LineLimits) -> tuple[Vertices, Ints]:
     rows, part = replace(rows, fixed=fixed), np.cumsum(fixed)
     place, ends, again = np.hstack((rows.tip, rows.words)), np.zeros(count, np.bool_), np.arange(count)
     for number in range(_ROUNDS + 1):
-        own = replace(some_rows(rows, again), room=room[again] if number < _ROUNDS else None)
-        kept = fewest_lines(own, limits, _LANE)
+        some = replace(some_rows(rows, again), room=room[again] if number < _ROUNDS else None)
+        kept = fewest_lines(some, limits, _LANE)
         ends[again] = False
         ends[again[kept]] = True
-        if own.room is None:
-            place[again] = np.hstack((own.tip, own.words))
+        if some.room is None:
+            place[again] = np.hstack((some.tip, some.words))
             break
-        place[again[kept]], off = _moved(own, kept, limits)
+        place[again[kept]], off = _moved(some, kept, limits)
         far = (off > 1.0) & (np.diff(kept) > 1)  # no line is shorter than from one row to the next
         if not far.any():
             break
@@ -67,31 +67,31 @@ def _moved(rows: Vertices, kept: Ints, limits: LineLimits) -> tuple[Floats, Floa
 
     That is in shares of the limits.
     """
-    held, s = np.flatnonzero(rows.fixed[kept]), rows.parameter[kept]
+    pinned, s = np.flatnonzero(rows.fixed[kept]), rows.parameter[kept]
     line = np.append(np.repeat(np.arange(len(kept) - 1), np.diff(kept)), len(kept) - 2)  # of each row
     length = np.diff(s)
     share = (rows.parameter - s[line]) / np.where(length > 0.0, length, 1.0)[line]
     data = np.hstack((rows.tip, rows.words))
-    best, least, found = data[kept], np.full(len(held) - 1, np.inf), np.zeros(len(kept) - 1)
+    best, least, found = data[kept], np.full(len(pinned) - 1, np.inf), np.zeros(len(kept) - 1)
     gaps = np.diff(rows.parameter, prepend=rows.parameter[0], append=rows.parameter[-1])
     weight = (gaps[1:] + gaps[:-1]) / np.sqrt(np.maximum(share * (1.0 - share), _NEXT))
     for _ in range(_WEIGHTS):
         weight *= len(weight) / weight.sum()
-        at = _fitted(data, kept, line, share, weight, held)
+        at = _fitted(data, kept, line, share, weight, pinned)
         off = _off(rows, limits, at, line, share)
         of_lines = np.maximum.reduceat(off[:-1], kept[:-1])
-        worst = np.maximum.reduceat(of_lines, held[:-1])  # of lines between two ends that stay
-        better = np.repeat(worst < least, np.diff(held))
+        worst = np.maximum.reduceat(of_lines, pinned[:-1])  # of lines between two ends that stay
+        better = np.repeat(worst < least, np.diff(pinned))
         least = np.minimum(worst, least)
         found[better] = of_lines[better]
         inner = np.append(better, False)
         best[inner] = at[inner]
         weight *= np.maximum(off, _LEAST_WEIGHT)
-    best[held] = data[kept[held]]
+    best[pinned] = data[kept[pinned]]
     return best, found
 
 
-def _fitted(data: Floats, kept: Ints, line: Ints, share: Floats, weight: Floats, held: Ints) -> Floats:
+def _fitted(data: Floats, kept: Ints, line: Ints, share: Floats, weight: Floats, pinned: Ints) -> Floats:
     """(k, d) ends of lines with the least weighted squares of what rows (r, d) are off at their shares of lines."""
     left, right = weight * (1.0 - share), weight * share
     both = np.column_stack((left * (1.0 - share), right * share, left * share))
@@ -103,7 +103,7 @@ def _fitted(data: Floats, kept: Ints, line: Ints, share: Floats, weight: Floats,
     wanted[:-1] = of_left
     wanted[1:] += of_right
     stiff = np.full(len(kept), 1e-9 * bands[1].max())
-    stiff[held] *= 1e18
+    stiff[pinned] *= 1e18
     bands[1] += stiff
     wanted += stiff[:, None] * data[kept]
     found: Floats = solveh_banded(bands, wanted, check_finite=False)

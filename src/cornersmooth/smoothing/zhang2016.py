@@ -79,14 +79,14 @@ class Zhang2016(Construction):
 
         def again(rows: Ints, most: Floats) -> None:
             for part in np.split(np.arange(len(rows)), np.arange(BATCH, len(rows), BATCH)):
-                own = rows[part]
+                some = rows[part]
                 legs = legs_at(
-                    program, settings.axis_length, corners.pose[own], corners.before[own], corners.after[own]
+                    program, settings.axis_length, corners.pose[some], corners.before[some], corners.after[some]
                 )
                 placed = self.sized(legs, settings, most[part])
                 if np.isfinite(most[part]).all():
                     placed.status[placed.status == Status.TOO_SHORT] = Status.STRAYS
-                put(corners, own, placed, legs.shift)
+                put(corners, some, placed, legs.shift)
 
         rows = np.flatnonzero(corners.status == Status.STRAYS)
         again(rows, np.full(len(rows), np.inf))
@@ -255,9 +255,9 @@ class _Transitions:
     @classmethod
     def of(cls, legs: Legs, trims: Sequence[Floats], settings: Settings) -> _Transitions:
         tips, turns = (legs.tip_in, legs.tip_out), (legs.turn_in, legs.turn_out)
-        own = [trim[:, None] * leg for trim, leg in zip(trims, (*tips, *sums(tips, turns)), strict=True)]
+        cut = [trim[:, None] * leg for trim, leg in zip(trims, (*tips, *sums(tips, turns)), strict=True)]
         original = Original(tips, turns, settings.axis_length * legs.axis)
-        return cls((own[0], own[1]), (own[2], own[3]), tuple(trims), original, legs.spare(settings))
+        return cls((cut[0], cut[1]), (cut[2], cut[3]), tuple(trims), original, legs.spare(settings))
 
     def bounded(
         self, parameters: tuple[Floats, Floats], missing: Floats, settings: Settings
@@ -273,9 +273,9 @@ class _Transitions:
             factor * norm(self.axis_legs[1] - self.axis_legs[0]),
         )
         gone = parts_gone(self.trims, parameters, weights)
-        own, both = bounded(gone, missing, self.original, errors, settings.axis_length)
-        share = _most_share(own, both, self.spare, settings)
-        return own, share, np.flatnonzero(share > 1.0)
+        off, both = bounded(gone, missing, self.original, errors, settings.axis_length)
+        share = _most_share(off, both, self.spare, settings)
+        return off, share, np.flatnonzero(share > 1.0)
 
     def motion(
         self, rows: Ints, parameters: tuple[Floats, Floats], settings: Settings
@@ -283,10 +283,10 @@ class _Transitions:
         """Poses of some, the segments that they are measured against, and what is left of the tolerances."""
         (u, v), weights = parameters, np.array(settings.weights)
         tip_legs, axis_legs = ((one[0][rows], one[1][rows]) for one in (self.tip_legs, self.axis_legs))
-        own, trims = (u, v if len(v) == 1 else v[rows]), tuple(trim[rows] for trim in self.trims)
+        at, trims = (u, v if len(v) == 1 else v[rows]), tuple(trim[rows] for trim in self.trims)
         original = self.original.some(rows)
-        gone = parts_gone(trims, own, weights)
-        return motion_of(tip_legs, axis_legs, gone, original.lever, own, weights), original, self.spare[rows]
+        gone = parts_gone(trims, at, weights)
+        return motion_of(tip_legs, axis_legs, gone, original.lever, at, weights), original, self.spare[rows]
 
     def missing_at_ends(self, height: float) -> Floats:
         """(g,) mm: the larger ``||Q − P| − H|`` of both ends of the curves."""
@@ -312,16 +312,16 @@ def _measured(
     at = u[None]  # controls run curves at common parameters
     if lines:
         (u, at), missing = _joined(u, v), np.maximum(missing, made.missing_at_ends(settings.axis_length))
-    own, share, doubtful = made.bounded((u, at), missing, settings)
-    passing = own + (settings.chord if lines else 0.0)
+    off, share, doubtful = made.bounded((u, at), missing, settings)
+    passing = off + (settings.chord if lines else 0.0)
     most = *made.motion(doubtful, (u, at), settings), settings, len(u) // 2, passing[doubtful] if lines else None
     share[doubtful] = most_taken(*most)
     return tuple(report), share
 
 
-def _most_share(own: Floats, both: Floats, spare: Floats, settings: Settings) -> Floats:
+def _most_share(off: Floats, both: Floats, spare: Floats, settings: Settings) -> Floats:
     """(g,) bound of what is taken of the tolerances, from those of `bounded`; none for a tolerance of the axis."""
-    share: Floats = np.maximum(own, both / TOGETHER) / (settings.common_tolerance + spare)
+    share: Floats = np.maximum(off, both / TOGETHER) / (settings.common_tolerance + spare)
     return share if settings.axis_tolerance is None else np.full_like(share, np.inf)
 
 
@@ -346,10 +346,10 @@ def straying_lines(smoothed: SmoothProgram, rows: Ints) -> Ints:
     order = np.argsort(number, kind="stable")
     cuts = np.union1d(np.flatnonzero(np.diff(number[order])) + 1, np.arange(BATCH, len(rows), BATCH))
     for part in np.split(order, cuts) if len(rows) else ():
-        own, u = rows[part], nodes(int(number[part[0]]))[:-1]
-        legs = legs_at(program, height, corners.pose[own], corners.before[own], corners.after[own])
+        some, u = rows[part], nodes(int(number[part[0]]))[:-1]
+        legs = legs_at(program, height, corners.pose[some], corners.before[some], corners.after[some])
         trims = [
-            column[own] for column in (corners.trim_in, corners.trim_out, corners.axis_trim_in, corners.axis_trim_out)
+            column[some] for column in (corners.trim_in, corners.trim_out, corners.axis_trim_in, corners.axis_trim_out)
         ]
         made = _Transitions.of(legs, trims, settings)
         v, missing = synchronised(made.tip_legs, made.axis_legs, made.original.lever, weights, u, height)
@@ -357,7 +357,7 @@ def straying_lines(smoothed: SmoothProgram, rows: Ints) -> Ints:
         parameters = _joined(u, v)
         doubtful = made.bounded(parameters, missing, settings)[2]
         share = taken(*made.motion(doubtful, parameters, settings), settings)
-        found.append(own[doubtful[share.max(axis=1) > 1.0 + 1e-6]])
+        found.append(some[doubtful[share.max(axis=1) > 1.0 + 1e-6]])
     return np.concatenate(found)
 
 
@@ -384,8 +384,8 @@ def straying_remainders(smoothed: SmoothProgram, rows: Ints | slice = slice(None
         # at one pose |Q − P| is H but for the chord of the turn; the tip is `apart` from that of the axis point
         apart = np.maximum(*(np.abs(of_tip - of_axis) for of_tip, of_axis in zip(*ends, strict=True)))
         missing = chord_sag(original, settings.axis_length) + apart[:, 0] * norm(step)
-        own, both = bounded((apart, 0.0 * apart), missing, original, (none, none + reserve), settings.axis_length)
-        doubtful = np.flatnonzero(_most_share(own, both, none, settings) > 1.0)
+        off, both = bounded((apart, 0.0 * apart), missing, original, (none, none + reserve), settings.axis_length)
+        doubtful = np.flatnonzero(_most_share(off, both, none, settings) > 1.0)
 
         tip_at, axis_at = (low[doubtful] + _PARTS * (high - low)[doubtful] for low, high in ends)
         original = original.some(doubtful)
