@@ -100,3 +100,17 @@ def test_explain_takes_a_code_as_it_is_printed() -> None:
     assert found["CS337"]["messages"][0]["kind"] == "warning, to check"
     failed = run("explain", "CS999")
     assert (failed.returncode, failed.stderr[:25]) == (2, b"error: no code 'CS999'\nhi")
+
+
+#: options of other programs that pages show
+OF_OTHERS = set(
+    "--cuts --sshlogin --resume-failed --nworkers --joblog --array --nthreads --cpus-per-task --workdir "
+    "--scheduler-file --help --help-all --version".split()
+)
+
+
+def test_options_that_pages_name_are_there() -> None:
+    known = {option for command in COMMANDS.values() for parameter in command.params for option in parameter.opts}
+    for page in (DOCS.parent / "README.md", *DOCS.glob("*.md")):
+        named = set(re.findall(r"(?<![\w-])--[a-z][a-z-]+", page.read_text(encoding="utf-8")))
+        assert named - known - OF_OTHERS == set(), page.name
