@@ -129,3 +129,9 @@ def test_the_spindle_may_be_turned_for_another_tool(control: str, tmp_path: Path
     orient = "M19 R0" if control == "linuxcnc" else "M19"
     assert judged(tmp_path, control, ("^T7", f"{orient}\nT7")).startswith("PASSED")
     assert judged(tmp_path, control, (r"^(G1 .*X20\..* Y0\..*)$", rf"{orient}\n\1")).startswith("FAILED")
+
+
+@pytest.mark.parametrize("control", ["fanuc", "siemens", "linuxcnc"])
+def test_codes_may_have_zeros_before_them(control: str, tmp_path: Path) -> None:
+    edits = [("^M8$", "M08"), (r" M3$", " M03"), ("^M5$", "M05")]
+    assert judged(tmp_path, control, *edits).startswith("PASSED")

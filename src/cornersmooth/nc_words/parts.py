@@ -19,6 +19,7 @@ from typing import Final
 from cornersmooth.control.state import CUTS, State
 from cornersmooth.control.table import FRAME, Row, table_of
 from cornersmooth.nc_reader.words import Line, Table
+from cornersmooth.nc_words.rules import word_text
 from cornersmooth.provenance import PARTS, PARTS_WORD
 
 #: hexadecimal digits of a part
@@ -108,11 +109,11 @@ class Parts:
                 for group, _ in row.sets
             )
             if row.does or changed:
-                own = [other.text for other in line.words if other.name in row.beside]
-                self._take(line.number, " ".join(("/" * line.skipped + word.text, *own)))
+                own = [word_text(other) for other in line.words if other.name in row.beside]
+                self._take(line.number, " ".join(("/" * line.skipped + word_text(word), *own)))
         moved = {word.name for word in line.words} & _PLACES
         if "machine" in does:
-            self._take(line.number, " ".join(sorted(word.text for word in line.words)))
+            self._take(line.number, " ".join(sorted(map(word_text, line.words))))
             self._above = True
         elif moved:
             self._state.place |= {word.name: word.value for word in line.words if word.name in _ROTARY}
