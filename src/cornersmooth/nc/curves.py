@@ -44,9 +44,14 @@ class Shape:
 
 
 def spelt(values: Floats | Ints, write: Callable[[float], str]) -> Part:
-    """A text for each distinct value."""
-    distinct = np.unique(values)
-    return [write(value).encode() for value in distinct.tolist()], np.searchsorted(distinct, values)
+    """A text for each distinct value; mostly the first ones are all that there are."""
+    distinct = np.unique(values[:_FEW])
+    if len(distinct) == 1 and (values == distinct).all():
+        return [write(distinct[0].item()).encode()], np.zeros(len(values), np.int64)
+    which = np.searchsorted(distinct, values)
+    if len(values) > _FEW and (distinct.take(which, mode="clip") != values).any():
+        distinct, which = np.unique(values, return_inverse=True)
+    return [write(value).encode() for value in distinct.tolist()], which.reshape(-1)
 
 
 def joined(*parts: Part) -> Part:
