@@ -194,7 +194,7 @@ def _reported(
     saving: Saving | None = None,
     **more: Any,
 ) -> dict[str, Any]:
-    """Make the report of two programs, write it where it is asked for, and the page of the runs before and after."""
+    """Make the report of two programs, write it where it is wanted, and the page of the runs before and after."""
     from cornersmooth.page import verified_page
 
     old_name, old = source

@@ -86,6 +86,6 @@ def _places(words: Floats, state: State, letter: str, lost: Bools) -> Floats:
 
 
 def filled(values: Floats, before: float) -> tuple[Floats, Ints]:
-    """Give what was said last in each row, and in which row, -1 for before."""
+    """Give what was written last in each row, and in which row, -1 for before."""
     last = np.maximum.accumulate(np.where(np.isnan(values), -1, np.arange(len(values))))
     return np.where(last < 0, before, values[last]), last

@@ -9,7 +9,7 @@ word              meaning
 ================= =====================================================================================================
 cut               a feed move of the program
 run               plain cuts that follow one another in a state that is surely known
-state             what a control remembers from block to block; what may have changed is unknown until it is said again
+state             what a control remembers from block to block; what may have changed is unknown until it comes again
 left              cuts that stay as they are, with the reason
 ================= =====================================================================================================
 

@@ -201,8 +201,8 @@ def _blocks(
     # codes: those of lines, and of arcs both ways with the plane where it is another one
     code = np.where(arc, np.where(pieces.radius < 0, 1, 2), 0)
     plane = np.where(arc, pieces.plane, 0)
-    held = _held(plane, first, group.plane)
-    says_plane = arc & (plane != held)
+    holding = _held(plane, first, group.plane)
+    says_plane = arc & (plane != holding)
     before = np.concatenate(([0], code[:-1]))
     begins_in_line = np.array([run.state.groups["motion"] == "line" for run in group.runs])
     begins_in_line = begins_in_line[np.cumsum(begins[pieces.start]) - 1] if len(begins_in_line) else first
@@ -211,7 +211,7 @@ def _blocks(
     )
     repeats &= ~arc  # R and its like are read beside the code alone
     words = [look.line, look.clockwise, look.counterclockwise]
-    heads = [f"{said}{word}{gap}" for said in ("", f"G17{gap}", f"G18{gap}", f"G19{gap}") for word in words] + [""]
+    heads = [f"{stated}{word}{gap}" for stated in ("", f"G17{gap}", f"G18{gap}", f"G19{gap}") for word in words] + [""]
     head_id = np.where(repeats, len(heads) - 1, code + 3 * np.where(says_plane, plane - 16, 0))
     feeds = feed[pieces.end]
     previous = np.where(first, feed[pieces.start], np.concatenate(([np.nan], feeds[:-1])))

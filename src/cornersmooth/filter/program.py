@@ -54,10 +54,10 @@ class Filtered:
     smoothed: int
     runs: int
     left: tuple[Left, ...]  #: why the others stay
-    checked: Checked | None  #: None where it was not asked for
+    checked: Checked | None  #: None where it was not wanted
     units_said: bool = True  #: whether the program says its units
     seconds: tuple[float, float] | None = None  #: planned time before and after; see `planned_times`
-    #: what the control does in the runs before and after, where that was asked for
+    #: what the control does in the runs before and after, where that was wanted
     motions: tuple[NcProgram, NcProgram] | None = None
     #: first and last line of each run that was replaced, in the old program and in the new one; of those in `motions`
     changed: tuple[tuple[int, int, int, int], ...] = ()
@@ -284,7 +284,7 @@ def left_all_but(reading: Reading, most: int) -> None:
 
 
 def _result(job: Job, old: Reading, way: _Way, axes: Machine | None, *, paths: bool) -> Filtered:
-    """What became of a program; how long its runs take, and what the control does in them, as far as asked for."""
+    """What became of a program; how long its runs take, and what the control does in them, as far as needed."""
     new, where, why = way.after, way.where, way.why
     for run in old.runs:
         if run.first in why:
@@ -309,9 +309,9 @@ def _result(job: Job, old: Reading, way: _Way, axes: Machine | None, *, paths: b
 
 def _rounding(new: Reading, place: Place) -> float:
     """By how much G64 P lets the control round the blocks of a place, in units of the program; 0.0 for unknown."""
-    said = _BLENDING.findall(f"{place.run.state.rounding}\n".encode() + new.lines(place.first, place.stop))
+    blends = _BLENDING.findall(f"{place.run.state.rounding}\n".encode() + new.lines(place.first, place.stop))
     # without Q lines are merged within P, too
-    return max((float(p) + float(q or p) for p, q in said), default=0.0)
+    return max((float(p) + float(q or p) for p, q in blends), default=0.0)
 
 
 def compare_filtered(

@@ -103,7 +103,7 @@ class Reading(Text):
     #: (l,) for each line 0 where it is no cut, 1 for a plain cut, else 2 plus the number of the reason in `reasons`
     why: NDArray[np.uint16] = field(init=False)
     reasons: list[str] = field(default_factory=list)
-    at: dict[int, State] = field(default_factory=dict)  #: before the lines that were asked for
+    at: dict[int, State] = field(default_factory=dict)  #: before the lines that were chosen
     said: frozenset[str] = frozenset()  #: groups that the program has set (`State.said`)
     absent: tuple[str, ...] = ()  #: linear axes that the program never names
 
@@ -174,7 +174,7 @@ class ProgramReader:
             letter for letter in "XYZ" if re.search(rb"(?i)(?<![A-Z])%b" % letter.encode(), data) is None
         )
         still: dict[str, float] = dict.fromkeys(found.absent if self.wanted == ANY else (), 0.0)
-        stream, asked, last = self.stream(found), sorted(set(stops), reverse=True), self._first
+        stream, stops_left, last = self.stream(found), sorted(set(stops), reverse=True), self._first
         corners = _near([number for number, line in stream.others if _CORNER_WORDS.search(line)], len(found))
         for item in _over_feeds(stream):
             first, count = (item.first, len(item)) if isinstance(item, Rows) else (item.line, 1)
@@ -184,11 +184,11 @@ class ProgramReader:
                 turns = self.wanted == ANY and _TURNS.search(item.text)
                 reason = "an axis turns in it: name the machine" if turns else item.cuts
                 found.why[first] = found.number(why_not(item.after, self.wanted) or reason)
-            while asked and asked[-1] < first + count:
-                stop = asked.pop()
+            while stops_left and stops_left[-1] < first + count:
+                stop = stops_left.pop()
                 found.at[stop] = item.after(stop - first) if isinstance(item, Rows) and stop > first else item.before
             last = item.after(count) if isinstance(item, Rows) else item.after
-        found.at |= dict.fromkeys(asked, last)
+        found.at |= dict.fromkeys(stops_left, last)
         found.at = {line: replace(state, place=state.place | still) for line, state in found.at.items()}
         found.said = last.said
         return found
@@ -237,16 +237,16 @@ class ProgramReader:
 
 def _over_feeds(stream: Iterable[Rows | Act]) -> Iterator[Rows | Act]:
     """Items of a stream; motion blocks with nothing but feeds in lines of their own between them are one item."""
-    held: list[Rows | Act] = []
+    kept: list[Rows | Act] = []
     for item in stream:
         quiet = isinstance(item, Act) and _FEED_ALONE.fullmatch(item.text) is not None
-        if not (quiet or isinstance(item, Rows)) or (held and _stop(held[-1]) != _first(item)):
-            yield from _one_item(held)
-            held = []
-        held.append(item)
+        if not (quiet or isinstance(item, Rows)) or (kept and _stop(kept[-1]) != _first(item)):
+            yield from _one_item(kept)
+            kept = []
+        kept.append(item)
         if not (quiet or isinstance(item, Rows)):
-            yield held.pop()
-    yield from _one_item(held)
+            yield kept.pop()
+    yield from _one_item(kept)
 
 
 def _one_item(items: Sequence[Rows | Act]) -> Iterator[Rows | Act]:

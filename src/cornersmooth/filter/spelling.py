@@ -37,7 +37,7 @@ class Spelling:
     feed_point: bool
     modal: bool  #: whether words that repeat are left out
     codes: bool  #: whether most blocks say that they are lines
-    line: str  #: the word of lines, such as ``G01``; empty where none is said
+    line: str  #: the word of lines, such as ``G01``; empty where none is written
     numbered: bool  #: whether most blocks have numbers
     end: bytes  #: line end
 

@@ -128,12 +128,12 @@ def _split(job: Job, form: Form, text: bytes, runs: Sequence[Run]) -> Iterator[l
         kept = [*filter(_is_mode, lines[:cut]), *lines[cut:]]
         begin = _turned(angles, [line for line in lines[:cut] if not _is_mode(line)])
         angles = _turned(begin, kept)
-        said = next((k for k, line in enumerate(kept) if not _is_mode(line)), 0)
+        first_block = next((k for k, line in enumerate(kept) if not _is_mode(line)), 0)
         own = _INVERSE if run.state.groups["feed"] == "inverse" else _MINUTE
         head = [] if run.state.groups["distance"] == "absolute" else [b"G90"]
-        if mode != own and not {_INVERSE, _MINUTE} & {*kept[:said]}:
+        if mode != own and not {_INVERSE, _MINUTE} & {*kept[:first_block]}:
             head.append(mode)
-        if rounding and run.state.rounding and not any(map(_ROUNDING.match, kept[:said])):
+        if rounding and run.state.rounding and not any(map(_ROUNDING.match, kept[:first_block])):
             head.append(rounding)
         feed_before = feed if mode == _MINUTE else b""
         for line in kept:
@@ -147,8 +147,8 @@ def _split(job: Job, form: Form, text: bytes, runs: Sequence[Run]) -> Iterator[l
         if not stays or not kept:
             yield None
             continue
-        if feed_before and b"F" not in kept[said]:
-            kept[said] += (b" " if look.spaces else b"") + feed_before
+        if feed_before and b"F" not in kept[first_block]:
+            kept[first_block] += (b" " if look.spaces else b"") + feed_before
         tail = [own] if mode != own else []
         if mode == _INVERSE and own == _MINUTE:
             tail.append(f"{look.feed}{run.feeds[-1]:.10g}".encode())

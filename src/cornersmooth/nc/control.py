@@ -54,7 +54,7 @@ class ProgramTable:
     work_offset: str = ""  #: what ``{work_offset}`` stands for where the user gives nothing
     work_offset_pattern: Pattern = ""  #: regular expression of what it may be
     work_offset_block: Blocks = ()  #: with ``{work_offset}``
-    #: blocks that bring the tool to a height that clears everything; none where the control is told nothing
+    #: blocks that bring the tool to a height that clears everything; none where the control gets nothing
     retract: Blocks = ()
     #: block with ``{position}``, words of a position of the machine; empty where the control has no such
     position: str = ""
@@ -66,7 +66,7 @@ class ProgramTable:
     end: Blocks = ("{footer}",)  #: after everything else, `tool_end` included
 
 
-#: steps that `ProgramTable` may name; what is off already, or not asked for, is no block
+#: steps that `ProgramTable` may name; what is off already, or not chosen, is no block
 STEPS = {
     "retract": "the blocks of `retract`, where the tool is not there yet",
     "work_offset": "the block of the work offset",
@@ -87,7 +87,7 @@ STEPS = {
 
 @dataclass(frozen=True)
 class Words:
-    """Blocks by which a control is told what is not motion; an empty field is not translated."""
+    """Blocks of what is not motion; an empty field is not translated."""
 
     #: tool_change, tool_select: with ``{tool}``; the latter only brings the tool near. The former may have ``{speed}``,
     #: the first of the tool.
@@ -224,7 +224,7 @@ class TextStyle:
     comment: Annotated[tuple[str, str], "give what stands before and behind"] = ("(", ")")
     #: first words by which a comment would be an order to the control; they get a mark before them
     comment_orders: Blocks = ()
-    block_number: str = ""  #: with ``{number}``; empty where blocks have none unless asked for
+    block_number: str = ""  #: with ``{number}``; empty where blocks have none unless wanted
     unnumbered: Pattern = ""  #: regular expression of what begins a line without number besides ``%``; empty for none
     #: number_start, number_step, number_last: after the last the first follows again; 0 for no last
     number_start: int = 10
@@ -279,7 +279,7 @@ class Cycles:
 
 @dataclass(frozen=True)
 class Extra:
-    """Blocks that are written when they are asked for by name: a function of the control that not every one has."""
+    """Blocks that are written when they are chosen by name: a function of the control that not every one has."""
 
     name: str = ""
     description: str = ""

@@ -3,7 +3,7 @@
 Controls take no hole cycles and no cutter compensation under tool tip control. So a tool has cycles only where it stays
 along Z from its change to the next, and where the rotary axes are known to stand at zero: then it runs without tool tip
 control (`Form.upright`), and X Y Z mean the same. All its other motion is written without orientation. Everything else
-stays plain moves. Where cycles are asked for, a tool with cutter compensation runs in the same way.
+stays plain moves. Where cycles are wanted, a tool with cutter compensation runs in the same way.
 """
 
 from __future__ import annotations
@@ -56,9 +56,9 @@ def has_cycles(program: Program, form: Form, part: slice, *, drills: bool) -> bo
     """Whether any hole of a part of the poses can be a cycle of the control; `drills` as in `upright_poses`."""
     if not (program.kind[part] == Move.HOLE).any():
         return False
-    said = _said_cycles(program)
-    for k, (first, args, clockwise) in enumerate(said):
-        until = said[k + 1][0] if k + 1 < len(said) else len(program)
+    cycles_in_force = _said_cycles(program)
+    for k, (first, args, clockwise) in enumerate(cycles_in_force):
+        until = cycles_in_force[k + 1][0] if k + 1 < len(cycles_in_force) else len(program)
         poses = np.arange(max(first, part.start), min(until, part.stop))
         poses = poses[program.kind[poses] == Move.HOLE]
         cycle = read_cycle(args, program, None) if len(poses) else None
@@ -69,7 +69,7 @@ def has_cycles(program: Program, form: Form, part: slice, *, drills: bool) -> bo
 
 def _said_cycles(program: Program) -> list[tuple[int, tuple[float | str, ...], bool]]:
     """Pose and arguments in force of CYCLE statements, and whether the spindle turns clockwise, as a tap needs it."""
-    said: list[tuple[int, tuple[float | str, ...], bool]] = []
+    cycles_in_force: list[tuple[int, tuple[float | str, ...], bool]] = []
     args: tuple[float | str, ...] = ()
     clockwise = False
     for statement in program.statements:
@@ -77,8 +77,8 @@ def _said_cycles(program: Program) -> list[tuple[int, tuple[float | str, ...], b
             clockwise = not {"OFF", "NOMORE", "CCLW", "LOCK", "ORIENT"} & set(words_of(statement))
         elif statement.word == "CYCLE" and words_of(statement)[:1] not in (["OFF"], ["NOMORE"]):
             args = in_force(args, statement.args, program)
-            said.append((statement.pose, args, clockwise))
-    return said
+            cycles_in_force.append((statement.pose, args, clockwise))
+    return cycles_in_force
 
 
 def _can_stand_upright(form: Form) -> bool:

@@ -30,11 +30,11 @@ class Form:
     orientation: Orientation
     mode: Mode
     machine: Machine | None = None  #: for rotary words
-    extras: tuple[Extra, ...] = ()  #: functions of the control that were asked for
+    extras: tuple[Extra, ...] = ()  #: functions of the control that were chosen
     upright: Mode | None = None  #: `FormTable.upright`
     #: mm; how far a cut is left along the tool where a rotary axis would pass its limit; 0 where that is an error
     rewind: float = 0.0
-    plane: Mode | None = None  #: `FormTable.plane` where tilted planes are asked for
+    plane: Mode | None = None  #: `FormTable.plane` where tilted planes are wanted
 
     @property
     def control(self) -> str:
@@ -118,7 +118,7 @@ class Form:
         return max(self.table.digits.lever / axis_length, 1.0)
 
     def rotary_tolerance(self, tolerance: float, axis_length: float) -> float:
-        """Degrees by which rotary axes may leave the axis asked for, rounding of the words not counted.
+        """Degrees by which rotary axes may leave the given axis, rounding of the words not counted.
 
         `axis_length` is the distance from the tip, mm, at which the axis may be off by the tolerance.
         """

@@ -79,11 +79,11 @@ def choose_form(
         what = f"{machine.name} has no two rotary axes, which a tilted plane asks for"
         raise SettingsError("CS232", what, "leave out --planes")
     orientation, mode = _mode(table, chosen, machine, tcp)
-    asked = tuple(_extra(table, name, extra) for extra in dict.fromkeys(extras))
+    chosen_extras = tuple(_extra(table, name, extra) for extra in dict.fromkeys(extras))
     if machine is not None and machine.names:
         _check_axes(table, mode, machine)
     plane = _plane(table, chosen, machine) if planes else None
-    found = Form(table, name, chosen.curve, orientation, mode, machine, asked, chosen.upright, rewind, plane)
+    found = Form(table, name, chosen.curve, orientation, mode, machine, chosen_extras, chosen.upright, rewind, plane)
     _check_rewind(found)
     return found
 

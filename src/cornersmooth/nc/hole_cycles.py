@@ -67,21 +67,21 @@ class Cycle:
     steps: tuple[float, ...] = ()  #: depths of the pecks, the last one repeated; none for a single feed
     full_retract: bool = True  #: whether a peck comes out of the hole
     feed_out: bool = False
-    pecking: bool = False  #: whether pecks are asked for; without any steps the hole is drilled in one feed
+    pecking: bool = False  #: whether pecks are wanted; without any steps the hole is drilled in one feed
     tap: bool = False  #: whether a thread is cut: the spindle turns with the feed
 
 
 def in_force(
-    before: tuple[float | str, ...], said: tuple[float | str, ...], program: Program
+    before: tuple[float | str, ...], stated: tuple[float | str, ...], program: Program
 ) -> tuple[float | str, ...]:
     """Arguments that hold after a CYCLE statement that has `said` its own, every number after its word."""
-    own = _without_on(said)
+    own = _without_on(stated)
     if own == ["INIT"]:  # SolidWorks announces a cycle by it
         return before
     if own[:1] != ["ON"]:
         clearance = _unit_place(own) + 2
         named = (
-            [own[0], "DEPTH", *own[1:clearance], "CLEAR", *own[clearance:]] if has_fixed_order(said, program) else own
+            [own[0], "DEPTH", *own[1:clearance], "CLEAR", *own[clearance:]] if has_fixed_order(stated, program) else own
         )
         return tuple(named)
     gone = set().union(*(family for family in _FAMILIES if family.intersection(own)))
@@ -181,7 +181,7 @@ def _pairs(args: tuple[float | str, ...]) -> tuple[set[str], dict[str, tuple[flo
                 return None
             values[word] = (*values.get(word, ()), value)
         elif value == "AUTO" and word in _RETURNS and word not in values:
-            word = ""  # the control's own height: ours is the height of travel
+            word = ""  # the control's own height: that of the CL file is the height of travel
         elif value == "REV" and word == "DWELL":
             kinds.add(value)
         elif value in _KINDS:

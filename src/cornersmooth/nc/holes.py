@@ -154,10 +154,10 @@ def cycle_blocks(
     over = at.ticks(program.tip[poses] + heights[0][:, None] * frame[:, 2], program.axis[poses])
     feeds, modes = hole_feeds(cycle, program, poses)
     words = [feed_digits(ticks, at) for ticks in feed_ticks(feeds, modes, program, at).tolist()]
-    said: Blocks = ()
+    once_written: Blocks = ()
     for k, pose in enumerate(poses.tolist()):
         goes = k == 0 or bool(over[k, 2] != over[k - 1, 2])
-        before, said = (table.off if said else (), ()) if goes else ((), said)
+        before, once_written = (table.off if once_written else (), ()) if goes else ((), once_written)
         turns = 1.0 if modes[k] == FeedMode.PER_REVOLUTION or not speed else speed
         values = _numbers(cycle, at, program, program.tip[pose] @ frame, (heights[0][k], heights[1][k]))
         values |= {
@@ -168,8 +168,8 @@ def cycle_blocks(
             "speed": format_number(speed, at.form.table.digits.speed, trim=True).rstrip("."),
         }
         blocks = tuple(block.format(**values) for block in getattr(table, kind))
-        yield before, goes, blocks[once:] if said and said == blocks[:once] else blocks, over[k]
-        said = blocks[:once] or blocks
+        yield before, goes, blocks[once:] if once_written and once_written == blocks[:once] else blocks, over[k]
+        once_written = blocks[:once] or blocks
 
 
 def _numbers(

@@ -66,7 +66,7 @@ def corner_blends(
 ) -> Floats | None:
     """How far the control may round the corner at each kept row, mm: the usual blend at rapids and arcs.
 
-    None where it is not told for each.
+    None where one holds for all.
     """
     style = form.table.lines
     if not style.rounding:

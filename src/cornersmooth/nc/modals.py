@@ -228,7 +228,7 @@ class Modals:
         blocks += self.end_tool()
         home = self._to_position({name: value for name, value in position.items() if name != "Z"})
         zero = rotary.get("rotary_zero", ())
-        if any(name not in LINEAR for name in position):  # they stand there, and are held
+        if any(name not in LINEAR for name in position):  # they stand there, and are clamped
             zero = ()
         elif zero and "{rotary_zero}" in steps:
             zero = (*self.set(held=False), *zero, *self.set(held=True))
@@ -290,7 +290,7 @@ class Modals:
         return dict(getattr(machine, key)) if machine is not None and self.form.table.program.position else {}
 
     def _to_position(self, position: Mapping[str, float]) -> list[str]:
-        """Block that sends axes to a position of the machine; rotary ones are let turn, and held again."""
+        """Block that sends axes to a position of the machine; rotary ones are let turn, and clamped again."""
         if not position:
             return []
         table, motion = self.form.table, self.form.mode.motion

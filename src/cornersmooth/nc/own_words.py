@@ -27,7 +27,7 @@ _KINDS: dict[str, tuple[str, ...]] = {
     "compensation_off": ("compensation",),
 }
 
-#: fields of which only new blocks are the table's own: stops for a tool are told by the words of the tool
+#: fields of which only new blocks are the table's own: stops for a tool are named by the words of the tool
 _TOOLS = {"tool_change", "tool_select", "stop", "optional_stop"}
 
 #: blocks around the motion
@@ -51,18 +51,18 @@ def own_words(table: Control) -> tuple[str, ...]:
     blocks = [block for block in _blocks(table) if block not in known and not re.fullmatch(r"\{\w+\}", block)]
     changed = {name for name in _KINDS if getattr(table.words, name) != getattr(base.words, name)}
     for _ in _KINDS:  # one field may say several kinds, and several fields one
-        said = {kind for name in changed for kind in _KINDS[name]}
-        changed |= {name for name, own in _KINDS.items() if said & set(own)}
+        stated = {kind for name in changed for kind in _KINDS[name]}
+        changed |= {name for name, own in _KINDS.items() if stated & set(own)}
     names = [kind for name in _KINDS if name in changed for kind in _KINDS[name]]
     blocks += [block for name in _KINDS if name in changed - _TOOLS for block in _of_field(table, name)]
-    ours, theirs = _modes(table, base), _modes(base, table)
-    if [mode.on for mode in ours] != [mode.on for mode in theirs]:
+    own_modes, base_modes = _modes(table, base), _modes(base, table)
+    if [mode.on for mode in own_modes] != [mode.on for mode in base_modes]:
         names.append("offset")
-        blocks += [block for mode in ours for block in mode.on]
+        blocks += [block for mode in own_modes for block in mode.on]
     if table.program.end != base.program.end:
         names.append("end")
     framed = any(getattr(table.program, name) != getattr(base.program, name) for name in _FRAME)
-    framed |= _around(ours) != _around(theirs)
+    framed |= _around(own_modes) != _around(base_modes)
     return (*dict.fromkeys(blocks), *dict.fromkeys(names), *((FRAME,) if framed else ()))
 
 

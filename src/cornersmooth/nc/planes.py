@@ -133,9 +133,9 @@ def _plane(axis: Floats, settings: Settings, form: Form) -> tuple[Plane | None, 
     digits = form.table.digits.angle
     if form.plane.rotations:
         plus = form.plane.motion.signs
-        said = [format_number(angle, digits, plus=plus) for angle in tilting_angles(form.plane.rotations, axis)]
-        frame = rotations_frame(form.plane.rotations, [float(number) for number in said])
-        plane = Plane(frame, dict(zip(("first", "second", "third"), said, strict=True)))
+        angle_words = [format_number(angle, digits, plus=plus) for angle in tilting_angles(form.plane.rotations, axis)]
+        frame = rotations_frame(form.plane.rotations, [float(number) for number in angle_words])
+        plane = Plane(frame, dict(zip(("first", "second", "third"), angle_words, strict=True)))
     else:
         assert form.machine is not None
         angles = _rotary_angles(form.machine, axis)
@@ -220,8 +220,8 @@ def check_travel_in_planes(planes: Planes, program: Program, form: Form, finding
             raise refused
         if refused is not None:
             names = zip(machine.names, fit[0].tolist(), strict=True)
-            said = " ".join(f"{name}{angle:.3f}" for name, angle in names)
-            findings.note("CS379", int(program.line[poses[0]]), angles=said)
+            angle_words = " ".join(f"{name}{angle:.3f}" for name, angle in names)
+            findings.note("CS379", int(program.line[poses[0]]), angles=angle_words)
 
 
 def check_travel_without_axes(machine: Machine, program: Program) -> None:

@@ -39,12 +39,12 @@ class PlannedFeeds:
         motion, digits = form.mode.motion, form.table.digits
         scale = 10.0**digits.feed
         unit = (motion.inch_feed if units == "inch" else 1) / mm_per_unit
-        asked = np.rint(self.programmed * unit * scale)
+        given = np.rint(self.programmed * unit * scale)
         planned = np.fmin(self.feed, self.programmed) * unit * scale
         # not more figures than say anything, rounded down
         step = np.maximum(10.0 ** np.floor(np.log10(np.maximum(planned, 1.0)) - _FIGURES + 1), 1.0)
-        planned = np.where(planned >= _ALL_BUT * asked, asked, np.maximum(np.floor(planned / step) * step, 1.0))
-        ticks = np.where(np.isnan(self.feed), asked, planned)
+        planned = np.where(planned >= _ALL_BUT * given, given, np.maximum(np.floor(planned / step) * step, 1.0))
+        ticks = np.where(np.isnan(self.feed), given, planned)
         rate = np.floor(10.0**INVERSE_TIME_DECIMALS / self.minutes)
         end = b"\r\n" if b"\r\n" in text else b"\n"
         lines = text.split(end)

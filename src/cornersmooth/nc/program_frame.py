@@ -242,7 +242,7 @@ def blend_word(blend: float) -> str:
 
 @dataclass
 class FramedText:
-    """Writes one text; numbers its blocks where asked for."""
+    """Writes one text; numbers its blocks where wanted."""
 
     stream: Stream
     number: str  #: with ``{number}``; empty for none

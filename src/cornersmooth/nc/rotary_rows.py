@@ -96,8 +96,8 @@ def rotary_rows(
         findings.note_each("CS367", line[more.segment + 1], names=" and ".join(machine.names))
         filled = fill(way.tip[here], way.axis[here], way.angles[here], more)
         start, at_pose = segments_of_rows(way.move, here.start, here.stop)
-        held = left | np.append(left[1:], False)  # both rows of a place where a cut is left
-        chunk = _Chunk(move, start, at_pose, held, left, None if timed is None else timed[here])
+        stays = left | np.append(left[1:], False)  # both rows of a place where a cut is left
+        chunk = _Chunk(move, start, at_pose, stays, left, None if timed is None else timed[here])
         blend = None
         if long:
             # in long programs as many lines take too long to find

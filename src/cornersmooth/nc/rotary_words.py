@@ -65,7 +65,7 @@ def rotary_way(rows: Rows, smoothed: SmoothProgram, form: Form, findings: Findin
         path = rotary_angles(machine, tip, axis, **how)
     findings.add_all(path.findings)
     from_zero(form, program, axis, path.angles, move, rapid)
-    return_free_memory()  # rows are written while all of this is held
+    return_free_memory()  # rows are written while all of this is kept
     return RotaryWay(tip, axis, move, path.angles, rapid, left, tolerance)
 
 

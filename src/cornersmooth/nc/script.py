@@ -45,7 +45,7 @@ class Script:
     def hand_on(self, stream: Stream) -> None:
         """Write to a stream what was written since it was handed on last."""
         text, self.motion.text = self.motion.text[::-1], []
-        while text:  # what is written is held no longer
+        while text:  # what is written is kept no longer
             stream.write(text.pop())
 
     def run(self, rows: Rows, ticks: Ints) -> None:

@@ -57,11 +57,11 @@ def with_starts(program: Program) -> tuple[Statement, ...]:
     starts = np.flatnonzero(program.kind == Move.FROM).tolist()
     if not starts:
         return program.statements
-    said = [
+    stated = [
         Statement(pose, int(program.line[pose]), "FROM", tuple((program.tip[pose] / program.mm_per_unit).tolist()))
         for pose in starts
     ]
-    return tuple(sorted((*program.statements, *said), key=lambda statement: (statement.pose, statement.word == "FROM")))
+    return tuple(sorted((*program.statements, *stated), key=lambda one: (one.pose, one.word == "FROM")))
 
 
 def milliseconds(amount: float, in_revolutions: bool, speed: float | None) -> int | None:

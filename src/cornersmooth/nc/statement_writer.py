@@ -62,8 +62,8 @@ class StatementWriter:
     def __post_init__(self) -> None:
         self.words = self.form.table.words
         self.cycles = HoleCycles(self.program, self.findings, skip=self.skip_cycles)
-        said = {statement.word for statement in self.program.statements}
-        self.toolno_loads = not TOOL_WORDS & said
+        written_words = {statement.word for statement in self.program.statements}
+        self.toolno_loads = not TOOL_WORDS & written_words
         self._ahead_of_tools = ahead_of_tools(self.program)
         self._unknown = frozenset(map(id, statements_not_understood(self.program)))
 
@@ -104,7 +104,7 @@ class StatementWriter:
 
     @property
     def clockwise(self) -> bool:
-        """Whether the spindle was last told to turn clockwise, or nothing."""
+        """Whether the spindle was last named to turn clockwise, or nothing."""
         return self._direction == "clockwise"
 
     def comment(self, text: str) -> list[str]:

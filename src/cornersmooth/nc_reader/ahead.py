@@ -14,14 +14,14 @@ class Ahead:
     def __init__(self, chunks: Iterable[Elements]) -> None:
         self._chunks = iter(chunks)
         self._held: Elements | None = None
-        #: number of the first element that is held
+        #: number of the first element that is kept
         self.base = 0
         #: elements read so far
         self.count = 0
 
     @property
     def nc(self) -> Elements:
-        """What is held; at least one element must have been read."""
+        """What is kept; at least one element must have been read."""
         assert self._held is not None
         return self._held
 

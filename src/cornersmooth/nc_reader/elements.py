@@ -207,7 +207,7 @@ class Elements:
         return self.divided(np.flatnonzero(kept), np.cumsum(kept) - 1)
 
     def divided(self, owner: Ints, last: Ints) -> Elements:
-        """Every element as often as it is in `owner`, ascending; curves and arcs are the `last` of theirs."""
+        """Every element as often as it is in `owner`, ascending; curves and arcs are the `last` of the others."""
         own: dict[str, Any] = {name: getattr(self, name)[owner] for name in _COLUMNS}
         curves = replace(self.curves, element=last[self.curves.element])
         return replace(self, **own, curves=curves, arcs=replace(self.arcs, element=last[self.arcs.element]))
@@ -266,10 +266,10 @@ class NcProgram(Elements):
 def settle(elements: Elements) -> int | None:
     """Put the tool where words that come later first send it, as long as it moves at rapid only: in place, for NaN.
 
-    Return the NC line where a feed move goes from or to such a place although a part of it has been said, or None.
+    Return the NC line where a feed move goes from or to such a place although a part of it has been written, or None.
     """
     for values in (elements.tip, elements.second):
-        if not len(values) or not np.isnan(values[0]).any():  # what has been said holds
+        if not len(values) or not np.isnan(values[0]).any():  # what has been written holds
             continue
         unknown = np.isnan(values)
         first = np.where(unknown.all(axis=0), len(values), unknown.argmin(axis=0))

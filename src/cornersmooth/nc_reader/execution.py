@@ -64,12 +64,12 @@ def execute(table: Table, modal: Modal, problems: list[Problem]) -> tuple[Elemen
         After the last block.
     """
     points = modal.points or any(letter in table.columns for letter in _POINT)
-    held = _Held()
-    code = held.fill(table.column("G"), modal.code)
+    kept = _Held()
+    code = kept.fill(table.column("G"), modal.code)
     # tip and second triple side by side: curves take both at once
     six = np.empty((len(table), 6))
     tip, second = six[:, :3], six[:, 3:]
-    placed = held.columns(table, _TIP, modal.tip, tip)
+    placed = kept.columns(table, _TIP, modal.tip, tip)
     straight = (code <= 1) | np.isnan(code)
     is_arc = np.zeros(len(table), np.bool_) if straight.all() else (code == 2) | (code == 3)
     if is_arc.any():  # a full circle need not say where it ends
@@ -78,7 +78,7 @@ def execute(table: Table, modal: Modal, problems: list[Problem]) -> tuple[Elemen
     vector_length = modal.vector_length
     if modal.rotary or points:
         known = modal.rotary or modal.points  # else there has been a vector, which is no point
-        placed |= held.columns(table, letters, modal.second if known else (np.nan,) * 3, second)
+        placed |= kept.columns(table, letters, modal.second if known else (np.nan,) * 3, second)
     else:
         given = _vectors(table, modal, straight, second, problems)
         vector_length = min(vector_length, _to_unit_length(second, given))
@@ -96,7 +96,7 @@ def execute(table: Table, modal: Modal, problems: list[Problem]) -> tuple[Elemen
         ends = rows.copy()
         curved = np.searchsorted(rows, curves.element)
         ends[curved] = curves.end
-    feed = held.fill(table.column("F"), modal.feed)
+    feed = kept.fill(table.column("F"), modal.feed)
     end = six if ends is rows and len(rows) == len(six) else six.take(ends, axis=0)
     if len(curves) and cut.any():  # between its knots a curve does not end in a control point
         end[curved[cut]] = curves.point[(curves.first_point + curves.points)[cut] - 1]
@@ -158,7 +158,7 @@ class _Held:
         self._last = np.zeros(0, np.int64)
 
     def fill(self, column: Floats, before: float, missing: Bools | None = None) -> Floats:
-        """Fill a column; `before` is what held in front of it."""
+        """Fill a column; `before` is what was in force in front of it."""
         if missing is None:
             missing = np.isnan(column)
         if not missing.any():
@@ -174,7 +174,7 @@ class _Held:
         return np.concatenate((np.full(rest, before), filled)) if rest else filled
 
     def columns(self, table: Table, letters: str, before: tuple[float, ...], values: Floats) -> Bools:
-        """Put three words held from block to block into `values`; say which blocks have any of them."""
+        """Put three words kept from block to block into `values`; say which blocks have any of them."""
         given = np.zeros(len(table), np.bool_)
         for k, letter in enumerate(letters):
             column = table.columns.get(letter)
@@ -202,10 +202,10 @@ def _vectors(table: Table, modal: Modal, straight: Bools, values: Floats, proble
         # K is a knot in a curve; I J K are no vector on an arc
         missing.append(np.isnan(table.column(letter)) | ~straight)
         given |= ~missing[-1]
-    held = _Held()
+    kept = _Held()
     for k, letter in enumerate(_VECTOR):
         column = np.where(missing[k], 0.0, table.column(letter)) if missing[k].any() else table.column(letter)
-        values[:, k] = held.fill(column, before[k], ~given)
+        values[:, k] = kept.fill(column, before[k], ~given)
     bare = values[:, 2] == 0
     if bare.any():  # seldom: only then the others are looked at
         bare &= given & (values[:, 0] == 0) & (values[:, 1] == 0)
@@ -226,7 +226,7 @@ def _to_unit_length(vectors: Floats, given: Bools) -> float:
     length = np.sqrt(square)
     whole = np.rint(length)
     length = np.where((whole >= 1.0) & (np.abs(length - whole) <= _WHOLE), whole, length)
-    length[length == 0.0] = 1.0  # said to be wrong elsewhere
+    length[length == 0.0] = 1.0  # a problem elsewhere
     vectors /= length[:, None]
     return float(length[given].min())
 

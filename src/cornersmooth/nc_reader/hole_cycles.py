@@ -54,7 +54,7 @@ def drill(cycle: HoleCycle, x: float, y: float, line: Line, before: Modal, clamp
         raise refused(line, "a cycle whose heights are not one below another", "give them in their order")
     if cycle.step and (cycle.clearance - cycle.bottom) / cycle.step > _MOST_PECKS:
         raise refused(line, f"more than {_MOST_PECKS:,} pecks in one hole", "give a larger step")
-    free = [axis for axis, held in clamped.items() if not held]
+    free = [axis for axis, kept in clamped.items() if not kept]
     if free:
         yield Wrong("CS538", f"a hole cycle while {' and '.join(free)} is not clamped")
     # all moves up to the next event are carried out together

@@ -1,6 +1,6 @@
 """Lines to words, and which words make a motion block: each control's grammar, written once.
 
-A grammar reads one line. For texts of millions of lines it is asked once for every kind of line (`line_patterns`):
+A grammar reads one line. For texts of millions of lines it reads once for every kind of line (`line_patterns`):
 it says where in such a line the numbers stand and what their columns are called.
 """
 

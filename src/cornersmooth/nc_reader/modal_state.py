@@ -19,7 +19,7 @@ class ModalState:
     tip_control: str = ""  #: name of the tool tip control that is on
     incremental: bool = False  #: G91 is in force, in which no motion is read
     high_speed: bool = False  #: look ahead of the kind that some controls ask for with curves is on
-    clamped: dict[str, bool] = field(default_factory=dict)  #: rotary axes with a clamp: held, or words let them turn
+    clamped: dict[str, bool] = field(default_factory=dict)  #: rotary axes with a clamp: kept, or words let them turn
     keeps_tip: bool | None = None  #: whether the kinematics do, where the machine's file says what switches that
     shorter_way: bool = False  #: whether rotary axes go it
     speed: float = math.nan  #: of the spindle

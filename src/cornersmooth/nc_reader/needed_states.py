@@ -49,7 +49,7 @@ def control_problems(
 ) -> Iterator[Problem]:
     """What of a run of motion blocks the control would not take for what it is; `code` is the G word before the run.
 
-    On the way down from a retract, in lines `approach`, rotary axes turn before the control is told of the tip.
+    On the way down from a retract, in lines `approach`, rotary axes turn before the control knows the tip.
     `unlooked` takes what is not known.
     """
     if state.rotary is not None:
@@ -83,16 +83,16 @@ def axis_problems(
     """
     for axis in machine.axes:
         name, values = axis.name, table.column(axis.name)
-        given, told = ~np.isnan(values), ~np.isnan(table.column(f"{BY_WORD} {axis.name}"))
+        given, by_words = ~np.isnan(values), ~np.isnan(table.column(f"{BY_WORD} {axis.name}"))
         if axis.modulo:
             text = f"a word of {name} that is not from 0 to 360 degrees"
             yield from first_wrong(CONTROL_WORDS, (values < 0.0) | (values >= 360.0), table.line, text)
         if way == BY_WORD and axis.modulo:
             text = f"{name} without {BY_WORD}(), which sends it the shorter way"
-            yield from first_wrong(CONTROL_WORDS, given & ~told, table.line, text)
+            yield from first_wrong(CONTROL_WORDS, given & ~by_words, table.line, text)
         elif way == BY_WORD:
             text = f"{name} with {BY_WORD}(), which is for modulo axes"
-            yield from first_wrong(CONTROL_WORDS, told, table.line, text)
+            yield from first_wrong(CONTROL_WORDS, by_words, table.line, text)
         elif way and axis.modulo and not state.shorter_way:
             text = f"{name} without {way} in force, which sends it the shorter way"
             yield from first_wrong(CONTROL_WORDS, given, table.line, text)
@@ -116,7 +116,7 @@ def turn_problems(run: Elements, before: Sequence[float], machine: Machine) -> I
 def idle_turns(
     run: Elements, before: Sequence[float], machine: Machine, step: float, turned: Floats
 ) -> Iterator[tuple[int, str]]:
-    """Where rotary axes turn by half a turn or more at feed while the tool axis stands along them, and what is said.
+    """Where rotary axes turn by half a turn or more at feed while the tool axis stands along them; texts.
 
     From there a quarter of a turn leads to any other axis, or half a turn where limits leave one way to reach it. More
     swings part or head around the tool, which the CL file does not ask for. `step` is the last printed digit, degrees;
@@ -138,15 +138,15 @@ def idle_turns(
 def take_clamp(word: float, machine: Machine, state: ModalState) -> bool:
     """Note an M word that clamps a rotary axis or lets it turn; return whether it is one."""
     for axis in machine.axes:
-        for said, clamped in zip(axis.clamp or (), (True, False), strict=False):
-            if float(said[1:]) == word:
+        for clamp_word, clamped in zip(axis.clamp or (), (True, False), strict=False):
+            if float(clamp_word[1:]) == word:
                 state.clamped[axis.name] = clamped
                 return True
     return False
 
 
 def clamp_problems(run: Elements, before: Sequence[float], machine: Machine, state: ModalState) -> Iterator[Problem]:
-    """Which rotary axes turn in a run although they are clamped, or nobody has said that they are not."""
+    """Which rotary axes turn in a run although they are clamped, or no word says that they are not."""
     for column, axis in enumerate(machine.axes):
         if axis.clamp is not None and state.clamped[axis.name]:
             angles = np.append(before[column], run.second[:, column])

@@ -68,7 +68,7 @@ class Reader:
         self.events: list[Event] = []
         self.late: list[Event] = []
         self.problems: list[Problem] = []
-        self._told: set[str] = set()  # texts of problems that are told once for each tilted plane
+        self._told: set[str] = set()  # texts of problems that come once for each tilted plane
         self.lever, self._given_lever = 0.0, lever
         self.elements = self.given_out = self.curves = 0
         #: whether the tool has been fed from a position that was known
@@ -260,7 +260,7 @@ class Reader:
         self._left_turned = True
 
     def _check_turned(self, run: Elements, before: Modal) -> None:
-        """Complain of motion where no word has said how the rotary axes stand: behind a plane, or where it comes late.
+        """Complain of motion where no word says how the rotary axes stand: behind a plane, or where it comes late.
 
         Before their first words they count as at zero; the first may not turn a tool that has come down.
         """
@@ -281,7 +281,7 @@ class Reader:
             self._wrong(NOT_ABOVE, line, text)
 
     def _turn(self, line: Line) -> None:
-        """Complain of rotary axes that are held where a plane turns them."""
+        """Complain of rotary axes that are clamped where a plane turns them."""
         for name, clamped in self.state.clamped.items():
             if clamped:
                 self._wrong("CS538", line, f"{name} turns to a tilted plane while it is clamped")
@@ -317,7 +317,7 @@ class Reader:
             self._left_at = last
 
     def _know_points(self, run: Elements) -> None:
-        """From here on U V W are a point on the axis: what was said before of the axis is no such point."""
+        """From here on U V W are a point on the axis: what was written before of the axis is no such point."""
         if self.placed:
             self._refuse_unknown(int(run.line[0]))
         for part in self.ready:
@@ -465,7 +465,7 @@ class Reader:
         self.problems.append(Problem(code, 0, line.number, text))
 
     def _tell_once(self, problems: Iterable[Problem]) -> None:
-        """Note problems whose texts have not been told."""
+        """Note problems whose texts are new."""
         for problem in problems:
             if problem.text not in self._told:
                 self._told.add(problem.text)

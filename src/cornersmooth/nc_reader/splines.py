@@ -110,7 +110,7 @@ def _knot_curves(
     point_rows = rows[is_point]
     wrong = (weight <= 0) | ~np.isfinite(weight)
     problems += Problem.at("CS518", wrong, table.line[point_rows], "a weight R that is not positive")
-    weight[wrong] = 1.0  # has been said; what follows wants curves that can be measured
+    weight[wrong] = 1.0  # it is a problem already; what follows wants curves that can be measured
     bad = (single != order) | (points < order) | (order < 2) | unclamped
     bad |= np.logical_or.reduceat(falls | crowded, start)
     if bad.any():

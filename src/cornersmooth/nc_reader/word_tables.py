@@ -81,5 +81,5 @@ def _effects(row: str) -> str:
 @cache
 def means_of(control: str) -> Means:
     """What the words of a control say beside the motion."""
-    said = {word: text.split() for word, text in word_table(control)["means"].items() if text}
-    return {word: (parts[0], "".join(parts[1:2])) for word, parts in said.items()}
+    meanings = {word: text.split() for word, text in word_table(control)["means"].items() if text}
+    return {word: (parts[0], "".join(parts[1:2])) for word, parts in meanings.items()}

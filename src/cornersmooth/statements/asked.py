@@ -70,14 +70,14 @@ class Asking:
         self.place, self.line = 0, 0
         self.running, self.speed, self.diameter = "CLW", 0.0, 0.0
         self.tool, self.offset = -1.0, 1.0
-        said = {statement.word for statement in program.statements}
+        stated = {statement.word for statement in program.statements}
         sides = [one for one in program.statements if one.word == "CUTCOM"]
         #: CUTCOM/ON right before that with a side, as Autodesk's CAMplete post writes it
         self.announcing = {
             id(one) for one, after in pairwise(sides) if one.pose == after.pose and {"LEFT", "RIGHT"} & {*after.args}
         }
-        self.lathe = "TURRET" in said  # cutting speeds are those at the part
-        self.loads_alone = not said & {"LOADTL", "LOAD", "TURRET"}
+        self.lathe = "TURRET" in stated  # cutting speeds are those at the part
+        self.loads_alone = not stated & {"LOADTL", "LOAD", "TURRET"}
         self.handlers: dict[str, Handler] = {
             "LOADTL": self.load,
             "LOAD": self.load,

@@ -48,7 +48,7 @@ _STOPPED: Final = ("spindle", "coolant")
 #: states that end with the program
 _ENDED: Final = (*_STOPPED, "compensation")
 
-#: what holds before anything is said
+#: what holds before anything is written
 _AT_START: Final[dict[str, float | str]] = {**dict.fromkeys(_ENDED, "OFF"), "offset": 1.0}
 
 #: kinds for which a control may have no words
@@ -57,7 +57,7 @@ _WORDED: Final = (*_ENDED, "offset", "register")
 #: states that are compared where the program waits
 _AT_PAUSES: Final = ("tool", "spindle", "speed", "coolant", "compensation")
 
-#: what may be said in a hole
+#: what may be written in a hole
 _IN_HOLES: Final = ("dwell", "tap")
 
 #: what holds: the token that says it, by its kind
@@ -85,7 +85,7 @@ class _Side:
     starting: dict[str, tuple[Token, Key]] = field(default_factory=dict)
     #: what has been started, and was something else before anything moved
     idle: list[tuple[Token, Key]] = field(default_factory=list)
-    #: what is on with each tool since the last motion, where it is said, or goes on behind a tool change
+    #: what is on with each tool since the last motion, where it is written, or goes on behind a tool change
     running: set[Key] = field(default_factory=set)
 
     def value(self, kind: str) -> float | str | None:
@@ -149,14 +149,14 @@ class Comparison:
         self.cl = _Side([one for one in asked_for if counts(one) and one.kind not in own], stops=False)
         self.nc = _Side([one for one in found if counts(one) and one.kind not in own & _LOOSE], stops=True)
         self.problems: list[Problem] = []
-        self._agreed: _Held = {}  # words that said what was asked for when they were met last
+        self._agreed: _Held = {}  # words that were as wanted when they were met last
         self._named: set[tuple[Token | None, Token | None]] = set()
 
     def meet(self, move: int, element: int, *, moves: bool = True) -> None:
         """Both are right before a motion, a move and an element; or at the end, where nothing `moves`."""
-        asked, done = self.cl.up_to(move), self.nc.up_to(element)
+        requested, done = self.cl.up_to(move), self.nc.up_to(element)
         for kind in _ACTIONS:
-            self._same(*([one for one in some if one[0].kind == kind] for some in (asked, done)))
+            self._same(*([one for one in some if one[0].kind == kind] for some in (requested, done)))
         for token, key in self.nc.idle_starts(moves=moves):
             if key not in self.cl.running:
                 self._say(None, token)
@@ -172,38 +172,39 @@ class Comparison:
 
     def in_hole(self, line: int, tokens: Iterable[Token], dwell: float, *, tap: bool) -> None:
         """Within a hole, which CL `line` asks for, the program says its dwell and its tap, and changes nothing else."""
-        theirs = [Token("dwell", dwell, 0, line)] * (dwell > 0.0) + [Token("tap", 84.0, 0, line)] * tap
-        ours = list(tokens)
+        cl_values = [Token("dwell", dwell, 0, line)] * (dwell > 0.0) + [Token("tap", 84.0, 0, line)] * tap
+        nc_values = list(tokens)
         for kind in _IN_HOLES:
-            asked, done = (list[_Done]((one, {}) for one in some if one.kind == kind) for some in (theirs, ours))
-            self._same(asked, done)
-        for one in ours:
+            both = (cl_values, nc_values)
+            requested, done = (list[_Done]((one, {}) for one in some if one.kind == kind) for some in both)
+            self._same(requested, done)
+        for one in nc_values:
             if one.kind not in _IN_HOLES and (one.kind in _ACTIONS or one.value != self.nc.value(one.kind)):
                 code, name = _NAMES[one.kind]
                 self.problems.append(Problem(code, line, one.line, f"{name.format(one.value)} is said within a hole"))
 
     def _same(
         self,
-        asked: list[_Done],
+        requested: list[_Done],
         done: list[_Done],
     ) -> None:
         """Actions of one kind must be the same in their order, and at pauses the states."""
         missing, surplus, spare, first = [], list[Token](), list[Token](), 0
-        for wanted, theirs in asked:
+        for wanted, cl_values in requested:
             alike = [k for k in range(first, len(done)) if done[k][0].value == wanted.value]
             if not alike:
                 missing.append(wanted)
                 continue
-            others = {k: _others(wanted.kind, theirs, done[k][1]) for k in alike}
+            others = {k: _others(wanted.kind, cl_values, done[k][1]) for k in alike}
             # a stop that posts write before a tool change may stand beside one of the CL file
             best = min(alike, key=lambda k: (len(others[k]) > 0, done[k][0].optional, k))
             for token, _ in done[first:best]:
                 (spare if token.optional else surplus).append(token)
-            first, ours = best + 1, done[best][0]
+            first, nc_values = best + 1, done[best][0]
             for state, here, value in others[best]:
-                (code, name), pause = _NAMES[state], _NAMES[ours.kind][1].format(ours.value)
+                (code, name), pause = _NAMES[state], _NAMES[nc_values.kind][1].format(nc_values.value)
                 text = f"{name.format(here)} holds at {pause}, where the CL file has {name.format(value)}"
-                self.problems.append(Problem(code, wanted.line, ours.line, text))
+                self.problems.append(Problem(code, wanted.line, nc_values.line, text))
         for token, _ in done[first:]:
             (spare if token.optional else surplus).append(token)
         surplus += spare[: max(len(missing) - len(surplus), 0)]  # what may be left over may be the wrong one
@@ -216,8 +217,8 @@ class Comparison:
         if (wanted, token) in self._named:
             return
         self._named.add((wanted, token))
-        said = token if token is not None and token.line and token != self._agreed.get(kind) else None
-        self._say(wanted if said is None or (wanted is not None and wanted.line) else None, said)
+        stated = token if token is not None and token.line and token != self._agreed.get(kind) else None
+        self._say(wanted if stated is None or (wanted is not None and wanted.line) else None, stated)
 
     def _say(self, wanted: Token | None, token: Token | None) -> None:
         """What is wrong with a token, or with none, that stands for one."""
@@ -238,17 +239,17 @@ class Comparison:
 
 
 def _others(
-    kind: str, theirs: dict[str, float | str | None], ours: dict[str, float | str | None]
+    kind: str, cl_values: dict[str, float | str | None], nc_values: dict[str, float | str | None]
 ) -> list[tuple[str, float | str, float | str]]:
     """States of the program that are not those of the CL file at a pause of a kind, and what they should be.
 
     Where it stops, spindle and coolant may be off although the CL file leaves them on: they go on before any motion.
     """
     found = []
-    for state, value in theirs.items():
-        here = ours.get(state)
+    for state, value in cl_values.items():
+        here = nc_values.get(state)
         off = kind == "stop" and state in _STOPPED and here == "OFF"
-        off |= state == "speed" and "OFF" in (theirs.get("spindle", "OFF"), ours.get("spindle", "OFF"))
+        off |= state == "speed" and "OFF" in (cl_values.get("spindle", "OFF"), nc_values.get("spindle", "OFF"))
         if value is not None and here is not None and here != value and not off and kind in ("stop", "dwell"):
             found.append((state, here, value))
     return found
@@ -256,7 +257,7 @@ def _others(
 
 def _counting(found: Iterable[Token], means: Means) -> Callable[[Token], bool]:
     """Whether a token is compared: the control has a word for it."""
-    # what shifts the path counts wherever it is said
+    # what shifts the path counts wherever it is written
     shifted = {token.kind for token in found if token.kind == "compensation" and token.value != "OFF"}
     sayable = {*shifted, *means.values()}
 

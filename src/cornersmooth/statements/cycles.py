@@ -47,7 +47,7 @@ class Drilling:
     retract: float = math.nan
     #: mm: pecks, the last one again and again; none where one feed leads to the bottom, or the statement leaves it open
     steps: tuple[float, ...] = ()
-    pecking: bool = False  #: whether there are pecks, though it may not be said of what depth
+    pecking: bool = False  #: whether there are pecks, though it may not come of what depth
     breaks_chips: bool = False  #: whether they stay in the hole
 
     @property

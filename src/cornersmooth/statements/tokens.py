@@ -23,7 +23,7 @@ class Token:
     #: ``"home"``, ``"end"``
     kind: str
     value: float | str  #: a number; or the word of the CL file that says the same: ``"FLOOD"``, ``"OFF"``
-    place: int  #: the move of the CL file, or the element of the program, that it is said before
+    place: int  #: the move of the CL file, or the element of the program, that it is written before
     line: int  #: CL or NC line
     #: of an action: whether it may be missing in the other file, as an optional stop of the post before another tool
     optional: bool = False

@@ -111,7 +111,7 @@ class AlongTool:
         if not found and self._ahead.has(element + 1):
             found = self._is(Element.RAPID, element + 1) and self._is_where_left(element + 1)
         if found:
-            self._left = -1  # that is said once
+            self._left = -1  # that is written once
         return found
 
     def _is_where_left(self, element: int) -> bool:

@@ -62,7 +62,7 @@ class Batches:
         # guessed; and the last move that it may have
         self._move, self._element, self._move_last, self._place = -1, 0, -1, np.zeros(3)
         self._continued = self._guessed = False
-        self._told = False  # whether a lack of motion between its stops has been said
+        self._told = False  # whether a lack of motion between its stops has been written
         self._ratio = 1.0  # how long the CL path is beside the written one, of the last batch that was cut
         self._pending: list[_Row] = []
 
@@ -125,10 +125,10 @@ class Batches:
         """End the stretch."""
         if self._move < 0:
             return
-        theirs, ours = move_last > self._move, element_last > self._element
-        if theirs != ours and not self._told:
+        theirs, nc_side = move_last > self._move, element_last > self._element
+        if theirs != nc_side and not self._told:
             self._stands(move_last, element_last, theirs=theirs)
-        if not (theirs and ours):
+        if not (theirs and nc_side):
             return
         stop = int(self.task.original.trail.last[move_last])
         while element_last - self._element > BATCH + BATCH // 2:
@@ -140,12 +140,12 @@ class Batches:
         self._pending.append((self._element, element_last, start, end, stop, self._guessed))
 
     def _cut_open(self, last: int) -> Iterator[Batch]:
-        """Give out what is held of a stretch whose end is not known yet, but its last element."""
+        """Give out what is kept of a stretch whose end is not known yet, but its last element."""
         if self._move < self._move_last:
             while last - self._element > BATCH + BATCH // 2:
                 yield from self._cut(self._element + BATCH, int(self.task.original.trail.last[self._move_last]))
             return
-        # nothing of the CL path is left for what is held: it may only stay where it is
+        # nothing of the CL path is left for what is kept: it may only stay where it is
         yield from self._flush()
         yield from self._close(self._move, last)
         self._element, self._continued = last, True

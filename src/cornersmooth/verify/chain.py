@@ -317,10 +317,10 @@ def _bent(
     one, other = on_own[:-1], np.where(on_row[1:], 1.0, on_own[1:])
     segment = np.minimum(on_path[:-1].astype(np.int64), path.segments - 1)
     low, high = on_path[:-1] - segment, np.minimum(on_path[1:] - segment, 1.0)
-    mine, theirs = bend[step], path.bend[segment]
-    off_one = 4.0 * (mine * one * (1.0 - one) + theirs * low * (1.0 - low))
-    off_other = 4.0 * (mine * other * (1.0 - other) + theirs * high * (1.0 - high))
-    between = mine * (other - one) ** 2 + theirs * (high - low) ** 2
+    mine, cl_side = bend[step], path.bend[segment]
+    off_one = 4.0 * (mine * one * (1.0 - one) + cl_side * low * (1.0 - low))
+    off_other = 4.0 * (mine * other * (1.0 - other) + cl_side * high * (1.0 - high))
+    between = mine * (other - one) ** 2 + cl_side * (high - low) ** 2
     wrong = np.zeros(len(step), np.bool_)
     for c in range(0, len(away), 3):
         size = np.sqrt(np.einsum("ij,ij->j", away[c : c + 3], away[c : c + 3]))
@@ -330,7 +330,7 @@ def _bent(
         beta = radius * radius - (size[1:] + off_other) ** 2
         gamma = 8.0 * between * radius + 4.0 * between * between - apart_size * apart_size
         room = np.sqrt(np.maximum(alpha, 0.0)) + np.sqrt(np.maximum(beta, 0.0))
-        bent = (mine > 0.0) | (theirs > 0.0)
+        bent = (mine > 0.0) | (cl_side > 0.0)
         wrong |= bent & ((alpha < 0.0) | (beta < 0.0) | (gamma > room * room))
     bad = np.zeros(count, np.bool_)
     bad[step[wrong] + 1] = True

@@ -31,7 +31,7 @@ _WIDTHS: Final = (1 / 8, 1 / 64, 1 / 512)
 #: rows for which tip and axis point are looked at each on its own at a time: only the largest are wanted
 _SOME: Final = 16
 
-#: vertices and segments around a break that are looked at for what is said of it
+#: vertices and segments around a break that are looked at for what the message has of it
 _MOST_ROWS, _MOST_SEGMENTS = 256, 4096
 
 

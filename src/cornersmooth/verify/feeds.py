@@ -99,8 +99,8 @@ def _fits_any(task: Task, nc: Elements, element: Ints, first: Ints, last: Ints) 
 def _fits(original: Original, nc: Elements, element: Ints | int, move: Ints) -> Bools:
     """Whether elements carry the feeds of moves, in their unit."""
     program, pose = original.program, original.pose[move]
-    asked, mode = program.feed[pose], program.feed_mode[pose] == FeedMode.PER_REVOLUTION
-    return np.isnan(asked) | nc.carry(element, asked, mode)
+    wanted, mode = program.feed[pose], program.feed_mode[pose] == FeedMode.PER_REVOLUTION
+    return np.isnan(wanted) | nc.carry(element, wanted, mode)
 
 
 def reach(task: Task, six: Floats, place: Floats, limits: tuple[Ints, Ints], way: int) -> Floats:
@@ -158,12 +158,12 @@ def feed_at(task: Task, nc: Elements, element: int, move: int, place: float) -> 
 def _problem(original: Original, nc: Elements, element: int, move: int) -> Problem:
     program, pose = original.program, int(original.pose[move])
     unit = "rev" if program.feed_mode[pose] == FeedMode.PER_REVOLUTION else "min"
-    said = "rev" if nc.per_revolution[element] else "min"
+    stated = "rev" if nc.per_revolution[element] else "min"
     if np.isnan(nc.feed[element]):
         what = "CS542", "a feed move before any F, or at inverse time (G93) from a place that is not known"
-    elif unit != said:
-        what = "CS543", f"the feed is per {said}, the CL file says per {unit}"
+    elif unit != stated:
+        what = "CS543", f"the feed is per {stated}, the CL file says per {unit}"
     else:
-        what = "CS541", f"the feed is {nc.feed[element]:g} mm/{said}, the CL file says {program.feed[pose]:g}"
+        what = "CS541", f"the feed is {nc.feed[element]:g} mm/{stated}, the CL file says {program.feed[pose]:g}"
     code, text = what
     return Problem(code, int(program.line[pose]), int(nc.line[element]), text)

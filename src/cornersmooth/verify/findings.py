@@ -16,7 +16,7 @@ _SAME_PROBLEM: Final = 3.0
 #: code of an axis that is beyond its own tolerance
 AXIS_OFF: Final = "CS527"
 
-#: what a violation of each code is said to be; its amount in mm, that of the tool axis in degrees
+#: what a violation of each code is called; its amount in mm, that of the tool axis in degrees
 _TEXT = {
     "CS521": "the tip leaves its path by {:.6f} mm",
     "CS522": "the axis point leaves its path by {:.6f} mm",

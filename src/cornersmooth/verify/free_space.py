@@ -207,16 +207,16 @@ class Around:
         """
         own, bend, number = rows
         base = min(int(start), top - 1)
-        theirs = parts_of(path.bend[base:top], FINE * radius, _MOST_PARTS)
+        cl_side = parts_of(path.bend[base:top], FINE * radius, _MOST_PARTS)
         known = np.zeros(len(bend)) if inner is None else np.where(number[:-1] < 0.0, 0.0, bend)
-        ours = parts_of(known, FINE * radius, _MOST_PARTS)
-        at, places = np.append(0, np.cumsum(ours)), _divided(np.arange(base, top + 1), theirs)
+        nc_side = parts_of(known, FINE * radius, _MOST_PARTS)
+        at, places = np.append(0, np.cumsum(nc_side)), _divided(np.arange(base, top + 1), cl_side)
         points = np.empty((own.shape[1], at[-1] + 1))
         points[:, at] = own.T
         between = np.setdiff1d(np.arange(at[-1] + 1), at, assume_unique=True)
         if inner is not None and len(between):
-            points[:, between] = inner(_divided(number, ours)[between]).T
-        bends = np.repeat(bend / ours**2, ours), np.repeat(path.bend[base:top] / theirs**2, theirs)
+            points[:, between] = inner(_divided(number, nc_side)[between]).T
+        bends = np.repeat(bend / nc_side**2, nc_side), np.repeat(path.bend[base:top] / cl_side**2, cl_side)
         return cls(FreeSpace(points, path.at(places).T, radius, *bends), at, places, start)
 
     @property
@@ -272,6 +272,6 @@ class Around:
 
 
 def _divided(values: Floats | Ints, parts: Ints) -> Floats:
-    """Ascending values (n + 1,) with as many equal parts between neighbours (n,) as asked for."""
+    """Ascending values (n + 1,) with as many equal parts between neighbours (n,) as wanted."""
     at = np.append(0, np.cumsum(parts))
     return np.interp(np.arange(at[-1] + 1), at, values)

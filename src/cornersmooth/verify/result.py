@@ -29,7 +29,7 @@ class Verification:
     #: degrees: what the tool axis may be off where the tip is within ε; None where the axis point has to keep ε
     axis_tolerance: float | None
     #: mm: largest distance between the tip paths, and between the axis-point paths, both ways, in order along the path;
-    #: with an axis tolerance, which axis points are not part of, all that is told of them is NaN
+    #: with an axis tolerance, which axis points are not part of, all of them is NaN
     tip: Where
     axis_point: Where
     #: mm: largest distances at the common poses by which the decision was proved
@@ -188,13 +188,13 @@ class Verification:
         worst, own = found.worst, task.own_axis
         orientation = np.degrees(worst["orientation"].value)
         tangent = np.degrees(np.arccos(np.clip(-worst["tangent_jump"].value, -1.0, 1.0)))
-        told = {"orientation": orientation, "tangent_jump": tangent, "shortest": -worst["shortest"].value}
+        measured = {"orientation": orientation, "tangent_jump": tangent, "shortest": -worst["shortest"].value}
         if own:
             worst = worst | {"orientation": worst["axis_point"]}
-            told |= {"orientation": task.degrees(worst["axis_point"].value)}
-            told |= {"axis_point": np.nan, "together_axis_point": np.nan}
+            measured |= {"orientation": task.degrees(worst["axis_point"].value)}
+            measured |= {"axis_point": np.nan, "together_axis_point": np.nan}
         peaks: dict[str, Any] = {
-            name: replace(where, value=float(told.get(name, where.value))) for name, where in worst.items()
+            name: replace(where, value=float(measured.get(name, where.value))) for name, where in worst.items()
         }
         return cls(
             passed=not problems,

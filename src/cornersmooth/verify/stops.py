@@ -102,7 +102,7 @@ class Stops:
         #: rapids, holes and feeds out of holes, two numbers for each: the move and the element that begin it
         self.acts = array("q")
         self.holes: list[Hole] = []
-        #: CS561 for holes that the program leaves out and may leave out if asked
+        #: CS561 for holes that the program leaves out and may leave out if requested
         self.left_out: list[Problem] = []
         self.moves_left_out: set[int] = set()
         #: CS531 a rapid goes elsewhere, CS532 one is missing, CS533 one too many; CS536 a feed move too many; of holes
@@ -332,7 +332,7 @@ class Stops:
             here = self._without(here, t, element)
 
     def _without(self, trace: _Trace, stop: int, element: int) -> _Trace:
-        """Trace at the next stop, which is missing before an element; of a hole that is said when it is left."""
+        """Trace at the next stop, which is missing before an element; of a hole that is written when it is left."""
         if self._hole[stop]:
             return self._finished(trace, _Trace(stop, element, True, trace), element)
         there = self._finished(trace, _Trace(stop, element - 1 if trace.inside else trace.begin, False, trace), element)
@@ -387,7 +387,7 @@ class Stops:
         return all(self.lines.at(move, element - 1) for move in range(self._move[stop] + 1, self._move[stop + 1]))
 
     def _is_fed(self, stop: int, element: int) -> bool:
-        """Whether a feed move may follow a stop; it is only asked for before holes, else the decision says it."""
+        """Whether a feed move may follow a stop; it is only wanted before holes, else the decision says it."""
         return self._fed[stop] or not self._hole[stop + 1] or self.lines.at(self._move[stop + 1] - 1, element)
 
     def _negligible(self, stop: int, element: int) -> bool:

@@ -56,7 +56,7 @@ CHECKS: Final[tuple[Callable[[Match, Findings], None], ...]] = (
     place_words,
 )
 
-#: what is said of a text without feeds, which both files may agree on
+#: what the message has of a text without feeds, which both files may agree on
 NO_FEED: Final = "no F before the first feed move, and most controls stop there with an alarm (smooth --feed gives one)"
 
 #: poses from which on it is worth while to let other processes work
@@ -69,7 +69,7 @@ _HALVED: Final = 5
 class Verifier:
     """Measures an NC text against the CL program it was made from, and may begin while the text is still being written.
 
-    A context manager: processes of its own read the text as it grows, until `result` is asked for or the block ends::
+    A context manager: processes of its own read the text as it grows, until `result` is wanted or the block ends::
 
         with Verifier(program, path, tolerance=0.04) as verifier:
             ...  # write to path

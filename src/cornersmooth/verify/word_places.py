@@ -113,14 +113,14 @@ class WordPlaces:
         # statements by the first move behind them that leads anywhere, words and retracts by the first such element
         places = np.searchsorted(original.pose, [one.pose for one in program.statements]).tolist()
         leading = self._leading(np.unique(np.array(places, np.int64)))
-        theirs = [
+        cl_tokens = [
             replace(one, place=leading.get(one.place, one.place))
             for one in asked(program, places, moves, means)
             if (one.kind != "auxiliary" or one.value not in clamps) and (one.kind != "home" or retracts)
         ]
         events = [replace(one, element=self._moving(one.element)) for one in self._events]
         up = [Token("home", "", self._moving(element), 0, optional=True) for element in batches.retracts]
-        ours = sorted([*said(events, means), *up], key=lambda one: one.place)
+        nc_tokens = sorted([*said(events, means), *up], key=lambda one: one.place)
         spots: dict[int, Spot] = {}
         for element in {*(one.element for one in self._events), *batches.retracts}:
             if (spot := found.words.get(element - 1)) is not None:
@@ -130,20 +130,20 @@ class WordPlaces:
         behind: dict[int, set[int]] = {}
         for place, lead in leading.items():  # the moves that end where statements are
             behind.setdefault(lead, set()).update(range(place - 1, lead))
-        # that of those no element names is said
+        # that of those no element names is written
         missed = {int(original.trail.owner[int(one.place)]) for one in found.violations if one.code == "CS524"}
 
-        holes = {self._moving(one.first): (one, _within(ours, one)) for one in batches.holes}
+        holes = {self._moving(one.first): (one, _within(nc_tokens, one)) for one in batches.holes}
         inside = {id(one) for _, some in holes.values() for one in some if one.kind in ("dwell", "tap")}
-        comparison = Comparison(theirs, [one for one in ours if id(one) not in inside], means, own)
+        comparison = Comparison(cl_tokens, [one for one in nc_tokens if id(one) not in inside], means, own)
         acts = np.append(np.frombuffer(batches.acts, np.int64).reshape(-1, 2), [[moves, batches.elements]], axis=0)
         # what leads nowhere in the program is no act: a rapid to where the tool is, or the same element again
         rapid = program.kind[original.pose[np.minimum(acts[:, 0], moves - 1)]] == Move.RAPID
         first = np.array([self._moving(one) for one in acts[:, 1].tolist()])
         kept = (~rapid | (first == acts[:, 1])) & (np.diff(first, prepend=-1) > 0)
         acts = np.maximum.accumulate(np.column_stack((acts[:, 0], first))[kept])
-        cl_places = np.array(sorted({one.place for one in theirs} | homes), np.int64)
-        nc_places = np.array(sorted({one.place for one in ours}), np.int64)
+        cl_places = np.array(sorted({one.place for one in cl_tokens} | homes), np.int64)
+        nc_places = np.array(sorted({one.place for one in nc_tokens}), np.int64)
         cl_act, nc_act = np.searchsorted(acts[:, 0], cl_places), np.searchsorted(acts[:, 1], nc_places)
         of_cycles = [first for first, (one, some) in holes.items() if some or one.cycle.dwell or one.cycle.tap]
         wanted = {*cl_act.tolist(), *nc_act.tolist(), *np.searchsorted(acts[:, 1], of_cycles).tolist()}
@@ -168,7 +168,7 @@ class WordPlaces:
                 hole, some = holes[end[1]]
                 line = int(program.line[original.pose[hole.move]])
                 comparison.in_hole(line, some, hole.cycle.dwell, tap=hole.cycle.tap)
-        return comparison.problems, at_home, without_word(theirs, ours, means, own)
+        return comparison.problems, at_home, without_word(cl_tokens, nc_tokens, means, own)
 
     def _leading(self, places: Ints) -> dict[int, int]:
         """The first moves from some on that lead anywhere, and are no holes that are left out."""
@@ -200,7 +200,7 @@ def _within_run(
     """Where both files say something within a run of feed moves: places of both up to which it belongs together.
 
     Of `missed` poses it is enough that a word is near them. From a word on of which nothing is known, as over holes
-    that are left out, they are not told apart.
+    that are left out, they are not distinguished.
     """
     found: list[tuple[int, int]] = []
     i, move, element = 0, -1, -1
@@ -221,7 +221,7 @@ def _within_run(
 
 
 def _within(tokens: Sequence[Token], hole: Hole) -> list[Token]:
-    """Tokens that are said within a hole; a tap is said before it begins."""
+    """Tokens that are written within a hole; a tap is written before it begins."""
     first, stop = (
         side(tokens, place, key=lambda one: one.place)
         for side, place in ((bisect_left, hole.first), (bisect_right, hole.leaves))

@@ -69,8 +69,8 @@ class Dialect:
 
     def after_motion(self, letter: str, value: float) -> bool:
         """Whether a word acts after the motion of its block: M words that stop, end or switch off."""
-        kind, said = self.means.get(f"M{value:g}", ("", "")) if letter == "M" else ("", "")
-        return kind in ("stop", "end") or said == "OFF"
+        kind, stated = self.means.get(f"M{value:g}", ("", "")) if letter == "M" else ("", "")
+        return kind in ("stop", "end") or stated == "OFF"
 
     def row(self, line: Line) -> dict[str, float] | None:
         """Words of a motion block; None where the line is something else."""
@@ -78,7 +78,7 @@ class Dialect:
         return None if columns is None else values(columns)
 
     def acts(self, line: Line, state: ModalState) -> Acts:
-        """Give out what a line that is no motion block does; each act is carried out before the next is asked for.
+        """Give out what a line that is no motion block does; each act is carried out before the next is wanted.
 
         Raises
         ------

@@ -146,7 +146,7 @@ class Heidenhain(Dialect):
         yield ToMachine(axes)
 
     def _circle(self, motion: dict[str, float], line: Line, state: ModalState) -> dict[str, float]:
-        """C: about the centre that CC has said, in the plane XY; CR: with a radius."""
+        """C: about the centre that CC has written, in the plane XY; CR: with a radius."""
         centre = state.centre
         by_radius = line.words[0].text == "CR"
         known = "R" in motion if by_radius else "R" not in motion and len(centre) == 2
