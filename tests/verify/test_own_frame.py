@@ -5,15 +5,17 @@ import re
 from collections.abc import Callable
 from functools import cache
 
+import numpy as np
 import pytest
 
 from cornersmooth import Verdict, Verification, read, verify
+from cornersmooth.errors import InputError
 from cornersmooth.kinematics import load_machine
 from cornersmooth.nc import Frame, choose_form, load_control
 from cornersmooth.pipeline import postprocess
 from cornersmooth.settings import Settings
 from oracle.files import SAMPLES
-from oracle.share import covering_share, share_of_kinds
+from oracle.share import covering_share, how_many, share_of_kinds
 
 MACHINES = {
     "fanuc": "table-ac",
@@ -463,3 +465,27 @@ def test_a_circle_without_a_centre_that_fits_is_no_line(words: str) -> None:
     at = next(k for k, line in enumerate(lines) if line.startswith("G1 X20."))
     lines[at] = lines[at].replace("G1", "G2") + words
     assert "CS520" in {problem.code for problem in verify(program, "\n".join(lines).encode(), **how).problems}
+
+
+#: blocks that change nothing where they are said again, stops that nobody asked for, shares of ε that are compared
+_HOLDS = r"M1|G54|M126|ORIMKS ORIAXES|G64 P\S+ Q0"
+
+
+@pytest.mark.parametrize("control", MACHINES)
+def test_each_block_around_the_cuts_that_is_lost_is_found(control: str) -> None:
+    lines = _text(control).splitlines()
+    plain = [re.sub(r"^\d+ ", "", line) for line in lines]
+    places = [
+        k
+        for k, block in enumerate(plain)
+        if not re.match(r"[(;%]|G[123] |LN? .*[XYZ].* F\d|LN? .*[XYZ][^F]*$|CR ", block)
+        and not (re.fullmatch(_HOLDS, block) and (block in plain[:k] or not block.startswith("G5")))
+    ]
+    assert len(places) > 20
+    rng = np.random.default_rng(len(places))
+    for k in rng.permutation(places)[: how_many(6, len(places))].tolist():
+        try:
+            found = _problems(control, [*lines[:k], *lines[k + 1 :]])
+        except InputError:
+            continue
+        assert found, lines[k]
