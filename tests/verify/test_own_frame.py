@@ -273,7 +273,8 @@ def test_a_retract_under_tip_control_is_found(control: str, off: str, up: str) -
     assert len(places) > 1
     for k in places:
         problems = _problems(control, [*lines[:k], lines[k + 1], lines[k], *lines[k + 2 :]])
-        (said,) = problems
+        (said,) = [text for text in problems if CHANGED in text]
+        assert any(" under " in text for text in problems)
         first, last = map(int, re.findall(r"\d+", said))
         assert CHANGED in said
         assert first <= k + 1 <= last
@@ -489,3 +490,62 @@ def test_each_block_around_the_cuts_that_is_lost_is_found(control: str) -> None:
         except InputError:
             continue
         assert found, lines[k]
+
+
+def _without_digests(control: str, lines: list[str]) -> list[str]:
+    """What is wrong with a text whose digests are gone, as those of version 0.2.0 have none."""
+    assert any("PARTS=" in line for line in lines)
+    found = verify(
+        _program(), "\n".join([*(line for line in lines if "PARTS=" not in line), ""]).encode(), **_how(control)
+    )
+    return [problem.text for problem in found.problems]
+
+
+@pytest.mark.parametrize("control", sorted(_HIGH))
+def test_what_is_wrong_around_a_retract_needs_no_digests(control: str) -> None:
+    lines = _text(control).splitlines()
+    plain = [re.sub(r"^\d+ ", "", line) for line in lines]
+    assert not _without_digests(control, lines)
+    over = [k for k, block in enumerate(plain) if re.fullmatch(_MUTANTS["not over the place"][0], block)]
+    assert over
+    for k in over:  # start and tool change
+        said = _without_digests(control, [*lines[:k], *lines[k + 1 :]])
+        assert any("before it is over its place" in text or "in one block of X Y Z" in text for text in said), plain[k]
+    up = [
+        k
+        for k, block in enumerate(plain)
+        if re.fullmatch(r"G91 G28 Z0\.|G53 G0 Z0\.?|SUPA G0 Z0 D0|L Z-1 .*M91", block)
+    ]
+    first = next(k for k, block in enumerate(plain) if re.match(r"G0 X|L X", block))
+    before = [k for k in up if k < first]
+    gone = [line for k, line in enumerate(lines) if k not in before]
+    assert any("without a retract before it" in text for text in _without_digests(control, gone))
+    off = [
+        k for k, block in enumerate(plain) if re.fullmatch("G49|TRAFOOF|FUNCTION RESET TCPM|M429", block) and k > first
+    ]
+    earlier = next((k for k in off if k + 1 in up), None)
+    if earlier is not None:  # off before the retract on this control
+        swapped = [*lines[:earlier], lines[earlier + 1], lines[earlier], *lines[earlier + 2 :]]
+        assert any(" under " in text for text in _without_digests(control, swapped))
+    if "G49" in plain:  # and behind it on this
+        k, retract = off[-1], max(k for k in up if k < off[-1])
+        swapped = [*lines[:retract], lines[k], *lines[retract:k], *lines[k + 1 :]]
+        assert any(" before the retract" in text or " under " in text for text in _without_digests(control, swapped))
+    turn = next((k for k in range(off[-1], len(lines)) if re.match(r"(G0|L) [ABC]", plain[k])), None)
+    if turn is not None and control in ("fanuc", "haas", "mitsubishi", "siemens"):
+        late = [*lines[: off[-1]], *lines[off[-1] + 1 : turn + 1], lines[off[-1]], *lines[turn + 1 :]]
+        assert any("rotary axes turn under" in text or " under " in text for text in _without_digests(control, late))
+
+
+@pytest.mark.parametrize("control", sorted(_HIGH))
+def test_a_way_back_after_gohome_needs_no_digests(control: str) -> None:
+    cl = _ONE_TOOL.replace("GOTO/20,0,60,0.2,0.15,0.96825", "GOHOME\nRAPID\nGOTO/5,5,60,0,0,1\nGOTO/5,5,30,0,0,1")
+    form, stream = choose_form(control, machine=load_machine(MACHINES[control])), io.BytesIO()
+    postprocess(cl.encode(), stream, Settings(tolerance=0.05), form=form)
+    lines = [line for line in stream.getvalue().decode().splitlines() if "PARTS=" not in line]
+    how = {"control": control, "machine": form.machine, "tolerance": 0.05}
+    assert verify(read(cl.encode()), "\n".join(lines).encode(), **how).verdict is Verdict.PASSED
+    over = [k for k, line in enumerate(lines) if re.fullmatch(r"(\d+ )?(G0|L) X\S+ Y\S+ [AB]\S+ C\S+( FMAX)?", line)]
+    changed = [*lines[: over[-1]], *lines[over[-1] + 1 :]]
+    found = verify(read(cl.encode()), "\n".join(changed).encode(), **how).problems
+    assert any("before it is over its place" in problem.text for problem in found)

@@ -241,10 +241,10 @@ class WordCheck:
 
     def _move(self, line: int, given: Mapping[str, float], rules: Sequence[WordRule] = ()) -> None:
         """Look at where the words of a block send the axes; those beside a word that is alone do not move the tool."""
-        self._states.turn(given)
-        moves = any(rule.moves for rule in rules)
+        self._states.turn(line, given)
+        moves, drills = any(rule.moves for rule in rules), any(rule.cycle for rule in rules)
         if moves or (LINEAR & given.keys() and not any(rule.alone for rule in rules)):
-            self._states.motion(line, given, 1.0 if moves else self._code)
+            self._states.motion(line, given, 1.0 if moves else self._code, drills=drills)
 
     def _follow(self, line: int, text: str, ruled: Ruled) -> None:
         """Look at what a block and that before want of each other."""

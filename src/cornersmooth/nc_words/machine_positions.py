@@ -43,9 +43,13 @@ class MachinePositions:
         Of the text.
     switches : bool
         `Dialect.switches`.
+    tcp : bool
+        Whether words are those of the tip.
     """
 
-    def __init__(self, machine: Machine | None, mm_per_unit: float, *, switches: bool = False) -> None:
+    def __init__(
+        self, machine: Machine | None, mm_per_unit: float, *, switches: bool = False, tcp: bool = True
+    ) -> None:
         home, change = ((), ()) if machine is None else (machine.home, machine.tool_change)
         units = dict.fromkeys("XYZ", mm_per_unit)
         self._home, self._change = (
@@ -53,7 +57,11 @@ class MachinePositions:
         )
         self._at: dict[str, float] = {}
         self._axes = () if machine is None else machine.axes
+        #: with its rotary axes
+        self.machine = machine if self._axes else None
         blocks = (machine.tip_control or ()) if machine is not None and self._axes and switches else ()
+        #: whether words are those of the tip without any that switches that on
+        self.keeps_tip = bool(switches and tcp and not blocks)
         #: rules for words that switch tip control of the kinematics
         self.switch: tuple[WordRule, ...] = (*_switch(blocks[:1], ends=True), *_switch(blocks[1:], ends=False))
         #: rules for blocks that the control's own list need not have

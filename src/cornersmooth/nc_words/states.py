@@ -4,7 +4,8 @@ A word sets a state to a value; its rule (`rules`) says when it must have been s
 which places of the program it may be: after a retract, on the way down, under tool tip control.
 
 Posts have many ways to begin, to change tools and to end, and most of them are right. What has changed in a program
-whose head says how it was made, `parts` finds.
+whose head says how it was made, `parts` finds; around its retracts it must be right also without digests
+(`WordStates._around_retracts`).
 """
 
 from __future__ import annotations
@@ -14,7 +15,10 @@ from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from typing import Final
 
+import numpy as np
+
 from cornersmooth.nc_reader.elements import Problem
+from cornersmooth.nc_reader.rotary import tool_vectors
 from cornersmooth.nc_words.blocks import NOT_LISTED, Ruled
 from cornersmooth.nc_words.machine_positions import MachinePositions
 from cornersmooth.nc_words.rules import WordList, WordRule, any_of, shown
@@ -28,8 +32,11 @@ NOT_ESTABLISHED: Final = "CS572"
 #: name of the blocks around the motion, among what is left to the user
 FRAME: Final = "program frame"
 
-#: state that is spoken of by name
+#: states that are spoken of by name; planes are those to which the control turns the rotary axes
 _OFFSET: Final = "work offset"
+_LENGTH: Final = "tool length"
+_PLANES: Final = frozenset(("tilted plane", "swivelled plane"))
+_DYNAMIC: Final = "dynamic work offset"
 
 #: comments that say how a program was made, and the words in them
 _MADE: Final = re.compile(r"CORNERSMOOTH \S+: \w+=", re.IGNORECASE)
@@ -38,6 +45,12 @@ _MADE_WORDS: Final = re.compile(r"\b(\w+)=([\w.]*)")
 #: words of axes
 LINEAR: Final = frozenset("XYZ")
 ROTARY: Final = frozenset("ABC")
+_VECTOR: Final = frozenset("IJK")
+_POINT: Final = frozenset(("U", "V", "W", "XH", "YH", "ZH"))
+
+#: angles of a plane, and the cosine of the angle from Z beyond which a tool is tilted
+_DECIMAL: Final = re.compile(r"(?<![G\d])\d+\.\d*")
+_UPRIGHT: Final = 1.0 - 1e-6
 
 
 @dataclass(frozen=True)
@@ -100,6 +113,10 @@ class WordStates:
             self.unsure += [(line, text) for text in texts]
         else:
             self.wrong(code, line, *texts)
+
+    def _around_retracts(self, line: int, *texts: str) -> None:
+        """Complain of what a program of ours never does around a retract; other posts may."""
+        self.unframed(NOT_LISTED, line, *(texts if self._made else ()))
 
     # what holds
 
@@ -174,6 +191,9 @@ class WordStates:
         if rule.turns:
             self.angles = {}
         if rule.retract:
+            # of FANUC the length of the tool holds in the retract, with its tip control
+            own = [held.text for held in self._held.values() if held.rule.ends and held.rule.state != _LENGTH]
+            self._around_retracts(line, *(f"{word} under {tip}" for tip in own if "Z" in word))
             self._retract, self._high, self.above = line, True, True
         if rule.changes_tool or rule.outside:
             self._retract = 0
@@ -193,6 +213,8 @@ class WordStates:
             more = [other for other, its in beside if not (its.compared or its.follows)]
             self._held[rule.state] = _Held(" ".join([word, *more]), rule, line)
             self._ended.pop(rule.state, None)
+            if rule.off and rule.state == _LENGTH and self._first is not None and self._retracts and not self.above:
+                self._around_retracts(line, f"{word} before the retract: it may move the tool by its length")
             if not rule.off and rule.state in self._approach:  # GOHOME: the same tool comes back as a new one does
                 self._retract = 0
 
@@ -207,12 +229,19 @@ class WordStates:
 
     # where axes turn, and where the tool moves
 
-    def turn(self, words: Mapping[str, float]) -> None:
-        """Take over rotary words."""
+    def turn(self, line: int, words: Mapping[str, float]) -> None:
+        """Take over rotary words; they may not turn the axes alone where a retract has left the tool."""
         self.angles |= {name: words[name] for name in ROTARY & words.keys()}
+        if self.above and ROTARY & words.keys() and not LINEAR & words.keys():
+            self._around_retracts(line, *(f"the rotary axes turn under {word}" for word in self._tip_control))
 
-    def motion(self, line: int, words: Mapping[str, float], code: float) -> None:
-        """Look at what holds where the tool moves by the words of a block, and by the G word of group 01 in force."""
+    def motion(self, line: int, words: Mapping[str, float], code: float, *, drills: bool) -> None:
+        """Look at what holds where the tool moves by the words of a block, and by the G word of group 01 in force.
+
+        `drills`: in a cycle of the control, so it does not go there at once.
+        """
+        if self._high and not drills:
+            self._around_retracts(line, *self._comes_down(words))
         for state, word in self._ended.items():
             if state not in self._left:
                 self.unframed(NOT_ESTABLISHED, line, f"{state}: it must come after {word}, which deselects it")
@@ -232,6 +261,8 @@ class WordStates:
         """Look at what holds at the first motion, and return it."""
         self._retract = 0
         self.unframed(NOT_LISTED, line, *self._wrong_offset())
+        if self._retracts and not self._high:
+            self._around_retracts(line, "the first motion without a retract before it")
         self._first = {state: "" if state in late else held.text for state, held in self._held.items()}
         for state, wanted in self._unsaid():
             if state not in self._left:
@@ -249,6 +280,31 @@ class WordStates:
                 self.wrong(NOT_LISTED, held.line, f"{held.text} where no arc follows")
             if not held.rule.follows:
                 self._others.setdefault(held, (state, first.get(state, "nothing")))
+
+    def _comes_down(self, words: Mapping[str, float]) -> Iterator[str]:
+        """What is wrong with the first motion after a retract, by the words of a block."""
+        tilted = None if words.keys() & _POINT else self._tilted(words)
+        if tilted and not words.keys() >= LINEAR:
+            yield "a tilted tool does not come from a retract in one block of X Y Z"
+        if tilted is False and "Z" in words and words.keys() & (set("XY") | ROTARY):
+            yield "the tool comes down from a retract before it is over its place"
+
+    def _tilted(self, words: Mapping[str, float]) -> bool | None:
+        """Whether X and Y lie in another plane in the part than on the machine; None where that is not known."""
+        on = {held.rule.state: held.text for held in self._held.values() if not held.off}
+        plane = [text for state, text in on.items() if state in _PLANES]
+        if plane:
+            return any(map(float, _DECIMAL.findall(plane[0])))
+        if not (self._positions.keeps_tip or self._tip_control or _DYNAMIC in on):
+            return False
+        if words.keys() >= _VECTOR:
+            axis = np.array([words[name] for name in "IJK"])
+            return bool(axis[2] < _UPRIGHT * np.linalg.norm(axis))
+        machine = self._positions.machine
+        if machine is None or not set(machine.names) <= self.angles.keys():
+            return None
+        given = [self.angles.get(axis.name, 0.0) for axis in machine.axes]
+        return bool(tool_vectors(machine, np.array([given]))[0, 2] < _UPRIGHT)
 
     def _wrong_offset(self) -> Iterator[str]:
         """What is wrong with the work offset, one for the whole program."""

@@ -195,7 +195,7 @@ class Verifier:
         reader = Reader(self._name, options, steps, lever)
         machine = self._machine if options.dialect.retracts else None
         scale, switches = self._program.mm_per_unit, options.dialect.switches
-        positions = MachinePositions(machine, scale, switches=switches)
+        positions = MachinePositions(machine, scale, switches=switches, tcp=options.tcp)
         own_axis, (tip, length) = self._axis_tolerance, (options.tolerance, options.axis_length)
         turn = math.degrees(tip / length) if own_axis is None else own_axis
         check = WordCheck(options.control, options.dialect.lexer, tip / scale, *self._own, positions, turn)
