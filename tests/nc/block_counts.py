@@ -27,7 +27,7 @@ FORMS = ("fanuc g1", "fanuc g6.2", "linuxcnc g1 xyzac-trt", "fanuc g1 table-ac")
 MOST = 2.5
 
 
-def blocks(path: Path, name: str, tolerance: float) -> int | str:
+def blocks_of(path: Path, name: str, tolerance: float) -> int | str:
     """Blocks of a CL file in a form, or the code of what is refused."""
     control, form, *machine = name.split()
     try:
@@ -52,7 +52,7 @@ def main() -> int:
     grown = 0
     print("".join(f"{name:>24}" for name in ("file", *given.forms, "times")))
     for path in files:
-        counts = [blocks(path, name, given.tolerance) for name in given.forms]
+        counts = [blocks_of(path, name, given.tolerance) for name in given.forms]
         known = [count for count in counts if isinstance(count, int)]
         times = max(known) / known[0] if known else 0.0
         grown += times > MOST

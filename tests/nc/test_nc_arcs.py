@@ -20,6 +20,7 @@ from cornersmooth.model import Program
 from cornersmooth.nc import choose_form, fit_settings, write
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
+from nc.block_counts import FORMS, MOST, blocks_of
 from nc.cases import without_limits
 from nc.grammars import reader
 from nc.writing import codes, one_arc, text_of, text_of_cl
@@ -357,3 +358,28 @@ def test_arcs_in_files_are_on_their_circles(name: str, arcs: int) -> None:
     assert np.isfinite(path).all()
     feeds = [line for line in lines if re.match("G[123] ", line)]
     assert all(one != other for one, other in pairwise(feeds))
+
+
+@pytest.mark.parametrize("name", ["nx_pocket.cls", "makino_contour.cldata", "catia_profile.aptsource"])
+def test_no_form_makes_many_blocks_of_arcs(name: str) -> None:
+    """27 times as many it once was; `python -m nc.block_counts` has all files."""
+    first, *others = (blocks_of(cl_file(name), form, 0.02) for form in FORMS)
+    assert isinstance(first, int)
+    assert all(isinstance(count, int) and count <= MOST * first for count in others)
+
+
+@pytest.mark.parametrize(
+    ("control", "form", "extras", "hinted"),
+    [("fanuc", "g1", (), "aicc"), ("siemens", "g1", (), "cycle832"), ("heidenhain", "g1", (), "cycle32"),
+     ("fanuc", "g1", ("hpcc",), ""), ("fanuc", "g6.2", (), ""), ("mitsubishi", "g1", (), "")],
+)  # fmt: skip
+def test_many_short_lines_want_a_control_that_looks_ahead(
+    control: str, form: str, extras: tuple[str, ...], hinted: str
+) -> None:
+    cl = "UNITS/MM\nFEDRAT/90,MMPM\nRAPID\nGOTO/0,0,0\nGOTO/20,0,0\nGOTO/20,{},0\nFINI\n"
+    chosen = choose_form(control, form, extras=extras)
+    for second, corner in ((20, True), (0, False)):
+        program = read(cl.format(second).encode(), name="part.cls")
+        smoothed = smooth(program, fit_settings(Settings(tolerance=0.05), chosen, program.units))
+        texts = [one.text for one in write(smoothed, io.BytesIO(), form=chosen).findings if one.code == "CS396"]
+        assert [f"--with {hinted}," in text for text in texts] == [True] * bool(hinted and corner)
