@@ -30,6 +30,9 @@ _SAME, _SAME_DIRECTION = 1e-9, 2e-6
 #: and after; `verify` takes off that of the new program
 _SHARE: Final = (1.0 - 2.0 * LINE_SHARE) / (1.0 - LINE_SHARE)
 
+#: a block by which LinuxCNC rounds corners within a distance, which the verdict adds to ε
+_BOUNDED: Final = re.compile(rb"(?i)\s*(?:N\d+\s*)?G64\s*P\s*\d*\.?\d+(?:\s*Q\s*\d*\.?\d+)?\s*")
+
 #: the last block of a run in distances: the word that says distances again after it
 _DISTANCES: Final = re.compile(rb"G91(?=[ \t]*\r?\n?\Z)")
 
@@ -68,7 +71,8 @@ def places(old: Reading, new: Reading, reader: ProgramReader) -> tuple[list[Plac
         if new.lines(at, begin) != old.lines(run.first, run.stop):
             found.append(Place(run, at, begin))
             others = np.flatnonzero(new.why[at:begin] != PLAIN_CUT) + at
-            more = [line for line in others.tolist() if not meanings.is_motion(new.lines(line, line + 1))]
+            texts = ((line, new.lines(line, line + 1)) for line in others.tolist())
+            more = [line for line, text in texts if not (meanings.is_motion(text) or _BOUNDED.fullmatch(text))]
             if more:
                 return found, [_changed(more[0], "within a run the program does more than to move")]
         at = stop
