@@ -107,7 +107,7 @@ def _found(
         line = int(np.searchsorted(new.start, begin))
         if new.start[line] == begin:
             return line, line + len(lines), []
-    wanted = [(line, said) for line in lines if (said := meanings.of_line(old.lines(line, line + 1)))]
+    wanted = [(line, stated) for line in lines if (stated := meanings.of_line(old.lines(line, line + 1)))]
     # plain cuts are looked at only where the first line is one
     first = [line for line in lines if wanted and line == wanted[0][0] and old.why[line] == PLAIN_CUT]
     there = [k for k in range(at, len(new)) if first or new.why[k] != PLAIN_CUT]
@@ -117,10 +117,10 @@ def _found(
             continue
         stop, count = k, 0
         while stop < len(new) and count < len(wanted):
-            said = meanings.of_line(new.lines(stop, stop + 1))
-            if said and said != wanted[count][1]:
+            stated = meanings.of_line(new.lines(stop, stop + 1))
+            if stated and stated != wanted[count][1]:
                 break
-            count, stop = count + bool(said), stop + 1
+            count, stop = count + bool(stated), stop + 1
         ends = not last or not any(meanings.of_line(new.lines(j, j + 1)) for j in range(stop, len(new)))
         if count == len(wanted) and ends:
             return k, stop, []
