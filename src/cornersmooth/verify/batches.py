@@ -125,10 +125,10 @@ class Batches:
         """End the stretch."""
         if self._move < 0:
             return
-        theirs, nc_side = move_last > self._move, element_last > self._element
-        if theirs != nc_side and not self._told:
-            self._stands(move_last, element_last, theirs=theirs)
-        if not (theirs and nc_side):
+        cl_moves, nc_moves = move_last > self._move, element_last > self._element
+        if cl_moves != nc_moves and not self._told:
+            self._stands(move_last, element_last, cl_moves=cl_moves)
+        if not (cl_moves and nc_moves):
             return
         stop = int(self.task.original.trail.last[move_last])
         while element_last - self._element > BATCH + BATCH // 2:
@@ -210,12 +210,12 @@ class Batches:
         retracts = self.retracts[bisect_left(self.retracts, first + 1) : bisect_right(self.retracts, last + 1)]
         return np.unique(np.array([*(event.element for event in self._events[low:high]), *retracts], np.int64)) - 1
 
-    def _stands(self, move_last: int, element_last: int, *, theirs: bool) -> None:
+    def _stands(self, move_last: int, element_last: int, *, cl_moves: bool) -> None:
         """Say if between two stops one motion leaves the place where the other stands: CS535, CS536."""
         task, path, original = self.task, self.task.path, self.task.original
         motion = written_motion(self._ahead.part(self._element, element_last + 1), task)
         place = path.at(self._place[:1])
-        if theirs:
+        if cl_moves:
             start, stop = int(self._place[0]), int(original.trail.last[move_last])
             own, bend = np.concatenate((place, path.points[start + 1 : stop + 1])), path.bend[start:stop]
             text, code, other = "feed moves of the CL file are missing", "CS535", motion.six[0]
