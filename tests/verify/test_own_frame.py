@@ -549,3 +549,17 @@ def test_a_way_back_after_gohome_needs_no_digests(control: str) -> None:
     changed = [*lines[: over[-1]], *lines[over[-1] + 1 :]]
     found = verify(read(cl.encode()), "\n".join(changed).encode(), **how).problems
     assert any("before it is over its place" in problem.text for problem in found)
+
+
+@pytest.mark.parametrize("control", MACHINES)
+def test_comments_and_the_order_of_spindle_and_coolant_change_no_part(control: str) -> None:
+    """A comment behind each cut, and M8 before M3: nothing is moved across a motion."""
+    lines = _text(control).splitlines()
+    mark = ";" if control in ("siemens", "heidenhain") else "("
+    noted = [f"{line} {mark}note" + ")" * (mark == "(") if re.search("X.*Y.*Z", line) else line for line in lines]
+    assert noted != lines
+    assert not _problems(control, noted)
+    plain = [re.sub(r"^\d+ ", "", line) for line in lines]
+    k = next(k for k, block in enumerate(plain) if block == "M8")
+    assert "M3" in plain[k - 1]
+    assert not _problems(control, [*lines[: k - 1], lines[k], lines[k - 1], *lines[k + 1 :]])

@@ -79,7 +79,7 @@ class WordCheck:
         kinds = KINDS & trusted
         self._moving = _own_table(kinds & _OF_MOTION)
         self.trusted += [(0, text) for text in _own_table(kinds - _OF_MOTION)]
-        self.parts = Parts(control)
+        self.parts = Parts(control, lexer)
         self._line = 0  # of the last block
         self._wanted = self.list.begin  # blocks of the begin that are still to come
         self._opening = ""

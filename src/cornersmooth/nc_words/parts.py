@@ -18,7 +18,9 @@ from typing import Final
 
 from cornersmooth.control.state import CUTS, State
 from cornersmooth.control.table import FRAME, Row, table_of
+from cornersmooth.nc_reader.lexer import Lexer
 from cornersmooth.nc_reader.words import Line, Table
+from cornersmooth.nc_reader.words import table_of as table_of_rows
 from cornersmooth.nc_words.rules import word_text
 from cornersmooth.provenance import PARTS, PARTS_WORD
 
@@ -28,6 +30,7 @@ _DIGITS: Final = 6
 #: groups that follow the CL file, and words that do
 _GROUPS: Final = frozenset(("motion", "feed", "plane", "path", "compensation"))
 _WORDS: Final = frozenset(("T", "S"))
+_SWITCHED: Final = frozenset(("spindle", "coolant"))
 
 #: words that begin and end a program
 _FRAME: Final = re.compile("O$|(BEGIN|END) PGM")
@@ -57,13 +60,15 @@ class _Part:
 class Parts:
     """Follows one program; lines are its blocks in order."""
 
-    def __init__(self, control: str) -> None:
+    def __init__(self, control: str, lexer: Lexer) -> None:
+        self._lexer = lexer
         self._state = State(table_of(control), ("X", "Y", "Z", *_ROTARY))
         self._parts: list[_Part] = []
         self._part = _Part()
         self._cuts = False  # whether the part is within cuts
         self._above = True  # Z has not moved since a retract
         self._still = True  # nothing has moved since the last word that counts
+        self._switched: list[str] = []  # words of spindle and coolant since the last motion: their order is free
         self._wanted = ""  # digests of the head
 
     # what the program says
@@ -88,6 +93,11 @@ class Parts:
 
     def line(self, line: Line) -> None:
         """Take any other line."""
+        columns = self._lexer.motion(line)
+        if columns is not None:  # a motion block with a comment
+            numbers = {name: word if isinstance(word, float) else word.value for name, word in columns.items()}
+            self.table(table_of_rows([(line.number, numbers)]))
+            return
         rows = self._state.rows(line.words)
         does = {effect for _, _, row in rows for effect in row.does}
         beside = frozenset[str]().union(*(row.beside for _, _, row in rows))
@@ -110,7 +120,11 @@ class Parts:
             )
             if row.does or changed:
                 own = [word_text(other) for other in line.words if other.name in row.beside]
-                self._take(line.number, " ".join(("/" * line.skipped + word_text(word), *own)))
+                text = " ".join(("/" * line.skipped + word_text(word), *own))
+                if not row.does and {group for group, _ in row.sets} <= _SWITCHED:
+                    self._switched.append(text)
+                else:
+                    self._take(line.number, text, stays="tool" not in row.does and "machine" not in does)
         moved = {word.name for word in line.words} & _PLACES
         if "machine" in does:
             self._take(line.number, " ".join(sorted(map(word_text, line.words))))
@@ -128,12 +142,23 @@ class Parts:
         at = {name: self._state.place[name] for name in _ROTARY}
         return " ".join(f"{name}{value:g}" for name, value in at.items() if not math.isnan(value))
 
-    def _take(self, line: int, word: str) -> None:
+    def _take(self, line: int, word: str, *, stays: bool = False) -> None:
+        """Take a word; `stays`: the machine does not move by it."""
+        if not stays:
+            self._flush(line)
         self._part.add(line, re.sub(r"\s+", " ", word))
         self._still = True
 
+    def _flush(self, line: int) -> None:
+        """Take the words of spindle and coolant that have come since the last motion."""
+        for word in sorted(self._switched):
+            self._part.add(line, word)
+            self._still = True
+        self._switched = []
+
     def _moves(self, line: int, names: set[str]) -> None:
         """Take a motion: on the way down from a retract with its letters, elsewhere the first behind a word alone."""
+        self._flush(line)
         if self._above:
             self._part.add(line, "".join(sorted(_PLACES & names)))
             self._above = "Z" not in names
@@ -148,6 +173,7 @@ class Parts:
 
     def _close(self, line: int, *, cuts: bool) -> None:
         """End the part: the next begins at a line."""
+        self._flush(line)
         if self._part.words:
             self._part.last = line
             self._parts.append(self._part)
@@ -158,6 +184,7 @@ class Parts:
     @property
     def _whole(self) -> list[_Part]:
         """All parts; what is beyond the number that a head has is the last of them."""
+        self._flush(self._part.last)
         parts = [*self._parts, self._part] if self._part.words else [*self._parts]
         rest = parts[PARTS - 1 :]
         if len(rest) > 1:
