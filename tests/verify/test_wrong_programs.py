@@ -239,7 +239,7 @@ def kinds_of_cycle(line: str, control: str) -> list[str]:
 
 
 @pytest.mark.parametrize("cycle", CYCLES)
-@pytest.mark.parametrize("control", [*ISO, "heidenhain", "siemens"])
+@pytest.mark.parametrize("control", ["fanuc", "heidenhain", "linuxcnc", "siemens"])
 def test_each_number_of_each_cycle_is_compared(control: str, cycle: str) -> None:
     text = HOLES.format(CYCLES[cycle])
     lines = right(text, control, "native")
