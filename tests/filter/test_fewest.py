@@ -15,6 +15,7 @@ from cornersmooth.filter.program import THREE_AXES
 from cornersmooth.verdict import Verdict
 from filter.fine_programs import HEAD, PROGRAMS, program
 from filter.foreign import by_rs274, by_words, difference
+from oracle.command import DONE, run
 
 EPS = 0.01
 
@@ -226,3 +227,15 @@ def test_a_feed_in_a_line_of_its_own_is_no_end_of_a_run() -> None:
     assert found.verdict is Verdict.PASSED
     assert re.findall(rb"F\d+", found.data) == [b"F300", b"F500", b"F600"]
     assert difference(by_words(text.encode()), by_words(found.data), EPS) == ""
+
+
+@pytest.mark.parametrize("control", ["grbl", "FluidNC", "mach3", "Mach4"])
+def test_controls_of_three_axes_have_the_words_of_linuxcnc(control: str, tmp_path: Path) -> None:
+    text = "; made elsewhere\nG21\nG90\nG0 X0 Y0\nZ5\nG1 Z-1 F300\n" + WAVE + "G0 Z5\nM2\n"
+    (tmp_path / "part.nc").write_text(text)
+    made = run("filter", "part.nc", "--control", control, "-o", "new.nc", cwd=tmp_path)
+    assert made.returncode == DONE, made.stderr
+    assert made.stderr.startswith(b"PASSED")
+    assert (tmp_path / "new.nc").read_bytes().count(b"R") >= 4
+    asked = run("filter", "part.nc", "-o", "other.nc", cwd=tmp_path)
+    assert b"--control grbl, mach3" in asked.stderr

@@ -61,6 +61,9 @@ from cornersmooth.verify import useful_processes
 #: names of NC programs, for folders
 PATTERNS = ("*.nc", "*.ngc", "*.mpf", "*.spf", "*.h", "*.tap", "*.cnc", "*.eia", "*.iso", "*.gcode")
 
+#: controls of three axes whose finished programs have LinuxCNC's words
+ALIKE = ("grbl", "grblhal", "fluidnc", "mach", "mach3", "mach4")
+
 #: reasons shown without -v, and problems shown
 _SHOWN, _WRONG_SHOWN = 10, 20
 
@@ -299,13 +302,17 @@ def options_for(data: bytes, name: str, given: Options) -> Options:
 
     if is_cl_file(data[:HEAD]):  # who reads it will say so
         return given
+    if given.control.lower() in ALIKE:
+        if given.limits:
+            warn(f"times are those of LinuxCNC's law: that of {given.control} is not known", name)
+        given = replace(given, control="linuxcnc")
     head = recognised(given, data[:HEAD])
     if head.remark:
         warn(head.remark, name)
     default = click.get_current_context().get_parameter_source("control") == click.core.ParameterSource.DEFAULT
     if default and not recognise_control(data[:HEAD]) and needs_its_control(data[:HEAD]):
         what = f"{name} does not say its control, and has numbers without a point or comments after a semicolon"
-        raise SettingsError("CS267", what, "name it: --control linuxcnc (for grbl and Mach, too), siemens or another")
+        raise SettingsError("CS267", what, "name it: --control grbl, mach3, linuxcnc, siemens or another")
     alone = not head.given.machine and not names_tip_control(data)
     return replace(head.given, machine=THREE_AXES) if alone else head.given
 

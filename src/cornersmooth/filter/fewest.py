@@ -159,7 +159,7 @@ def _lines(job: Job, group: _Group, place: Floats, fixed: Bools, begins: Bools) 
     changes = np.abs(np.diff(words, axis=0, prepend=words[:1])).max(axis=1)
     parameter = np.cumsum(np.sqrt((square(way) + square(way + turn)) / 2.0) + 1e-3 * changes)
     limits = line_limits(settings.but(lines="long"), form, LARGEST_TURN)
-    share = _USED / (1.0 if machine is None else 1.01)
+    share = 1.0 if machine is None else 0.99
     limits = replace(limits, tip=share * limits.tip, axis_point=share * limits.axis_point, lag=np.inf)
     rows = Vertices(tip, words, tip, tip + lever, parameter, fixed, position if form.orientation == "machine" else None)
     kept = fewest_lines(rows, limits)
