@@ -25,7 +25,7 @@ _ACTING: Final = re.compile(r"\s*([A-Za-z]+\s*,|PROBE|LOG)", re.IGNORECASE)
 _JUMPS: Final = re.compile(r"GOTO|REPEAT|(?<!TOOL )CALL|\bM0*9[6-9]|\bM198|\bG0*6[56]\b|\bG7[0-3]\b.*P")
 
 #: groups that blocks of a run may set
-_OF_MOTION: Final = frozenset(("motion", "distance", "feed", "plane"))
+_OF_MOTION: Final = frozenset(("motion", "distance", "feed", "plane", "path"))
 
 
 @dataclass
