@@ -43,4 +43,4 @@ def test_places_and_feeds_are_those_of_the_reader(path: Path) -> None:
                 scale = 0.1 if control == "heidenhain" and state.unit != 1.0 else 1.0  # tenths of inches there
                 assert scale * state.unit * state.feed == pytest.approx(read.feed[row]), item.first + k + 1
             compared += 1
-    assert compared >= 10 or axes or "g1" not in path.stem
+    assert compared >= 5 or axes or "g1" not in path.stem

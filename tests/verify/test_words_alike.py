@@ -205,3 +205,19 @@ def test_an_offset_that_was_not_compared_is_said(control: str, offset: str, othe
     assert found.startswith("PASSED")
     assert found.endswith(f"offset {other}, not compared")
     assert judged(tmp_path, control, f"^{re.escape(offset)}$", other, cl=PLAIN).startswith("FAILED")
+
+
+@pytest.mark.parametrize(
+    ("control", "block"),
+    [
+        ("fanuc", "G53 G0 X1. Z2."),
+        ("fanuc", "G53 G0 Z-50."),
+        ("fanuc", "G91 G28 X0. Z0."),
+        ("siemens", "SUPA G0 Z50"),
+        ("heidenhain", "L X+5 Z+5 R0 FMAX M91"),
+    ],
+)
+def test_z_goes_to_a_position_of_the_machine_in_retracts_alone(control: str, block: str) -> None:
+    """To any other height of the machine only where its file says so."""
+    listed = word_list(control)
+    assert not any(rule.pattern.fullmatch(block) for rule in listed.blocks)
