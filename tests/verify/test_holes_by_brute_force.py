@@ -14,7 +14,8 @@ from oracle.share import share
 from .test_statements import said, text
 
 DEPTH, CLEARANCE, RETRACT = 8.0, 2.0, 4.0
-CYCLE = ("DRILL", "FEDTO", DEPTH, "MMPM", 100.0, "RAPTO", CLEARANCE, "RTRCTO", RETRACT)
+# pecks of any depth
+CYCLE = ("DRILL", "DEEP", "FEDTO", DEPTH, "MMPM", 100.0, "RAPTO", CLEARANCE, "RTRCTO", RETRACT)
 
 Element = tuple[str, float, float]  # code, x, z
 Hole = tuple[float, float]  # x, z
@@ -66,6 +67,8 @@ def is_drilled(holes: list[Hole], i: int, group: list[Element], before: Element)
     last = np.inf
     for (code, *_), height in zip(group, heights, strict=True):
         if code == "G1":
+            if height > last:  # it is left in rapid
+                return False
             if height < last and (height > RETRACT or drilled == DEPTH or 0.0 < -height <= drilled):
                 return False
             drilled, free = max(drilled, -height), min(free, height)
