@@ -22,7 +22,7 @@ from cornersmooth.cli import run
 from cornersmooth.geometry import nurbs
 from cornersmooth.model import LimitedBy, Program, SmoothProgram, Status
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing import smooth
+from cornersmooth.smoothing import smooth, zhang2016
 from cornersmooth.smoothing.construction import Construction
 from cornersmooth.smoothing.segments import segments_of
 from cornersmooth.smoothing.synchronise import matching_parameters
@@ -351,6 +351,19 @@ def test_corners_are_made_smaller_by_no_more_than_what_just_keeps_the_tolerance(
     made_smaller = found.corners.limited_by == LimitedBy.TOLERANCE
     assert made_smaller.sum() > 10
     assert (free.corners.extra["size"][made_smaller] > found.corners.extra["size"][made_smaller]).all()
+
+
+@pytest.mark.parametrize("curves", [True, False])
+def test_bounds_let_nothing_pass_that_is_measured(curves: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Curves are run at common parameters, where Q is off H by more than at v(u)."""
+    program, settings = cornersmooth.read(SAMPLE.with_name("impeller.cls")), settings_of(0.01, curves=curves)
+    found = CONSTRUCTION.smooth(program, settings).corners
+    monkeypatch.setattr(zhang2016, "_most_share", lambda off, *_others: np.full_like(off, np.inf))
+    measured = CONSTRUCTION.smooth(program, settings).corners
+    assert (found.status == measured.status).all()
+    rows = found.smoothed
+    assert rows.sum() > 200
+    assert found.extra["size"][rows] == pytest.approx(measured.extra["size"][rows], rel=1e-9)
 
 
 @pytest.mark.parametrize("tolerance", TABLE_2)

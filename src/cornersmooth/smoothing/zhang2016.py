@@ -288,6 +288,12 @@ class _Transitions:
         gone = parts_gone(trims, at, weights)
         return motion_of(tip_legs, axis_legs, gone, original.lever, at, weights), original, self.spare[rows]
 
+    def missing_at(self, u: Floats, weights: Floats, height: float) -> Floats:
+        """(g,) mm: the largest ``||Q(u) − P(u)| − H|`` at common parameters (m,)."""
+        turns = np.stack(self.axis_legs, axis=1) - np.stack(self.tip_legs, axis=1)
+        levers = self.original.lever[:, None] + nurbs.leg_coefficients(u, weights)[:, 1:] @ turns
+        return np.abs(norm(levers) - height).max(axis=1)
+
     def missing_at_ends(self, height: float) -> Floats:
         """(g,) mm: the larger ``||Q − P| − H|`` of both ends of the curves."""
         (tip_in, tip_out), (axis_in, axis_out), lever = self.tip_legs, self.axis_legs, self.original.lever
@@ -308,10 +314,11 @@ def _measured(
     u = REPORT_PARAMETERS if settings.weights == (1.0, 1.0) and settings.axis_tolerance is None else _MORE_PARAMETERS
     both, lever = (made.tip_legs, made.axis_legs), made.original.lever
     v, *report = synchronisation_report(*both, lever, weights, settings.axis_length, u)
-    lines, missing = settings.round_feed_changes, report[0]
-    at = u[None]  # controls run curves at common parameters
+    lines = settings.round_feed_changes
     if lines:
-        (u, at), missing = _joined(u, v), np.maximum(missing, made.missing_at_ends(settings.axis_length))
+        (u, at), missing = _joined(u, v), np.maximum(report[0], made.missing_at_ends(settings.axis_length))
+    else:  # controls run curves at common parameters
+        at, missing = u[None], made.missing_at(u, weights, settings.axis_length)
     off, share, doubtful = made.bounded((u, at), missing, settings)
     passing = off + (settings.chord if lines else 0.0)
     most = *made.motion(doubtful, (u, at), settings), settings, len(u) // 2, passing[doubtful] if lines else None
