@@ -71,3 +71,24 @@ def test_a_way_home_is_compared(case: Case) -> None:
         assert wrong(case, lines, home=home) == []
     missing = ["GOHOME of the CL file is missing: the tool does not go up to a retract"]
     assert wrong(case, texts[False], home=True) == ([] if case.control == "generic" else missing)
+
+
+@pytest.mark.parametrize("case", [one for one in CASES if one.control != "generic"], ids=str)
+def test_the_spindle_turns_on_the_way_home(case: Case) -> None:
+    """The CL file stops it behind GOHOME, if at all; the tool is in the part until then."""
+    lines = written(program(home=True), case.choose(), Settings(tolerance=0.02))[0].splitlines()
+    home = next(k for k, line in enumerate(lines) if re.search(r"GOHOME", line))
+    for word in ("M5", "M4"):
+        put = f"99 {word}" if case.control == "heidenhain" else word
+        assert any(text.startswith("spindle") for text in wrong(case, [*lines[:home], put, *lines[home:]], home=True))
+
+
+def test_what_is_asked_for_behind_the_way_home_is_compared_behind_it() -> None:
+    case = CASES[0]
+    part = read(CL.replace("GOHOME\n", "GOHOME\nSPINDL/RPM,2000,CLW\n").encode(), name="part.cls")
+    lines = written(part, case.choose(), Settings(tolerance=0.02))[0].splitlines()
+    start = next(k for k, line in enumerate(lines) if "S2000" in line)
+    home = max(k for k, line in enumerate(lines[:start]) if "G28" in line)
+    early = [*lines[:home], lines[start], *lines[home:start], *lines[start + 1 :]]
+    for text, right in ((lines, True), (early, False)):
+        assert verify(part, ("\n".join(text) + "\n").encode(), tolerance=0.02).passed is right

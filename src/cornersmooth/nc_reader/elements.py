@@ -23,6 +23,10 @@ _ARITHMETIC: Final = 1e-9
 Second = Literal["vector", "point"]
 
 
+#: letter of an event that is no word: axes go to positions of the machine
+RETRACT: Final = "retract"
+
+
 class Element(IntEnum):
     """What a motion block does (`NcProgram.kind`)."""
 
@@ -139,7 +143,7 @@ class Event:
 
     element: int  #: index of the path element it stands before (the number of elements after the last one)
     line: int  #: NC line, from 1
-    letter: str  #: ``"T"``, ``"S"``, ``"M"``, ``"G"``, ``"H"`` or ``"D"``
+    letter: str  #: ``"T"``, ``"S"``, ``"M"``, ``"G"``, ``"H"`` or ``"D"``; or `RETRACT`
     value: float  #: the number of the word; for ``G4`` the dwell in milliseconds is in `text`
     text: str = ""  #: the word as written
 

@@ -14,7 +14,7 @@ from cornersmooth.errors import InputError
 from cornersmooth.model import MM_PER_UNIT, Floats, Units
 from cornersmooth.nc_reader.acts import Act, Beside, Modes, Move, Tilt, ToMachine, TurnToPlane, Unknown, Wrong
 from cornersmooth.nc_reader.block_tables import Readable, read_lines
-from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem, Second, settle
+from cornersmooth.nc_reader.elements import RETRACT, Element, Elements, Event, Problem, Second, settle
 from cornersmooth.nc_reader.execution import Modal, execute
 from cornersmooth.nc_reader.modal_state import ModalState
 from cornersmooth.nc_reader.needed_states import (
@@ -235,6 +235,7 @@ class Reader:
         self.plane, self._told, self._left_turned = plane, set(), False
         self.retracts.end(turned=True)
         self.retracts.leave(self.elements, self._words(self.state.modal))
+        self.events.append(Event(self.elements, line.number, RETRACT, 0.0))
         self.state.modal = self.state.modal.but(tip=(math.nan,) * 3)
         if plane.turned:
             self._turn(line)
@@ -412,7 +413,7 @@ class Reader:
             case TurnToPlane():
                 self._turn_to_plane(line)
             case ToMachine():
-                self._leave(act.axes)
+                self._leave(line, act.axes)
             case Wrong():
                 self._wrong(act.code, line, act.text)
             case Unknown():
@@ -453,9 +454,10 @@ class Reader:
             raise InputError("CS503", what, "name the machine with --machine", file=self.name, line=line.number)
         self.state.modal = self.state.modal.but(**modes)
 
-    def _leave(self, axes: str) -> None:
+    def _leave(self, line: Line, axes: str) -> None:
         """Say that axes go to positions of the machine."""
         self.retracts.leave(self.elements, self._words(self.state.modal))
+        self.events.append(Event(self.elements, line.number, RETRACT, 0.0))
         gone = "XYZ" if self.plane is not None else axes
         tip = tuple(math.nan if axis in gone else at for axis, at in zip("XYZ", self.state.modal.tip, strict=True))
         self.state.modal = self.state.modal.but(tip=tip)

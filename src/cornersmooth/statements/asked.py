@@ -315,7 +315,7 @@ def asked(program: Program, places: Sequence[int], end: int, means: Means) -> li
         if statement.word == "GOHOME" and not statement.args and place not in [one.place for one in homes[-1:]]:
             homes.append(Token("home", "", place, statement.line))
     line = max((item.line for item in program.statements if item.word in ("FINI", "END")), default=0)
-    return [*sorted([*asking.tokens, *homes], key=lambda token: token.place), Token("end", "", end, line)]
+    return [*sorted([*asking.tokens, *homes], key=lambda token: (token.place, token.line)), Token("end", "", end, line)]
 
 
 def _behind(statement: Statement, word: str) -> float | None:

@@ -54,7 +54,7 @@ _AT_START: Final[dict[str, float | str]] = {**dict.fromkeys(_ENDED, "OFF"), "off
 #: kinds for which a control may have no words
 _WORDED: Final = (*_ENDED, "offset", "register")
 
-#: states that are compared where the program waits
+#: states that are compared where the program waits, and on the way home
 _AT_PAUSES: Final = ("tool", "spindle", "speed", "coolant", "compensation")
 
 #: what may be written in a hole
@@ -149,6 +149,7 @@ class Comparison:
         self.cl = _Side([one for one in asked_for if counts(one) and one.kind not in own], stops=False)
         self.nc = _Side([one for one in found if counts(one) and one.kind not in own & _LOOSE], stops=True)
         self.problems: list[Problem] = []
+        self._moved = False
         self._agreed: _Held = {}  # words that were as wanted when they were met last
         self._named: set[tuple[Token | None, Token | None]] = set()
 
@@ -157,6 +158,7 @@ class Comparison:
         requested, done = self.cl.up_to(move), self.nc.up_to(element)
         for kind in _ACTIONS:
             self._same(*([one for one in some if one[0].kind == kind] for some in (requested, done)))
+        self._moved = True
         for token, key in self.nc.idle_starts(moves=moves):
             if key not in self.cl.running:
                 self._say(None, token)
@@ -196,20 +198,21 @@ class Comparison:
                 missing.append(wanted)
                 continue
             others = {k: _others(wanted.kind, cl_values, done[k][1]) for k in alike}
-            # a stop that posts write before a tool change may stand beside one of the CL file
-            best = min(alike, key=lambda k: (len(others[k]) > 0, done[k][0].optional, k))
-            for token, _ in done[first:best]:
-                (spare if token.optional else surplus).append(token)
-            first, nc_values = best + 1, done[best][0]
-            for state, here, value in others[best]:
-                (code, name), pause = _NAMES[state], _NAMES[nc_values.kind][1].format(nc_values.value)
+            # a stop of the post before a tool change may stand beside one of the CL file; the first way home counts
+            best = min(alike, key=lambda k: (wanted.kind != "home" and len(others[k]) > 0, done[k][0].optional, k))
+            for one, _ in done[first:best]:
+                (spare if one.optional else surplus).append(one)
+            first, token = best + 1, done[best][0]
+            at_home = wanted.kind == "home" and not self._moved  # before the first motion the tool is at home
+            for state, here, value in () if at_home else others[best]:
+                (code, name), pause = _NAMES[state], _NAMES[token.kind][1].format(token.value)
                 text = f"{name.format(here)} holds at {pause}, where the CL file has {name.format(value)}"
-                self.problems.append(Problem(code, wanted.line, nc_values.line, text))
+                self.problems.append(Problem(code, wanted.line, token.line, text))
         for token, _ in done[first:]:
             (spare if token.optional else surplus).append(token)
         surplus += spare[: max(len(missing) - len(surplus), 0)]  # what may be left over may be the wrong one
-        for one in zip_longest(missing, surplus):
-            self._say(*one)
+        for pair in zip_longest(missing, surplus):
+            self._say(*pair)
 
     def _other(self, kind: str) -> None:
         """A state is another where the tool moves."""
@@ -243,14 +246,16 @@ def _others(
 ) -> list[tuple[str, float | str, float | str]]:
     """States of the program that are not those of the CL file at a pause of a kind, and what they should be.
 
-    Where it stops, spindle and coolant may be off although the CL file leaves them on: they go on before any motion.
+    Where it stops, spindle and coolant may be off although the CL file leaves them on: they go on before any motion. On
+    the way home the coolant may be off.
     """
     found = []
     for state, value in cl_values.items():
         here = nc_values.get(state)
         off = kind == "stop" and state in _STOPPED and here == "OFF"
+        off |= kind == "home" and state == "coolant" and here == "OFF"
         off |= state == "speed" and "OFF" in (cl_values.get("spindle", "OFF"), nc_values.get("spindle", "OFF"))
-        if value is not None and here is not None and here != value and not off and kind in ("stop", "dwell"):
+        if value is not None and here is not None and here != value and not off and kind in ("stop", "dwell", "home"):
             found.append((state, here, value))
     return found
 

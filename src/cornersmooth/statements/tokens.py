@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from cornersmooth.nc_reader.elements import Event
+from cornersmooth.nc_reader.elements import RETRACT, Event
 from cornersmooth.nc_reader.word_tables import Means
 
 #: decimals of a spindle speed that count: FANUC's S takes whole numbers only
@@ -59,7 +59,10 @@ def said(events: Sequence[Event], means: Means) -> list[Token]:
     words = [(event.letter, event.value) for event in events]
     changes = _CHANGE in words
     # R0 of M91, and what ends with the tool
-    idle = [word == ("G", 40.0) or (word[0] == "M" and of_m(word[1], means)[1] in ENDINGS) for word in words]
+    idle = [
+        word == ("G", 40.0) or word[0] == RETRACT or (word[0] == "M" and of_m(word[1], means)[1] in ENDINGS)
+        for word in words
+    ]
     for k, (event, word) in enumerate(zip(events, words, strict=True)):
         letter, value = word
         meaning: tuple[str, float | str] | None = None
@@ -75,6 +78,8 @@ def said(events: Sequence[Event], means: Means) -> list[Token]:
             meaning = "dwell", round(float(event.text))
         elif letter == "G" and value in _CODES:
             meaning = _CODES[value]
+        elif letter == RETRACT:
+            meaning = "home", ""
         elif letter == "S":
             meaning = "speed", round(value, SPEED_DECIMALS)
         elif letter in means:
@@ -82,7 +87,7 @@ def said(events: Sequence[Event], means: Means) -> list[Token]:
         if meaning is None:
             continue
         # without M6 the control may take the tool with T alone
-        optional = meaning[0] == "dwell" or (meaning[0] == "next tool" and changes)
+        optional = meaning[0] in ("dwell", "home") or (meaning[0] == "next tool" and changes)
         if meaning in _BEFORE_TOOLS:  # and nothing moves between
             after = next((j for j in range(k + 1, len(words)) if not idle[j]), None)
             tool = after is not None and (words[after][0] == "T" or words[after] == _CHANGE)

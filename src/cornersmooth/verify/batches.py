@@ -204,11 +204,10 @@ class Batches:
         )
 
     def _with_words(self, first: int, last: int) -> Ints:
-        """Elements from `first` to `last` with words or a retract behind them, ascending, each once."""
+        """Elements from `first` to `last` with words, or a retract, behind them, ascending, each once."""
         low = bisect_left(self._events, first + 1, key=lambda event: event.element)
         high = bisect_right(self._events, last + 1, key=lambda event: event.element)
-        retracts = self.retracts[bisect_left(self.retracts, first + 1) : bisect_right(self.retracts, last + 1)]
-        return np.unique(np.array([*(event.element for event in self._events[low:high]), *retracts], np.int64)) - 1
+        return np.unique(np.array([event.element for event in self._events[low:high]], np.int64)) - 1
 
     def _stands(self, move_last: int, element_last: int, *, cl_moves: bool) -> None:
         """Say if between two stops one motion leaves the place where the other stands: CS535, CS536."""

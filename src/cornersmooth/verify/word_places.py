@@ -119,10 +119,9 @@ class WordPlaces:
             if (one.kind != "auxiliary" or one.value not in clamps) and (one.kind != "home" or retracts)
         ]
         events = [replace(one, element=self._moving(one.element)) for one in self._events]
-        up = [Token("home", "", self._moving(element), 0, optional=True) for element in batches.retracts]
-        nc_tokens = sorted([*said(events, means), *up], key=lambda one: one.place)
+        nc_tokens = sorted(said(events, means), key=lambda one: one.place)
         spots: dict[int, Spot] = {}
-        for element in {*(one.element for one in self._events), *batches.retracts}:
+        for element in {one.element for one in self._events}:
             if (spot := found.words.get(element - 1)) is not None:
                 begin = self._moving(element)
                 spots[begin] = spot.joined(spots.get(begin, spot))
