@@ -12,7 +12,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.linalg import solveh_banded
 
 from cornersmooth.arrays import Floats, Ints
 from cornersmooth.arrays.slices import some_rows
@@ -106,6 +105,8 @@ def _fitted(data: Floats, kept: Ints, line: Ints, share: Floats, weight: Floats,
     stiff[pinned] *= 1e18
     bands[1] += stiff
     wanted += stiff[:, None] * data[kept]
+    from scipy.linalg import solveh_banded  # it loads longer than all else of a short run
+
     found: Floats = solveh_banded(bands, wanted, check_finite=False)
     return found
 
