@@ -239,3 +239,17 @@ def test_controls_of_three_axes_have_the_words_of_linuxcnc(control: str, tmp_pat
     assert (tmp_path / "new.nc").read_bytes().count(b"R") >= 4
     asked = run("filter", "part.nc", "-o", "other.nc", cwd=tmp_path)
     assert b"--control grbl, mach3" in asked.stderr
+
+
+def test_the_first_block_of_a_run_says_that_it_cuts() -> None:
+    """Behind a rapid, where the run before it stays and another begins in a cut; a program without it is found out."""
+    zigzag = "G0 X0. Y0. Z5.\nG1 Z-1. F240.\nG4 P100\nX5. Y9.\nX9. Y0.\nX14. Y9.\n"
+    text = START.format("") + zigzag + "G0 X0. Y0. Z5.\nG1 " + WAVE + "G0 Z50.\nM30\n"
+    found = few(text)
+    assert found.smoothed > 70
+    assert difference(by_words(text.encode()), by_words(found.data), EPS) == ""
+    first = found.data.index(b"X0. Y0. Z5.", found.data.index(b"X14.")) + len(b"X0. Y0. Z5.\n")
+    wrong = found.data[:first] + re.sub(rb"^G[1-3] ", b"", found.data[first:])
+    assert wrong != found.data
+    form = cs.choose_form("fanuc", "g1", machine=THREE_AXES)
+    assert verify_programs(text.encode(), wrong, form, cs.Settings(tolerance=EPS)).verdict is Verdict.FAILED

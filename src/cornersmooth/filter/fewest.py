@@ -205,7 +205,7 @@ def _blocks(
     says_plane = arc & (plane != holding)
     before = np.concatenate(([0], code[:-1]))
     begins_in_line = np.array([run.state.groups["motion"] == "line" for run in group.runs])
-    begins_in_line = begins_in_line[np.cumsum(begins[pieces.start]) - 1] if len(begins_in_line) else first
+    begins_in_line = begins_in_line[np.cumsum(begins)[pieces.start] - 1]  # runs that stay have no pieces
     repeats = np.where(first, begins_in_line & (code == 0), code == before) & (
         "code" in look.modal and not spelling.codes
     )

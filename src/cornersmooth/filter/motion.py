@@ -135,6 +135,8 @@ def _start(job: Job, run: Run, form: Form, before: str) -> bytes:
     feed = b" F%.9f" % state.feed if mode != "inverse" and not math.isnan(state.feed) else b""
     if state.groups["motion"] == "line" or feed:  # a whole block, though nothing moves: it is read with those around it
         lines.append(_block(job, run, run.start, form, rapid=False) + feed)
+    if state.groups["motion"] != "line":  # a first block that does not say that it cuts is a rapid
+        lines.append(_block(job, run, run.start, form, rapid=True))
     return b"".join(line + b"\n" for line in lines)
 
 
