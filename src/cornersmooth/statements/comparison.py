@@ -247,8 +247,10 @@ def _others(
     """States of the program that are not those of the CL file at a pause of a kind, and what they should be.
 
     Where it stops, spindle and coolant may be off although the CL file leaves them on: they go on before any motion. On
-    the way home the coolant may be off.
+    the way home the coolant may be off. A retract for another tool may be the way home of what follows the change.
     """
+    if kind == "home" and cl_values["tool"] != nc_values["tool"]:
+        return []
     found = []
     for state, value in cl_values.items():
         here = nc_values.get(state)
