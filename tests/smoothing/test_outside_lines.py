@@ -90,3 +90,11 @@ def test_a_path_of_two_rows_is_one_line() -> None:
     moved, kept = lines_outside(rows, LIMITS)
     assert kept.tolist() == [0, 1]
     assert moved.tip.tolist() == rows.tip.tolist()
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_a_tool_that_stands_is_where_it_was(count: int) -> None:
+    rows = path(np.zeros((count, 3)), np.zeros((count, 2)))
+    moved, kept = lines_outside(rows, LIMITS)
+    assert np.array_equal(moved.tip, rows.tip)
+    assert np.array_equal(kept, fewest_lines(rows, LIMITS))

@@ -37,6 +37,8 @@ def lines_outside(rows: Vertices, limits: LineLimits) -> tuple[Vertices, Ints]:
     Rows that are `fixed` stay on the path. Where lines cannot be moved to within the limits, they are on the path.
     """
     count = len(rows.parameter)
+    if count < 3 or rows.parameter[-1] <= rows.parameter[0]:  # one line, or a tool that stands
+        return rows, fewest_lines(rows, limits)
     fixed, room = rows.fixed.copy(), np.full(count, _CHORD)
     fixed[::_LANE] = fixed[-1] = True
     rows, part = replace(rows, fixed=fixed), np.cumsum(fixed)
