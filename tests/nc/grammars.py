@@ -99,7 +99,7 @@ def _iso(control: str, form: str, machine: str, tcp: bool, tip: int) -> Reader:
         turn,
         machine,
         decimals=(tip,) * 3 + decimals,
-        circles="" if control in ("haas", "generic") and turn in ("angles", "point") else "R",
+        circles="" if (control, turn) in (("haas", "angles"), ("generic", "point")) else "R",
         longest=252,
         extra=KnotSplines(weight_decimals=4 if control == "mitsubishi" else 3) if form == "g6.2" else None,
         **switch,

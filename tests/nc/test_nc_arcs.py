@@ -14,12 +14,14 @@ import pytest
 from numpy.typing import NDArray
 
 from cornersmooth.cl import read
+from cornersmooth.errors import InputError
 from cornersmooth.geometry.arcs import arc_points
 from cornersmooth.kinematics import load_machine
 from cornersmooth.model import Program
 from cornersmooth.nc import choose_form, fit_settings, write
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
+from cornersmooth.verify import verify
 from nc.block_counts import FORMS, MOST, blocks_of
 from nc.cases import without_limits
 from nc.grammars import reader
@@ -248,6 +250,29 @@ def test_a_tool_along_z_needs_no_axis_point() -> None:
     assert any(re.fullmatch(r"G3 X30\.0+ Y10\.0+ Z5\.0+ R10\.0+", line) for line in lines)
     assert any(line.startswith("G98 G84 X40.0000 Y0.0000 Z-9.0000") for line in lines)
     assert not {"CS315", "CS395"} & codes(written).keys()  # left out; axis points
+
+
+def test_tools_have_axis_points_all_or_none() -> None:
+    """U V W stay as they are from tool to tool, and no word says where a tool without them leaves them."""
+    cl = (
+        "UNITS/MM\nLOADTL/1\nSPINDL/900,RPM,CLW\nFEDRAT/90,MMPM\nRAPID\nGOTO/10,0,50,0,0,1\nGOTO/10,0,5\n"
+        "GOTO/20,0,5\nCIRCLE/20,10,5,0,0,1,10\nGOTO/30,10,5\nRAPID\nGOTO/30,10,50\n{}"
+        "LOADTL/2\nSPINDL/900,RPM,CLW\nRAPID\nGOTO/0,0,50,0.6,0,0.8\nGOTO/0,30,50\nGOTO/30,30,50,0,0.6,0.8\nFINI\n"
+    )
+    chosen, settings, stream = choose_form("fanuc", "g6.2"), Settings(tolerance=0.01), io.BytesIO()
+    program = read(cl.format("").encode(), name="two.cls")
+    fitted = fit_settings(settings, chosen, program.units)
+    write(smooth(program, fitted), stream, form=chosen)
+    text = stream.getvalue()
+    places = [line for line in text.decode().splitlines() if re.search(r" X\S+ Y\S+ Z", line)]
+    assert len(places) > 10
+    assert all(re.search(r" U\S+ V\S+ W", line) for line in places), places
+    found = verify(program, text, tolerance=fitted.tolerance, axis_length=fitted.axis_length, control="fanuc")
+    assert found.passed, found.problems
+    tap = "CYCLE/TAP,DEPTH,9,MMPR,1.5,CLEAR,5\nGOTO/40,0,0\nCYCLE/OFF\n"
+    with pytest.raises(InputError, match="a tap, and a tool of the program tilts") as refusal:
+        text_of_cl(cl.format(tap), "g6.2")
+    assert refusal.value.code == "CS342"
 
 
 @pytest.mark.parametrize(

@@ -30,6 +30,8 @@ def upright_poses(program: Program, form: Form, *, drills: bool) -> Bools:
     """(n,) whether a pose belongs to a tool that runs without tool tip control, for cycles or cutter compensation.
 
     In curves all tools do that can: without words of the tool axis arcs are circles, and curves those of every control.
+    Where the tool axis is a second point, all tools have it or none: a control keeps U V W from tool to tool, and no
+    word says where they are before the first.
 
     `drills` says whether holes are to be written as cycles; taps are in any case.
     """
@@ -42,6 +44,8 @@ def upright_poses(program: Program, form: Form, *, drills: bool) -> Bools:
     tilted = np.abs(program.axis - (0.0, 0.0, 1.0)).max(axis=1) > _ALONG_Z
     tilted &= program.kind != Move.FROM
     starts = tool_starts(program)
+    if form.orientation == "point" and tilted.any():
+        return chosen
     if not form.rotary and tilted.any():  # without a machine no words bring the rotary axes back
         tilted[int(np.argmax(tilted)) :] = True
     for first, stop in zip(starts, [*starts[1:], len(program)], strict=True):

@@ -95,6 +95,8 @@ class Holes:
             return "", "a tap takes a spindle that turns clockwise at a known speed"
         if motion.at.tip_control:
             where = "the tool does not stay along Z between its changes, or nothing says that the rotary axes do"
+            if motion.at.form.orientation == "point":
+                where = "a tool of the program tilts, so all have axis points; lines (-f g1) need none"
             return "", f"a tap, and {where}"
         return kind if self.native or cycle.tap else "", ""
 
