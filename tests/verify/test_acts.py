@@ -117,3 +117,47 @@ def test_what_does_not_change_anything_may_be_said() -> None:
     for word in ("M4", "M8", "S2000", "M5"):
         assert len(found(RUN, (*lines[:k], word, *lines[k:])).problems) <= 2, word
         assert not found(RUN, (*lines[:k], word, *lines[k:])).passed, word
+
+
+MET = """LOADTL/3
+SPINDL/RPM,3000,CLW
+RAPID
+GOTO/0,0,50,0,0,1
+CYCLE/BORE,DEPTH,10,MMPM,100,CLEAR,2
+GOTO/0,0,0
+CYCLE/OFF
+COOLNT/ON
+RAPID
+GOTO/0,0,50
+SPINDL/RPM,2000,CLW
+FEDRAT/MMPM,500
+GOTO/0,10,50
+GOTO/0,10,60
+RAPID
+GOTO/0,0,80
+FINI
+"""
+
+
+@pytest.mark.parametrize(
+    "text", [MET, MET.replace("FEDRAT/MMPM,500\nGOTO/0,10,50\n", "RAPID\nGOTO/0,10,50\nFEDRAT/MMPM,500\n")]
+)
+def test_a_rapid_that_ends_where_a_hole_is_left_is_the_way_up_or_leads_nowhere(text: str) -> None:
+    lines = right(text)
+    m8, s = lines.index("M8"), next(k for k, line in enumerate(lines) if line.startswith("S2000"))
+    assert "Z50." in lines[m8 - 1]  # the tool is up
+    rest = tuple(line for k, line in enumerate(lines) if k not in (m8, s))
+    up = m8 - 1
+
+    def said(coolant: int, speed: int) -> set[str]:
+        """Codes with both words before lines of the rest."""
+        words = {coolant: ["M8"]}
+        words.setdefault(speed, []).append(lines[s])
+        new = [one for k, line in enumerate(rest) for one in (*words.get(k, ()), line)]
+        return {one.code for one in found(text, tuple(new)).problems}
+
+    assert said(up + 1, up + 1) == said(up, up + 1) == set()
+    assert said(up, up) == {"CS552"}  # the speed is that behind the rapid
+    assert "CS553" in said(up - 1, up + 1)
+    assert said(up + 2, up + 1) == {"CS553"}
+    assert said(up + 1, up + 2) == {"CS552"}

@@ -7,6 +7,7 @@ the same between two motions: one is left over without harm where it is optional
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence, Set
+from copy import deepcopy
 from dataclasses import dataclass, field
 from itertools import zip_longest
 from typing import Final
@@ -171,6 +172,13 @@ class Comparison:
                 self._agreed[kind] = self.nc.held[kind]
             elif wanted != value and (moves or (kind in _ENDED and wanted == "OFF")):
                 self._other(kind)
+
+    def agrees(self, move: int, element: int) -> bool:
+        """Whether both are right before a motion, which is not met by that."""
+        kept = {id(side.tokens): side.tokens for side in (self.cl, self.nc)}
+        trial = deepcopy(self, dict[int, object](kept))
+        trial.meet(move, element)
+        return len(trial.problems) == len(self.problems)
 
     def in_hole(self, line: int, tokens: Iterable[Token], dwell: float, *, tap: bool) -> None:
         """Within a hole, which CL `line` asks for, the program says its dwell and its tap, and changes nothing else."""

@@ -54,6 +54,7 @@ class Batches:
         self.holes: list[Hole] = []
         self.left_out: list[Problem] = []
         self.moves_left_out: set[int] = set()
+        self.ways_up: dict[int, range] = {}
         #: as of `AlongTool`
         self.rewinds: list[tuple[int, int]] = []
         self.still: set[int] = set()
@@ -75,7 +76,7 @@ class Batches:
             stops = Stops(self.task, ahead, ToolChanges(original.program, self._events), along)
             self.rewinds, self.still = along.rewinds, along.still
             self.acts, self.holes, self.left_out = stops.acts, stops.holes, stops.left_out
-            self.moves_left_out = stops.moves_left_out
+            self.moves_left_out, self.ways_up = stops.moves_left_out, stops.ways_up
             for part in stops.parts():
                 yield from self._take(part)
             yield from self._close(len(original.pose) - 1, ahead.count - 1)

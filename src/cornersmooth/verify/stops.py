@@ -105,6 +105,8 @@ class Stops:
         #: CS561 for holes that the program leaves out and may leave out if requested
         self.left_out: list[Problem] = []
         self.moves_left_out: set[int] = set()
+        #: holes that an element may be the way up from, by the element: it also ends at the rapid behind them
+        self.ways_up: dict[int, range] = {}
         #: CS531 a rapid goes elsewhere, CS532 one is missing, CS533 one too many; CS536 a feed move too many; of holes
         self.problems: list[Problem] = []
         self._steps: list[Step] = []
@@ -213,6 +215,8 @@ class Stops:
                 put(self._from(trace, element))
             elif trace.inside or self._moved_on(trace.stop, element, -1):
                 put(self._takes(trace, element))
+        if stands and not found:  # it comes down to a hole that is left out
+            put(one for trace in alive for one in self._from(trace, element))
         if found:
             return list(found.values())
         if self._along.stays(element):
@@ -302,6 +306,9 @@ class Stops:
             there = self._finished(trace, _Trace(t, element, True, trace), element)
             return None if there.problems else there
         if not passes or not trace.inside or self._hole[t] or not lines.at(self._move[t], element - 1):
+            return None
+        first, behind = self._changes.elements_of(int(self._task.original.pose[self._move[t]]))
+        if not first <= element - 1 < behind:
             return None
         if lines.fed_above(self._move[k], element - 1, self._cycles[self._move[k]]):  # a rapid written as a feed move
             return None
@@ -436,7 +443,19 @@ class Stops:
             self.acts.extend((next(leads, last), trace.begin))
         elif not self._is_way_out(trace.begin):
             self.acts.extend((move, trace.begin))
+            if trace.end > trace.begin:
+                self._note_way_up(trace)
         self._steps.append(Step(move, trace.begin, True, last))
+
+    def _note_way_up(self, trace: _Trace) -> None:
+        """Take down from which holes the element that reaches a rapid may be the way up."""
+        first = stop = trace.stop
+        while first and self._hole[first - 1] and (first == stop or self._move[first - 1] in self.moves_left_out):
+            if not self._over(first - 1, trace.begin):
+                break
+            first -= 1
+        if first < stop:
+            self.ways_up[trace.begin] = range(self._move[first], self._move[stop])
 
     def _is_way_out(self, element: int) -> bool:
         """Whether an element belongs to the block with which the tool leaves the last hole."""

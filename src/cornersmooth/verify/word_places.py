@@ -112,7 +112,8 @@ class WordPlaces:
         self._still |= batches.still
         # statements by the first move behind them that leads anywhere, words and retracts by the first such element
         places = np.searchsorted(original.pose, [one.pose for one in program.statements]).tolist()
-        leading = self._leading(np.unique(np.array(places, np.int64)))
+        unique = np.unique(np.array(places, np.int64))
+        leading, beyond = self._leading(unique, set()), self._leading(unique, batches.moves_left_out)
         cl_tokens = [
             replace(one, place=leading.get(one.place, one.place))
             for one in asked(program, places, moves, means)
@@ -128,7 +129,7 @@ class WordPlaces:
         homes = {leading[place] for place, one in zip(places, program.statements, strict=True) if one.word == "GOHOME"}
         behind: dict[int, set[int]] = {}
         for place, lead in leading.items():  # the moves that end where statements are
-            behind.setdefault(lead, set()).update(range(place - 1, lead))
+            behind.setdefault(lead, set()).update(range(place - 1, beyond[place]))
         # that of those no element names is written
         missed = {int(original.trail.owner[int(one.place)]) for one in found.violations if one.code == "CS524"}
 
@@ -146,8 +147,9 @@ class WordPlaces:
         cl_act, nc_act = np.searchsorted(acts[:, 0], cl_places), np.searchsorted(acts[:, 1], nc_places)
         of_cycles = [first for first, (one, some) in holes.items() if some or one.cycle.dwell or one.cycle.tap]
         wanted = {*cl_act.tolist(), *nc_act.tolist(), *np.searchsorted(acts[:, 1], of_cycles).tolist()}
+        wanted |= {act + 1 for act in wanted if act < len(acts) and int(acts[act, 1]) in batches.ways_up}
         at_home: set[int] = set()
-        before = -1, -1
+        before, behind_way = (-1, -1), None
         for act in sorted(one for one in wanted if one < len(acts)):
             end = int(acts[act, 0]), int(acts[act, 1])
             meetings: list[tuple[int, int]] = []
@@ -158,7 +160,17 @@ class WordPlaces:
                 if lost and not (batches.moves_left_out or batches.problems or found.breaks):
                     line = next((one.line for one in events if one.element == lost[0]), 0)
                     found.unlooked.append((line, "where the words stand on the path"))
+            if behind_way is not None and behind_way[1] < end[1]:
+                meetings.insert(0, behind_way)
+            behind_way = None
             for move, element in [*(one for one in meetings if one[0] < end[0] and one[1] < end[1]), end]:
+                if (move, element) == end and not comparison.agrees(*end):
+                    # a rapid that ends where the tool goes up from a hole is that way, or leads nowhere behind it
+                    readings = ((one, element) for one in reversed(batches.ways_up.get(end[1], ())))
+                    if (reading := next((one for one in readings if comparison.agrees(*one)), None)) is not None:
+                        lead = self._leading(np.array([move + 1]), set())[move + 1]
+                        behind_way = min(lead, int(acts[act + 1, 0])), self._moving(element + 1)
+                        move, element = reading
                 comparison.meet(move, element, moves=(move, element) != (moves, batches.elements))
                 if not homes.isdisjoint(range(before[0] + 1, move + 1)):
                     at_home |= {one.line for one in events if before[1] < one.element <= element}
@@ -169,9 +181,9 @@ class WordPlaces:
                 comparison.in_hole(line, some, hole.cycle.dwell, tap=hole.cycle.tap)
         return comparison.problems, at_home, without_word(cl_tokens, nc_tokens, means, own)
 
-    def _leading(self, places: Ints) -> dict[int, int]:
-        """The first moves from some on that lead anywhere, and are no holes that are left out."""
-        original, left_out = self._task.original, self._batches.moves_left_out
+    def _leading(self, places: Ints, left_out: Set[int]) -> dict[int, int]:
+        """The first moves from some on that lead anywhere, and are none that are left out."""
+        original = self._task.original
         pose, program = original.pose, original.program
         first, moves = pose[np.maximum(places - 1, 0)], places.copy()
         rows = np.flatnonzero(places < len(pose))
