@@ -175,6 +175,8 @@ def main() -> None:
         print(f"{'in wall':>8}   {'lines':>10} {'MB':>8}")
         for case in given.case or CASES:
             measure(case, path, folder, programs, given.runs)
+        if not given.case:
+            subprocess.run([sys.executable, HERE / "bench_methods.py", path], check=True)
 
 
 if __name__ == "__main__":
