@@ -45,7 +45,7 @@ def blocks(text: str | bytes) -> int:
 
 
 @pytest.mark.parametrize("control", ["fanuc", "haas", "mitsubishi"])
-@pytest.mark.parametrize("name", PROGRAMS)
+@pytest.mark.parametrize("name", [name for name in PROGRAMS if name != "mould, turned"])  # all its arcs are steep
 def test_few_blocks_say_the_same_motion(name: str, control: str) -> None:
     text = PROGRAMS[name]
     found = few(text, control)
@@ -57,7 +57,45 @@ def test_few_blocks_say_the_same_motion(name: str, control: str) -> None:
 
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_blocks_are_near_a_greedy_count(name: str) -> None:
-    assert blocks(few(PROGRAMS[name]).data) <= 1.3 * COUNTS[name]
+    """Where F counts along a helix; where it does not, helices are flat."""
+    assert blocks(few(PROGRAMS[name], "linuxcnc").data) <= 1.3 * COUNTS[name]
+
+
+def steepest(text: bytes) -> float:
+    """Largest way of the tool on an arc for each mm of it in its plane: what F is multiplied by, if it counts there."""
+    place, plane, largest = np.zeros(3), "G17", 0.0
+    for line in text.decode().splitlines():
+        plane = next((word for word in ("G17", "G18", "G19") if word in line), plane)
+        words = dict(re.findall(r"([XYZR])([-+]?[\d.]+)", line))
+        end = np.array([float(words.get(letter, old)) for letter, old in zip("XYZ", place, strict=True)])
+        if re.search(r"G[23] ", line):
+            rise = {"G17": 2, "G18": 1, "G19": 0}[plane]
+            chord, radius = np.linalg.norm(np.delete(end - place, rise)), float(words["R"])
+            largest = max(largest, np.hypot(1.0, (end - place)[rise] / (2 * radius * np.arcsin(chord / 2 / radius))))
+        place = end
+    return largest
+
+
+@pytest.mark.parametrize("name", ["mould, turned", "fine"])
+def test_helices_are_flat_where_f_counts_in_their_plane(name: str) -> None:
+    """FANUC: F along the arc, and the third axis is faster by as much as it rises (1403#5 HTG 0)."""
+    text = PROGRAMS[name]
+    assert steepest(few(text, "fanuc").data) < 1.021
+    assert steepest(few(text, "linuxcnc").data) > 1.05
+
+
+@pytest.mark.parametrize("mode", ["G93", "G95"])
+def test_a_run_behind_another_kind_of_feed(mode: str) -> None:
+    """The first cut behind G94 says the feed: none was known before it."""
+    text = START.format("") + f"{mode}\nG1 X-1. F2.\nG94\nX0. F700.\n" + WAVE + "G0 Z50.\nM30\n"
+    found = few(text)
+    assert found.verdict is Verdict.PASSED, found.left
+    assert found.smoothed > 70
+    assert difference(by_words(text.encode()), by_words(found.data), EPS) == ""
+    assert found.data.count(b"F700") == 1
+    wrong = found.data.replace(b" F700.", b"").replace(b" F700", b"")
+    form = cs.choose_form("fanuc", "g1", machine=THREE_AXES)
+    assert verify_programs(text.encode(), wrong, form, cs.Settings(tolerance=EPS)).verdict is Verdict.FAILED
 
 
 @pytest.mark.linuxcnc
@@ -129,8 +167,8 @@ def test_plane_and_motion_are_put_back() -> None:
 
 def test_arcs_that_are_off_are_found() -> None:
     text = PROGRAMS["fine"].encode()
-    new = few(text).data
-    form = cs.choose_form("fanuc", "g1", machine=THREE_AXES)
+    new = few(text, "linuxcnc").data
+    form = cs.choose_form("linuxcnc", "g1", machine=THREE_AXES)
     assert verify_programs(text, new, form, cs.Settings(tolerance=EPS)).verdict is Verdict.PASSED
     for old, other in ((rb"R(\d+)\.", b"R1\\1."), (rb"G2 ", b"G3 "), (rb"G18 G", b"G17 G")):
         wrong = re.sub(old, other, new, count=1)

@@ -5,6 +5,7 @@ The cuts of a run are a polyline, and its vertices the ends of all new blocks. S
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
@@ -35,6 +36,9 @@ _MOST: Final = 9
 
 #: digits of radii after the point, at least, in mm and in inches: every control takes so many
 _RADIUS_DIGITS: Final = (3, 4)
+
+#: rad; slope up to which an arc rises where F counts in its plane alone: the tool is 2 % faster there than F says
+_SLOPE: Final = math.acos(1.0 / 1.02)
 
 #: what a run in time per block is left for
 TIMED: Final = "each cut says its own time (G93)"
@@ -117,7 +121,9 @@ def _texts(job: Job, reading: Reading, group: _Group) -> list[bytes | None]:
     digits = max(decimals[0], _RADIUS_DIGITS[group.unit != 1.0])
     if group.mode is not None:
         flat = bool(group.mode.motion.arc_directions)
-        limits = PieceLimits(_USED * job.settings.tolerance, group.planes, flat, group.unit * 10.0**-digits)
+        slope = _SLOPE if group.mode.motion.feed_in_plane else math.inf
+        step = group.unit * 10.0**-digits
+        limits = PieceLimits(_USED * job.settings.tolerance, group.planes, flat, step, slope=slope)
         pieces = fewest_pieces(Polyline(group.unit * place[:, :3], fixed, begins), limits)
     else:
         pieces = _lines(job, group, place, fixed, begins)

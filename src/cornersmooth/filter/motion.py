@@ -132,7 +132,9 @@ def _start(job: Job, run: Run, form: Form, before: str) -> bytes:
         lines.append(words[2 if mode == "inverse" else 0].encode())
     if state.groups.get("plane", PRESET) != PRESET and plane_of(state):  # that of arcs in its place
         lines.append(b"G%d" % plane_of(state))
-    feed = b" F%.9f" % state.feed if mode != "inverse" and not math.isnan(state.feed) else b""
+    # one that is not known differs from all of the run: a first cut that leaves it out is found
+    value = 2.0 * float(np.max(run.feeds)) if math.isnan(state.feed) else state.feed
+    feed = b" F%.9f" % value if mode != "inverse" else b""
     if state.groups["motion"] == "line" or feed:  # a whole block, though nothing moves: it is read with those around it
         lines.append(_block(job, run, run.start, form, rapid=False) + feed)
     if state.groups["motion"] != "line":  # a first block that does not say that it cuts is a rapid

@@ -153,6 +153,7 @@ class Motion:
     #: what stands before and after the number of a modulo axis that goes the shorter way; none where the control has no
     #: words for that
     shortest: tuple[str, ...] = ()
+    feed_in_plane: bool = False  #: whether F of a circular block that rises counts in the plane of the circle alone
     inch_feed: int = 1  #: what one inch per minute is written as: 10 where F counts tenths
     #: what may be left out where it repeats, as the control keeps it: ``code`` (G0, G1), ``tip`` (each of X Y Z) and
     #: ``axis`` (the tool vector as a whole, each rotary word)

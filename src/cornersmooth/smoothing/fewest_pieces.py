@@ -75,6 +75,7 @@ class PieceLimits:
     flat: bool = False  #: whether arcs have no rise
     step: float = 1e-3  #: mm; step of written radii
     largest: float = 5000.0  #: mm; largest radius
+    slope: float = math.inf  #: rad; how steeply arcs may rise
 
 
 @dataclass(frozen=True)
@@ -292,6 +293,8 @@ class _Search:
         fit &= np.bincount(line[wrong], minlength=count) == 0
         fit &= lowest <= highest
         slope = np.arctan2(rise, safe * mean / np.where(mean == 0.0, 1.0, np.sin(mean)) + (mean == 0.0) * safe)
+
+        fit &= np.abs(slope) <= limits.slope
 
         def window(direction: Floats, room: Floats) -> tuple[Floats, Floats]:
             """Angle from the chord to a direction in the plane, and how far a tangent may be off it."""
