@@ -73,3 +73,11 @@ def test_half_turns_are_not_bounded():
     axis = np.array([[0.0, 0.0, 1.0]])
     assert np.isinf(turn_bend(axis, -axis)).all()
     assert (turn_bend(axis, axis) == 0).all()
+
+
+def test_a_single_control_point_does_not_bend() -> None:
+    """What is left of a curve that something has cut off behind its first block; reading refuses it already."""
+    one = np.ones(1, np.int64)
+    curve = Curves(one - 1, one, one, np.ones((1, 6)), np.ones(1), np.array([0.0, 1.0]))
+    (group,) = groups(curve, one - 1)
+    assert curve_bend(group, "vector", H).tolist() == [[0.0]]

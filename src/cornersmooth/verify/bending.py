@@ -103,6 +103,8 @@ def _derivatives(points: Floats, knots: Floats) -> tuple[Floats, Floats]:
     interval, in their middle.
     """
     degree = len(points) - 1
+    if degree == 0:  # one control point, of a curve that is refused already
+        return np.zeros(points.shape[2]), np.zeros(points.shape[2])
     width = knots[degree] - knots[degree - 1]
     first = np.diff(points, axis=0) * (degree * width / (knots[degree:] - knots[:degree]))[:, None, None]
     share = (degree - 1) * width / (knots[degree:-1] - knots[1:degree])
