@@ -50,7 +50,8 @@ class Blocks:
             self.counted.take(rows)
         count, rapid = len(rows), rows.rapid.astype(np.int64)
         shapes = shapes_of(rows, at, self.circles, open_spline=modals["spline"])
-        none, before = np.zeros(count, np.int64), self._changes(rows, at)
+        none = np.zeros(count, np.int64)
+        before = [part for part in self._changes(rows, at) if len(part[0]) > 1]  # mostly nothing changes
         if at.form.curve in MODAL_CURVES:
             if before and at.form.curve == "g6.2":
                 before.insert(0, self._end_of_curve(rows, at, before))
@@ -181,8 +182,9 @@ def feed_digits(ticks: int, at: Coordinates) -> str:
 
 def _of_rows(part: Part, rows: Bools) -> Part:
     """Texts of some rows as those of all: nothing for the others."""
-    ids = np.zeros(len(rows), np.int64)
-    ids[rows] = 1 + part[1]
+    ids = rows.astype(np.int64)
+    if len(part[0]) > 1:
+        ids[rows] += part[1]
     return [b"", *part[0]], ids
 
 
