@@ -42,7 +42,7 @@ FINDINGS: Final[dict[str, tuple[Severity, str]]] = {
         "that the control has it, else it stops with an alarm, or use -f g1",
     ),
     "CS396": (
-        "warning",
+        "note",
         "rounded corners are many short lines, and a control that does not look ahead slows down on them; "
         "give --with {name}, unless the machine has such a function on",
     ),
