@@ -135,3 +135,13 @@ def test_the_spindle_may_be_turned_for_another_tool(control: str, tmp_path: Path
 def test_codes_may_have_zeros_before_them(control: str, tmp_path: Path) -> None:
     edits = [("^M8$", "M08"), (r" M3$", " M03"), ("^M5$", "M05")]
     assert judged(tmp_path, control, *edits).startswith("PASSED")
+
+
+def test_a_block_with_a_vector_may_say_again_what_holds(tmp_path: Path) -> None:
+    """As posts of others write it, without digests in the head."""
+    others = (r"^; PARTS=.*\n", "")
+    for word in ("G90", "G17"):
+        again = (r"^(G1 .*X20\..* Y20\..*)$", rf"{word} \1")
+        assert judged(tmp_path, "siemens", others, again).startswith("PASSED")
+    turned = (r"^(G1 .*X20\..* Y20\..*C3=)1", r"G90 \1-1")
+    assert judged(tmp_path, "siemens", others, turned).startswith("FAILED")

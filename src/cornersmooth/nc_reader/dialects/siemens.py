@@ -102,7 +102,7 @@ class Siemens(Dialect):
                 yield Beside(name, value, text)
             elif name == "SPOS":
                 yield Beside("M", 19.0, text)
-            elif name in ("X", "Y", "Z", "F", *self.rotary) or name.removeprefix(f"{BY_WORD} ") in self.rotary:
+            elif name in ("F", *self.lexer.places) or name.removeprefix(f"{BY_WORD} ") in self.rotary:
                 motion[name] = value
             elif name in ("TRAORI", "TRAFOOF", *_AXIS_FRAMES, *_ORIENTATIONS):
                 self._transform(name, state)
