@@ -161,3 +161,15 @@ def test_a_rapid_that_ends_where_a_hole_is_left_is_the_way_up_or_leads_nowhere(t
     assert "CS553" in said(up - 1, up + 1)
     assert said(up + 2, up + 1) == {"CS553"}
     assert said(up + 1, up + 2) == {"CS552"}
+
+
+def test_a_rapid_higher_than_the_way_up_from_a_hole_is_no_way_up() -> None:
+    text = MET.replace("RAPID\nGOTO/0,0,50\nSPINDL", "RAPID\nGOTO/0,0,70\nSPINDL").replace(
+        ",50\nGOTO/0,10", ",70\nGOTO/0,10"
+    )
+    lines = right(text)
+    k = lines.index("M8")
+    assert "Z50." in lines[k - 1]
+    assert "Z70." in lines[k + 1]
+    assert {one.code for one in found(text, moved(lines, "M8", 1)).problems} == {"CS553"}
+    assert {one.code for one in found(text, moved(lines, "M8", -1)).problems} == {"CS553"}

@@ -432,6 +432,8 @@ class Stops:
                 self._drilled(before, one.end, left=one.cost[1] > before.cost[1])
             if not one.inside and (before.inside or one.begin > before.begin):
                 self._open(one)
+                if before.inside and one.end > one.begin and not self._hole[one.stop]:
+                    self._note_way_up(before, one)
             elif one.inside and not before.inside and one.stop < len(self.moves):
                 self._steps.append(Step(self._move[one.stop], one.begin, False, -1))
         trace.back, trace.problems = None, ()
@@ -443,19 +445,25 @@ class Stops:
             self.acts.extend((next(leads, last), trace.begin))
         elif not self._is_way_out(trace.begin):
             self.acts.extend((move, trace.begin))
-            if trace.end > trace.begin:
-                self._note_way_up(trace)
         self._steps.append(Step(move, trace.begin, True, last))
 
-    def _note_way_up(self, trace: _Trace) -> None:
-        """Take down from which holes the element that reaches a rapid may be the way up."""
-        first = stop = trace.stop
-        while first and self._hole[first - 1] and (first == stop or self._move[first - 1] in self.moves_left_out):
-            if not self._over(first - 1, trace.begin):
+    def _note_way_up(self, hole: _Trace, trace: _Trace) -> None:
+        """Take down from which holes the element that reaches a rapid may be the way up.
+
+        It is the first that goes up, and no higher than the cycle does, or than where the tool came from.
+        """
+        lines, first, element, nc = self.lines, trace.stop, trace.begin, self._ahead.nc
+        came_from = nc.tip[max(hole.begin - 1 - self._ahead.base, 0)]
+        goes_up = element == hole.begin or lines.feeds(element - 1)
+        while goes_up and first and self._hole[first - 1] and self._over(first - 1, element):
+            move = self._move[first - 1]
+            highest = max(self._cycles[move].level, float((came_from - lines.tip[move]) @ lines.axis[move]))
+            left = first == trace.stop or (move in self.moves_left_out and element == hole.begin)
+            if not left or lines.height(move, element) > highest + lines.tolerance:
                 break
             first -= 1
-        if first < stop:
-            self.ways_up[trace.begin] = range(self._move[first], self._move[stop])
+        if first < trace.stop:
+            self.ways_up[element] = range(self._move[first], self._move[trace.stop])
 
     def _is_way_out(self, element: int) -> bool:
         """Whether an element belongs to the block with which the tool leaves the last hole."""
