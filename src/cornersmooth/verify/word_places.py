@@ -164,7 +164,7 @@ class WordPlaces:
                 meetings.insert(0, behind_way)
             behind_way = None
             for move, element in [*(one for one in meetings if one[0] < end[0] and one[1] < end[1]), end]:
-                if (move, element) == end and not comparison.agrees(*end):
+                if (move, element) == end and end[1] in batches.ways_up and not comparison.agrees(*end):
                     # a rapid that ends where the tool goes up from a hole is that way, or leads nowhere behind it
                     readings = ((one, element) for one in reversed(batches.ways_up.get(end[1], ())))
                     if (reading := next((one for one in readings if comparison.agrees(*one)), None)) is not None:
