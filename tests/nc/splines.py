@@ -92,7 +92,12 @@ class SplineRun:
         weights = np.array(self.weights)
         if (weights == 1.0).all() and not set(self.intervals) <= {0.0, 0.5}:
             return long_places(self.reader, np.array(self.points), weights, self.knots)
-        return np.linspace(0.0, self.knots[-4], SAMPLES * int(np.count_nonzero(self.intervals)) + 1)
+        count = SAMPLES * int(np.count_nonzero(self.intervals))
+        # an arc is one long curve: so many that chords leave its tips by a hair of ε, by what they leave at first
+        twice = rational(np.array(self.points), weights, self.knots, np.linspace(0.0, self.knots[-4], 2 * count + 1))
+        chords = np.linalg.norm((twice[:-2:2] + twice[2::2]) / 2 - twice[1::2], axis=1)
+        finer = np.sqrt(chords.max() / (CHORD * self.reader.limit))
+        return np.linspace(0.0, self.knots[-4], count * int(np.clip(np.ceil(finer), 1, 4000 // SAMPLES)) + 1)
 
     def at(self, share: Floats) -> tuple[Floats, Floats]:
         knots = self.knots
