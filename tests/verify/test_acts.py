@@ -172,4 +172,5 @@ def test_a_rapid_higher_than_the_way_up_from_a_hole_is_no_way_up() -> None:
     assert "Z50." in lines[k - 1]
     assert "Z70." in lines[k + 1]
     assert {one.code for one in found(text, moved(lines, "M8", 1)).problems} == {"CS553"}
-    assert {one.code for one in found(text, moved(lines, "M8", -1)).problems} == {"CS553"}
+    assert not found(text, moved(lines, "M8", -1)).problems  # the hole ends at its clearance, as in the test above
+    assert {one.code for one in found(text, moved(lines, "M8", -2)).problems} == {"CS553"}  # the tool is in the hole
