@@ -119,9 +119,8 @@ class _Search:
         edge[path.begins[1:]] = 0.0
         lanes = path.fixed | path.begins
         lanes[-1:] = True
-        whole = lanes | np.append(path.begins[1:], True)
-        apart = whole.copy()
-        lanes = whole.copy()
+        apart = lanes | np.append(path.begins[1:], True)
+        lanes = apart.copy()
         lanes[::LANE] = True
         #: (r, 3) direction of the edge behind each vertex; no number where there is none
         self.ahead = np.full((count, 3), np.nan)
@@ -142,7 +141,7 @@ class _Search:
         made: list[tuple[Ints, ...]] = []
         at, stop = self.begin.copy(), self.stop
         count = len(at)
-        enters = np.where(np.isnan(self.ahead[at]), np.nan, self.ahead[at])
+        enters = self.ahead[at]
         enters[self.room[at] >= KINK] = np.nan  # no piece before it that has to be met
         kind, near, beyond = np.zeros(count, np.int64), at + 1, stop + 1
         best, tried = at + 1, _Found.none(count)  # the farthest good end, and what leads there
@@ -293,7 +292,6 @@ class _Search:
         fit &= np.bincount(line[wrong], minlength=count) == 0
         fit &= lowest <= highest
         slope = np.arctan2(rise, safe * mean / np.where(mean == 0.0, 1.0, np.sin(mean)) + (mean == 0.0) * safe)
-
         fit &= np.abs(slope) <= limits.slope
 
         def window(direction: Floats, room: Floats) -> tuple[Floats, Floats]:

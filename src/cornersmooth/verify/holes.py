@@ -200,7 +200,7 @@ class HoleLines:
             if np.linalg.norm(turn) * self.axis_length <= 2 * self.room:
                 low.append((first, cycle.level + min(float(way @ self.axis[move]), 0.0)))
         for k, level in low:
-            if self.room < (amount := level - height[k]) < cycle.level + self.room:  # in the hole it is written as such
+            if self.room < (amount := level - height[k]) < cycle.level + self.room:  # within it, another fault
                 text = f"a rapid beside a hole runs {amount:.4f} mm below the height of its cycle (RTRCTO, RAPTO)"
                 say("CS563", k, text, amount)
         if self.feeds(first) and beside:

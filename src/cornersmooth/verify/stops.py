@@ -339,7 +339,7 @@ class Stops:
             here = self._without(here, t, element)
 
     def _without(self, trace: _Trace, stop: int, element: int) -> _Trace:
-        """Trace at the next stop, which is missing before an element; of a hole that is written when it is left."""
+        """Trace at the next stop, which is missing before an element; a hole is noted where it is left."""
         if self._hole[stop]:
             return self._finished(trace, _Trace(stop, element, True, trace), element)
         there = self._finished(trace, _Trace(stop, element - 1 if trace.inside else trace.begin, False, trace), element)
@@ -394,7 +394,7 @@ class Stops:
         return all(self.lines.at(move, element - 1) for move in range(self._move[stop] + 1, self._move[stop + 1]))
 
     def _is_fed(self, stop: int, element: int) -> bool:
-        """Whether a feed move may follow a stop; it is only wanted before holes, else the decision says it."""
+        """Whether a feed move may follow a stop; only before holes, elsewhere the decision finds it."""
         return self._fed[stop] or not self._hole[stop + 1] or self.lines.at(self._move[stop + 1] - 1, element)
 
     def _negligible(self, stop: int, element: int) -> bool:

@@ -164,9 +164,10 @@ class WordPlaces:
                 meetings.insert(0, behind_way)
             behind_way = None
             for move, element in [*(one for one in meetings if one[0] < end[0] and one[1] < end[1]), end]:
-                if (move, element) == end and end[1] in batches.ways_up and not comparison.agrees(*end):
+                ways_up = batches.ways_up.get(element, ()) if (move, element) == end else ()
+                if ways_up and not comparison.agrees(*end):
                     # a rapid that ends where the tool goes up from a hole is that way, or leads nowhere behind it
-                    readings = ((one, element) for one in reversed(batches.ways_up.get(end[1], ())))
+                    readings = ((one, element) for one in reversed(ways_up))
                     if (reading := next((one for one in readings if comparison.agrees(*one)), None)) is not None:
                         lead = self._leading(np.array([move + 1]), set())[move + 1]
                         behind_way = min(lead, int(acts[act + 1, 0])), self._moving(element + 1)
