@@ -102,26 +102,29 @@ def first_program() -> tuple[str, str, str]:
     return output, lines, text
 
 
+def times_of(part: Path, *options: str) -> tuple[float, float]:
+    """Planned seconds of a part as `smooth` says them: smoothed, and as it is."""
+    with tempfile.TemporaryDirectory() as folder:
+        output = io.StringIO()
+        with contextlib.redirect_stderr(output):
+            run(["smooth", str(part), *options, "-o", str(Path(folder) / "part.nc")])
+    times = re.search(r"time .*?([\d.]+) s instead of ([\d.]+) s", output.getvalue())
+    assert times
+    return float(times[1]), float(times[2])
+
+
 def on_linuxcnc(part: Path) -> str:
     """What LinuxCNC's planner makes of a part, in a sentence: its time smoothed, and as it is."""
-    with tempfile.TemporaryDirectory() as folder:
-        said, target = io.StringIO(), str(Path(folder) / "part.ngc")
-        with contextlib.redirect_stderr(said):
-            run(["smooth", str(part), "--control", "linuxcnc", "--machine", "xyzac-trt", "-o", target])
-    times = re.search(r"time .*?([\d.]+) s instead of ([\d.]+) s", said.getvalue())
-    assert times
-    after, before = map(float, times.groups())
-    told = f"{'loses' if after > before else 'gains'} {100.0 * abs(after / before - 1.0):.0f} %"
-    return f"The sample {told} there, planned: {after:.1f} s, unsmoothed {before:.1f} s.\n"
+    after, before = times_of(part, "--control", "linuxcnc", "--machine", "xyzac-trt")
+    change = f"{'loses' if after > before else 'gains'} {100.0 * abs(after / before - 1.0):.0f} %"
+    return f"The sample {change} there, planned: {after:.1f} s, unsmoothed {before:.1f} s.\n"
 
 
 def by_the_paper(part: Path) -> str:
     """Times of a part in curves, by the method of the paper and by the default one, in words."""
-    program, machine = cornersmooth.read(part).with_feed(FEED), load_machine(MACHINE)
-    curves = [one for one in candidates(load_control(CONTROL), Settings(), None) if one.form.name == "g6.2"]
-    tried = [one for one in curves if one.settings.method in ("zhang2016", "global")]
-    seconds = {row.method: row.seconds for row in compare_programs(program, tried, machine).rows}
-    return f"The sample takes {seconds['zhang2016']:.1f} s by it in curves, {seconds['global']:.1f} s by ours"
+    curves = ("-e", "0.01", "--control", CONTROL, "-f", "g6.2", "--limits", MACHINE, "--method")
+    paper, default = (times_of(part, *curves, method)[0] for method in ("zhang2016", "global"))
+    return f"The sample takes {paper:.1f} s by it in curves, {default:.1f} s by ours"
 
 
 def wrong_programs(text: str) -> str:
