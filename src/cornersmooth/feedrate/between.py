@@ -18,7 +18,6 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
 
 from cornersmooth.feedrate.grid import Grid
 from cornersmooth.feedrate.interior_point import COLD, GAP, MAX_STEPS, WARM, solve
@@ -64,7 +63,9 @@ def fastest(
     solve_runs(batch, grid, c, gap=resolution.rough, most=_STEPS)
     most, stricter, first, last = _used(batch, c, grid, derivatives, bounds), np.ones(len(c)), grid.first, grid.last
     for number in range(max(resolution.rounds, 1)):
-        holding = np.argsort(-maximum_filter1d(most, _NEAR, axis=1), axis=0)[: _HELD + number]
+        wide = np.pad(most, ((0, 0), (_NEAR // 2, _NEAR // 2)), mode="edge")
+        near = np.maximum.reduce([wide[:, k : k + most.shape[1]] for k in range(_NEAR)])
+        holding = np.argsort(-near, axis=0)[: _HELD + number]
         own = (
             np.take_along_axis(part, holding[index], axis=1)
             for part, index in ((derivatives, np.s_[None, ..., None]), (bounds, np.s_[None]))
