@@ -279,11 +279,14 @@ def test_controls_of_three_axes_have_the_words_of_linuxcnc(control: str, tmp_pat
     assert b"--control grbl, mach3" in asked.stderr
 
 
-def test_distances_to_centres_are_what_arcs_have_anyway() -> None:
+def test_distances_to_centres_are_nothing_to_arcs_with_a_radius() -> None:
     """`G91.1` is in the first block of many programs for Mach and LinuxCNC; `G90.1` changes what I and J are."""
     text = "G90 G94 {} G40 G49 G17\nG21\nG0 X0 Y0 Z5\nG1 Z-1 F300\n" + WAVE + "G0 Z5\nM2\n"
     assert few(text.format("G91.1"), "linuxcnc").smoothed > 70
-    assert few(text.format("G90.1"), "linuxcnc").smoothed == 0
+    found = few(text.format("G90.1"), "linuxcnc")
+    assert found.smoothed > 70
+    assert not set(b"IJK") & set(found.data.replace(b"G40", b"").replace(b"G49", b""))
+    assert b"R" in found.data
 
 
 def test_the_first_block_of_a_run_says_that_it_cuts() -> None:

@@ -162,3 +162,42 @@ def test_rotary_words_without_a_machine_say_what_is_missing(tmp_path: Path) -> N
     (tmp_path / "part.nc").write_text(PROGRAMS["fanuc"].replace("G1 Z-1.", "G1 A5. Z-1."))
     made = run("filter", "part.nc", "-o", "new.nc", cwd=tmp_path)
     assert b"an axis turns in it: name the machine" in made.stderr
+
+
+@pytest.mark.parametrize(
+    ("control", "block"),
+    [
+        ("grbl", "$H"),
+        ("grbl", "$G"),
+        ("mach3", "G71 G91.1"),
+        ("mach3", "G70"),
+        ("mach3", "G50\nG69"),
+        ("mach3", "G90.1"),
+    ],
+)
+def test_words_of_hobby_controls_leave_the_rest_known(control: str, block: str, tmp_path: Path) -> None:
+    text = PROGRAMS["linuxcnc"].replace("G0 X0 Y0 Z20\n", f"{block}\nG0 X0 Y0 Z20\n")
+    told, new = filtered(tmp_path, text, "--control", control)
+    assert told.startswith("PASSED")
+    unit = 25.4 if block == "G70" else 1.0
+    assert difference(by_words(text.encode()), by_words(new), EPS / unit) == ""
+    left = difference(by_words(text.encode()), by_words(new), 0.1 * EPS / unit)
+    assert "farther away" in left  # so the units are those that it says
+
+
+def test_an_axis_is_said_again_and_stands_still(tmp_path: Path) -> None:
+    cuts = CUTS.replace("\n", " A90.\n")
+    text = FANUC.format(cuts).replace("G54 G0 X0. Y0.", "G54 G0 X0. Y0. A90.")
+    told, new = filtered(tmp_path, text)
+    assert f"{len(PASS) + 1} of {len(PASS) + 1} cuts" in told
+    assert difference(by_words(text.encode()), by_words(new), EPS) == ""
+    for other in (text.replace("A90.\nG0 Z20.", "A91.\nG0 Z20."), text.replace("G1 Z-1.", "G91\nG1 Z-21.")):
+        told, new = filtered(tmp_path, other)
+        assert int(re.search(r"(\d+) of \d+ cuts", told)[1]) <= len(PASS)  # type: ignore[index]
+        assert difference(by_words(other.encode()), by_words(new), EPS) == ""
+
+
+def test_what_is_not_known_is_said_with_the_line_since_which(tmp_path: Path) -> None:
+    (tmp_path / "part.nc").write_text(FANUC.format("M98 P1000\nG1 " + CUTS))
+    made = run("filter", "part.nc", "-o", "new.nc", cwd=tmp_path)
+    assert b"not said again since 'M98 P1000': compensation of the cutter (G40), G90 or G91, units" in made.stderr

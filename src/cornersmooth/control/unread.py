@@ -7,8 +7,10 @@ import re
 from typing import Final
 
 from cornersmooth.control.state import CUTS, State
+from cornersmooth.control.table import UNKNOWN
 from cornersmooth.errors import InputError
 from cornersmooth.nc_reader.lexer import Lexer
+from cornersmooth.nc_reader.words import Line, Word
 
 #: a value for a variable, which is no axis and no word of its own
 _ASSIGNMENT: Final = re.compile(r"(#|Q[LRS]?\d+\s*=|(R\d*|[A-Z_]{2,}\w*)(\[[^]]*\])?\s*=(?!=)|DEF\s|FN ?[0-8] ?:)")
@@ -49,13 +51,15 @@ def _execute(state: State, plain: str, lexer: Lexer) -> str:
         line = lexer.line(_WORKED_OUT.sub(" ", plain).encode("latin-1"), 0, None) if lost else None
     except InputError:
         line = None
-    if line is None and _KLARTEXT_PATH.match(plain) and "RAPID" in state.table.named:
+    if line is None and state.table.row(plain) is not UNKNOWN:
+        line = Line(0, (Word("block", 0.0, plain),))
+    elif line is None and _KLARTEXT_PATH.match(plain) and "RAPID" in state.table.named:
         for word in _KLARTEXT_WORDS.findall(plain):
             state.execute(lexer.line(f"L {word}".encode(), 0, None))
         state.lose_place()
         state.groups["motion"], state.feed = None, math.nan
         return "words that are not known"
-    if line is None or {"G", "M"} & lost or (line.words and line.words[0].name == "block"):
+    if line is None or {"G", "M"} & lost or (lost and line.words and line.words[0].name == "block"):
         state.lose_all(frames=not _FLOW.match(plain))
         return ""
     state.execute(line)
@@ -78,6 +82,8 @@ def execute(state: State, text: bytes, lexer: Lexer) -> str:
     try:
         line = lexer.line(text, 0, None)
     except InputError:
+        return _execute_unread(state, text, lexer)
+    if line.words and line.words[0].name == "DEF":  # a variable of Siemens, with its name as a word
         return _execute_unread(state, text, lexer)
     cuts = state.execute(line)
     state.lose_place(word.name for word in line.words if lexer.without_point(word))  # in which unit, nobody says

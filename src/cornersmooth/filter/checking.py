@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
 from cornersmooth.arrays.vectors import unit
-from cornersmooth.control.state import State
+from cornersmooth.control.state import VECTOR, State
 from cornersmooth.errors import CornersmoothError
 from cornersmooth.filter.meaning import Meanings
 from cornersmooth.filter.motion import Job, Stretch, motion, motion_of_runs, plane_of, program_of, says_motion
@@ -208,13 +208,12 @@ def _left_otherwise(job: Job, run: Run, state: State, following: bytes) -> str:
 
     The kind of motion may be another one where the line behind says its own, or every line does.
     """
-    place = [state.place[letter] for letter in state.axes]
-    there, wanted = np.array(place), run.place[-1].copy()
+    there, wanted = np.array(list(state.place.values())), np.array(list(run.end.values()))
     room = np.full(len(there), _SAME)
-    if len(there) > 5:  # of vectors only the direction counts, in its printed digits
+    if VECTOR.issubset(state.place):  # only the direction counts, in its printed digits
         there[3:], wanted[3:], room[3:] = unit(there[3:]), unit(wanted[3:]), _SAME_DIRECTION
-    if not (np.abs(there - wanted) <= room).all():
-        return f"the run ends at {_told(state.axes, place)}, not at {_told(state.axes, run.place[-1].tolist())}"
+    if not np.isclose(there, wanted, rtol=0.0, atol=room, equal_nan=True).all():
+        return f"the run ends at {_told(state.place)}, not at {_told(run.end)}"
     wanted_groups = run.state.groups | {"motion": "line"}
     if says_motion(following) or "code" not in job.form.mode.motion.modal:
         del wanted_groups["motion"]
@@ -227,5 +226,5 @@ def _left_otherwise(job: Job, run: Run, state: State, following: bytes) -> str:
     return ""
 
 
-def _told(axes: Sequence[str], place: Sequence[float]) -> str:
-    return " ".join(f"{axis}{value:g}" for axis, value in zip(axes, place, strict=True))
+def _told(place: Mapping[str, float]) -> str:
+    return " ".join(f"{axis}{value:g}" for axis, value in place.items() if not math.isnan(value))

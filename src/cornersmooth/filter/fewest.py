@@ -15,7 +15,7 @@ import numpy as np
 from cornersmooth.arrays.vectors import square, unit
 from cornersmooth.control.state import State
 from cornersmooth.filter.motion import Job, plane_of, says_motion
-from cornersmooth.filter.runs import ANGLES, NONE, VECTOR, Reading, Run
+from cornersmooth.filter.runs import ANGLES, ANY, NONE, TURNS, VECTOR, Reading, Run
 from cornersmooth.filter.spelling import numbered, numbers_of
 from cornersmooth.kinematics import tip_position, tool_axis
 from cornersmooth.model import Bools, Floats, Ints
@@ -73,7 +73,7 @@ def fewest(
             run.state.unit,
             plane_of(run.state),
             stays,
-            _planes(job, run.state),
+            _planes(job, run.state, reading),
         )
         groups.setdefault(key, []).append(run)
     for (_, unit_, plane, stays, planes), own in groups.items():
@@ -94,15 +94,15 @@ def _mode(job: Job) -> Mode:
     return upright if job.reader.wanted == NONE and upright is not None else form.mode
 
 
-def _planes(job: Job, state: State) -> tuple[int, ...]:
+def _planes(job: Job, state: State, reading: Reading) -> tuple[int, ...]:
     """Planes in which arcs may lie: none under tip control of rotary axes, that which holds under a frame."""
-    mode, plane, frames = _mode(job), plane_of(state), state.frames
-    axes = [frame for frame in frames or () if frame.startswith("axis ")]
-    if not mode.circles or not plane or job.reader.wanted == ANGLES or (axes and state.groups["tip"] != "off"):
+    mode, plane, wanted = _mode(job), plane_of(state), job.reader.wanted
+    tips = wanted == ANGLES or (wanted == ANY and state.groups["tip"] != "off" and TURNS.search(reading.data))
+    if not mode.circles or not plane or tips:
         return ()
     if mode.motion.arc_directions or mode.circles_in_xy:
         return (17,) if plane == 17 else ()
-    return (17, 18, 19) if frames is not None and len(frames) == len(axes) else (plane,)
+    return (17, 18, 19) if state.frames == () else (plane,)
 
 
 def _texts(job: Job, reading: Reading, group: _Group) -> list[bytes | None]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from cornersmooth.control.state import PRESET, State
 from cornersmooth.errors import InputError
-from cornersmooth.filter.runs import ProgramReader, Reading, Run
+from cornersmooth.filter.runs import ANY, TURNS, ProgramReader, Reading, Run
 from cornersmooth.filter.spelling import Spelling
 from cornersmooth.model import Floats, Move, Program, Statement
 from cornersmooth.nc.form import Form
@@ -61,7 +61,8 @@ def motion_of_runs(job: Job, reading: Reading, runs: Sequence[Run]) -> NcProgram
     stretches = []
     for run in runs:
         text = reading.lines(run.first, run.stop)
-        if run.state.groups["distance"] == "incremental":  # in places, with their own feeds
+        others = job.reader.wanted == ANY and TURNS.search(text)
+        if others or run.state.groups["distance"] == "incremental":  # in places, with their own feeds
             pairs = zip(in_places(job, run), run.feeds.tolist(), strict=True)
             text = b"".join(b"%b F%.9f\n" % pair for pair in pairs)
         stretches.append(Stretch(run, text, run.first + 1))
@@ -143,7 +144,7 @@ def _start(job: Job, run: Run, form: Form, before: str) -> bytes:
 
 
 def _block(job: Job, run: Run, place: Floats, form: Form, *, rapid: bool) -> bytes:
-    look, axes, spelling = form.mode.motion, run.state.axes, job.spelling
+    look, axes, spelling = form.mode.motion, job.reader.axes, job.spelling
     vector = axes[3:] == ("I", "J", "K")
     other = place[3:] / np.linalg.norm(place[3:]) if vector else place[3:]
     words = [*"XYZ", *(form.mode.words if vector else axes[3:])]

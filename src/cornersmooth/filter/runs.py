@@ -41,11 +41,24 @@ _LEAST: Final = 2
 #: frames that change lengths, or call a macro for each block
 _NOT_RIGID: Final = ("scale", "macro", "polar", "cylinder")
 
-#: a word of an axis that the machine of a program with three axes has not
-_TURNS: Final = re.compile(rb"(?i)(?<![A-Z])[ABC][ \t]*=?[ \t]*[-+]?[\d.]")
+#: what must be known in a run: the groups, and how messages call them
+_NEEDED: Final = {
+    "tip": "whether tool tip control is on",
+    "compensation": "compensation of the cutter (G40)",
+    "distance": "G90 or G91",
+    "units": "units",
+    "feed": "the kind of feed (G94)",
+}
+
+#: bytes of a line that messages show
+_SHOWN: Final = 40
 
 #: a word that may name a linear axis
 _NAMED: Final = {axis: re.compile(rb"(?i)(?<![A-Z])%b" % axis.encode()) for axis in "XYZ"}
+
+#: a word that may turn an axis that a program of three axes has not, and what a cut that has it is left for
+TURNS: Final = re.compile(rb"(?i)(?<![A-Z])[ABC][ \t]*=?[ \t]*[-+]?[\d.]")
+_TURNS: Final = "an axis turns in it: name the machine"
 
 _FEED_ALONE: Final = re.compile(rb"(?i)\s*(?:N\s*\d+)?\s*F\s*[\d.]+\s*")
 
@@ -62,7 +75,7 @@ class Run:
 
     first: int  #: first, stop: lines, from 0; the latter excluded
     stop: int
-    state: State  #: before the first
+    state: State  #: before the first; beside those c axes it may have others, which stand still
     #: (n, c) words at the end of each cut, in units of the program; lines between that say a feed alone are no cuts
     place: Floats
     feeds: Floats  #: (n,) as written
@@ -78,7 +91,12 @@ class Run:
     @property
     def start(self) -> Floats:
         """(c,) where the machine is before the run."""
-        return np.array([self.state.place[letter] for letter in self.state.axes])
+        return np.array([self.state.place[letter] for letter in self.state.axes[: self.place.shape[1]]])
+
+    @property
+    def end(self) -> dict[str, float]:
+        """Place of each axis after the run, those that stand still included."""
+        return self.state.place | dict(zip(self.state.axes, self.place[-1].tolist(), strict=False))
 
     @property
     def places(self) -> Floats:
@@ -151,10 +169,11 @@ class ProgramReader:
         names = ("I", "J", "K") if machine is None else machine.names
         self.axes = ("X", "Y", "Z", *names)
         self.wanted = NONE if not tcp else VECTOR if machine is None else ANGLES if names else ANY
-        self.lexer = dialect_of(control, "" if machine is None else "".join(names)).lexer
+        turning = ("A", "B", "C") if self.wanted == ANY else names
+        self.lexer = dialect_of(control, "" if machine is None else "".join(turning)).lexer
         self._weak_feed = "F" in self.lexer.points  # in inches a feed without a point may count otherwise
         self.lexer.points = self.lexer.points - {"F"}
-        self._first = State(table_of(control), self.axes)
+        self._first = State(table_of(control), ("X", "Y", "Z", *turning))
         self._first.groups |= {"units": "inch"} if inch else {}
         self._first.groups |= {"tip": self.wanted} if tip_from_start else {}
 
@@ -170,20 +189,20 @@ class ProgramReader:
     def read(self, data: bytes, stops: Iterable[int] = ()) -> Reading:
         """Read a program, whatever it is; remember the state before some lines."""
         found = Reading(**vars(Text.of(data)))
-        found.absent = tuple(
-            letter for letter in "XYZ" if re.search(rb"(?i)(?<![A-Z])%b" % letter.encode(), data) is None
-        )
+        found.absent = tuple(letter for letter, named in _NAMED.items() if named.search(data) is None)
         still: dict[str, float] = dict.fromkeys(found.absent if self.wanted == ANY else (), 0.0)
-        stream, stops_left, last = self.stream(found), sorted(set(stops), reverse=True), self._first
+        stream, stops_left, last, cause = self.stream(found), sorted(set(stops), reverse=True), self._first, ""
         corners = _near([number for number, line in stream.others if _CORNER_WORDS.search(line)], len(found))
         for item in _over_feeds(stream):
             first, count = (item.first, len(item)) if isinstance(item, Rows) else (item.line, 1)
             if isinstance(item, Rows):
-                self._take_rows(found, _with_places(item, still) if still else item, corners)
-            elif item.cuts:
-                turns = self.wanted == ANY and _TURNS.search(item.text)
-                reason = "an axis turns in it: name the machine" if turns else item.cuts
-                found.why[first] = found.number(why_not(item.after, self.wanted) or reason)
+                self._take_rows(found, _with_places(item, still) if still else item, corners, cause)
+            else:
+                if {*self._unknown(item.after)} - {*self._unknown(item.before)}:
+                    cause = " ".join(item.text.decode("latin-1").split())[:_SHOWN]
+                if item.cuts:
+                    reason = _TURNS if self.wanted == ANY and TURNS.search(item.text) else item.cuts
+                    found.why[first] = found.number(self.why_not(item.after, cause) or reason)
             while stops_left and stops_left[-1] < first + count:
                 stop = stops_left.pop()
                 found.at[stop] = item.after(stop - first) if isinstance(item, Rows) and stop > first else item.before
@@ -193,18 +212,15 @@ class ProgramReader:
         found.said = last.said
         return found
 
-    def _take_rows(self, found: Reading, rows: Rows, corners: Bools) -> None:
+    def _take_rows(self, found: Reading, rows: Rows, corners: Bools, cause: str) -> None:
         """Note the runs among motion blocks, and why others are left."""
         count, here = len(rows), slice(rows.first, rows.first + len(rows))
         arc = (rows.code == 2.0) | (rows.code == 3.0)
-        cut, known, moved = (
-            (rows.code == 1.0) & rows.moves,
-            np.isfinite(rows.place),
-            np.abs(np.diff(rows.place, axis=0)),
-        )
+        place, others = rows.place[:, : len(self.axes)], rows.place[:, len(self.axes) :]
+        cut, known, moved = (rows.code == 1.0) & rows.moves, np.isfinite(place), np.abs(np.diff(place, axis=0))
         plain = cut & ~rows.lost & (known[1:] & known[:-1]).all(axis=1)
-        never = f": {found.absent[0]} is never given" if found.absent else ""
-        unknown = found.number(f"the place before or after it is not known{never}")
+        never = ": {0} is never given; say it before, as in G0 {0}0." if found.absent else ""
+        unknown = found.number("the place before or after it is not known" + never.format(*found.absent))
         why = np.where(cut, unknown, NO_CUT).astype(np.uint16)
         why[plain & ~np.isfinite(rows.feed)] = found.number("its feed is not known")
         plain &= np.isfinite(rows.feed) & (rows.feed > 0.0)
@@ -213,6 +229,7 @@ class ProgramReader:
         for some, reason in (
             (~(moved[:, :3] > 0.0).any(axis=1), "the tip stays where it is"),
             (wide, "a rotary axis turns by half a turn or more in it"),
+            (self._turning(found, rows, others), _TURNS),
             (corners[here], "the program rounds its corner by words of its own"),
         ):
             why[plain & some] = found.number(reason)
@@ -220,7 +237,7 @@ class ProgramReader:
         plain &= ~left
         if (arc & (rows.moves | rows.odd)).any():
             why[arc] = found.number("an arc")
-        if reason := why_not(rows.before, self.wanted):
+        if reason := self.why_not(rows.before, cause):
             why[cut | arc] = found.number(reason)
             plain[:] = False
         quiet = (rows.code == 1.0) & ~rows.moves & ~rows.odd  # a feed alone, and the like
@@ -231,8 +248,48 @@ class ProgramReader:
                 why[own] = found.number("a single cut between other blocks: it has no corner")
                 continue
             why[own] = PLAIN_CUT
-            found.runs.append(Run(first + a, first + b, rows.after(a), rows.place[own + 1], rows.feed[own]))
+            found.runs.append(Run(first + a, first + b, rows.after(a), place[own + 1], rows.feed[own]))
         found.why[rows.first : rows.first + count] = why
+
+    def _turning(self, found: Reading, rows: Rows, others: Floats) -> Bools:
+        """(r,) whether an axis that is none of a run moves in a block."""
+        still = (others[1:] == others[:-1]) | (np.isnan(others[1:]) & np.isnan(others[:-1]))
+        if others.size and rows.before.groups["distance"] != "absolute":  # a distance from an unknown place is one, too
+            still &= TURNS.search(found.lines(rows.first, rows.first + len(rows))) is None
+        return ~still.all(axis=1)
+
+    def _unknown(self, state: State) -> list[str]:
+        """What must be known in a run and is not, as messages call it."""
+        needed = (name for name in _NEEDED if not (name == "tip" and self.wanted == ANY))
+        unknown = [_NEEDED[name] for name in needed if state.groups[name] is None]
+        frames = state.frames if self.wanted != ANY else _not_rigid(state)
+        return unknown + ["planes, rotations and scales"] * (frames is None)
+
+    def why_not(self, state: State, cause: str = "") -> str:
+        """Say why cuts in a state are left as they are; empty where they need not be.
+
+        `cause` is the line since which something is not known.
+        """
+        groups, tip, wanted = state.groups, state.groups["tip"], self.wanted
+        frames = state.frames if wanted != ANY else _not_rigid(state)
+        if frames:
+            return f"places of the part are turned, scaled or called by a macro ({', '.join(sorted(frames))})"
+        if unknown := self._unknown(state):
+            return f"not known, and not said again{f' since {cause!r}' if cause else ''}: {', '.join(unknown)}"
+        if wanted == NONE and tip != NONE:
+            return "tool tip control is on, and --no-tcp says that it is not"
+        if wanted in (ANGLES, VECTOR) and tip not in (wanted, "both"):
+            return (
+                "tool tip control is off" + ": for rotary words name the machine" * (wanted == VECTOR)
+                if tip == NONE
+                else f"tool tip control is for {_TOLD[str(tip)]}, not for {_TOLD[wanted]}"
+            )
+        even = all(groups.get(group, PRESET) in _EVEN.get(wanted, ()) for group in ("orientation", "coordinates"))
+        if not even and wanted in (ANGLES, VECTOR):
+            return f"the control turns the tool by a law of its own between {_TOLD[wanted]}"
+        if groups["compensation"] != "off":
+            return "the radius of the cutter is taken account of"
+        return "feed per revolution (G95)" if groups["feed"] == "revolution" else ""
 
 
 def _over_feeds(stream: Iterable[Rows | Act]) -> Iterator[Rows | Act]:
@@ -297,37 +354,6 @@ def _bridged(plain: Bools, quiet: Bools) -> Bools:
     following = np.minimum.accumulate(np.where(plain, index, len(plain))[::-1])[::-1]
     breaks = np.minimum.accumulate(np.where(other, index, len(plain))[::-1])[::-1]
     return plain | (quiet & (last > broken) & (following < breaks))
-
-
-def why_not(state: State, wanted: str) -> str:
-    """Say why cuts in a state are left as they are; empty where they need not be.
-
-    `wanted` is the kind of tool tip control that must be on; `NONE` where it must be off, `ANY` for either.
-    """
-    groups, tip = state.groups, state.groups["tip"]
-    frames = state.frames if wanted != ANY else _not_rigid(state)
-    if frames:
-        return f"places of the part are turned, scaled or called by a macro ({', '.join(sorted(frames))})"
-    if tip is None and wanted != ANY:
-        return "it is not known whether tool tip control is on"
-    if wanted == NONE and tip != NONE:
-        return "tool tip control is on, and --no-tcp says that it is not"
-    if wanted in (ANGLES, VECTOR) and tip not in (wanted, "both"):
-        return (
-            "tool tip control is off" + ": for rotary words name the machine" * (wanted == VECTOR)
-            if tip == NONE
-            else f"tool tip control is for {_TOLD[str(tip)]}, not for {_TOLD[wanted]}"
-        )
-    even = all(groups.get(group, PRESET) in _EVEN.get(wanted, ()) for group in ("orientation", "coordinates"))
-    if not even and wanted in (ANGLES, VECTOR):
-        return f"the control turns the tool by a law of its own between {_TOLD[wanted]}"
-    if groups["compensation"] != "off":
-        return "the radius of the cutter is taken account of, or that is not known"
-    if None in (groups["distance"], groups["units"], groups["feed"]):
-        return "units, distances (G90, G91) or the kind of feed are not known"
-    if frames is None:
-        return "it is not known whether places of the part are turned, scaled or called by a macro"
-    return "feed per revolution (G95)" if groups["feed"] == "revolution" else ""
 
 
 def _not_rigid(state: State) -> tuple[str, ...] | None:

@@ -119,7 +119,7 @@ def _split(job: Job, form: Form, text: bytes, runs: Sequence[Run]) -> Iterator[l
         return line.startswith(rapid) and line.endswith(rapid_end) and not others
 
     def same(angles: Mapping[str, float], place: Floats, run: Run) -> bool:  # but for their last digit
-        wanted = dict(zip(run.state.axes, place.tolist(), strict=True))
+        wanted = dict(zip(run.state.axes, place.tolist(), strict=False))
         return all(abs(value - wanted[name]) <= digit for name, value in angles.items())
 
     for run, part in zip(runs, text.split(f"{before}RUN{behind}\n".encode())[1:], strict=True):
