@@ -23,7 +23,8 @@ ROOT = Path(__file__).resolve().parent.parent
 SOURCE = ROOT / "src" / "cornersmooth"
 TABLE = SOURCE / "cli" / "codes.toml"
 CAUSES = SOURCE / "cli" / "causes.toml"
-CODE = re.compile(r"CS\d{3}")
+#: a code; with a ``b`` behind it in tables of texts, for another text of it
+CODE = re.compile(r"CS\d{3}b?")
 SEVERITIES = ("note", "warning", "error")
 
 HEAD = """# Codes
@@ -93,7 +94,7 @@ class Module:
     def codes(self, node: ast.AST) -> frozenset[str]:
         """Codes that a node stands for."""
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and CODE.fullmatch(node.value):
-            return frozenset({node.value})
+            return frozenset({node.value[:5]})
         name = node.id if isinstance(node, ast.Name) else node.attr if isinstance(node, ast.Attribute) else ""
         return self.names.get(name, frozenset())
 
@@ -118,6 +119,10 @@ class Module:
         call = around
         while call in self.parent and not isinstance(call, (ast.Call, ast.For)):
             call = self.parent[call]
+            if isinstance(call, ast.Assign | ast.AnnAssign):
+                named = ast.unparse(call.targets[0] if isinstance(call, ast.Assign) else call.target).lower()
+                if named[:-1] in SEVERITIES:
+                    return named[:-1]
         if isinstance(call, ast.Call) and called(call) in ERRORS:
             return "error"
         for node in ast.walk(call) if isinstance(call, ast.For) else ():

@@ -108,7 +108,7 @@ class Blocks:
         if not modals.speed:
             per_turn = (np.diff(modes, prepend=modals["feed_mode"]) != 0) & (modes == FeedMode.PER_REVOLUTION)
             for move in rows.move[feeding[per_turn]].tolist():
-                self._refuse(at, move, which=1)
+                self._refuse(at, move, "CS343b")
                 self.findings.note("CS324", int(self.program.line[move]))
         changes.append(self._change("feed_mode", feeding, modes, len(rows)))
         if rows.arc is not None:
@@ -144,7 +144,7 @@ class Blocks:
         missing = np.isnan(rows.feed[feeding])
         without = rows.move[feeding[missing & ~curved[feeding]]]
         if len(without) and self.modals["feed"] < 0:
-            self._refuse(at, int(without[0]))
+            self._refuse(at, int(without[0]), "CS343")
         self.findings.note_each("CS311", self.program.line[without])
         given = feeding[~missing]
         mode = rows.mode[given]
@@ -159,10 +159,10 @@ class Blocks:
         self.modals.now["feed"] = int(keys[-1])
         return [b"", *texts], none
 
-    def _refuse(self, at: Coordinates, move: int, which: int = 0) -> None:
+    def _refuse(self, at: Coordinates, move: int, code: str) -> None:
         """Refuse what the control would refuse before it runs a line."""
         if at.motion.feed_needed:
-            raise refused("CS343", self.program, int(self.program.line[move]), which)
+            raise refused(code, self.program, int(self.program.line[move]))
 
 
 def feed_ticks(feed: Floats, mode: Ints, program: Program, at: Coordinates) -> Ints:

@@ -193,7 +193,7 @@ class StatementWriter:
         """GOHOME without coordinates: to the height of the retract."""
         blocks = self.modals.go_home()
         self.changed |= self.modals.can_rewind
-        self.findings.note("CS332", statement.line, which=int(self.modals.can_rewind))
+        self.findings.note("CS332b" if self.modals.can_rewind else "CS332", statement.line)
         return [*self.comment(statement.text), *blocks]
 
     def toolno(self, statement: Statement) -> list[str] | None:

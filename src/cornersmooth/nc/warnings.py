@@ -28,7 +28,7 @@ def add_warnings(form: Form, smoothed: SmoothProgram, circles: Circles, upright:
     program, style = smoothed.program, form.table.lines
     lines = program.line[program.arcs.pose]
     findings.note_each("CS313", lines[(circles.blocks > 0) & ~circles.curved])
-    findings.note_each("CS313", lines[circles.curved], which=1)
+    findings.note_each("CS313b", lines[circles.curved])
     findings.note_each("CS314", lines[circles.blocks == 0])
     rapid = rapid_moves(program.kind)
     if not form.rotary:  # rotary words say which way to turn; feed moves that turn so far are refused before
@@ -68,12 +68,12 @@ class MotionWarnings:
 
     def another_tool(self) -> None:
         """Begin anew with what is noted for each tool."""
-        self._noted.discard("CS335")
+        self._noted.discard("CS335b")
 
-    def _once(self, code: str, pose: int, which: int = 0, **values: object) -> None:
+    def _once(self, code: str, pose: int, **values: object) -> None:
         if code not in self._noted:
             self._noted.add(code)
-            self.findings.note(code, int(self.program.line[pose]), 1, which, **values)
+            self.findings.note(code, int(self.program.line[pose]), **values)
 
     def of_first(self, pose: int, form: Form, *, rapid: bool) -> None:
         """Say that the control turns the tool on its own before its first position, or feeds to it."""
@@ -119,7 +119,7 @@ class MotionWarnings:
     def of_cut(self, pose: int, *, turning: bool) -> None:
         """Say that a tool cuts while the spindle stands."""
         if not turning:
-            self._once("CS335", pose, which=1)
+            self._once("CS335b", pose)
 
     def of_turns(self, rows: BlockRows, form: Form, angles_of: Callable[[Ints], Floats]) -> None:
         """Say that an endless axis gets words that some machines of the control refuse; angles are those of ticks."""
