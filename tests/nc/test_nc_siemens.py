@@ -17,7 +17,7 @@ from cornersmooth.cl import read
 from cornersmooth.geometry import nurbs
 from cornersmooth.model import SmoothProgram
 from cornersmooth.nc import choose_form, fit_settings, write
-from cornersmooth.nc.block_rows import BlockRows
+from cornersmooth.nc.coordinates import BlockRows
 from cornersmooth.nc.curves import SplineCount, _intervals
 from cornersmooth.nc.messages import Findings
 from cornersmooth.settings import Settings

@@ -19,19 +19,18 @@ from cornersmooth.nc.control_tables import (
     control_table,
     find_control,
     load_control,
+    own_words,
     parse_control,
 )
 from cornersmooth.nc.coordinates import Coordinates
 from cornersmooth.nc.curves import SplineCount
-from cornersmooth.nc.cycle_blocks import upright_poses
-from cornersmooth.nc.form import Form
-from cornersmooth.nc.form_choice import check_program, choose_form
+from cornersmooth.nc.form import Form, check_program, choose_form
+from cornersmooth.nc.hole_cycles import upright_poses
 from cornersmooth.nc.holes import Holes
 from cornersmooth.nc.long_rows import coarse_rows, long_rows
 from cornersmooth.nc.messages import Findings
 from cornersmooth.nc.modals import Modals
 from cornersmooth.nc.motion import Motion
-from cornersmooth.nc.own_words import own_words
 from cornersmooth.nc.planes import Planes, check_travel_in_planes, check_travel_without_axes, plan_planes
 from cornersmooth.nc.program_frame import BLEND_STEP, POINT_APPROACH, Frame, Stream
 from cornersmooth.nc.rotary_rows import arc_angles, rotary_rows

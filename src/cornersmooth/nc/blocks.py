@@ -11,10 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program
-from cornersmooth.nc.block_rows import BlockRows
 from cornersmooth.nc.circles import Circles
 from cornersmooth.nc.control import INVERSE_TIME
-from cornersmooth.nc.coordinates import Coordinates
+from cornersmooth.nc.coordinates import BlockRows, Coordinates
 from cornersmooth.nc.curves import Part, SplineCount, joined, prepared, shapes_of, spelt
 from cornersmooth.nc.messages import Findings, refused
 from cornersmooth.nc.modals import Modals

@@ -7,15 +7,16 @@ each tool whose length goes into positions of the machine.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cornersmooth.arrays.vectors import unit
 from cornersmooth.kinematics import machine_position, tool_axis
-from cornersmooth.model import MM_PER_UNIT, Bools, Floats, Ints, Units
-from cornersmooth.nc.control import Motion
+from cornersmooth.model import MM_PER_UNIT, Bools, Floats, Ints, Program, Units
+from cornersmooth.nc.control import INVERSE_TIME, Motion
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.planes import Plane
 from cornersmooth.text import RowFormat, to_ticks
@@ -195,3 +196,39 @@ class Coordinates:
             ends = [machine_position(machine, tip, angles)[0] for tip in (tool_axis(machine, angles), np.zeros((1, 3)))]
             return unit(ends[0] - ends[1])
         return self.tool_axis(ticks)
+
+
+@dataclass(frozen=True)
+class BlockRows:
+    """Rows that nothing interrupts, r of them."""
+
+    ticks: Ints  #: (r, c) numbers in steps of their last digit
+    move: Ints  #: (r,) pose, for messages
+    rapid: Bools  #: (r,)
+    feed: Floats  #: (r,) mm/min, mm/rev or 1/min, NaN where there is none
+    mode: Ints  #: (r,) `FeedMode` or `INVERSE_TIME`
+    curve: NDArray[np.int8]  #: (r,) as in `Rows`
+    arc: Ints | None = None  #: (r,) as in `Rows`
+    dwell: Bools | None = None  #: (r,) where the tool waits after the block
+    #: (r, 4, c) Bézier points of the knot intervals of curves, in units of the text, for polynomials
+    bezier: Floats | None = None
+    spline: Floats | None = None  #: (r, 3) as in `Rows`
+    blend: Floats | None = None  #: (r,), mm; as in `Rows`
+    left: Bools | None = None  #: (r,) as in `Rows`
+
+    @classmethod
+    def straight(cls, program: Program, ticks: Ints, move: Ints, *, rapid: bool = False) -> BlockRows:
+        """Straight moves in rapid, or at the feeds of moves of the program."""
+        count, mode = len(ticks), program.feed_mode[move].astype(np.int64)
+        return cls(ticks, move, np.full(count, rapid), program.feed[move], mode, np.zeros(count, np.int8))
+
+    def __len__(self) -> int:
+        return len(self.ticks)
+
+    def with_programmed_feed(self, program: Program) -> BlockRows:
+        """Give the first move the program's feed where it has a time, which counts the way from the pose before."""
+        if self.mode[0] != INVERSE_TIME:
+            return self
+        feed, mode = self.feed.copy(), self.mode.copy()
+        feed[0], mode[0] = program.feed[self.move[0]], program.feed_mode[self.move[0]]
+        return replace(self, feed=feed, mode=mode)

@@ -12,9 +12,8 @@ from cornersmooth.arrays.slices import some_rows
 from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.geometry.ragged import ranges
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.nc.block_rows import BlockRows
 from cornersmooth.nc.circles import Circles
-from cornersmooth.nc.coordinates import Coordinates
+from cornersmooth.nc.coordinates import BlockRows, Coordinates
 from cornersmooth.nc.messages import Findings
 from cornersmooth.text import RowFormat, format_number, to_ticks
 

@@ -1,14 +1,27 @@
-"""A form of a control in one of its modes: everything that the writers go by."""
+"""A form of a control in one of its modes: everything that the writers go by, and how it is chosen.
+
+Combinations that a control cannot run are refused with what works instead.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
 
+import numpy as np
+
+from cornersmooth.arrays.vectors import norm
+from cornersmooth.errors import SettingsError
 from cornersmooth.kinematics import Machine
-from cornersmooth.model import MM_PER_UNIT, Units
-from cornersmooth.nc.control import Blocks, Control, CurveStyle, Extra, Mode, Orientation
+from cornersmooth.model import MM_PER_UNIT, Move, Program, Units
+from cornersmooth.nc.control import Blocks, Control, CurveStyle, Extra, FormTable, Mode, Orientation
+from cornersmooth.nc.control_tables import load_control
+from cornersmooth.nc.statement_args import loaded_tool
 from cornersmooth.settings import Settings
+from cornersmooth.tables import closest
 
 #: share of ε, at the axis point, that rotary axes may take between and at the written words
 ROTARY_SHARE = 0.1
@@ -128,3 +141,200 @@ class Form:
     def angle_rounding(self) -> float:
         """Degrees by which the rounding of both rotary words may turn the axis."""
         return float(10.0**-self.table.digits.angle)
+
+
+#: mm along the tool that a cut is left by, at least: less is not clear of it
+LEAST_REWIND: Final = 1.0
+
+
+def choose_form(
+    control: str | Path | Control = "fanuc",
+    form: str | None = None,
+    *,
+    machine: Machine | None = None,
+    tcp: bool = True,
+    extras: Iterable[str] = (),
+    digits: str = "",
+    rewind: float = 0.0,
+    planes: bool = False,
+) -> Form:
+    """Return the form of a control by name; the control's default where `form` is None.
+
+    Parameters
+    ----------
+    control : str, Path or Control
+        A name, or a TOML file.
+    machine : Machine, optional
+        For rotary words instead of tool vectors.
+    tcp : bool
+        Whether the control keeps the tool tip itself; without, the words are positions of the machine's axes.
+    extras : iterable of str
+        Names of functions of the control to be switched on.
+    digits : str
+        As `Control.with_digits` takes it; empty for those of the control's table.
+    rewind : float, mm
+        How far a cut is left along the tool where a rotary axis would pass its limit; 0 where that is an error.
+    planes : bool
+        Whether a tool that keeps a tilted axis between rapids is to run in a tilted plane of the control.
+
+    Returns
+    -------
+    Form
+        Control, form, machine and functions together, as `smooth`, `write` and `verify` take it.
+
+    Raises
+    ------
+    SettingsError
+        Unknown control or form, or a combination that the control cannot run.
+    """
+    table = control if isinstance(control, Control) else load_control(control)
+    if digits:
+        table = table.with_digits(digits)
+    name = next(iter(table.forms)) if form is None else form if form in table.forms else form.lower()
+    if name not in table.forms:
+        close = closest(name, tuple(table.forms))
+        advice = f"did you mean {close}? " if close else ""
+        hint = f"{advice}choose one of {', '.join(table.forms)}"
+        raise SettingsError("CS211", f"{table.name} has no form {form!r}", hint)
+    chosen = table.forms[name]
+    if machine is None and not tcp and "machine" in chosen.modes:
+        raise SettingsError("CS215", "machine positions need a machine", "name it with --machine")
+    if machine is not None and len(machine.names) < 2 and planes:
+        what = f"{machine.name} has no two rotary axes, which a tilted plane asks for"
+        raise SettingsError("CS232", what, "leave out --planes")
+    orientation, mode = _mode(table, chosen, machine, tcp)
+    chosen_extras = tuple(_extra(table, name, extra) for extra in dict.fromkeys(extras))
+    if machine is not None and machine.names:
+        _check_axes(table, mode, machine)
+    plane = _plane(table, chosen, machine) if planes else None
+    found = Form(table, name, chosen.curve, orientation, mode, machine, chosen_extras, chosen.upright, rewind, plane)
+    _check_rewind(found)
+    return found
+
+
+def _mode(table: Control, form: FormTable, machine: Machine | None, tcp: bool) -> tuple[Orientation, Mode]:
+    """What says the orientation, and how; refuses what the form has not."""
+    if machine is not None and not machine.names:
+        return "fixed", _without_rotary_axes(table, form)
+    wanted: tuple[Orientation, ...] = ("vector", "point", "fixed") if machine is None else ("angles",)
+    wanted = wanted if tcp else ("machine",)
+    for orientation in wanted:
+        if orientation in form.modes:
+            return orientation, form.modes[orientation]
+    raise _refusal(table, form, wanted, machine)
+
+
+def _without_rotary_axes(table: Control, form: FormTable) -> Mode:
+    """Return the mode for a machine without rotary axes: blocks without words of the tool axis, along Z."""
+    mode = form.modes.get("fixed", None if form.curve else form.upright)
+    if mode is None:
+        here = f"{table.name} form {form.name}"
+        with_such = (name for name, other in table.forms.items() if "fixed" in other.modes or other.upright)
+        lines = next((name for name in with_such if not table.forms[name].curve), "")
+        hint = f"use -f {lines}" if lines else "leave out --machine"
+        raise SettingsError("CS215", f"{here} has no blocks without words of the tool axis", hint)
+    return mode
+
+
+def _check_axes(table: Control, mode: Mode, machine: Machine) -> None:
+    """Refuse modulo axes that the control does not turn the shorter way."""
+    axes = " and ".join(machine.modulo)
+    if axes and not mode.motion.shortest:
+        what = f"{table.name} has no words by which {axes} goes the shorter way"
+        raise SettingsError("CS215", what, "leave out modulo in the machine file")
+
+
+def _check_rewind(form: Form) -> None:
+    """Refuse to leave cuts where there is nothing above which rotary axes could turn."""
+    if not form.rewind:
+        return
+    here = f"{form.control} form {form.name}"
+    if not form.rewind >= LEAST_REWIND:
+        raise SettingsError("CS202", f"rewind is {form.rewind:g} mm", f"give {LEAST_REWIND:g} mm or more")
+    if not form.rotary:
+        raise SettingsError("CS215", f"{here} has no rotary axes here that could turn back", "leave out --rewind")
+    if not form.table.program.retract:
+        what = f"the table of {form.control} has no retract above which rotary axes could turn back"
+        raise SettingsError("CS215", what, "leave out --rewind")
+
+
+def _plane(table: Control, form: FormTable, machine: Machine | None) -> Mode:
+    """Mode of the tilted planes of a form; refuses a control, form or machine without such."""
+    if form.plane is None:
+        others = [name for name, other in table.forms.items() if other.plane is not None]
+        what = f"{table.name} form {form.name}" if others else table.name
+        hint = f"use -f {others[0]}" if others else "leave out --planes"
+        raise SettingsError("CS232", f"{what} has no tilted planes", hint)
+    if not form.plane.rotations and machine is not None and machine.swings_the_tool:
+        text = f"{table.name} has tilted planes for machines whose tables turn the part only; {machine.name} has a head"
+        raise SettingsError("CS232", text, "leave out --planes")
+    return form.plane
+
+
+def _extra(table: Control, form: str, name: str) -> Extra:
+    if name not in table.extras:
+        known = f"choose one of {', '.join(table.extras)}" if table.extras else "leave it out"
+        raise SettingsError("CS218", f"{table.name} has no function {name!r}", known)
+    extra = table.extras[name]
+    if extra.forms and form not in extra.forms:
+        raise SettingsError("CS218", f"{name} is not for {table.name} form {form}", f"use -f {extra.forms[0]}")
+    return extra
+
+
+def check_program(form: Form, program: Program, settings: Settings) -> None:
+    """Refuse a program whose tool is not along Z where the form has no words for its axis (CS219)."""
+    if form.orientation == "fixed":
+        tilt = norm(program.axis - (0.0, 0.0, 1.0))
+        tilt[program.kind == Move.FROM] = 0.0
+        text = "the tool is not parallel to Z, and {} has no words for its axis"
+        vectors = [name for name, other in form.table.forms.items() if "vector" in other.modes]
+        hint = f"use -f {vectors[0]}" if vectors else "name your machine with --machine"
+        if form.machine is not None:
+            text = f"the tool is not parallel to Z, and {form.machine.name} has no rotary axis"
+            hint = "turn the part for an operation of its own, or use a machine that reaches it"
+        tilted = np.flatnonzero(settings.axis_scale * tilt > ROTARY_SHARE * settings.tolerance)
+        if len(tilted):  # by more than a rounding error at the axis point
+            what, line = text.format(f"{form.control} form {form.name}"), int(program.line[tilted[0]])
+            raise SettingsError("CS219", what, hint, file=program.source.name, line=line)
+    if form.orientation == "machine" and form.machine is not None and form.machine.swings_the_tool:
+        _check_lengths(form.machine, program)
+
+
+def _check_lengths(machine: Machine, program: Program) -> None:
+    """Refuse a program with tools whose lengths are not known, where these go into every position."""
+    loads = [statement for statement in program.statements if statement.word in ("LOADTL", "LOAD", "TURRET")]
+    known = dict(machine.tool_lengths)
+    numbers = [(loaded_tool(statement) or (-1, -1))[0] for statement in loads]
+    missing = [one for one, number in zip(loads, numbers, strict=True) if number not in known]
+    if known and missing:
+        what = f"a tool that [tool_lengths] of {machine.name} does not have, and whose length goes into every position"
+        hint = "write its length into the machine file"
+        raise SettingsError("CS219", what, hint, file=program.source.name, line=missing[0].line)
+    tools = set(numbers)
+    if len(tools) > 1 and not known:
+        what = f"{len(tools)} tools, and {machine.name} has one tool_length that goes into every position"
+        hint = "write [tool_lengths] into the machine file, or let the control keep the tool tip"
+        line = next(one.line for one, number in zip(loads, numbers, strict=True) if number != numbers[0])
+        raise SettingsError("CS219", what, hint, file=program.source.name, line=line)
+
+
+def _refusal(
+    table: Control, form: FormTable, wanted: tuple[Orientation, ...], machine: Machine | None
+) -> SettingsError:
+    here = f"{table.name} form {form.name}"
+    others = [name for name, other in table.forms.items() if any(mode in other.modes for mode in wanted)]
+    instead = f"use -f {others[0]}" if others else ""
+    if "machine" in wanted:
+        what = f"{here} cannot run without tool tip control"
+        if form.curve:
+            what += ": its curves are refused at inverse time feed (G93)"
+        if instead and machine is None:
+            instead += " and name your machine with --machine"
+        lines = next((name for name, other in table.forms.items() if not other.curve), form.name)
+        hint = "leave out --no-tcp" if lines == form.name else f"use -f {lines} and leave out --no-tcp"
+        return SettingsError("CS215", what, instead or hint)
+    if "angles" in wanted:
+        return SettingsError("CS215", f"{here} has no rotary words", instead or "leave out --machine")
+    return SettingsError(
+        "CS215", f"{here} has no tool vectors, only rotary words", instead or "name your machine with --machine"
+    )

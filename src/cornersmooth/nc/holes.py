@@ -18,13 +18,11 @@ import numpy as np
 
 from cornersmooth.arrays.vectors import dot
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program
-from cornersmooth.nc.block_rows import BlockRows
 from cornersmooth.nc.blocks import feed_digits, feed_ticks
 from cornersmooth.nc.circles import FIRST_PLANE
 from cornersmooth.nc.control import Blocks
-from cornersmooth.nc.coordinates import Coordinates
-from cornersmooth.nc.cycle_blocks import hole_feeds, kind_of
-from cornersmooth.nc.hole_cycles import Cycle
+from cornersmooth.nc.coordinates import BlockRows, Coordinates
+from cornersmooth.nc.hole_cycles import Cycle, hole_feeds, kind_of
 from cornersmooth.nc.motion import NOWHERE, Motion
 from cornersmooth.nc.statement_writer import StatementWriter
 from cornersmooth.smoothing.sampling import Rows

@@ -14,15 +14,13 @@ from cornersmooth.arrays.slices import some_rows
 from cornersmooth.kinematics.poses import continued
 from cornersmooth.kinematics.position import nose_position
 from cornersmooth.model import Bools, Floats, Ints, Move, Program
-from cornersmooth.nc.block_rows import BlockRows
 from cornersmooth.nc.blocks import Blocks
 from cornersmooth.nc.control import INVERSE_TIME
-from cornersmooth.nc.coordinates import Coordinates
+from cornersmooth.nc.coordinates import BlockRows, Coordinates
 from cornersmooth.nc.curves import bezier_points
-from cornersmooth.nc.first_block import UPRIGHT, check_first_block
 from cornersmooth.nc.messages import Findings, refused
 from cornersmooth.nc.modals import Modals
-from cornersmooth.nc.rewinds import retracts_before
+from cornersmooth.nc.rewinds import UPRIGHT, check_first_block, retracts_before
 from cornersmooth.nc.warnings import MotionWarnings
 from cornersmooth.smoothing.sampling import Rows
 

@@ -23,10 +23,10 @@ from cornersmooth.errors import InputError
 from cornersmooth.geometry.arcs import arc_points, divided
 from cornersmooth.kinematics import Machine, machine_position, solutions, tool_axis
 from cornersmooth.model import Bools, Floats, Ints, Keep, Move, Numbers, Program
-from cornersmooth.nc.cycle_blocks import has_cycles
 from cornersmooth.nc.form import Form
+from cornersmooth.nc.hole_cycles import has_cycles
 from cornersmooth.nc.messages import Findings
-from cornersmooth.nc.tools import ToolTravel, tool_starts
+from cornersmooth.nc.statement_args import ToolTravel, tool_starts
 from cornersmooth.settings import Settings
 from cornersmooth.text import format_number
 

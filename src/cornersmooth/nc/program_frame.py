@@ -16,7 +16,7 @@ from cornersmooth.model import Move, Program
 from cornersmooth.nc.control import LINE_ENDS, Blocks, Control, ProgramTable, TextStyle
 from cornersmooth.nc.control_tables import control_names, load_control
 from cornersmooth.nc.form import Form
-from cornersmooth.nc.tools import tool_loads
+from cornersmooth.nc.statement_args import tool_loads
 from cornersmooth.settings import Settings
 from cornersmooth.settings.frame import FrameSettings
 from cornersmooth.statements.work_offsets import spellings, work_offset_of

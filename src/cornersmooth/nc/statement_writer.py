@@ -20,7 +20,10 @@ from cornersmooth.nc.modals import Modals
 from cornersmooth.nc.program_frame import comment_lines
 from cornersmooth.nc.statement_args import (
     GEARS,
+    TOOL_WORDS,
+    ahead_of_tools,
     cutting_unit,
+    loaded_tool,
     milliseconds,
     numbers_of,
     revolutions,
@@ -29,7 +32,6 @@ from cornersmooth.nc.statement_args import (
     whole_number,
     words_of,
 )
-from cornersmooth.nc.tools import TOOL_WORDS, ahead_of_tools, loaded_tool
 from cornersmooth.statements.asked import statements_not_understood
 from cornersmooth.text import format_number
 

@@ -11,11 +11,11 @@ import numpy as np
 from cornersmooth.arrays.vectors import dot
 from cornersmooth.methods import CURVES_METHOD, DEFAULT_METHOD
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program, SmoothProgram
-from cornersmooth.nc.block_rows import BlockRows
 from cornersmooth.nc.circles import Circles
-from cornersmooth.nc.first_block import UPRIGHT
+from cornersmooth.nc.coordinates import BlockRows
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.messages import Findings
+from cornersmooth.nc.rewinds import UPRIGHT
 from cornersmooth.rotary import rapid_moves
 from cornersmooth.settings import FLIP_ANGLE
 
@@ -73,7 +73,7 @@ class MotionWarnings:
     def _once(self, code: str, pose: int, **values: object) -> None:
         if code not in self._noted:
             self._noted.add(code)
-            self.findings.note(code, int(self.program.line[pose]), **values)
+            self.findings.note(code, int(self.program.line[pose]), 1, **values)
 
     def of_first(self, pose: int, form: Form, *, rapid: bool) -> None:
         """Say that the control turns the tool on its own before its first position, or feeds to it."""

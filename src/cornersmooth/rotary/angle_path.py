@@ -26,11 +26,13 @@ from cornersmooth.rotary.branch_choice import (
     CutTooFarError,
     NoChoiceError,
     Stretches,
+    WideSteps,
     choose,
+    meet_at_pole,
     parts_of_cut,
     too_far,
+    unwrap,
 )
-from cornersmooth.rotary.unwrapping import WideSteps, meet_at_pole, unwrap
 
 #: Poses worked on at a time, so that memory is needed for their angles and little else.
 CHUNK = 1 << 15
