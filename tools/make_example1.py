@@ -14,7 +14,7 @@ import numpy as np
 
 from cornersmooth import Settings, choose_form, read, smooth, write
 from cornersmooth.nc_reader import read_nc
-from cornersmooth.report.deviation_profile import Distribution, deviation_along
+from cornersmooth.report.paths import Distribution, deviation_along
 
 ROOT = Path(__file__).resolve().parent.parent
 TOLERANCES = (0.078, 0.15)

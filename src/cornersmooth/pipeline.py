@@ -30,8 +30,8 @@ from cornersmooth.report import NcFile, report
 from cornersmooth.report.record import planned_times, sha256_of
 from cornersmooth.report.verdict import Judgement, Saving, judge, trusted_blocks
 from cornersmooth.settings import Settings
-from cornersmooth.system.memory import return_free_memory
 from cornersmooth.system.output import FAILED, Output, Target, check_output, open_output, path_of
+from cornersmooth.system.processes import return_free_memory
 from cornersmooth.verdict import Verdict
 from cornersmooth.verify import Verification, Verifier, useful_processes
 

@@ -10,8 +10,9 @@ import re
 import numpy as np
 
 from cornersmooth import Settings
-from cornersmooth.page import page_and_saving
+from cornersmooth.page import smoothed_page
 from cornersmooth.pipeline import Result, postprocess
+from cornersmooth.times.saving import planned_saving
 
 #: a zigzag with corners of several kinds: rounded ones, a reversal, a turn of the axis alone
 PATH = """TOOL PATH/{name},TOOL,T
@@ -57,8 +58,11 @@ def smoothed(
 
 
 def page_of(result: Result, **more: object) -> str:
-    """Page of a run."""
-    return page_and_saving(result, source=b"part", **more)[0]  # type: ignore[arg-type]
+    """Page of a run, with its planned time where it is good."""
+    saving = None
+    if result.verdict == "PASSED":
+        saving = planned_saving(result.program, result.smoothed.settings, result.form, axes=more.get("axes"))
+    return smoothed_page(result, source=b"part", saving=saving, **more)  # type: ignore[arg-type]
 
 
 def values_of(page: str) -> tuple[dict[str, object], dict[str, np.ndarray]]:

@@ -343,8 +343,7 @@ def test_hostile_names_do_nothing(look):
 
 def test_surface_on_a_page(look):
     from cornersmooth.geometry.tool import tools_of
-    from cornersmooth.page import verified_page
-    from cornersmooth.page.pages import read_written
+    from cornersmooth.page import read_written, verified_page
     from cornersmooth.surface import measure_surface
 
     result = smoothed()

@@ -7,7 +7,7 @@ import pytest
 
 from cornersmooth.kinematics import load_machine, tool_axis
 from cornersmooth.model import Move, Program
-from cornersmooth.report.rotary_marks import marks_text, rotary_marks
+from cornersmooth.report import marks_text, rotary_marks
 
 #: table-ac has its axes in the order C, A
 MACHINE = load_machine("table-ac")

@@ -14,8 +14,7 @@ from cornersmooth.geometry.tool import Tool, parse_tool, tools_of
 from cornersmooth.nc import choose_form, fit_settings
 from cornersmooth.surface import measure_surface
 from cornersmooth.surface.distance import distance_to_motion
-from cornersmooth.surface.envelope import envelope_points
-from cornersmooth.surface.motion import original_cuts
+from cornersmooth.surface.motion import envelope_points, original_cuts
 from cornersmooth.surface.passes import neighbouring_passes
 from oracle.share import how_many, share
 

@@ -11,8 +11,8 @@ import pytest
 from cornersmooth.cli import run
 from cornersmooth.nc_reader import read_nc
 from cornersmooth.nc_reader.tool import written_at
-from cornersmooth.report.deviation_profile import deviation_along
-from cornersmooth.report.verification import (
+from cornersmooth.report.paths import deviation_along
+from cornersmooth.report.tables import (
     CSV_COLUMNS,
     along_lines,
     histogram_lines,

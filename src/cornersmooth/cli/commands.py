@@ -158,7 +158,7 @@ TIME = new_command(
     "time",
     "IN",
     f"tolerance axis_length axis_tolerance {LIMITS} control form machine method limits text text_machine block_time "
-    f"look_ahead {READING} tip_control as_json law csv reports tool force quiet verbose",
+    f"look_ahead {READING} tip_control as_json law csv force quiet verbose",
     """
     Plan the CL file IN as it is and the program that the options write, under the same limits.
 
@@ -174,7 +174,6 @@ TIME = new_command(
       cornersmooth time part.cls -e 0.04 --feed 1800 --accel 1000 --json
       cornersmooth time part.cls -e 0.04 --csv motion.csv
       cornersmooth time part.cls -e 0.04 --machine mill.toml --csv axes.csv
-      cornersmooth time part.cls -e 0.04 --report times.html
       cornersmooth time part.cls --text part.nc --block-time 1ms --look-ahead 200
       cornersmooth time part.ngc --control linuxcnc --machine xyzac-trt
     """,
@@ -184,7 +183,6 @@ TIME = new_command(
     block_time="Shortest time that the control takes for one block, of lines to write and in the plan. [default: that "
     "of the control's table for lines, none in the plan]",
     csv="Write the motion, a row every period.",
-    reports="Write a page to look at: .html. May be repeated.",
 )
 
 SETUP = new_command(

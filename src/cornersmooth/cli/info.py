@@ -8,8 +8,8 @@ from typing import Any
 from cornersmooth.cl import read
 from cornersmooth.cli.options import Options
 from cornersmooth.cli.show import say, say_line, told_finding
+from cornersmooth.report import marks_text
 from cornersmooth.report.info import describe
-from cornersmooth.report.rotary_marks import marks_text
 
 
 def run_info(given: Options) -> int:

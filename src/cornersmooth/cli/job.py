@@ -21,8 +21,8 @@ from cornersmooth.pipeline import Progress, Result, postprocess
 from cornersmooth.report import corners_csv, report_json
 from cornersmooth.report.verdict import Saving
 from cornersmooth.settings import TIMED_POSES, Settings
-from cornersmooth.system.memory import return_large_arrays
 from cornersmooth.system.output import ClosedPipe, make_folder, read_mark
+from cornersmooth.system.processes import return_large_arrays
 from cornersmooth.verdict import Verdict
 
 if TYPE_CHECKING:
@@ -224,23 +224,18 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> dict[
         outcome.held_back = beginning.held_back
     outcome.seconds = result.seconds
     outcome.verdict_text = "; ".join(filter(None, (result.judgement.text, job.loosened)))
-    timed = given.time or len(result.program) <= TIMED_POSES
     pages = [path for path in job.reports if suffix_of(path) == ".html"]
-    for path in pages:
-        from cornersmooth.page.pages import page_and_saving
-
-        page, saving = page_and_saving(
-            result, source=source, frame=result.frame, axes=job.axes, timed=timed, tool=given.tool
-        )
-        write_report(path, [page], replace=bool(may_replace[path]))
-        outcome.saving = saving or outcome.saving
-    good = result.verdict in (Verdict.PASSED, Verdict.INCOMPLETE)
-    if good and timed and not outcome.saving and (given.time or not (given.quiet or job.batch)):
+    timed = given.time or (len(result.program) <= TIMED_POSES and (pages or not (given.quiet or job.batch)))
+    if timed and result.verdict in (Verdict.PASSED, Verdict.INCOMPLETE):
         from cornersmooth.times.saving import planned_saving
 
-        outcome.saving = planned_saving(
-            result.program, result.smoothed.settings, result.form, axes=job.axes, progress=progress
-        )
+        settings = result.smoothed.settings
+        outcome.saving = planned_saving(result.program, settings, result.form, axes=job.axes, progress=progress)
+    for path in pages:
+        from cornersmooth.page import smoothed_page
+
+        page = smoothed_page(result, source=source, axes=job.axes, saving=outcome.saving, tool=given.tool)
+        write_report(path, [page], replace=bool(may_replace[path]))
     contents = result.report(command=job.command, loosened=job.loosened, saving=outcome.saving, limits=job.axes)
     for path in job.reports:
         if path not in pages:

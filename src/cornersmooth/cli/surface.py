@@ -16,7 +16,7 @@ from cornersmooth.geometry.tool import Tool, tools_of
 from cornersmooth.model import Program
 from cornersmooth.nc_reader import read_nc
 from cornersmooth.report import report_json
-from cornersmooth.report.surface import surface_csv, surface_lines
+from cornersmooth.report.tables import surface_csv, surface_lines
 from cornersmooth.surface import SurfaceMap, measure_surface
 from cornersmooth.verdict import Verdict
 from cornersmooth.verify import verify

@@ -9,7 +9,7 @@ import click
 import numpy as np
 
 from cornersmooth.cl import read
-from cornersmooth.cli.files import check_inputs, check_path, check_reports, read_head, write_report
+from cornersmooth.cli.files import check_inputs, check_path, read_head, write_report
 from cornersmooth.cli.options import Options
 from cornersmooth.cli.show import print_message, progress_bar, say
 from cornersmooth.errors import message
@@ -41,32 +41,23 @@ def run_time(given: Options) -> int:
     """Do the work of the command; return its exit code."""
     inputs = [given.source, given.text] if given.text else [given.source]
     check_inputs(*inputs)
-    check_reports(given.reports, ".html", inputs, force=given.force)
     if given.csv:
         check_path(given.csv, inputs, force=given.force)
     data, name, is_program = given.read()
     if is_program:
-        if given.csv or given.reports:
-            raise click.UsageError("--csv and --report: of an NC program only the times are told")
+        if given.csv:
+            raise click.UsageError("--csv: of an NC program only the times are told")
         from cornersmooth.cli.filter import time_of_program
 
         return time_of_program(data, name, given)
     control = given.load_control()
     if control.lines.planner:
-        if given.csv or given.reports:
-            raise click.UsageError(
-                f"--csv and --report: {control.name} plans by a law of its own, which gives times only"
-            )
+        if given.csv:
+            raise click.UsageError(f"--csv: {control.name} plans by a law of its own, which gives times only")
         return _by_own_law(data, name, given)
     compared = _compare(data, name, given)
-    if given.reports:
-        from cornersmooth.page import times_page
-
-        page = times_page(compared, source=data, tool=given.tool)
-        for path in given.reports:
-            write_report(path, [page])
     if given.csv:
-        from cornersmooth.report.csv_text import timelaw_csv
+        from cornersmooth.report.tables import timelaw_csv
 
         write_report(given.csv, timelaw_csv(compared.laws[given.law]))
     say(given, compared.as_dict(), _tables(compared, bool(given.verbose)))
@@ -87,8 +78,7 @@ def _compare(data: bytes, name: str, given: Options) -> Comparison:
         nc = read_back(written_text(without_holes(program.with_feed(given.feed)), fitted, form), form, fitted)
     if not given.quiet:
         _tell_feeds(program, given.feed)
-    everything = given.verbose or given.reports
-    methods = tuple(METHODS) if everything else tuple(name for name in METHODS if name == given.law)
+    methods = tuple(METHODS) if given.verbose else tuple(name for name in METHODS if name == given.law)
     with progress_bar(given.quiet) as progress:
         compared = compare(program, settings, limits, methods=methods, machine=axes, progress=progress)
         blocks = BlockLimits(given.block_time or 0.0, given.look_ahead)
@@ -140,7 +130,7 @@ def _tell_feeds(program: Program, feed: float | None) -> None:
 def _tables(compared: Comparison, verbose: bool) -> Iterator[str]:
     """Times and savings; with `verbose` what was reached, and the places that lose most."""
     settings, saving = compared.settings, compared.saving_percent
-    shown = times_text(compared.seconds, ["as_written"], limiting(compared.laws["as_written"]))
+    shown = times_text(compared.seconds, limiting(compared.laws["as_written"]))
     yield f"{shown}; {limits_of(None if compared.machine is None else compared.machine.name)}"
     own = settings.axis_tolerance
     second = f"axis point at {settings.axis_length:g} mm" if own is None else f"tool axis {own:g} deg"

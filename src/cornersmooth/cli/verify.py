@@ -27,10 +27,10 @@ from cornersmooth.nc_reader import NcProgram, read_nc
 from cornersmooth.nc_reader.source import readable_twice
 from cornersmooth.report import NcFile, findings_table, report_json
 from cornersmooth.report.record import cl_file, record, sha256_of
+from cornersmooth.report.tables import along_lines, histogram_lines, verification_csv
 from cornersmooth.report.verdict import judge, trusted_blocks
-from cornersmooth.report.verification import along_lines, histogram_lines, verification_csv
 from cornersmooth.settings import UNITS
-from cornersmooth.system.memory import return_large_arrays
+from cornersmooth.system.processes import return_large_arrays
 from cornersmooth.verdict import Verdict
 from cornersmooth.verify import Verification, Where, useful_processes, verify
 from cornersmooth.verify.task import APART, length_of
@@ -147,7 +147,7 @@ def run_verify(given: Options) -> int:
         for line in _summary(found):
             say_line(line, indent=18)
         if given.verbose:
-            from cornersmooth.report.deviation_profile import deviation_along
+            from cornersmooth.report.paths import deviation_along
 
             along = deviation_along(program, read_again(), **measures)
             for line in ("", *histogram_lines(found), "", *along_lines(along, found.tolerance)):

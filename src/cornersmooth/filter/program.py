@@ -25,7 +25,7 @@ from cornersmooth.nc_reader import NcProgram
 from cornersmooth.nc_reader.recognition import is_cl_file
 from cornersmooth.provenance import HEAD
 from cornersmooth.settings import Settings
-from cornersmooth.system.memory import return_free_memory
+from cornersmooth.system.processes import return_free_memory
 from cornersmooth.times.comparing import MOST_POSES, Candidate, Row, Table, law_of_lines, with_rows
 from cornersmooth.times.saving import Timing
 from cornersmooth.verdict import Verdict

@@ -17,7 +17,7 @@ from cornersmooth.nc.rewinds import from_zero
 from cornersmooth.rotary import rapid_moves, rewound_angles, rotary_angles, still_poses
 from cornersmooth.rotary.axis_findings import reach_error
 from cornersmooth.smoothing.sampling import Rows, all_dense_rows
-from cornersmooth.system.memory import return_free_memory
+from cornersmooth.system.processes import return_free_memory
 
 #: what a curve may turn the axis, over ε at H: tip and axis point may be off to opposite sides
 _SWING = 2.0

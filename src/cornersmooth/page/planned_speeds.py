@@ -46,21 +46,18 @@ def plan_all(
     written: WrittenPath,
     nc: NcProgram,
     *,
-    limits: Limits,
     machine: Machine | None,
     settings: Settings,
-    known: Mapping[str, TimeLaw],
 ) -> Planned:
-    """Plan what can be planned; laws that are `known` already are taken over."""
-    laws = dict(known)
+    """Plan what can be planned."""
+    laws: dict[str, TimeLaw] = {}
+    limits = Limits()
     ways: dict[str, tuple[Floats, Floats]] = {}
     left_out: list[str] = []
     seconds = None
     machine = with_dynamics(machine)
     try:
         for name, moves in (("direct", len(program)), ("written", len(nc))):
-            if name in laws:
-                continue
             if moves > MOST_MOVES:
                 left_out.append(f"The {name} path has {moves:,} moves; its speed is planned up to {MOST_MOVES:,}.")
             elif name == "direct":

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cornersmooth.arrays.slices import some_rows
-from cornersmooth.feedrate import Limits, TimeLaw
+from cornersmooth.feedrate import Limits
 from cornersmooth.geometry.tool import Tool, tools_of
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import Bools, Floats, Ints, Program, SmoothProgram
@@ -27,8 +27,7 @@ from cornersmooth.page.planned_speeds import (
     plan_all,
     speeds_over,
 )
-from cornersmooth.report.paths import OriginalPath, WrittenPath, original_path, written_path
-from cornersmooth.report.thinning import thinned
+from cornersmooth.report.paths import OriginalPath, WrittenPath, original_path, thinned, written_path
 from cornersmooth.settings import Settings
 from cornersmooth.verdict import Verdict
 from cornersmooth.verify import Verification
@@ -82,8 +81,6 @@ class Subject:
     verification: Verification | None = None
     smoothed: SmoothProgram | None = None  #: where the text was made here
     dense: bool = True  #: whether transitions are written as lines
-    laws: Mapping[str, TimeLaw] = field(default_factory=dict)  #: Laws that are planned already: ``"direct"``.
-    limits: Limits = field(default_factory=Limits)
     machine: Machine | None = None
     planner: str = ""  #: of the control's table: with a law of its own no speeds are planned
     tool: Tool | None = None  #: instead of those in the file
@@ -117,10 +114,8 @@ def scene(subject: Subject, story: Story) -> tuple[dict[str, Any], Pack]:
             original,
             written,
             subject.nc,
-            limits=subject.limits,
             machine=subject.machine,
             settings=settings,
-            known=subject.laws,
         )
     )
     if subject.smoothed is not None:
@@ -135,7 +130,7 @@ def scene(subject: Subject, story: Story) -> tuple[dict[str, Any], Pack]:
     seconds = planned.seconds
     timed = seconds is not None
     if seconds is None:
-        seconds = feed_seconds(written, subject.limits.rapid)
+        seconds = feed_seconds(written, Limits.rapid)
     # the point of the written path that is the last on the move into each pose
     reached = np.maximum.accumulate(written.pose)
     places = np.maximum(np.searchsorted(reached, np.arange(len(program)), side="right") - 1, 0)

@@ -15,8 +15,8 @@ from cornersmooth.geometry.arcs import arc_radii
 from cornersmooth.geometry.tool import tools_of
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import Bools, Corners, FeedMode, Floats, Move, Program, Status
+from cornersmooth.report import rotary_marks
 from cornersmooth.report.corners import counts_of
-from cornersmooth.report.rotary_marks import rotary_marks
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import axis_step_findings
 from cornersmooth.smoothing.construction import construction_of

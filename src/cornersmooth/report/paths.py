@@ -1,4 +1,7 @@
-"""The two motions that pages and pictures show: the original path, and the written one with its deviations."""
+"""The two motions that pages and pictures show: the original path, and the written one with its deviations.
+
+Deviations along the path are those of Figures 10, 11 and 16 of the paper.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +9,102 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cornersmooth.arrays.slices import joined_rows, some_rows
 from cornersmooth.arrays.vectors import angle_between, dot, norm
 from cornersmooth.geometry.arcs import poses_and_arcs
 from cornersmooth.model import Bools, Floats, Ints, Move, Program
-from cornersmooth.nc_reader import NcProgram
-from cornersmooth.nc_reader.elements import Element
+from cornersmooth.nc_reader.elements import Element, NcProgram
 from cornersmooth.nc_reader.tool import written_at
-from cornersmooth.report.deviation_profile import deviation_along
+from cornersmooth.verify.batches import Batches
+from cornersmooth.verify.deviation import Gap, of_original
+from cornersmooth.verify.match import Match
+from cornersmooth.verify.nearest import nearest_places
+from cornersmooth.verify.task import Task
+
+#: segments on either side in which the common pose is looked for
+_REACH = 2
+
+
+@dataclass(frozen=True)
+class Distribution:
+    """Deviations along the feed moves in path order: of written poses from the original, and of its poses from them."""
+
+    way: Floats  #: (k,) mm: length of the original path, rapids included, up to the original pose
+    #: (k,) mm: axis points as in `Task`: with an axis tolerance, what the axis is off, where that shows as the
+    #: tolerance
+    tip: Floats
+    axis_point: Floats
+    angle: Floats  #: (k,) degrees
+    share: Floats  #: (k,): where on the original move, 1 at its end
+    fraction: Floats  #: (k,): where on the written element, as in `written_at`; 0 for rows of original poses
+    pose: Ints  #: (k,): original pose that the original move leads to
+    element: Ints  #: (k,): written element that was sampled, -1 for rows of original poses
+    cl_line: Ints  #: (k,)
+    nc_line: Ints  #: (k,)
+
+    def __len__(self) -> int:
+        return len(self.way)
+
+
+def deviation_along(
+    program: Program,
+    nc: NcProgram,
+    *,
+    tolerance: float,
+    axis_length: float = 10.0,
+    axis_tolerance: float | None = None,
+    samples: int = 8,
+) -> Distribution:
+    """Measure the deviation at `samples` even parameters of every path element, and at every original pose.
+
+    It is that at the poses of the original that come nearest to tip and axis point together.
+    """
+    task = Task.of(program, tolerance, axis_length, axis_tolerance)
+    parts = [Distribution(*np.zeros((6, 0)), *np.zeros((4, 0), np.int64))]
+    for batch in Batches(task, nc.events, nc.retracts).of([nc]):
+        matched = Match.of(task, batch)
+        parts += [_of_elements(matched, batch.offset, samples), _of_poses(matched)]
+    found = joined_rows(parts)
+    return some_rows(found, np.argsort(found.way, kind="stable"))
+
+
+def _of_poses(match: Match) -> Distribution:
+    reached = of_original(match)
+    original = match.original
+    pose = original.pose[original.trail.owner[reached.vertex]]
+    nc_line = match.nc_lines(np.minimum(reached.place.astype(np.int64) + 1, len(match.six) - 1))
+    gap, way = reached.gap, match.path.length[reached.vertex]
+    share, none = original.trail.fraction[reached.vertex], np.zeros(len(pose))
+    places = pose, np.full(len(pose), -1), original.program.line[pose], nc_line
+    return Distribution(way, gap.tip, gap.axis_point, np.degrees(gap.angle), share, none, *places)
+
+
+def _of_elements(match: Match, offset: int, samples: int) -> Distribution:
+    last = match.motion.last
+    start, end = last[:-1], last[1:]
+    feeding = np.flatnonzero((match.section[start] == match.section[end]) & (match.section[end] >= 0))
+    # where the motions part places are those between the next that are known
+    known, count = np.flatnonzero(match.on), len(match.place)
+    filled = np.interp(np.arange(count), known, match.place[known]) if len(known) else 1.0 * match.low
+    element = np.repeat(feeding + match.first + 1, samples)
+    share = np.tile(np.arange(1, samples + 1) / samples, len(feeding))
+    tip, axis = written_at(match.nc, element, share)
+    # somewhere between the places of the element's ends
+    low, high = filled[start[feeding]], filled[end[feeding]]
+    place = np.repeat(low, samples) + share * np.repeat(high - low, samples)
+    vertex = np.repeat(end[feeding], samples)
+    limits = match.low[vertex], match.high[vertex]
+    middle = np.clip(place.astype(np.int64), *limits)
+    six = match.task.six(tip, axis)
+    place = nearest_places(six, match.path.points, middle, _REACH, *limits)
+    original = match.original
+    owner, fraction = original.move_at(place)
+    gap = Gap.of(match.task, six - match.task.six(*original.at(owner, fraction)))
+    way = match.path.lengths_at(place)
+    pose = original.pose[owner]
+    places = pose, element + offset, original.program.line[pose], match.nc.line[element]
+    return Distribution(way, gap.tip, gap.axis_point, np.degrees(gap.angle), fraction, share, *places)
+
 
 #: points on every line and on every curve or arc: so many in all, between the least and the most of each
 _POINTS = 6000
@@ -201,3 +293,35 @@ def _curvature(tip: Floats, end: Bools, rapid: Bools) -> Floats:
         turn = np.where(moving, angle_between(step[:-1], step[1:]), 0.0)
         found[1:-1] = np.divide(2.0 * turn, length[:-1] + length[1:], out=np.zeros_like(turn), where=moving)
     return found[np.minimum(np.searchsorted(vertex, np.arange(len(tip))), max(len(vertex) - 1, 0))]
+
+
+def thinned(points: Floats, weight: Floats, must: Bools, most: int) -> Ints:
+    """Rows (r,) of a path (n, 3) to keep, ascending: about so many at most, beside those that must stay.
+
+    Of every group of neighbours its first and last point are kept, the one farthest from the chord between them, and
+    the one of the largest weight, where NaN counts as nothing.
+    """
+    n = len(points)
+    if n <= most:
+        return np.arange(n)
+    size = -(-4 * n // most)
+    first = np.arange(0, n, size)
+    last = np.minimum(first + size, n) - 1
+    group = np.arange(n) // size
+    start = points[first][group]
+    chord = (points[last] - points[first])[group]
+    length, arm = norm(chord), points - start
+    off = np.where(length < 1e-9, norm(arm), norm(np.cross(arm, chord)) / np.maximum(length, 1e-12))
+    keep = must.copy()
+    keep[first] = keep[last] = True
+    for values in (off, np.nan_to_num(weight, nan=-1.0)):
+        keep[_largest(values, first, group)] = True
+    return np.flatnonzero(keep)
+
+
+def _largest(values: Floats, first: Ints, group: Ints) -> Ints:
+    """First row with the largest value in each group."""
+    top = np.maximum.reduceat(values, first)
+    rows = np.flatnonzero(values == top[group])
+    _, one = np.unique(group[rows], return_index=True)
+    return rows[one]

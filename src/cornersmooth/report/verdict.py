@@ -201,17 +201,14 @@ def limits_text(limits: Sequence[tuple[str, float]]) -> str:
     return f"; limited by {', '.join(parts)} of the cutting time" if parts else ""
 
 
-def times_text(seconds: Mapping[str, float], names: Sequence[str], limits: Sequence[tuple[str, float]] = ()) -> str:
-    """Say what smoothing saves of the planned time, and what limits the motion then.
+def times_text(seconds: Mapping[str, float], limits: Sequence[tuple[str, float]]) -> str:
+    """Say what the program as written saves of the planned time, and what limits the motion then.
 
-    Times are those of `feedrate.Comparison`, limits those of `feedrate.limiting`. The fastest is chosen from `names`:
-    methods, and the program as written.
+    Times are those of `feedrate.Comparison`, limits those of `feedrate.limiting`.
     """
-    stops, jumps = seconds["direct_exact_stop"], seconds["direct_velocity_jump"]
-    best = min(names, key=lambda name: seconds[name])
-    saved = jumps - seconds[best]
+    stops, jumps, written = (seconds[key] for key in ("direct_exact_stop", "direct_velocity_jump", "as_written"))
+    saved = jumps - written
     share = f" ({100.0 * abs(saved) / jumps:.0f} %)" if jumps else ""
     gain = f"saves {saved:.1f} s of" if saved >= 0.0 else f"takes {-saved:.1f} s more than"
-    best = best.replace("_", " ")
-    text = f"{best} {gain} the {jumps:.1f} s of the direct path{share}, which takes {stops:.1f} s with stops at corners"
-    return text + limits_text(limits)
+    direct = f"the {jumps:.1f} s of the direct path{share}, which takes {stops:.1f} s with stops at corners"
+    return f"as written {gain} {direct}{limits_text(limits)}"
