@@ -167,7 +167,7 @@ def test_several_holes_share_the_height_of_travel() -> None:
         f"{PLAIN}RAPID\nGOTO/0,0,20\nCYCLE/DRILL,FEDTO,5,IPM,10,RAPTO,2\nGOTO/10,0,0\nPPRINT next\nGOTO/20,0,8\n"
         "GOTO/30,0,19\nCYCLE/OFF\nRAPID\nGOTO/30,0,50\nFINI\n"
     )
-    holes = ["G0 20", "G0 2", "G1 -5", "G0 20"], ["G0 20", "G0 10", "G1 3", "G0 20"], ["G0 21", "G1 14", "G0 21"]
+    holes = ["G0 20", "G0 2", "G1 -5", "G0 20"], ["G0 20", "G0 10", "G1 3", "G0 21"], ["G0 21", "G1 14", "G0 21"]
     assert found == ["G0 20", *chain(*holes), "G0 50"]
     assert findings == {"CS316": 3}
 

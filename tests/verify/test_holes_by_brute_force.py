@@ -61,6 +61,8 @@ def is_drilled(holes: list[Hole], i: int, group: list[Element], before: Element)
         return False
     if i and holes[i - 1][0] != x and not entered and heights[0] < RETRACT + min(holes[i - 1][1] - z, 0.0):
         return False
+    if not entered and before[2] != group[0][2]:  # no rapid between holes goes aslant
+        return False
     fed = next(k for k, (code, *_) in enumerate(group) if code == "G1")
     if (heights[fed - 1] if fed else before[2] - z) > CLEARANCE:  # feeding begins there at the latest
         return False

@@ -244,7 +244,7 @@ def many_holes(count, dwell=()):
     program = said(cycle, Statement(count + 1, 4, "CYCLE", ("OFF",)), kind=kind, tip=tip)
     lines = ["G43.5 H1", ("G0", 0, 0, 20)]
     for x in range(0, 3 * count, 3):
-        lines += [("G0", x, 0, 2), ("G1", x, 0, -8), *(["G4 P500"] if dwell else []), ("G0", x, 0, 20)]
+        lines += [("G0", x, 0, 2), ("G1", x, 0, -8), *(["G4 P500"] if dwell else []), ("G0", x, 0, 2)]
     return program, [*lines, ("G0", 0, 0, 30)]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -251,3 +252,43 @@ def test_each_number_of_each_cycle_is_compared(control: str, cycle: str) -> None
     block, others = found[0], (*other_cycles(lines[found[0]], control), *kinds_of_cycle(lines[found[0]], control))
     wrong = [line for line in others if passes(text, control, (*lines[:block], line, *lines[block + 1 :]))]
     assert [line for line in wrong if not re.search(ALLOWED, line)] == []
+
+
+# ways between holes of different heights
+
+
+HEIGHTS = """LOADTL/3
+SPINDL/RPM,3000,CLW
+RAPID
+GOTO/5,5,2,0,0,1
+CYCLE/DRILL,FEDTO,12,RAPTO,3,RTRCTO,5,MMPM,200
+GOTO/5,5,0
+GOTO/15,5,30
+CYCLE/DRILL,FEDTO,10,RAPTO,2,RTRCTO,2,MMPM,200
+GOTO/25,5,40
+GOTO/35,5,20
+CYCLE/OFF
+RAPID
+GOTO/35,5,80
+SPINDL/OFF
+FINI
+"""
+
+
+@pytest.mark.parametrize("cycles", ["moves", "native"])
+@pytest.mark.parametrize("control", CONTROLS)
+def test_a_rapid_between_holes_never_goes_aslant(control: str, cycles: str) -> None:
+    rapids = [line for line in right(HEIGHTS, control, cycles) if re.match(r"G0|G43|\d+ LN? .*FMAX", line)]
+    found = (re.search(r" X\+?([\d.]+) .* Z\+?([\d.]+)", line) for line in rapids)
+    places = [(float(one[1]), float(one[2])) for one in found if one]
+    ways = [(one, other) for one, other in pairwise(places) if one[0] != other[0]]
+    # from the hole at 0 to that at 30, from there to that at 40, down to that at 20: at the higher height each time
+    assert ways == [((5.0, 35.0), (15.0, 35.0)), ((15.0, 42.0), (25.0, 42.0)), ((25.0, 42.0), (35.0, 42.0))]
+
+
+@pytest.mark.parametrize("control", CONTROLS)
+def test_the_way_across_to_the_next_hole_is_lost(control: str) -> None:
+    lines = right(HEIGHTS, control)
+    for x, z in ((15, 35), (35, 42)):
+        at = where(lines, rf"X\+?{x}\.?0* Y\+?5\.?0* Z\+?{z}(\.0*)?( |$)")
+        assert not passes(HEIGHTS, control, (*lines[:at], *lines[at + 1 :]))

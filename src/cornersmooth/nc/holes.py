@@ -2,8 +2,9 @@
 
 Plain moves run under tool tip control with any tool axis, where canned cycles are refused: rapid over the hole, rapid
 to the clearance, feed to the depth, out again. The tool travels between holes at the greatest of the cycle's heights
-and of the height from which the first hole was approached. ``DEEP`` retracts to the clearance after every ``STEP``,
-``INCR`` or ``1STPECK``/``SUBPECK``, ``BRKCHP`` by `PECK_GAP` only. ``REAM`` and ``BORE`` come out at feed.
+and of the height from which the first hole was approached: up, across at the higher of two such levels, down. ``DEEP``
+retracts to the clearance after every ``STEP``, ``INCR`` or ``1STPECK``/``SUBPECK``, ``BRKCHP`` by `PECK_GAP` only.
+``REAM`` and ``BORE`` come out at feed.
 
 Python runs per run of holes; per hole where the control has a cycle for it, or its words are not understood.
 """
@@ -45,6 +46,7 @@ class Holes:
     motion: Motion  #: what the moves over holes and into them are written by
     statements: StatementWriter  #: the cycle in force, and the spindle
     native: bool = False  #: whether holes are cycles of the control, where they can be
+    _left: tuple[int, Floats] = (-1, np.zeros(3))  #: the last hole, and the place (3,) above it where it was left, mm
 
     @cached_property
     def _approached(self) -> Ints:
@@ -64,12 +66,18 @@ class Holes:
             return
         travel = np.maximum(heights, max(cycle.retract, cycle.clearance or 0.0))
         clearance = travel if cycle.clearance is None else np.full(len(poses), cycle.clearance)
+        came = self._come_from(int(poses[0]))
+        self._left = int(poses[-1]), program.tip[poses[-1]] + travel[-1] * program.axis[poses[-1]]
         if kind:
-            self._cycles(cycle, kind, poses, travel, clearance)
+            self._cycles(cycle, kind, poses, travel, clearance, came)
             return
         motion.findings.note_each("CS316", program.line[poses])
         motion.warnings.of_holes(poses, -1 if motion.modals.comes_first else int(poses[0]) - 1, travel, clearance)
-        hole, tip, rapid, dwell = hole_moves(cycle, program, poses, travel, clearance)
+        enter, leave = crossings(program, poses, travel, came)
+        if travel[0] > came and motion.position is not None:
+            up = motion.at.lifted(motion.position, float(travel[0]) - came)
+            motion.emit(motion.moving(BlockRows.straight(program, up[None], poses[:1], rapid=True)))
+        hole, tip, rapid, dwell = hole_moves(cycle, program, poses, (enter, clearance, leave))
         feed, mode = hole_feeds(cycle, program, poses[hole])
         plain = BlockRows.straight(program, motion.ticks_at(rows, tip, hole), poses[hole])
         plain = motion.moving(replace(plain, rapid=rapid, dwell=dwell, feed=feed, mode=mode))
@@ -77,6 +85,14 @@ class Holes:
         waits = plain.dwell is not None and plain.dwell.any()
         line = self.statements.cycles.line
         motion.emit_above(plain, self.statements.dwell(cycle.dwell, line, per_turn=per_turn) if waits else ())
+
+    def _come_from(self, pose: int) -> float:
+        """Height over a hole, along its axis, at which the tool is over the one right before it, mm; NaN elsewhere."""
+        motion, program, (last, place) = self.motion, self.motion.program, self._left
+        away = motion.position is None or motion.modals["high"] or last != pose - 1
+        if away or dot(program.axis[last], program.axis[pose]) <= 1.0 - _SAME_AXIS:
+            return np.nan
+        return float((place - program.tip[pose]) @ program.axis[pose])
 
     def _cycle_of_control(self, cycle: Cycle | None, poses: Ints) -> tuple[str, str]:
         """Cycle of the control that drills holes, as `kind_of` names it; empty for none, and then why no tap can be.
@@ -98,8 +114,11 @@ class Holes:
             return "", f"a tap, and {where}"
         return kind if self.native or cycle.tap else "", ""
 
-    def _cycles(self, cycle: Cycle, kind: str, poses: Ints, travel: Floats, clearance: Floats) -> None:
-        """Write holes as cycles of the control, each from the height at which the tool goes from hole to hole."""
+    def _cycles(self, cycle: Cycle, kind: str, poses: Ints, travel: Floats, clearance: Floats, came: float) -> None:
+        """Write holes as cycles of the control, each from the height at which the tool goes from hole to hole.
+
+        The tool may have come from a hole, at a height over the first of these.
+        """
         motion, program = self.motion, self.motion.program
         lines = program.line[poses]
         motion.findings.note_each("CS347", lines)
@@ -112,7 +131,10 @@ class Holes:
         for k, (before, goes, blocks, over) in enumerate(made):
             if goes:
                 motion.say(before)
-                motion.emit(motion.moving(BlockRows.straight(program, over[None], poses[[k]], rapid=True)))
+                way = np.stack((over if motion.position is None else motion.position, over, over))
+                way[:2, 2] = way[:2, 2].max()
+                way = way if k or not np.isnan(came) else over[None]
+                motion.emit(motion.moving(BlockRows.straight(program, way, poses[[k] * len(way)], rapid=True)))
                 motion.say(motion.modals.go_on())
                 motion.say(motion.modals.set(feed_mode=mode))
             motion.say(blocks)
@@ -194,13 +216,14 @@ def _numbers(
 
 
 def hole_moves(
-    cycle: Cycle, program: Program, poses: Ints, travel: Floats, clearance: Floats
+    cycle: Cycle, program: Program, poses: Ints, above: tuple[Floats, Floats, Floats]
 ) -> tuple[Ints, Floats, Bools, Bools]:
     """Plain moves for holes of one cycle, m of them: the hole of each, its end (m, 3) mm, rapids, dwells after it.
 
-    Heights (h,) above the holes, mm: at which the tool goes from hole to hole, and where feeding begins.
+    Heights (h,) above the holes, mm: to which the tool comes, where feeding begins, and from which it goes.
     """
-    heights, rapid, dwell = [travel, clearance], [True, True], [False, False]
+    enter, clearance, leave = above
+    heights, rapid, dwell = [enter, clearance], [True, True], [False, False]
 
     def go(height: Floats, *, fast: bool) -> None:
         heights.append(height)
@@ -220,12 +243,26 @@ def hole_moves(
     dwell[-1] = cycle.dwell > 0
     if cycle.feed_out:
         go(clearance, fast=False)
-    go(travel, fast=True)
+    go(leave, fast=True)
     height = np.stack(heights, axis=1)
     tip = program.tip[poses][:, None, :] + height[..., None] * program.axis[poses][:, None, :]
     count = len(poses)
     hole = np.repeat(np.arange(count), len(rapid))
     return hole, tip.reshape(-1, 3), np.tile(rapid, count), np.tile(dwell, count)
+
+
+def crossings(program: Program, poses: Ints, travel: Floats, came: float) -> tuple[Floats, Floats]:
+    """(h,) mm: heights over holes at which the tool comes to each and goes from it, between two at the higher travel.
+
+    It may come from a hole with the same axis, at a height over the first one of these; NaN where it does not.
+    """
+    tip, axis = program.tip[poses], program.axis[poses]
+    down = dot(tip[:-1] - tip[1:], axis[1:])  # to the next, along the tool
+    same = dot(axis[:-1], axis[1:]) > 1.0 - _SAME_AXIS
+    before = np.append(came, np.where(same, travel[:-1] + down, np.nan))
+    enter = np.fmax(travel, before)
+    leave = np.append(np.where(same, enter[1:] - down, travel[:-1]), travel[-1:])
+    return enter, leave
 
 
 def travel_height(program: Program, poses: Ints, approach: Ints) -> Floats:

@@ -147,6 +147,23 @@ class HoleLines:
         tip, axis = (np.linalg.norm(values[first:stop] - values[first], axis=1) for values in (self.tip, self.axis))
         return bool(max(tip.max(), self.axis_length * axis.max()) > self.room)
 
+    def slant(self, move: int, element: int) -> float:
+        """Height, mm, that a rapid loses on its way from beside a hole to above it, or gains between two holes.
+
+        Zero where it leads from one pose of the CL file to the other, and where the tool turns.
+        """
+        nc, own = self.ahead.nc, np.array([element - 1, element]) - self.ahead.base
+        if not 0 <= own[0] < len(nc) - 1 or self.feeds(element):
+            return 0.0
+        if move and self.at(move - 1, element - 1) and self.at(move, element):
+            return 0.0
+        way, axis = nc.tip[own[1]] - nc.tip[own[0]], self.axis[move]
+        along = float(way @ axis)
+        turned = np.linalg.norm(np.diff(directions(nc, nc.tip[own], nc.second[own]), axis=0)) * self.axis_length
+        rises = along > 0.0 and self.kind[max(move - 1, 0)] != Move.HOLE
+        none = rises or turned > 2 * self.room or np.linalg.norm(way - along * axis) <= self.room
+        return 0.0 if none else max(abs(along) - 2 * self.room - float(nc.tip_room[own].sum()), 0.0)
+
     def _carries(self, element: int, feed: float, *, per_revolution: bool) -> bool:
         """Whether an element has a feed."""
         return bool(self.ahead.nc.carry(element - self.ahead.base, feed, per_revolution))

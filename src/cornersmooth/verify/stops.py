@@ -371,6 +371,9 @@ class Stops:
         if (before < -lines.room or not there.inside) and self._ahead.has(element) and not lines.feeds(element):
             there.end += lines.height(move, element) > before  # the way up is the hole's, wherever else it leads
         found, left = lines.check(move, range(trace.begin, there.end), self._cycles[move])
+        if self._along.next_retract(trace.begin) != trace.begin and (slant := lines.slant(move, trace.begin)):
+            text = f"a rapid goes aslant to a hole, {slant:.4f} mm: across at the higher level, then down"
+            found.append(lines.problem("CS563", move, trace.begin, text, slant))
         if there.stop > k and not self._done(k, element):
             found.append(lines.problem("CS535", move + 1, element - 1, "feed moves of the CL file are missing"))
         there.problems, there.cost = tuple(found), (trace.cost[0] + len(found), trace.cost[1] + left)
