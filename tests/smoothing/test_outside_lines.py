@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cornersmooth.model import Floats, Ints
 from cornersmooth.smoothing.long_lines import LineLimits, Vertices, fewest_lines
-from cornersmooth.smoothing.outside_lines import lines_outside
+from cornersmooth.smoothing.outside_lines import faster_lines
 
 HEIGHT, TOLERANCE, RADIUS = 10.0, 0.01, 20.0
 
@@ -46,6 +47,28 @@ def off(rows: Vertices, moved: Vertices, kept: np.ndarray) -> np.ndarray:
     lever = HEIGHT * (axis_of(words) - axis_of(rows.words))
     away = tip - rows.tip
     return np.maximum(np.linalg.norm(away, axis=1), np.linalg.norm(away + lever, axis=1))
+
+
+def lines_outside(rows: Vertices, limits: LineLimits) -> tuple[Vertices, Ints]:
+    """Lines of a control to which every line takes a second."""
+    return faster_lines(rows, limits, lambda rows, kept: np.arange(len(kept), dtype=np.float64))
+
+
+def test_lines_are_beside_the_path_only_where_they_are_faster() -> None:
+    """Two arcs, the second of which takes longer where its ends are off the path."""
+    rows = arc(401, fixed=(200,))
+
+    def reached(some: Vertices, kept: Ints) -> Floats:
+        slow = np.abs(some.tip - rows.tip)[201:].max() > 0.0
+        return np.where(kept > 200, 1e3 if slow else 500.0, np.arange(len(kept)))
+
+    moved, kept = faster_lines(rows, LIMITS, reached)
+    radius = np.hypot(*moved.tip[:, :2].T)
+    assert (radius[kept[(kept > 0) & (kept < 200)]] > RADIUS + 0.5 * TOLERANCE).all()
+    assert np.array_equal(moved.tip[200:], rows.tip[200:])
+    on_path = fewest_lines(rows, LIMITS)
+    assert np.array_equal(kept[kept >= 200], on_path[on_path >= 200])
+    assert off(rows, moved, kept).max() <= TOLERANCE * (1.0 + 1e-9)
 
 
 def test_ends_on_an_arc_are_as_far_outside_as_lines_are_inside() -> None:

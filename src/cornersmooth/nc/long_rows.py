@@ -10,12 +10,14 @@ import numpy as np
 
 from cornersmooth.arrays.vectors import unit
 from cornersmooth.kinematics import tip_position, tool_axis
+from cornersmooth.kinematics.machine import LINEAR
 from cornersmooth.methods import METHODS
 from cornersmooth.model import Bools, Floats, Ints, SmoothProgram
 from cornersmooth.nc.form import Form
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.blending import largest_blends
 from cornersmooth.smoothing.long_lines import LineLimits, Vertices, fewest_lines, segments_of_rows, vertices
+from cornersmooth.smoothing.outside_lines import faster_lines
 from cornersmooth.smoothing.sampling import ArcBlocks, Rows, all_dense_rows
 
 #: rows handed on at a time: many long lines are tested at once
@@ -61,18 +63,46 @@ def line_limits(settings: Settings, form: Form, largest_turn: float = 0.0) -> Li
     )
 
 
-def corner_blends(
-    rows: Vertices, kept: Ints, usual: Bools, limits: LineLimits, settings: Settings, form: Form
-) -> Floats | None:
-    """How far the control may round the corner at each kept row, mm: the usual blend at rapids and arcs.
+def has_law(form: Form) -> bool:
+    """Whether it is known when the control, which rounds corners of lines by itself, reaches the end of each."""
+    machine, style = form.machine, form.table.lines
+    known = set() if machine is None else {axis.name for axis in machine.dynamics}
+    return (
+        machine is not None and bool(style.rounding and style.planner) and known.issuperset((*LINEAR, *machine.names))
+    )
 
-    None where one holds for all.
+
+def rounded_lines(
+    rows: Vertices, usual: Bools, feed: Floats, limits: LineLimits, settings: Settings, form: Form, *, placed: bool
+) -> tuple[Vertices, Ints, Floats | None]:
+    """Rows, those (k,) at which lines end, and how far the control may round corners there.
+
+    That is in mm, None where one value holds for all; at rows (r,) that are `usual` it is that of the settings. Rows
+    that are `placed` are moved off the path where lines are faster so, with `feed` (r,) in mm/s, inf for none.
     """
     style = form.table.lines
-    if not style.rounding:
-        return None
-    found = largest_blends(rows, kept, limits, settings.tolerance, style.executed_share * settings.tolerance)
-    return np.where(usual, limits.blend, found)
+
+    def blends(rows: Vertices, kept: Ints) -> Floats:
+        found = largest_blends(rows, kept, limits, settings.tolerance, style.executed_share * settings.tolerance)
+        return np.where(usual[kept], limits.blend, found)
+
+    def ends_reached(rows: Vertices, kept: Ints) -> Floats:
+        from cornersmooth.feedrate.linuxcnc import Lines, axis_limits, line_times  # with all of feedrate
+
+        assert form.machine is not None
+        place = np.zeros((len(kept), 6))
+        place[:, [*range(3), *map("XYZABC".index, form.machine.names)]] = np.hstack((rows.tip, rows.words))[kept]
+        moves = np.flatnonzero((np.diff(place, axis=0) != 0.0).any(axis=1))
+        lines = Lines(place[moves], place[moves + 1], feed[kept[moves + 1]], blends(rows, kept)[moves + 1])
+        time = np.zeros(len(kept))
+        time[moves + 1] = line_times(lines, axis_limits(form.machine))[1]
+        return np.maximum.accumulate(time)
+
+    if placed:
+        rows, kept = faster_lines(rows, limits, ends_reached)
+    else:
+        kept = fewest_lines(rows, limits)
+    return rows, kept, blends(rows, kept) if style.rounding else None
 
 
 def long_rows(rows: Rows, smoothed: SmoothProgram, form: Form) -> Iterator[Rows]:

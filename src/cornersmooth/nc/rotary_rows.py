@@ -15,14 +15,13 @@ from cornersmooth.methods import METHODS
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program, SmoothProgram
 from cornersmooth.nc.circles import ArcAngles
 from cornersmooth.nc.form import TIP_SHARE, Form
-from cornersmooth.nc.long_rows import LONG_CHUNK, corner_blends, line_limits
+from cornersmooth.nc.long_rows import LONG_CHUNK, has_law, line_limits, rounded_lines
 from cornersmooth.nc.messages import Findings
 from cornersmooth.nc.rotary_words import RotaryWay, machine_of
 from cornersmooth.nc.statement_args import ToolTravel
 from cornersmooth.rotary import FilledPath, fill, insertions, rapid_moves
 from cornersmooth.settings import TIMED_POSES, Settings
 from cornersmooth.smoothing.long_lines import LineLimits, Vertices, fewest_lines, segments_of_rows, vertices
-from cornersmooth.smoothing.outside_lines import lines_outside
 from cornersmooth.smoothing.sampling import Rows
 from cornersmooth.text import to_ticks
 
@@ -47,7 +46,7 @@ INVERSE_TIME_DECIMALS = 3
 
 #: parts of a long step at whose ends lines may end, and how long it is beside the longer one of its
 #: neighbours, and beside what the axis turns at the axis point
-_STATIONS, _LONG_STEP = 4, 0.1
+_STATIONS, _LONG_STEP = 2, 0.1
 
 #: turns below this many degrees are none
 _NO_TURN = 1e-9
@@ -74,6 +73,8 @@ def rotary_rows(
     machine, travel = machine_of(form).with_longest_tool(), ToolTravel(program, machine_of(form))
     max_step = largest_turn(settings)
     limits = line_limits(settings, form, max_step)
+    # in long programs as many lines take too long to find
+    placed = has_law(form) and limits.tip_of is None and len(program) <= TIMED_POSES
     timed = _timed_cuts(way.angles, way.move, program) if form.orientation == "machine" else None
     size = LONG_CHUNK if long else _CHUNK
     for begin in range(0, max(len(way.move) - 1, 1), size):
@@ -100,16 +101,14 @@ def rotary_rows(
         chunk = _Chunk(move, start, at_pose, stays, left, None if timed is None else timed[here])
         blend = None
         if long:
-            # in long programs as many lines take too long to find
-            outside = form.table.lines.rounding and limits.tip_of is None and len(program) <= TIMED_POSES
-            if outside:
+            if placed:
                 cut = (program.kind[move] == Move.LINEAR) & ~way.free[here]
                 filled = _with_stations(filled, cut[filled.pose], limits)
+            usual = (way.free[here] | _beside_arcs(move, program))[filled.pose]
+            feed = np.where(way.free[here] | ~_cuts(move, program), np.inf, program.feed[move] / 60.0)[filled.pose]
             found = chunk.vertices(filled, smoothed)
-            found, kept = lines_outside(found, limits) if outside else (found, fewest_lines(found, limits))
+            found, kept, blend = rounded_lines(found, usual, feed, limits, settings, form, placed=placed)
             filled = some_rows(replace(filled, tip=found.tip, angles=found.words), kept)
-            usual = way.free[here][filled.pose] | _beside_arcs(move[filled.pose], program)
-            blend = corner_blends(found, kept, usual, limits, settings, form)
         own = slice(1 if begin else 0, None)
         filled, rate = _timed(filled, chunk, own, smoothed, form, limits, findings)
         pose, inserted = filled.pose[own], filled.inserted[own]

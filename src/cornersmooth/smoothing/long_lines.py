@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -138,18 +139,24 @@ def _fixed(smoothed: SmoothProgram, move: Ints, at_pose: Bools) -> Bools:
 
 
 def fewest_lines(rows: Vertices, limits: LineLimits, lane: int = LANE) -> Ints:
-    """Rows at which lines end, ascending, the first and the last row among them, and each after `lane` others.
-
-    The farthest row from each vertex is found by doubling and halving, in all parts between fixed rows at once.
-    """
+    """Rows at which lines end, ascending, the first and the last row among them, and each after `lane` others."""
     count = len(rows.parameter)
     if count < 3:
         return np.arange(count)
     ends = rows.fixed.copy()
     ends[::lane] = True
+    return without_lag(rows, limits, farthest(ends, partial(_reaches, rows, limits)))
+
+
+def farthest(ends: Bools, reaches: Callable[[Ints, Ints], Bools]) -> Ints:
+    """Rows at which lines end, ascending: of (r,) those that are `ends`, and each that is the farthest from the last.
+
+    It is found by doubling and halving, in all parts between ends at once. `reaches` says whether lines lead from rows
+    (q,) to others (q,), the next of which they always reach.
+    """
     begin = np.flatnonzero(ends)
     at, stop = begin[:-1].copy(), begin[1:].copy()
-    kept = ends
+    kept = ends.copy()
     near, beyond = at + 1, stop + 1  # the farthest row known to be reached, the nearest known not to be
     while len(at):
         done = beyond - near == 1
@@ -162,10 +169,10 @@ def fewest_lines(rows: Vertices, limits: LineLimits, lane: int = LANE) -> Ints:
         untried = beyond > stop
         target = np.where(untried, np.minimum(2 * near - at, stop), (near + beyond) // 2)
         target = np.where(near == stop, stop, target)
-        good = _reaches(rows, limits, at, target)
+        good = reaches(at, target)
         near = np.where(good, target, near)
         beyond = np.where(good, np.where(target == stop, stop + 1, beyond), target)
-    return _without_lag(rows, limits, np.flatnonzero(kept))
+    return np.flatnonzero(kept)
 
 
 def lags(tip: Floats, lever: Floats, blend: float) -> Floats:
@@ -187,7 +194,7 @@ def lags(tip: Floats, lever: Floats, blend: float) -> Floats:
     return found
 
 
-def _without_lag(rows: Vertices, limits: LineLimits, kept: Ints) -> Ints:
+def without_lag(rows: Vertices, limits: LineLimits, kept: Ints) -> Ints:
     """Rows beside vertices at which the axis point would lag too far are vertices too: short lines bound it."""
     for _ in range(_ROUNDS if np.isfinite(limits.lag) and len(kept) > 2 else 0):
         lever = limits.axis_length * limits.axis_of(rows.words[kept])

@@ -5,91 +5,190 @@ tolerance only. So chords may be nearly twice as far off, and their ends move ou
 they are a linear spline that is nearest to the path in the maximum norm, by least squares that are weighted anew
 (Lawson 1961). A chord is off an even bend by 4u(1 − u) of its sagitta, of which Chebyshev's weight has the mean ½: so
 that is what they begin with.
+
+Each line is as long as that lets it be. The axis point moves evenly with words that are so near to the path.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
-from cornersmooth.arrays import Floats, Ints
 from cornersmooth.arrays.slices import some_rows
-from cornersmooth.arrays.vectors import norm
-from cornersmooth.smoothing.long_lines import LANE, LineLimits, Vertices, fewest_lines
+from cornersmooth.arrays.vectors import norm, square
+from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.smoothing.long_lines import LANE, LineLimits, Vertices, farthest, fewest_lines, without_lag
 
 #: times the limits that chords may be off: moving their ends does not balance them perfectly
 _CHORD = 1.8
 
-#: rows after which a line ends in any case: there are stations between
-_LANE = 4 * LANE
+#: rows after which a line ends on the path in any case
+_LANE = 2 * LANE
+
+#: places at which a line is compared with the path while rows to lead it to are tried
+_INSIDE = 5
 
 #: rounds of weighting anew, the least weight of what is nowhere near the limits, and the share next to an end of a line
-_WEIGHTS, _LEAST_WEIGHT, _NEXT = 12, 0.3, 1e-3
+_WEIGHTS, _LEAST_WEIGHT, _NEXT = 8, 0.3, 1e-3
 
 #: rounds of making lines shorter where moving them does not bring them within the limits; by what chords come nearer
 _ROUNDS, _NEARER = 8, 0.85
 
+#: degrees or parts of a vector by which words change for their effect on the axis point
+_LITTLE = 1e-4
 
-def lines_outside(rows: Vertices, limits: LineLimits) -> tuple[Vertices, Ints]:
+
+def faster_lines(
+    rows: Vertices, limits: LineLimits, ends_reached: Callable[[Vertices, Ints], Floats]
+) -> tuple[Vertices, Ints]:
+    """Vertices of which some were moved off the path, where lines are faster so, and rows (k,) at which lines end.
+
+    Rows that are `fixed`, and one of so many others, stay on the path, and lines are compared between these.
+    `ends_reached` says when the control reaches the ends of lines (k,), s.
+    """
+    if len(rows.parameter) < 3 or rows.parameter[-1] <= rows.parameter[0]:  # one line, or a tool that stands
+        return rows, fewest_lines(rows, limits)
+    stays, near = _staying(rows), _Near.of(rows, limits)
+    straight = farthest(stays, partial(_reaches, near, np.ones(len(stays)), limits.turn))
+    moved, outside = _outside(rows, near, limits, stays)
+    before, after = (
+        np.diff(ends_reached(some, kept)[stays[kept]])  # from one row that stays to the next
+        for some, kept in ((rows, without_lag(rows, limits, straight)), (moved, outside))
+    )
+    faster = np.append(after < before, False)[np.cumsum(stays) - 1]
+    own = np.flatnonzero(~faster | stays)
+    ends = np.zeros(len(stays), np.bool_)
+    ends[own[fewest_lines(replace(some_rows(rows, own), fixed=stays[own]), limits)]] = True
+    ends[outside[faster[outside]]] = True
+    tip, words = (np.where(faster[:, None], *both) for both in ((moved.tip, rows.tip), (moved.words, rows.words)))
+    return replace(rows, tip=tip, words=words), np.flatnonzero(ends)
+
+
+def _staying(rows: Vertices) -> Bools:
+    """(r,) rows that stay on the path: the `fixed` ones, the ends, and some between them."""
+    stays = rows.fixed.copy()
+    stays[::_LANE] = stays[-1:] = True
+    return stays
+
+
+def _outside(rows: Vertices, near: _Near, limits: LineLimits, stays: Bools) -> tuple[Vertices, Ints]:
     """Vertices of which some were moved off the path, and the rows (k,) at which lines end, ascending.
 
-    Rows that are `fixed` stay on the path. Where lines cannot be moved to within the limits, they are on the path.
+    Where lines cannot be moved to within the limits, they are on the path.
     """
-    count = len(rows.parameter)
-    if count < 3 or rows.parameter[-1] <= rows.parameter[0]:  # one line, or a tool that stands
-        return rows, fewest_lines(rows, limits)
-    fixed, room = rows.fixed.copy(), np.full(count, _CHORD)
-    fixed[::_LANE] = fixed[-1] = True
-    rows, part = replace(rows, fixed=fixed), np.cumsum(fixed)
-    place, ends, again = np.hstack((rows.tip, rows.words)), np.zeros(count, np.bool_), np.arange(count)
-    for number in range(_ROUNDS + 1):
-        some = replace(some_rows(rows, again), room=room[again] if number < _ROUNDS else None)
-        kept = fewest_lines(some, limits, _LANE)
+    ends, room = np.zeros(len(stays), np.bool_), np.full(len(stays), _CHORD)
+    part, place, again = np.cumsum(stays), near.place.copy(), np.arange(len(stays))
+    for _ in range(_ROUNDS):
+        some, own = some_rows(near, again), some_rows(rows, again)
+        kept = farthest(stays[again], partial(_reaches, some, room[again], limits.turn))
+        kept = without_lag(own, limits, kept)
         ends[again] = False
         ends[again[kept]] = True
-        if some.room is None:
-            place[again] = np.hstack((some.tip, some.words))
-            break
-        place[again[kept]], off = _moved(some, kept, limits)
-        far = (off > 1.0) & (np.diff(kept) > 1)  # no line is shorter than from one row to the next
+        line, share = _shares(own, kept)
+        place[again[kept]] = _moved(some, kept, stays[again[kept]], line, share)
+        off = _off(own, limits, _along(place[again[kept]], line, share))
+        far = (np.maximum.reduceat(off[:-1], kept[:-1]) > 1.0) & (np.diff(kept) > 1)  # else from one row to the next
         if not far.any():
             break
         beside = np.convolve(far, np.ones(3))[1:-1] > 0.5
         room[again[np.append(np.repeat(beside, np.diff(kept)), False)]] *= _NEARER
         # all lines between two ends that stay are looked for anew
         parts = np.unique(part[again[kept[:-1][far]]])
-        again = again[np.isin(part[again], parts) | (fixed[again] & np.isin(part[again] - 1, parts))]
+        again = again[np.isin(part[again], parts) | (stays[again] & np.isin(part[again] - 1, parts))]
+    else:
+        ends[again] = False
+        ends[again[fewest_lines(replace(some_rows(rows, again), fixed=stays[again]), limits)]] = True
+        place[again] = near.place[again]
     return replace(rows, tip=place[:, :3], words=place[:, 3:]), np.flatnonzero(ends)
 
 
-def _moved(rows: Vertices, kept: Ints, limits: LineLimits) -> tuple[Floats, Floats]:
-    """(k, d) tips and words of the ends of lines where they are nearest to the path, and (k − 1,) what lines are off.
-
-    That is in shares of the limits.
-    """
-    pinned, s = np.flatnonzero(rows.fixed[kept]), rows.parameter[kept]
-    line = np.append(np.repeat(np.arange(len(kept) - 1), np.diff(kept)), len(kept) - 2)  # of each row
+def _shares(rows: Vertices, kept: Ints) -> tuple[Ints, Floats]:
+    """(r,) the line between rows at which lines end that each row is on, and how far along it."""
+    line, s = np.append(np.repeat(np.arange(len(kept) - 1), np.diff(kept)), len(kept) - 2), rows.parameter[kept]
     length = np.diff(s)
-    share = (rows.parameter - s[line]) / np.where(length > 0.0, length, 1.0)[line]
-    data = np.hstack((rows.tip, rows.words))
-    best, least, found = data[kept], np.full(len(pinned) - 1, np.inf), np.zeros(len(kept) - 1)
-    gaps = np.diff(rows.parameter, prepend=rows.parameter[0], append=rows.parameter[-1])
+    return line, (rows.parameter - s[line]) / np.where(length > 0.0, length, 1.0)[line]
+
+
+def _along(ends: Floats, line: Ints, share: Floats) -> Floats:
+    """(r, d) places on lines."""
+    return ends[line] + share[:, None] * np.diff(ends, axis=0)[line]
+
+
+@dataclass(frozen=True)
+class _Near:
+    """What tip and axis point are off where words are all but those of the path, r rows."""
+
+    place: Floats  #: (r, 3 + d) tips and words
+    parameter: Floats  #: (r,)
+    tip_off: Floats  #: (r, 3) from the original motion, over the limit
+    axis_point_off: Floats  #: (r, 3)
+    effect: Floats  #: (r, 3, d) that words have on the axis point, over the limit
+    scale: tuple[float, float]  #: one over the limits of tip and axis point
+
+    @classmethod
+    def of(cls, rows: Vertices, limits: LineLimits) -> _Near:
+        axis, (of_tip, of_axis) = limits.axis_of(rows.words), (1.0 / limits.tip, 1.0 / limits.axis_point)
+        changed = rows.words[None] + _LITTLE * np.eye(rows.words.shape[1])[:, None]
+        effect = [(limits.axis_of(words) - axis) * (limits.axis_length * of_axis / _LITTLE) for words in changed]
+        tip_off = of_tip * (rows.tip - rows.original_tip)
+        axis_point = rows.tip + limits.axis_length * axis
+        return cls(
+            np.hstack((rows.tip, rows.words)),
+            rows.parameter,
+            tip_off,
+            of_axis * (axis_point - rows.original_axis_point),
+            np.stack(effect, axis=-1),
+            (of_tip, of_axis),
+        )
+
+    def off(self, row: slice | Ints, place: Floats) -> Floats:
+        """(...,) share of the limits in use where tips and words of rows are some others (..., 3 + d)."""
+        away = place - self.place[row]
+        tip, effect = away[..., :3], self.effect[row]
+        axis_point = self.axis_point_off[row] + self.scale[1] * tip
+        for word in range(effect.shape[-1]):
+            axis_point += effect[..., word] * away[..., 3 + word, None]
+        return np.sqrt(np.maximum(square(self.tip_off[row] + self.scale[0] * tip), square(axis_point)))
+
+
+def _reaches(near: _Near, room: Floats, turn: float, begin: Ints, end: Ints) -> Bools:
+    """(q,) whether lines between rows are off by no more than the room of some rows inside."""
+    inside = begin + (end - begin) * np.arange(1, _INSIDE + 1)[:, None] // (_INSIDE + 1)
+    way, low = near.place[end] - near.place[begin], near.parameter[begin]
+    share = (near.parameter[inside] - low) / np.maximum(near.parameter[end] - low, np.finfo(np.float64).tiny)
+    off = near.off(inside, near.place[begin] + share[..., None] * way)
+    far = (off > room[inside]).any(axis=0) | (np.abs(way[:, 3:]).max(axis=1, initial=0.0) > turn)
+    return ~far | (end == begin + 1)
+
+
+def _moved(near: _Near, kept: Ints, stays: Bools, line: Ints, share: Floats) -> Floats:
+    """(k, d) tips and words of the ends of lines where they are nearest to the path."""
+    pinned = np.flatnonzero(stays)
+    best, least = near.place[kept], np.full(len(pinned) - 1, np.inf)
+    gaps = np.diff(near.parameter, prepend=near.parameter[0], append=near.parameter[-1])
     weight = (gaps[1:] + gaps[:-1]) / np.sqrt(np.maximum(share * (1.0 - share), _NEXT))
     for _ in range(_WEIGHTS):
         weight *= len(weight) / weight.sum()
-        at = _fitted(data, kept, line, share, weight, pinned)
-        off = _off(rows, limits, at, line, share)
-        of_lines = np.maximum.reduceat(off[:-1], kept[:-1])
-        worst = np.maximum.reduceat(of_lines, pinned[:-1])  # of lines between two ends that stay
-        better = np.repeat(worst < least, np.diff(pinned))
+        at = _fitted(near.place, kept, line, share, weight, pinned)
+        off = near.off(slice(None), _along(at, line, share))
+        worst = np.maximum.reduceat(off[:-1], kept[pinned[:-1]])  # between two ends that stay
+        inner = np.append(np.repeat(worst < least, np.diff(pinned)), False)
         least = np.minimum(worst, least)
-        found[better] = of_lines[better]
-        inner = np.append(better, False)
         best[inner] = at[inner]
         weight *= np.maximum(off, _LEAST_WEIGHT)
-    best[pinned] = data[kept[pinned]]
-    return best, found
+    best[pinned] = near.place[kept[pinned]]
+    return best
+
+
+def _off(rows: Vertices, limits: LineLimits, place: Floats) -> Floats:
+    """(r,) share of the limits in use at rows whose tips and words are others (r, 3 + d)."""
+    tip = place[:, :3]
+    axis_point = tip + limits.axis_length * limits.axis_of(place[:, 3:])
+    off_tip, off_axis_point = norm(tip - rows.original_tip), norm(axis_point - rows.original_axis_point)
+    return np.maximum(off_tip / limits.tip, off_axis_point / limits.axis_point)
 
 
 def _fitted(data: Floats, kept: Ints, line: Ints, share: Floats, weight: Floats, pinned: Ints) -> Floats:
@@ -103,20 +202,11 @@ def _fitted(data: Floats, kept: Ints, line: Ints, share: Floats, weight: Floats,
     bands[1, 1:] += of_lines[:, 1]
     wanted[:-1] = of_left
     wanted[1:] += of_right
-    stiff = np.full(len(kept), 1e-9 * bands[1].max())
-    stiff[pinned] *= 1e18
+    stiff = 1e-9 * bands[1]
+    stiff[pinned] = 1e9 * bands[1].max()
     bands[1] += stiff
     wanted += stiff[:, None] * data[kept]
     from scipy.linalg import solveh_banded  # it loads longer than all else of a short run
 
     found: Floats = solveh_banded(bands, wanted, check_finite=False)
     return found
-
-
-def _off(rows: Vertices, limits: LineLimits, ends: Floats, line: Ints, share: Floats) -> Floats:
-    """(r,) share of the limits in use at rows, at their shares of lines."""
-    place = ends[line] + share[:, None] * (ends[line + 1] - ends[line])
-    tip = place[:, :3]
-    axis_point = tip + limits.axis_length * limits.axis_of(place[:, 3:])
-    off_tip, off_axis_point = norm(tip - rows.original_tip), norm(axis_point - rows.original_axis_point)
-    return np.maximum(off_tip / limits.tip, off_axis_point / limits.axis_point)
