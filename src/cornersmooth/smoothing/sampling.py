@@ -128,7 +128,7 @@ class _Layout:
         arcs: ArcBlocks | None = None,
     ) -> _Layout:
         program = smoothed.program
-        segments = segments_of(smoothed, dense=divide)
+        segments = segments_of(smoothed, dense=divide, curves=curves)
         halves = np.zeros(0, np.int32) if curves else lines_per_half(smoothed)
         runs, replaced = _of_runs(smoothed, curves=curves)
         segments.lines[replaced] = 1
@@ -229,6 +229,8 @@ def _fill_curves(smoothed: SmoothProgram, segments: Segments, batch: _Batch) -> 
     pose, first = batch.poses[here], batch.last[here] - 5
     row, at = segments.row[pose].astype(np.int64), first[:, None] + np.arange(5)
     tip, top = nurbs.control_points(smoothed.program, corners, row, smoothed.settings.axis_length)
+    if segments.axis_entry is segments.entry:
+        _meet(smoothed, segments, row, tip, top)
     rows.tip[at], rows.other[at], rows.curve[at] = tip, top, np.arange(1, 6)
     assert rows.spline is not None
     rows.spline[at, 0], rows.spline[at[:, -1], 2] = KNOTS, 1.0
@@ -236,6 +238,19 @@ def _fill_curves(smoothed: SmoothProgram, segments: Segments, batch: _Batch) -> 
     line = segments.has_line[pose]
     rows.joined[first] = ~line
     rows.tip[first[line] - 1], rows.other[first[line] - 1] = tip[line, 0], top[line, 0]
+
+
+def _meet(smoothed: SmoothProgram, segments: Segments, row: Ints, tip: Floats, top: Floats) -> None:
+    """Let control points (g, 5, 3) of transitions begin and end where these meet their neighbours, in place."""
+    program, corners = smoothed.program, smoothed.corners
+    ends = (0, corners.pose[row], segments.exit), (-1, corners.after[row], segments.entry)
+    for end, segment, fraction in ends:
+        meets = np.flatnonzero(~segments.has_line[segment])
+        own = segment[meets]
+        start, share = segments.start[own], fraction[own, None]
+        tip[meets, end] = program.tip[start] + share * (program.tip[own] - program.tip[start])
+        axis = program.axis[start] + share * (program.axis[own] - program.axis[start])
+        top[meets, end] = tip[meets, end] + smoothed.settings.axis_length * axis
 
 
 def nodes(lines: int) -> Floats:

@@ -39,6 +39,9 @@ _BEND_PER_CHORD = 1.0 / PAPER_ERROR
 #: largest product of a line's turn and the tangent of half the segment's, rad, where the axis turns by more than 90°
 _STEEP = 0.25
 
+#: straight remainder between two curves that is none, over the shorter one of their legs beside it
+_SHORT = 0.5
+
 #: poses or corners measured at once: their intermediate arrays fit the processor's cache
 _BATCH = 16384
 
@@ -61,8 +64,11 @@ class Segments:
     lines: Numbers  # lines it is written in
 
 
-def segments_of(smoothed: SmoothProgram, *, dense: bool) -> Segments:
-    """Lay out the smoothed motion; straight remainders are divided into several lines only for `dense` output."""
+def segments_of(smoothed: SmoothProgram, *, dense: bool, curves: bool = False) -> Segments:
+    """Lay out the smoothed motion; straight remainders are divided into several lines only for `dense` output.
+
+    Between `curves` there are no short ones: two neighbours go on to the middle of what would be left.
+    """
     program, corners = smoothed.program, smoothed.corners
     n = len(program)
     row = np.full(n, -1, np.int32)
@@ -89,7 +95,7 @@ def segments_of(smoothed: SmoothProgram, *, dense: bool) -> Segments:
     segments = Segments(row, skip, start, entry, leave, axis_entry, axis_leave, has_line, lines)
     for begin in range(0, n, _BATCH):
         poses = begin + np.flatnonzero(linear[begin : begin + _BATCH] & ~skip[begin : begin + _BATCH])
-        _measure_remainders(smoothed, segments, poses, dense=dense)
+        _measure_remainders(smoothed, segments, poses, dense=dense, meet=curves and axis_entry is entry)
     return segments
 
 
@@ -103,8 +109,12 @@ def _ends(
     return np.where(linear, entry[known], 0.0), leave
 
 
-def _measure_remainders(smoothed: SmoothProgram, segments: Segments, poses: Ints, *, dense: bool) -> None:
-    """Set `has_line` and `lines` of the segments for some poses that are reached by linear moves."""
+def _measure_remainders(smoothed: SmoothProgram, segments: Segments, poses: Ints, *, dense: bool, meet: bool) -> None:
+    """Set `has_line` and `lines` of the segments for some poses that are reached by linear moves.
+
+    Transitions `meet` where they may go further along a straight: the point that their parameter belongs to moves along
+    it, and the deviation there stays as it is.
+    """
     program, settings = smoothed.program, smoothed.settings
     start = segments.start[poses]
     step = program.tip[poses] - program.tip[start]
@@ -116,8 +126,15 @@ def _measure_remainders(smoothed: SmoothProgram, segments: Segments, poses: Ints
         (norm(step + settings.axis_length * turn), segments.axis_entry, segments.axis_exit),
     ):
         rest, leg = length * (leave[poses] - entry[poses]), length * (1.0 - leave[poses])
-        joins &= (rest <= 1e-9) | ((rest < settings.shortest_line) & (rest < 0.1 * leg))
+        if meet:
+            short = rest < _SHORT * np.minimum(leg, length * entry[poses])
+        else:
+            short = (rest < settings.shortest_line) & (rest < 0.1 * leg)
+        joins &= (rest <= 1e-9) | short
     segments.has_line[poses[joins]] = False
+    if meet:
+        here = poses[joins]
+        segments.entry[here] = segments.exit[here] = (segments.entry[here] + segments.exit[here]) / 2.0
     if dense:
         chord = norm(turn)
         # about a standing tip all ways of turning evenly are one motion: nothing says when the axis is where
