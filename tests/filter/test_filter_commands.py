@@ -8,6 +8,9 @@ from pathlib import Path
 
 import pytest
 
+import cornersmooth as cs
+from cornersmooth.filter import filter_program
+from cornersmooth.verdict import Verdict
 from filter.programs import PROGRAMS
 from oracle.command import BAD_INPUT, DONE, USAGE, run
 from page.making import values_of
@@ -218,6 +221,55 @@ def test_blending_of_the_program_is_added_in_the_first_line(word: str, total: st
     (tmp_path / "part.ngc").write_text(f"{word}\n" + PLAIN.format(CUTS))
     on = ("--control", "linuxcnc", "--machine", THREE_AXES, "-e", 0.01)
     report = json.loads(run("filter", "part.ngc", *on, *DENSE, "-o", "new.ngc", "--json", cwd=tmp_path).stdout)
-    more = f"; {total} mm with G64 P of the program" * bool(total)
+    more = f"; {total} mm with the tolerance of the program itself" * bool(total)
     assert report["verdict"] == "PASSED"
     assert re.search(r"tip [\d.e-]+ mm, axis point [\d.e-]+ mm(.*)$", report["verdict_text"])[1] == more
+
+
+@pytest.mark.parametrize(
+    ("control", "before", "total"),
+    [
+        ("siemens", "CYCLE832(0.01,_FINISH,1)", "0.02"),
+        ("heidenhain", "CYCL DEF 32.0 TOLERANCE\nCYCL DEF 32.1 T0.05", "0.06"),
+        ("haas", "G187 P3 E0.025", "0.035"),
+    ],
+)
+def test_the_tolerance_of_the_program_is_added(control: str, before: str, total: str) -> None:
+    form = cs.choose_form(control, "g1", machine=cs.load_machine(THREE_AXES))
+    text = PLAIN.format(CUTS).replace("G21", "G710" if control == "siemens" else "G21")
+    lines = [line for line in text.splitlines() if "%" not in line]
+    if control == "heidenhain":
+        axes = [
+            re.sub(r"([XYZ])(?=\d)", r"\1+", re.findall(r"^(?:G1 )?([XYZ].*)", line)[0]) for line in CUTS.splitlines()
+        ]
+        lines = [
+            "BEGIN PGM A MM",
+            "TOOL CALL 1 Z S900",
+            "L X+0 Y+0 Z+5 FMAX",
+            "L Z+0 F300",
+            *(f"L {one}" for one in axes),
+        ]
+    found = filter_program("\n".join((before, *lines, "")).encode(), form, cs.Settings(tolerance=0.01, lines="dense"))
+    assert found.verdict is Verdict.PASSED
+    assert 0.01 + found.rounding == pytest.approx(float(total))
+
+
+def test_blocks_that_come_too_late_are_to_check(tmp_path: Path) -> None:
+    """0.03 mm at 6 m/min are 0.3 ms, and Haas takes a block in 1 ms."""
+    x = [0.03 * k for k in range(1, 81)]
+    cuts = "".join(f"X{a:.3f} Y{0.03 * (k % 2):.3f}\n" for k, a in enumerate(x))
+    for feed, checks in ((6000, b"PASSED, 1 to check"), (60, b"PASSED  ")):
+        (tmp_path / "part.nc").write_text(PLAIN.format(f"F{feed}.\n{cuts}"))
+        made = run(
+            "filter", "part.nc", "--control", "haas", *DENSE, "-e", 0.005, "-o", "new.nc", "--force", cwd=tmp_path
+        )
+        assert made.stderr.startswith(checks)
+        assert (b"blocks take less than 1 ms" in made.stderr) is (feed == 6000)
+
+
+def test_what_smooth_wrote_has_no_more_lines(tmp_path: Path) -> None:
+    sample = Path(__file__).parents[2] / "samples" / "impeller.cls"
+    assert run("smooth", sample, *LINUXCNC, *EPS, "-o", "part.ngc", cwd=tmp_path).returncode == DONE
+    assert run("filter", "part.ngc", *LINUXCNC, *EPS, "-o", "new.ngc", cwd=tmp_path).returncode == DONE
+    before, after = ((tmp_path / name).read_bytes().count(b"\n") for name in ("part.ngc", "new.ngc"))
+    assert after <= before

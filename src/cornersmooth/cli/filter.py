@@ -26,7 +26,6 @@ from cornersmooth.cli.inputs import Input, find_inputs
 from cornersmooth.cli.options import Options
 from cornersmooth.cli.shop import command_line, loosened
 from cornersmooth.cli.show import (
-    INDENT,
     more,
     print_line,
     print_message,
@@ -171,7 +170,8 @@ def verify_with_program(source: str, old: bytes, given: Options) -> int:
     )
     checked = found.checked
     assert checked is not None
-    judgement = Judgement(found.verdict, 0, 0, "", _problems(checked.wrong) or _measured(found, settings.tolerance))
+    what = _problems(checked.wrong) or _measured(found, settings.tolerance)
+    judgement = Judgement(found.verdict, _to_check(found), 0, "", what)
     path = None if given.text == STANDARD else given.text
     written = replace(NcFile.of(path, sha256_of(new), form), form=None)
     contents = _reported("verify", found, judgement, (source, old), name, written, form, settings, given.reports)
@@ -251,20 +251,21 @@ def _measured(found: Filtered, tolerance: float) -> str:
     assert found.checked is not None
     tip, axis_point = found.checked.tip, found.checked.axis_point
     point = f", axis point {axis_point:.4g} mm" if axis_point == axis_point else ""
-    more = f"; {tolerance + found.rounding:g} mm with G64 P of the program" * bool(found.rounding)
+    more = f"; {tolerance + found.rounding:g} mm with the tolerance of the program itself" * bool(found.rounding)
+    short, blocks, least = found.checked.short, found.checked.blocks, 1000.0 * found.block_time
+    more += f"; CHECK: {short:,} of {blocks:,} blocks take less than {least:g} ms, as the control does" * bool(short)
     return f"within {tolerance:g} mm: tip {tip:.4g} mm{point}{more}"
 
 
 def _show(name: str, contents: Mapping[str, Any], found: Filtered, given: Options) -> None:
     """Print the verdict, what was measured, and what was left as it is."""
     counts = f"{found.new_lines:,} lines from {found.lines:,} lines"
+    if found.seconds is not None:
+        before, after = found.seconds
+        counts += f", {after:.1f} s instead of {before:.1f} s ({100.0 * (after / before - 1.0):+.1f} %)"
     print_verdict(contents, counts, ["all outside of runs is the same byte for byte"])
     if found.checked is not None:
         show_wrong(name, found.checked.wrong)
-    if found.seconds is not None:
-        before, after = found.seconds
-        share = 100.0 * (after / before - 1.0)
-        print_line(f"{INDENT}time of the runs {after:.1f} s instead of {before:.1f} s ({share:+.1f} %)")
     if not found.units_said and given.units is None:
         warn("the program does not say its units: millimetres are taken; give --units", name)
     left = found.left if given.verbose else found.left[:_SHOWN]
@@ -290,7 +291,12 @@ def _judgement(found: Filtered, tolerance: float) -> Judgement:
         what = f"{_problems(found.checked.wrong)}; {what}"
     else:
         what = f"{what} {_measured(found, tolerance)}"
-    return Judgement(found.verdict, 0, 0, unverified, what)
+    return Judgement(found.verdict, _to_check(found), 0, unverified, what)
+
+
+def _to_check(found: Filtered) -> int:
+    """Whether blocks are shorter than the control can take them."""
+    return int(found.checked is not None and found.checked.short > 0)
 
 
 def options_for(data: bytes, name: str, given: Options) -> Options:

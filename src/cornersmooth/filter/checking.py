@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from cornersmooth.arrays.vectors import unit
+from cornersmooth.arrays.vectors import norm, unit
 from cornersmooth.control.state import VECTOR, State
 from cornersmooth.errors import CornersmoothError
 from cornersmooth.filter.meaning import Meanings
@@ -19,6 +19,7 @@ from cornersmooth.filter.runs import PLAIN_CUT, ProgramReader, Reading, Run
 from cornersmooth.model import Program
 from cornersmooth.nc_reader import NcProgram, Problem
 from cornersmooth.nc_reader.block_tables import CHUNK
+from cornersmooth.nc_reader.elements import Element
 from cornersmooth.nc_reader.rotary import LINE_SHARE
 from cornersmooth.settings import Settings
 from cornersmooth.verify import Verification, verify
@@ -53,6 +54,8 @@ class Checked:
     wrong: tuple[Problem, ...]
     tip: float = 0.0  #: tip, axis_point: largest deviation, mm
     axis_point: float = 0.0  #: NaN where the tool axis has a tolerance of its own
+    blocks: int = 0  #: new blocks, and those of them that the control gets later than it has passed the one before
+    short: int = 0
 
 
 def places(old: Reading, new: Reading, reader: ProgramReader) -> tuple[list[Place], list[Problem]]:
@@ -139,7 +142,7 @@ def check(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> Check
     """Measure the runs that have changed, and compare what holds after each."""
     wrong: list[Problem] = []
     share = _SHARE if set("ABC") & set(job.reader.axes) else 1.0
-    largest = [0.0, 0.0]
+    largest, counts = [0.0, 0.0], np.zeros(2, np.int64)
     for place in where:
         following = old.lines(place.run.stop, place.run.stop + 1)
         text = _left_otherwise(job, place.run, new.at[place.stop], following)
@@ -147,7 +150,8 @@ def check(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> Check
             wrong.append(Problem("CS592", 0, place.stop, f"the program goes on otherwise after the run: {text}"))
     for own in shared(old, new, where):
         try:
-            found = measure(*pair(job, old, new, own), job.settings, share=share, processes=job.processes)[2]
+            motions = pair(job, old, new, own)
+            found = measure(*motions, job.settings, share=share, processes=job.processes)[2]
         except CornersmoothError as error:
             wrong.append(Problem(error.code, 0, own[0].first + 1, error.what))
             continue
@@ -158,8 +162,24 @@ def check(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> Check
         if found.unverified:
             text = f"the run was not verified: {found.unverified}"
             wrong += [Problem("CS593", 0, place.first + 1, text) for place in own]
+        counts += _counts(job, motions[1])
         largest = np.maximum(largest, (found.tip.value, found.axis_point.value)).tolist()  # NaN stays
-    return Checked(tuple(sorted(wrong, key=lambda one: one.nc_line)), *largest)
+    blocks, short = counts.tolist()
+    return Checked(tuple(sorted(wrong, key=lambda one: one.nc_line)), largest[0], largest[1], blocks, short)
+
+
+def block_time(job: Job) -> float:
+    """Time that the control takes for a block, s; 0 for none."""
+    own = job.settings.block_time
+    return job.form.table.lines.block_time if own is None else own
+
+
+def _counts(job: Job, nc: NcProgram) -> tuple[int, int]:
+    """Blocks of a motion that cut, and those of them that take less than the time of a block."""
+    cut = np.flatnonzero((nc.line[1:] > 0) & (nc.kind[1:] != Element.RAPID)) + 1
+    seconds = 60.0 * norm(nc.tip[cut] - nc.tip[cut - 1]) / nc.feed[cut]
+    taken = np.bincount(np.unique(nc.line[cut], return_inverse=True)[1], seconds)
+    return len(taken), int((taken < block_time(job)).sum())
 
 
 def shared(old: Reading, new: Reading, where: Sequence[Place]) -> list[list[Place]]:

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.errors import CornersmoothError, InputError, SettingsError
-from cornersmooth.filter.checking import Checked, Place, check, pair, places
+from cornersmooth.filter.checking import Checked, Place, block_time, check, pair, places
 from cornersmooth.filter.fewest import fewest
 from cornersmooth.filter.motion import Job
 from cornersmooth.filter.runs import Left, ProgramReader, Reading
@@ -42,6 +42,11 @@ _EQUAL: Final = 1e-3
 #: words that let LinuxCNC blend
 _BLENDING: Final = re.compile(rb"(?i)G64[ \t]*P[ \t]*(\d*\.?\d+)(?:[ \t]*Q[ \t]*(\d*\.?\d+))?")
 
+#: words of a program by which a control rounds its motion within a tolerance: of Siemens, Klartext and Haas
+_SETTINGS: Final = re.compile(
+    rb"(?i)CYCLE832[ \t]*\([ \t]*(\d*\.?\d+)|CYCL DEF 32\.1[ \t]*T[ \t]*(\d*\.?\d+)|G187[^\n(]*E[ \t]*(\d*\.?\d+)"
+)
+
 
 @dataclass(frozen=True)
 class Filtered:
@@ -61,7 +66,8 @@ class Filtered:
     motions: tuple[NcProgram, NcProgram] | None = None
     #: first and last line of each run that was replaced, in the old program and in the new one; of those in `motions`
     changed: tuple[tuple[int, int, int, int], ...] = ()
-    rounding: float = 0.0  #: mm: by how much the control may round what has changed on its own: it adds to ε
+    rounding: float = 0.0  #: mm: by how much the program lets the control round what has changed: it adds to ε
+    block_time: float = 0.0  #: s: that of `Checked.short`
     compared: bool = False  #: whether two programs were compared alone, and nothing was to be smoothed
 
     @property
@@ -304,14 +310,16 @@ def _result(job: Job, old: Reading, way: _Way, axes: Machine | None, *, paths: b
         motions=pair(job, old, new, drawn) if paths and where else None,
         changed=tuple((place.run.first + 1, place.run.stop, place.first + 1, place.stop) for place in drawn),
         rounding=max((place.run.state.unit * _rounding(new, place) for place in where), default=0.0),
+        block_time=block_time(job),
     )
 
 
 def _rounding(new: Reading, place: Place) -> float:
-    """By how much G64 P lets the control round the blocks of a place, in units of the program; 0.0 for unknown."""
+    """By how much the program lets the control round the blocks of a place, in its units; 0.0 for unknown."""
     blends = _BLENDING.findall(f"{place.run.state.rounding}\n".encode() + new.lines(place.first, place.stop))
     # without Q lines are merged within P, too
-    return max((float(p) + float(q or p) for p, q in blends), default=0.0)
+    largest = max((float(p) + float(q or p) for p, q in blends), default=0.0)
+    return max([largest, *(float(next(filter(None, found))) for found in _SETTINGS.findall(new.data))])
 
 
 def compare_filtered(
