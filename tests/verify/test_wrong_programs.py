@@ -292,3 +292,36 @@ def test_the_way_across_to_the_next_hole_is_lost(control: str) -> None:
     for x, z in ((15, 35), (35, 42)):
         at = where(lines, rf"X\+?{x}\.?0* Y\+?5\.?0* Z\+?{z}(\.0*)?( |$)")
         assert not passes(HEIGHTS, control, (*lines[:at], *lines[at + 1 :]))
+
+
+# states over holes that are left out
+
+
+LEFT_OUT = """LOADTL/2
+SPINDL/RPM,1500,CLW
+RAPID
+GOTO/5,5,30,0,0,1
+CYCLE/THREAD,RAPTO,3,FEDTO,12,RTRCTO,5,MMPM,200,FOO,3
+GOTO/5,5,0
+COOLNT/ON
+GOTO/15,5,0
+COOLNT/OFF
+GOTO/35,5,0
+CYCLE/OFF
+RAPID
+GOTO/35,5,80
+SPINDL/OFF
+FINI
+"""
+
+
+def test_states_over_holes_that_are_left_out_are_not_verified() -> None:
+    """Coolant that no motion meets, in the right program and in one without it."""
+    form, stream = choose_form("fanuc", "g1"), io.BytesIO()
+    frame = Frame(skip_cycles=True)
+    postprocess(program(LEFT_OUT), stream, Settings(tolerance=0.02), form=form, frame=frame, verify=False)
+    text = stream.getvalue()
+    for some in (text, text.replace(b"M8\n", b"")):
+        found = verify(program(LEFT_OUT), some, tolerance=0.02, skip_cycles=True)
+        assert found.verdict is Verdict.NOT_VERIFIED
+        assert found.unverified.endswith("only over holes that are left out: coolant FLOOD of CL line 7")

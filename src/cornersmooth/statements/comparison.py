@@ -6,7 +6,7 @@ the same between two motions: one is left over without harm where it is optional
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence, Set
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from copy import deepcopy
 from dataclasses import dataclass, field
 from itertools import zip_longest
@@ -295,3 +295,19 @@ def without_word(asked_for: Iterable[Token], found: Iterable[Token], means: Mean
         if not counts(token) and token.kind not in own and token.value not in ("OFF", tool, _AT_START.get(token.kind)):
             lost.append(f"{_NAMES[token.kind][1].format(token.value)} in CL line {token.line}")
     return f"the control has no word for: {', '.join(dict.fromkeys(lost))}" if lost else ""
+
+
+def changed_unseen(asked_for: Iterable[Token], leading: Mapping[int, int], beyond: Mapping[int, int]) -> str:
+    """Say which states hold only where holes are left out, so that no motion of the program meets them.
+
+    By places: the first move behind each that leads anywhere, and the first of these that is not left out.
+    """
+    lost, last = [], dict[str, Token]()
+    for token in asked_for:
+        before, lead = last.get(token.kind), leading.get(token.place, token.place)
+        changes = before is not None and before.value != token.value and before.place in beyond
+        if before is not None and changes and leading[before.place] < lead <= beyond[before.place]:
+            lost.append(f"{_NAMES[token.kind][1].format(before.value)} of CL line {before.line}")
+        if token.kind in _STATES:
+            last[token.kind] = token
+    return f"what holds only over holes that are left out: {', '.join(lost)}" if lost else ""

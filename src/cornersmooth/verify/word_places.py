@@ -18,7 +18,7 @@ from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem
 from cornersmooth.nc_reader.tool import leads_somewhere
 from cornersmooth.nc_reader.word_tables import Means
 from cornersmooth.statements.asked import asked
-from cornersmooth.statements.comparison import Comparison, without_word
+from cornersmooth.statements.comparison import Comparison, changed_unseen, without_word
 from cornersmooth.statements.tokens import Token, said
 from cornersmooth.verify.batches import Batches
 from cornersmooth.verify.feeds import reach
@@ -114,11 +114,12 @@ class WordPlaces:
         places = np.searchsorted(original.pose, [one.pose for one in program.statements]).tolist()
         unique = np.unique(np.array(places, np.int64))
         leading, beyond = self._leading(unique, set()), self._leading(unique, batches.moves_left_out)
-        cl_tokens = [
-            replace(one, place=leading.get(one.place, one.place))
+        requested = [
+            one
             for one in asked(program, places, moves, means)
             if (one.kind != "auxiliary" or one.value not in clamps) and (one.kind != "home" or retracts)
         ]
+        cl_tokens = [replace(one, place=leading.get(one.place, one.place)) for one in requested]
         events = [replace(one, element=self._moving(one.element)) for one in self._events]
         nc_tokens = sorted(said(events, means), key=lambda one: one.place)
         spots: dict[int, Spot] = {}
@@ -129,7 +130,10 @@ class WordPlaces:
         homes = {leading[place] for place, one in zip(places, program.statements, strict=True) if one.word == "GOHOME"}
         behind: dict[int, set[int]] = {}
         for place, lead in leading.items():  # the moves that end where statements are
-            behind.setdefault(lead, set()).update(range(place - 1, beyond[place]))
+            first_of = place - 1
+            while first_of in batches.moves_left_out:
+                first_of -= 1
+            behind.setdefault(lead, set()).update(range(first_of, beyond[place]))
         # that of those no element names is written
         missed = {int(original.trail.owner[int(one.place)]) for one in found.violations if one.code == "CS524"}
 
@@ -180,7 +184,9 @@ class WordPlaces:
                 hole, some = holes[end[1]]
                 line = int(program.line[original.pose[hole.move]])
                 comparison.in_hole(line, some, hole.cycle.dwell, tap=hole.cycle.tap)
-        return comparison.problems, at_home, without_word(cl_tokens, nc_tokens, means, own)
+        hidden = changed_unseen(requested, leading, beyond) if batches.moves_left_out else ""
+        unsaid = "; ".join(filter(None, (without_word(cl_tokens, nc_tokens, means, own), hidden)))
+        return comparison.problems, at_home, unsaid
 
     def _leading(self, places: Ints, left_out: Set[int]) -> dict[int, int]:
         """The first moves from some on that lead anywhere, and are none that are left out."""
