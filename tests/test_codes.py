@@ -13,7 +13,7 @@ from types import ModuleType
 import pytest
 
 from cornersmooth.cli.commands import COMMANDS
-from cornersmooth.cli.explain import _one, codes
+from cornersmooth.cli.lookup import _code_lines, codes
 from oracle.command import run
 from writing import faults, plain, sentences, words
 
@@ -58,7 +58,7 @@ def test_every_code_is_explained_in_80_columns() -> None:
     assert all(len(line) <= 80 for line in listed.splitlines())
     for code, known in codes().items():
         assert f"\n  {code}  " in listed
-        lines = [*_one(code, known)]
+        lines = [*_code_lines(code, known)]
         assert any(f"[{code}]: " in line for line in lines)
         assert all(len(line) <= 80 for line in lines)
         for text in (known["cause"], known["remedy"]):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cornersmooth.verdict import Verdict
+from cornersmooth.errors import Verdict
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from cornersmooth.cli.explain import PARTS
+from cornersmooth.cli.lookup import PARTS
 from cornersmooth.errors import Finding
 
 ROOT = Path(__file__).resolve().parent.parent

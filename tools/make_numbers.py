@@ -19,7 +19,7 @@ import numpy as np
 
 import cornersmooth
 from cornersmooth import Program, Settings
-from cornersmooth.arrays.slices import some_poses
+from cornersmooth.arrays import some_poses
 from cornersmooth.cli import run
 from cornersmooth.feedrate import BlockLimits, Limits, direct, plan_text
 from cornersmooth.kinematics import load_machine

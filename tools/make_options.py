@@ -15,8 +15,7 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 from cornersmooth.cli import shop
 from cornersmooth.cli.command import _Setting
 from cornersmooth.cli.commands import COMMANDS
-from cornersmooth.settings import Settings
-from cornersmooth.settings.declared import key_of
+from cornersmooth.settings import Settings, key_of
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "settings.md"

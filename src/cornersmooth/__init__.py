@@ -31,20 +31,37 @@ TYPE_CHECKING = False  # typing takes longer to load than all the rest
 if TYPE_CHECKING:
     from typing import Any
 
-    from cornersmooth.cl import read
-    from cornersmooth.errors import CornersmoothError, Finding, VerdictError
-    from cornersmooth.feedrate import Limits, TimeLaw, direct, plan
-    from cornersmooth.filter import filter_program
-    from cornersmooth.kinematics import load_machine
-    from cornersmooth.model import Corners, Program, SmoothProgram, Statement
-    from cornersmooth.nc import Frame, choose_form, fit_settings, load_control, write
-    from cornersmooth.pipeline import Result, postprocess, smooth
-    from cornersmooth.report import report
-    from cornersmooth.report.corners import corner_table
-    from cornersmooth.settings import Settings
-    from cornersmooth.smoothing.path_points import PathPoints, sample
-    from cornersmooth.times.laws import compare
-    from cornersmooth.verify import Verification, verify
+    from cornersmooth.cl import read as read
+    from cornersmooth.errors import CornersmoothError as CornersmoothError
+    from cornersmooth.errors import Finding as Finding
+    from cornersmooth.errors import Verdict as Verdict
+    from cornersmooth.errors import VerdictError as VerdictError
+    from cornersmooth.feedrate import Limits as Limits
+    from cornersmooth.feedrate import TimeLaw as TimeLaw
+    from cornersmooth.feedrate import direct as direct
+    from cornersmooth.feedrate import plan as plan
+    from cornersmooth.filter import filter_program as filter_program
+    from cornersmooth.kinematics import load_machine as load_machine
+    from cornersmooth.model import Corners as Corners
+    from cornersmooth.model import Program as Program
+    from cornersmooth.model import SmoothProgram as SmoothProgram
+    from cornersmooth.model import Statement as Statement
+    from cornersmooth.nc import Frame as Frame
+    from cornersmooth.nc import choose_form as choose_form
+    from cornersmooth.nc import fit_settings as fit_settings
+    from cornersmooth.nc import load_control as load_control
+    from cornersmooth.nc import write as write
+    from cornersmooth.pipeline import Result as Result
+    from cornersmooth.pipeline import postprocess as postprocess
+    from cornersmooth.pipeline import smooth as smooth
+    from cornersmooth.report import report as report
+    from cornersmooth.report.corners import corner_table as corner_table
+    from cornersmooth.settings import Settings as Settings
+    from cornersmooth.smoothing.path_points import PathPoints as PathPoints
+    from cornersmooth.smoothing.path_points import sample as sample
+    from cornersmooth.times.laws import compare as compare
+    from cornersmooth.verify import Verification as Verification
+    from cornersmooth.verify import verify as verify
 
     from_poses = Program.from_poses
 
@@ -55,7 +72,7 @@ _HOME = {
     name: module
     for module, names in {
         "cl": "read",
-        "errors": "CornersmoothError Finding VerdictError",
+        "errors": "CornersmoothError Finding Verdict VerdictError",
         "feedrate": "Limits TimeLaw direct plan",
         "filter": "filter_program",
         "kinematics": "load_machine",
@@ -67,46 +84,12 @@ _HOME = {
         "report.corners": "corner_table",
         "settings": "Settings",
         "times.laws": "compare",
-        "verdict": "Verdict",
         "verify": "Verification verify",
     }.items()
     for name in names.split()
 }
 
-__all__ = [
-    "Corners",
-    "CornersmoothError",
-    "Finding",
-    "Frame",
-    "Limits",
-    "PathPoints",
-    "Program",
-    "Result",
-    "Settings",
-    "SmoothProgram",
-    "Statement",
-    "TimeLaw",
-    "Verdict",
-    "VerdictError",
-    "Verification",
-    "choose_form",
-    "compare",
-    "corner_table",
-    "direct",
-    "filter_program",
-    "fit_settings",
-    "from_poses",
-    "load_control",
-    "load_machine",
-    "plan",
-    "postprocess",
-    "read",
-    "report",
-    "sample",
-    "smooth",
-    "verify",
-    "write",
-]
+__all__ = sorted(_HOME)
 
 
 def __getattr__(name: str) -> Any:

@@ -18,7 +18,7 @@ import numpy as np
 
 from cornersmooth import __version__, nc, smoothing
 from cornersmooth.cl import read
-from cornersmooth.errors import Finding, InputError, SettingsError, VerdictError
+from cornersmooth.errors import Finding, InputError, SettingsError, Verdict, VerdictError
 from cornersmooth.methods import AUTO, CURVES_METHOD, DEFAULT_METHOD
 from cornersmooth.model import Move, Program, SmoothProgram
 from cornersmooth.nc import Form, Frame, Written
@@ -32,7 +32,6 @@ from cornersmooth.report.verdict import Judgement, Saving, judge, trusted_blocks
 from cornersmooth.settings import Settings
 from cornersmooth.system.output import FAILED, Output, Target, check_output, open_output, path_of
 from cornersmooth.system.processes import return_free_memory
-from cornersmooth.verdict import Verdict
 from cornersmooth.verify import Verification, Verifier, useful_processes
 
 if TYPE_CHECKING:

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from cornersmooth import postprocess, read, verify
-from cornersmooth.errors import InputError, SettingsError
+from cornersmooth.errors import InputError, SettingsError, Verdict
 from cornersmooth.nc import Frame, choose_form
 from cornersmooth.settings import Settings
-from cornersmooth.verdict import Verdict
 
 SECTION = """PPRINT/'NEW SECTION'
 CSI_TOOL_PATH/Op{tool}

@@ -8,10 +8,9 @@ import pytest
 
 from cornersmooth import postprocess
 from cornersmooth.cl import read
-from cornersmooth.errors import InputError
+from cornersmooth.errors import InputError, Verdict
 from cornersmooth.model import Move
 from cornersmooth.settings import Settings
-from cornersmooth.verdict import Verdict
 
 FOREIGN = {
     "Mastercam NCI": b'1050\n17. 0 2019 11 27 10 1 2 1 0 "A"\n0\n0 0. 0. 50. -2. 0\n',

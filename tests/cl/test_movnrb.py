@@ -9,11 +9,10 @@ import pytest
 
 from cornersmooth import postprocess
 from cornersmooth.cl import read
-from cornersmooth.errors import InputError
+from cornersmooth.errors import InputError, Verdict
 from cornersmooth.model import Floats, Program
 from cornersmooth.nc import choose_form
 from cornersmooth.settings import Settings
-from cornersmooth.verdict import Verdict
 
 LOW = np.array([[0, 0, 0], [10, 0, 0], [20, 5, 0], [30, 5, 1], [38, 0, 2], [45, -3, 2.0]])
 HIGH = np.array([[0, 0, 10], [10, 1, 10], [22, 5, 10], [33, 5, 10], [42, 0, 11], [50, -3, 11.0]])

@@ -11,9 +11,8 @@ import pytest
 
 from cornersmooth.cl import read
 from cornersmooth.cl.operations import find_operations
-from cornersmooth.errors import InputError
+from cornersmooth.errors import InputError, Verdict
 from cornersmooth.pipeline import postprocess
-from cornersmooth.verdict import Verdict
 from oracle.command import run
 from oracle.files import OWN, SAMPLES
 

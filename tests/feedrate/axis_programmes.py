@@ -20,7 +20,7 @@ from cornersmooth.feedrate.intervals import path_limits
 from cornersmooth.feedrate.motion import shares_at
 from cornersmooth.feedrate.timelaw import TimeLaw
 from cornersmooth.model import Floats
-from cornersmooth.settings.limits import Limits
+from cornersmooth.settings import Limits
 
 #: how far beside a border of elements derivatives are taken, mm, and elements that have no length
 BESIDE, NOTHING = 1e-7, 1e-9

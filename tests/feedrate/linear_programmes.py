@@ -23,7 +23,7 @@ from cornersmooth.feedrate.intervals import Intervals, path_limits
 from cornersmooth.feedrate.path import Path
 from cornersmooth.feedrate.resolution import Resolution
 from cornersmooth.model import Floats
-from cornersmooth.settings.limits import Limits
+from cornersmooth.settings import Limits
 
 #: change of the time, relative, below which a round brought nothing
 SETTLED = 2e-4

@@ -7,9 +7,9 @@ import random
 import pytest
 
 import cornersmooth as cs
+from cornersmooth.errors import Verdict
 from cornersmooth.filter import filter_program
 from cornersmooth.filter.runs import ProgramReader
-from cornersmooth.verdict import Verdict
 from filter.programs import PROGRAMS
 from oracle.share import THOROUGH
 

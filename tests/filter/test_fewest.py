@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import cornersmooth as cs
+from cornersmooth.errors import Verdict
 from cornersmooth.filter import Filtered, filter_program, verify_programs
 from cornersmooth.filter.program import THREE_AXES
-from cornersmooth.verdict import Verdict
 from filter.fine_programs import HEAD, PROGRAMS, program
 from filter.foreign import by_rs274, by_words, difference
 from oracle.command import DONE, run

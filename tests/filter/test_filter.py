@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 import cornersmooth as cs
-from cornersmooth.errors import SettingsError
+from cornersmooth.errors import SettingsError, Verdict
 from cornersmooth.filter import Filtered, filter_program, verify_programs
 from cornersmooth.filter.runs import FILTERED, ProgramReader
-from cornersmooth.verdict import Verdict
 from filter.programs import ISO, PROGRAMS, WORDS, X, Y, Z, cuts
 from oracle.command import BAD_INPUT, DONE, run
 

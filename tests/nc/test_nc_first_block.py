@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 
 from cornersmooth.cl import read
-from cornersmooth.errors import InputError
+from cornersmooth.errors import InputError, Verdict
 from cornersmooth.kinematics import Machine, parse_machine
 from cornersmooth.nc import Frame, choose_form
 from cornersmooth.pipeline import Result, postprocess
 from cornersmooth.settings import Settings
-from cornersmooth.verdict import Verdict
 from cornersmooth.verify import verify
 
 EPS = 0.01

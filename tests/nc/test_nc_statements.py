@@ -7,13 +7,12 @@ import io
 import pytest
 
 from cornersmooth.cl import read
-from cornersmooth.errors import InputError, SettingsError
+from cornersmooth.errors import InputError, SettingsError, Verdict
 from cornersmooth.kinematics import load_machine
 from cornersmooth.nc import Frame, choose_form, fit_settings, write
 from cornersmooth.pipeline import postprocess
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
-from cornersmooth.verdict import Verdict
 from cornersmooth.verify import verify
 from nc.writing import codes, lines_of, text_of_cl
 

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from cornersmooth import pipeline
+from cornersmooth.errors import Verdict
 from cornersmooth.feedrate import Limits, plan
 from cornersmooth.model import Keep, Program, Statement, Status
 from cornersmooth.nc import choose_form
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from cornersmooth.smoothing.doubled import one_corner_each
-from cornersmooth.verdict import Verdict
 from oracle.nc_text import Line, parse
 
 TOLERANCE = 0.01

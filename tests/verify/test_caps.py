@@ -18,8 +18,8 @@ import numpy as np
 import pytest
 
 from cornersmooth.cl import read
+from cornersmooth.errors import Verdict
 from cornersmooth.nc_reader.options import DIGITS_SAMPLE, Steps
-from cornersmooth.verdict import Verdict
 from cornersmooth.verify import verify
 from oracle.command import run
 

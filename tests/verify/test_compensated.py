@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 from cornersmooth.cl import read
+from cornersmooth.errors import Verdict
 from cornersmooth.kinematics import load_machine
 from cornersmooth.model import Program
 from cornersmooth.nc import choose_form
 from cornersmooth.pipeline import postprocess
 from cornersmooth.settings import Settings
-from cornersmooth.verdict import Verdict
 from cornersmooth.verify import Verification, verify
 
 SAMPLES = Path(__file__).parents[2] / "samples"

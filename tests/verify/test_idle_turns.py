@@ -8,11 +8,11 @@ import re
 import pytest
 
 from cornersmooth.cl import read
+from cornersmooth.errors import Verdict
 from cornersmooth.kinematics import load_machine
 from cornersmooth.nc import choose_form
 from cornersmooth.pipeline import postprocess
 from cornersmooth.settings import Settings
-from cornersmooth.verdict import Verdict
 from cornersmooth.verify import Verification, verify
 
 CL = """LOADTL/3

@@ -26,7 +26,7 @@ ALLOWED = (
     "cornersmooth.settings",
     "cornersmooth.text",
     "cornersmooth.provenance",  # the head of a program, which both know
-    "cornersmooth.verdict",  # a word, not a measure
+    "cornersmooth.errors",  # a word, not a measure
     "cornersmooth.kinematics.machine",  # what a machine is; its kinematics are the verification's own
 )
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from cornersmooth.cl import read
+from cornersmooth.errors import Verdict
 from cornersmooth.kinematics import load_machine
 from cornersmooth.nc import choose_form, control_tables
 from cornersmooth.nc_reader import word_tables
@@ -16,7 +17,6 @@ from cornersmooth.nc_words import rules
 from cornersmooth.pipeline import postprocess
 from cornersmooth.settings import Settings
 from cornersmooth.tables import Shelf
-from cornersmooth.verdict import Verdict
 from cornersmooth.verify import verify
 
 CL = """LOADTL/1

@@ -7,11 +7,10 @@ import io
 import pytest
 
 from cornersmooth import postprocess, read, verify
-from cornersmooth.errors import InputError
+from cornersmooth.errors import InputError, Verdict
 from cornersmooth.kinematics import load_machine
 from cornersmooth.nc import choose_form
 from cornersmooth.settings import Settings
-from cornersmooth.verdict import Verdict
 
 #: before the statement, five lines
 HEAD = "UNITS/MM\nCUTTER/10,0,5,5,0,0,50\nLOADTL/4\nSPINDL/RPM,3000,CLW\nRAPID\n"

@@ -2,13 +2,71 @@
 
 from __future__ import annotations
 
-from typing import TypeAlias
+from collections.abc import Iterable
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from cornersmooth.model import Program, Runs
 
 Floats: TypeAlias = NDArray[np.float64]
 Ints: TypeAlias = NDArray[np.int64]
 Bools: TypeAlias = NDArray[np.bool_]
 #: rows and poses where there are millions: half the memory
 Numbers: TypeAlias = NDArray[np.int32]
+
+Columns = TypeVar("Columns")
+
+
+def some_rows(columns: Columns, which: slice | Bools | Ints) -> Columns:
+    """Rows of a dataclass whose fields are arrays of the same length; what is no array stays."""
+    arrays = {item.name: getattr(columns, item.name) for item in fields(columns)}  # type: ignore[arg-type]
+    own: dict[str, Any] = {name: column[which] for name, column in arrays.items() if isinstance(column, np.ndarray)}
+    return replace(columns, **own)  # type: ignore[type-var]
+
+
+def joined_rows(parts: Iterable[Columns]) -> Columns:
+    """Rows of some such dataclasses, one or more, after one another; what is no array is that of the first."""
+    some = list(parts)
+    names = [name for name, column in vars(some[0]).items() if isinstance(column, np.ndarray)]
+    return replace(some[0], **{name: np.concatenate([getattr(one, name) for one in some]) for name in names})  # type: ignore[type-var]
+
+
+def some_poses(program: Program, first: int, stop: int) -> Program:
+    """Poses from `first` to before `stop`, with the arcs and statements between them.
+
+    Parameters
+    ----------
+    first, stop : int
+        An arc that ends at the first pose is left out: it begins outside. Earlier statements come
+        before the first pose.
+    """
+    arcs = some_rows(program.arcs, (program.arcs.pose > first) & (program.arcs.pose < stop))
+    return replace(
+        some_rows(program, slice(first, stop)),
+        arcs=replace(arcs, pose=arcs.pose - first),
+        statements=tuple(
+            replace(statement, pose=max(statement.pose - first, 0))
+            for statement in program.statements
+            if statement.pose < stop
+        ),
+    )
+
+
+def some_runs(runs: Runs, kept: Bools) -> Runs:
+    """The runs (r,) that are kept, at the poses they have."""
+    poses, knots = np.repeat(kept, runs.count), np.repeat(kept, runs.knot_count)
+    return replace(
+        runs,
+        pose=runs.pose[poses],
+        count=runs.count[kept],
+        s=runs.s[poses],
+        knot=runs.knot[knots],
+        knot_count=runs.knot_count[kept],
+        control=runs.control[np.repeat(kept, runs.knot_count + 2)],
+        tip_bound=runs.tip_bound[kept],
+        axis_bound=runs.axis_bound[kept],
+    )

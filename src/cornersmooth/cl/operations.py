@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cornersmooth.arrays.slices import some_poses
+from cornersmooth.arrays import some_poses
 from cornersmooth.errors import Finding, InputError, SettingsError
 from cornersmooth.model import Move, Program, Statement
 from cornersmooth.statements.asked import Asking

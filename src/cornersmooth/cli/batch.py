@@ -16,16 +16,17 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from itertools import islice
 from multiprocessing import parent_process
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from cornersmooth.cli.files import suffix_of, write_report
 from cornersmooth.cli.job import STATUSES, Job, Outcome, run_job
-from cornersmooth.cli.shutdown import Shutdown
-from cornersmooth.errors import message
+from cornersmooth.errors import Verdict, message
 from cornersmooth.report.record import report_json
 from cornersmooth.system.output import remove_leftovers, remove_unfinished
 from cornersmooth.system.processes import Helper, first_ready
-from cornersmooth.verdict import Verdict
+
+if TYPE_CHECKING:
+    from cornersmooth.cli import Shutdown
 
 #: exit code of a process that SIGKILL has ended
 _KILLED = -9

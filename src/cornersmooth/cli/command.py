@@ -135,9 +135,10 @@ def new_command(
     *,
     settings: str = "",
     epilog: str = EXIT_CODES,
+    module: str = "",
     **changes: str | Mapping[str, Any],
 ) -> click.Command:
-    """Make a command, whose work is `run_NAME` in the module of its name.
+    """Make a command, whose work is `run_NAME` in a module of the name or another.
 
     Arguments are as the usage line has them, and options fields of `Options` in the order of the help; settings are
     fields that no command line has. Changes are the helps of some options in this command, or all that is different of
@@ -153,7 +154,7 @@ def new_command(
             params.append(_option(kind, field, {"help": change} if isinstance(change, str) else change))
 
     def called(**given: Any) -> int:
-        run = getattr(import_module(f"cornersmooth.cli.{name}"), f"run_{name}")
+        run = getattr(import_module(f"cornersmooth.cli.{module or name}"), f"run_{name}")
         return int(run(Options(**{key: value for key, value in given.items() if value is not None})))
 
     return Command(name, params=params, callback=called, help=help, epilog=epilog)

@@ -1,4 +1,4 @@
-"""All commands: their arguments, options and helps. The work of each is `run_NAME` in the module of its name."""
+"""All commands: arguments, options and helps. The work of each is `run_NAME`, in the module of its name or another."""
 
 from __future__ import annotations
 
@@ -251,6 +251,7 @@ CONTROLS = new_command(
       cornersmooth controls siemens --table > mine.toml
       cornersmooth controls mine.toml
     """,
+    module="lookup",
 )
 
 MACHINES = new_command(
@@ -272,6 +273,7 @@ MACHINES = new_command(
       cornersmooth machines mine.toml --pose A30,C45
       cornersmooth machines mine.toml --json
     """,
+    module="lookup",
 )
 
 CONFIG = new_command(
@@ -289,6 +291,7 @@ CONFIG = new_command(
       cornersmooth config
       cornersmooth config jobs/part.cls
     """,
+    module="lookup",
 )
 
 EXPLAIN = new_command(
@@ -307,6 +310,7 @@ EXPLAIN = new_command(
       cornersmooth explain 337 --json
       cornersmooth explain --stream part.nc --control haas --machine table-bc
     """,
+    module="lookup",
     epilog=EXIT_CODES_OF_READERS,
     units="Units of a program that does not say them.",
 )

@@ -23,9 +23,7 @@ from cornersmooth.cli.parameters import (
     ToolShape,
 )
 from cornersmooth.methods import AUTO, METHODS
-from cornersmooth.settings import Settings
-from cornersmooth.settings.frame import FrameSettings
-from cornersmooth.settings.limits import Limits
+from cornersmooth.settings import FrameSettings, Limits, Settings
 
 Count = Annotated[int, click.IntRange(min=1)]
 Units = Literal["mm", "inch"]

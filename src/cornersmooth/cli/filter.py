@@ -12,9 +12,11 @@ import click
 
 from cornersmooth.cli.files import (
     STANDARD,
+    Input,
     check_endings,
     check_inputs,
     check_path,
+    find_inputs,
     read_head,
     read_input,
     suffix_of,
@@ -22,7 +24,6 @@ from cornersmooth.cli.files import (
     told_of,
     write_report,
 )
-from cornersmooth.cli.inputs import Input, find_inputs
 from cornersmooth.cli.options import Options
 from cornersmooth.cli.shop import command_line, loosened
 from cornersmooth.cli.show import (
@@ -37,7 +38,7 @@ from cornersmooth.cli.show import (
 )
 from cornersmooth.control.listing import listing
 from cornersmooth.control.program import Text
-from cornersmooth.errors import CornersmoothError, SettingsError
+from cornersmooth.errors import CornersmoothError, SettingsError, Verdict
 from cornersmooth.filter import Filtered, filter_program, verify_programs
 from cornersmooth.filter.checking import measure
 from cornersmooth.filter.program import THREE_AXES, read_program, refuse_cl_file
@@ -54,7 +55,6 @@ from cornersmooth.report.verdict import Judgement, Saving
 from cornersmooth.settings import Settings
 from cornersmooth.system.output import FAILED, make_folder, open_output
 from cornersmooth.times.comparing import limits_machine
-from cornersmooth.verdict import Verdict
 from cornersmooth.verify import useful_processes
 
 #: names of NC programs, for folders

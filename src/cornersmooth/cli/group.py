@@ -7,18 +7,20 @@ import errno
 import os
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from cornersmooth import __version__
 from cornersmooth.cli.command import write_part
 from cornersmooth.cli.commands import COMMANDS, GROUPS
-from cornersmooth.cli.powershell import add_powershell, asked_by_powershell
+from cornersmooth.cli.completion import ASKED, add_powershell
 from cornersmooth.cli.show import print_message, say_json
-from cornersmooth.cli.shutdown import Shutdown
 from cornersmooth.errors import EXIT_INTERNAL, CornersmoothError, SettingsError, internal_error, message
 from cornersmooth.system.output import ClosedPipe, reason
+
+if TYPE_CHECKING:
+    from cornersmooth.cli import Shutdown
 
 EXIT_INTERRUPTED = 130
 
@@ -81,7 +83,7 @@ def cli() -> None:
 
 def run(args: list[str] | None, ending: Shutdown) -> int:
     """Run the command line with the given arguments; returns the exit code."""
-    if asked_by_powershell():
+    if os.environ.get(ASKED, "").startswith("powershell"):
         add_powershell()
     try:
         result: Any = cli.main(args=args, standalone_mode=False, obj=ending)

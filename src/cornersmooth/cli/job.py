@@ -10,11 +10,18 @@ from typing import TYPE_CHECKING, Any, BinaryIO, cast
 
 from cornersmooth import __version__
 from cornersmooth.cl.apt import refuse_program
-from cornersmooth.cli.files import Beginning, check_path, read_input, suffix_of, target_of, write_report
-from cornersmooth.cli.inputs import Input
+from cornersmooth.cli.files import Beginning, Input, check_path, read_input, suffix_of, target_of, write_report
 from cornersmooth.cli.options import POINTS, Options
 from cornersmooth.cli.show import more
-from cornersmooth.errors import EXIT_INTERNAL, CornersmoothError, VerdictError, internal_error, message, printable
+from cornersmooth.errors import (
+    EXIT_INTERNAL,
+    CornersmoothError,
+    Verdict,
+    VerdictError,
+    internal_error,
+    message,
+    printable,
+)
 from cornersmooth.kinematics import Machine
 from cornersmooth.nc import Form, Frame
 from cornersmooth.pipeline import Progress, Result, postprocess
@@ -23,7 +30,6 @@ from cornersmooth.report.verdict import Saving
 from cornersmooth.settings import TIMED_POSES, Settings
 from cornersmooth.system.output import ClosedPipe, make_folder, read_mark
 from cornersmooth.system.processes import return_large_arrays
-from cornersmooth.verdict import Verdict
 
 if TYPE_CHECKING:
     from cornersmooth.feedrate import Limits

@@ -16,8 +16,7 @@ from cornersmooth.errors import SettingsError
 if TYPE_CHECKING:
     from cornersmooth.kinematics import Machine
     from cornersmooth.nc import Control, Form
-    from cornersmooth.settings import Settings
-    from cornersmooth.settings.limits import Limits
+    from cornersmooth.settings import Limits, Settings
 
 #: arguments of `cornersmooth.read` that options give
 _ARGUMENTS = (

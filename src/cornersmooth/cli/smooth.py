@@ -6,12 +6,12 @@ import os
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import click
 
 from cornersmooth.cli.batch import Batch, batch_report, end_lines, interrupted_line, line_of, write_summary
-from cornersmooth.cli.files import STANDARD, check_endings, check_inputs, check_path, read_lines
-from cornersmooth.cli.inputs import find_inputs
+from cornersmooth.cli.files import STANDARD, check_endings, check_inputs, check_path, find_inputs, read_lines
 from cornersmooth.cli.job import Job, Outcome, run_job
 from cornersmooth.cli.options import Options
 from cornersmooth.cli.shop import command_line, loosened
@@ -26,11 +26,12 @@ from cornersmooth.cli.show import (
     show_verdict,
     warn,
 )
-from cornersmooth.cli.shutdown import Shutdown
-from cornersmooth.errors import printable
+from cornersmooth.errors import Verdict, printable
 from cornersmooth.nc import Frame, fit_settings
 from cornersmooth.system.output import make_folder
-from cornersmooth.verdict import Verdict
+
+if TYPE_CHECKING:
+    from cornersmooth.cli import Shutdown
 
 #: files named in a warning
 _NAMED = 3

@@ -11,14 +11,13 @@ from cornersmooth.cl import read
 from cornersmooth.cli.files import STANDARD, check_inputs, check_reports, read_input, suffix_of, write_report
 from cornersmooth.cli.options import Options
 from cornersmooth.cli.show import say
-from cornersmooth.errors import SettingsError
+from cornersmooth.errors import SettingsError, Verdict
 from cornersmooth.geometry.tool import Tool, tools_of
 from cornersmooth.model import Program
 from cornersmooth.nc_reader import read_nc
 from cornersmooth.report import report_json
 from cornersmooth.report.tables import surface_csv, surface_lines
 from cornersmooth.surface import SurfaceMap, measure_surface
-from cornersmooth.verdict import Verdict
 from cornersmooth.verify import verify
 
 

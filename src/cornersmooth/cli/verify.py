@@ -22,6 +22,7 @@ from cornersmooth.cli.head import take_head
 from cornersmooth.cli.options import Options
 from cornersmooth.cli.shop import command_line, loosened
 from cornersmooth.cli.show import more, print_line, print_message, say_json, say_line, show_findings, warn
+from cornersmooth.errors import Verdict
 from cornersmooth.nc import own_words
 from cornersmooth.nc_reader import NcProgram, read_nc
 from cornersmooth.nc_reader.source import readable_twice
@@ -31,7 +32,6 @@ from cornersmooth.report.tables import along_lines, histogram_lines, verificatio
 from cornersmooth.report.verdict import judge, trusted_blocks
 from cornersmooth.settings import UNITS
 from cornersmooth.system.processes import return_large_arrays
-from cornersmooth.verdict import Verdict
 from cornersmooth.verify import Verification, Where, useful_processes, verify
 from cornersmooth.verify.task import APART, length_of
 

@@ -6,7 +6,7 @@ from cornersmooth.feedrate.planner import direct, plan
 from cornersmooth.feedrate.reached import AxisPeaks, axis_peaks, limiting
 from cornersmooth.feedrate.timelaw import States, TimeLaw
 from cornersmooth.feedrate.written import BlockLimits, block_feeds, plan_text
-from cornersmooth.settings.limits import Limits
+from cornersmooth.settings import Limits
 
 __all__ = [
     "AxisPeaks",

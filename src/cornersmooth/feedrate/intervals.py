@@ -18,7 +18,7 @@ from cornersmooth.feedrate.motion import curvature, taylor_along
 from cornersmooth.feedrate.path import Kind, Path, arc_series
 from cornersmooth.feedrate.resolution import FINER, Resolution
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.settings.limits import Limits
+from cornersmooth.settings import Limits
 
 #: the cone at the pole in which derivatives are cut off here, over the cone of the machine: smaller, to be safe
 WITHIN = 0.5

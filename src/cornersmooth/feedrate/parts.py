@@ -19,7 +19,7 @@ from cornersmooth.feedrate.reached import limiting
 from cornersmooth.feedrate.resolution import FINER, ROUGHLY
 from cornersmooth.feedrate.scurve import stopping_distance
 from cornersmooth.model import Ints
-from cornersmooth.settings.limits import Limits
+from cornersmooth.settings import Limits
 from cornersmooth.system.processes import map_in_processes
 
 #: elements of a part, and around it at least and at most

@@ -19,8 +19,7 @@ from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate.curves import Curves
 from cornersmooth.feedrate.rational_curves import STANDSTILL, WHOLE, end_tangents
 from cornersmooth.model import Bools, Corners, FeedMode, Floats, Ints, Move, Program, Runs, Status
-from cornersmooth.settings import Settings
-from cornersmooth.settings.limits import Limits
+from cornersmooth.settings import Limits, Settings
 from cornersmooth.smoothing.construction import find_neighbours
 
 #: angles below this are no motion of the axis, rad

@@ -21,8 +21,7 @@ from cornersmooth.feedrate.speed_problem import around
 from cornersmooth.feedrate.timelaw import TimeLaw, crossing_time
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import Floats, Ints, Program, SmoothProgram
-from cornersmooth.settings import Settings
-from cornersmooth.settings.limits import Limits
+from cornersmooth.settings import Limits, Settings
 
 Baseline = Literal["exact_stop", "velocity_jump"]
 Progress = Callable[[int, int], None]

@@ -10,7 +10,7 @@ from cornersmooth.feedrate.machine_axes import MachineAxes
 from cornersmooth.feedrate.motion import poses, shares_at
 from cornersmooth.feedrate.path import Path
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.settings.limits import Limits
+from cornersmooth.settings import Limits
 
 _HALVINGS = 60
 

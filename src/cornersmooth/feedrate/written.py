@@ -21,8 +21,7 @@ from cornersmooth.kinematics import Machine, endless
 from cornersmooth.model import Arcs, Bools, FeedMode, Floats, Ints, Move, Program, Source, Statement
 from cornersmooth.nc_reader.curves import groups
 from cornersmooth.nc_reader.elements import Element, Event, NcProgram
-from cornersmooth.settings import Settings
-from cornersmooth.settings.limits import Limits
+from cornersmooth.settings import Limits, Settings
 
 #: what a motion block does, as a move
 _MOVES = {Element.RAPID: Move.RAPID, Element.LINE: Move.LINEAR, Element.ARC: Move.ARC, Element.CURVE: Move.LINEAR}

@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from cornersmooth.errors import CornersmoothError, InputError, SettingsError
+from cornersmooth.errors import CornersmoothError, InputError, SettingsError, Verdict
 from cornersmooth.filter.checking import Checked, Place, block_time, check, pair, places
 from cornersmooth.filter.fewest import fewest
 from cornersmooth.filter.motion import Job
@@ -28,7 +28,6 @@ from cornersmooth.settings import Settings
 from cornersmooth.system.processes import return_free_memory
 from cornersmooth.times.comparing import MOST_POSES, Candidate, Row, Table, law_of_lines, with_rows
 from cornersmooth.times.saving import Timing
-from cornersmooth.verdict import Verdict
 
 #: the machine of a program that names no rotary axis
 THREE_AXES: Final = Machine("three axes", ())

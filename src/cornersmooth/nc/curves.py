@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.arrays.slices import some_rows
+from cornersmooth.arrays import some_rows
 from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.geometry.ragged import ranges
 from cornersmooth.model import Bools, Floats, Ints

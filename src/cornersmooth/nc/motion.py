@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cornersmooth.arrays.slices import some_rows
+from cornersmooth.arrays import some_rows
 from cornersmooth.kinematics.poses import continued
 from cornersmooth.kinematics.position import nose_position
 from cornersmooth.model import Bools, Floats, Ints, Move, Program

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cornersmooth.arrays.slices import some_rows
+from cornersmooth.arrays import some_rows
 from cornersmooth.arrays.vectors import norm
 from cornersmooth.geometry.ragged import spread
 from cornersmooth.kinematics import Machine, inverse_time, machine_position, tool_axis

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from cornersmooth.arrays.slices import some_rows
+from cornersmooth.arrays import some_rows
 from cornersmooth.model import Bools, Ints, Move, Statement
 from cornersmooth.nc.coordinates import Coordinates
 from cornersmooth.nc.holes import Holes

@@ -14,7 +14,7 @@ from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 from cornersmooth import __version__
-from cornersmooth.errors import Finding
+from cornersmooth.errors import Finding, Verdict
 from cornersmooth.geometry.tool import Tool
 from cornersmooth.kinematics import Machine, with_dynamics
 from cornersmooth.model import Program
@@ -32,9 +32,7 @@ from cornersmooth.report.verdict import (
     saving_text,
     trusted_blocks,
 )
-from cornersmooth.settings import Settings
-from cornersmooth.settings.limits import Limits
-from cornersmooth.verdict import Verdict
+from cornersmooth.settings import Limits, Settings
 from cornersmooth.verify import Verification
 
 if TYPE_CHECKING:

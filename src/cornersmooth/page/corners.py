@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cornersmooth.arrays.slices import some_rows
+from cornersmooth.arrays import some_rows
 from cornersmooth.arrays.vectors import angle_between
 from cornersmooth.model import Bools, Floats, Ints, LimitedBy, Program, SmoothProgram, Status
 from cornersmooth.report.corners import corner_table

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cornersmooth.arrays.slices import some_rows
+from cornersmooth.arrays import some_rows
+from cornersmooth.errors import Verdict
 from cornersmooth.feedrate import Limits
 from cornersmooth.geometry.tool import Tool, tools_of
 from cornersmooth.kinematics import Machine
@@ -29,7 +30,6 @@ from cornersmooth.page.planned_speeds import (
 )
 from cornersmooth.report.paths import OriginalPath, WrittenPath, original_path, thinned, written_path
 from cornersmooth.settings import Settings
-from cornersmooth.verdict import Verdict
 from cornersmooth.verify import Verification
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cornersmooth.arrays.slices import joined_rows, some_rows
+from cornersmooth.arrays import joined_rows, some_rows
 from cornersmooth.arrays.vectors import angle_between, dot, norm
 from cornersmooth.geometry.arcs import poses_and_arcs
 from cornersmooth.model import Bools, Floats, Ints, Move, Program

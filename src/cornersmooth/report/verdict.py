@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cornersmooth.errors import Finding
+from cornersmooth.errors import Finding, Verdict
 from cornersmooth.model import SmoothProgram, Status
 from cornersmooth.report.corners import corner_table
 from cornersmooth.smoothing.construction import STRAIGHT_ON
 from cornersmooth.smoothing.sharp import other_corners, sharp_rows
-from cornersmooth.verdict import Verdict
 
 if TYPE_CHECKING:
     from cornersmooth.verify import Verification

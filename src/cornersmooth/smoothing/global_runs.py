@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cornersmooth.arrays.slices import joined_rows, some_runs
+from cornersmooth.arrays import joined_rows, some_runs
 from cornersmooth.arrays.vectors import angle_between
 from cornersmooth.errors import Finding
 from cornersmooth.geometry.ragged import batches, ranges, spread, starts

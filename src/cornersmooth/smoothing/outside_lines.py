@@ -17,9 +17,8 @@ from functools import partial
 
 import numpy as np
 
-from cornersmooth.arrays.slices import some_rows
+from cornersmooth.arrays import Bools, Floats, Ints, some_rows
 from cornersmooth.arrays.vectors import norm, square
-from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.smoothing.long_lines import LANE, LineLimits, Vertices, farthest, fewest_lines, without_lag
 
 #: times the limits that chords may be off: moving their ends does not balance them perfectly

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.arrays.slices import joined_rows
+from cornersmooth.arrays import joined_rows
 from cornersmooth.model import Floats, Ints, SmoothProgram
 from cornersmooth.smoothing.sampling import dense_rows
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.arrays.slices import joined_rows, some_rows
+from cornersmooth.arrays import joined_rows, some_rows
 from cornersmooth.arrays.vectors import unit
 from cornersmooth.geometry import nurbs
 from cornersmooth.geometry.arcs import arc_curves, arc_lines, arc_points, arc_weights, divided

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from cornersmooth.arrays.slices import some_rows
+from cornersmooth.arrays import some_rows
 from cornersmooth.errors import SettingsError
 from cornersmooth.geometry.tool import Tool
 from cornersmooth.model import Bools, Floats, Program

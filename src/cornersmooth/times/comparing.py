@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from cornersmooth import nc
-from cornersmooth.arrays.slices import some_poses
-from cornersmooth.errors import CornersmoothError, SettingsError
+from cornersmooth.arrays import some_poses
+from cornersmooth.errors import CornersmoothError, SettingsError, Verdict
 from cornersmooth.feedrate import BlockLimits
 from cornersmooth.feedrate.resolution import ROUGHLY, Resolution
 from cornersmooth.kinematics import Machine, with_dynamics
@@ -22,7 +22,6 @@ from cornersmooth.pipeline import postprocess
 from cornersmooth.settings import BOUNDS, Settings
 from cornersmooth.system.processes import can_fork, map_in_processes, useful_processes
 from cornersmooth.times.saving import Timing, without_holes
-from cornersmooth.verdict import Verdict
 
 #: poses of a part that are looked at; of longer ones whole runs from the middle
 MOST_POSES = 2000

@@ -14,8 +14,7 @@ from cornersmooth.feedrate.reached import peaks
 from cornersmooth.kinematics import Machine
 from cornersmooth.methods import METHODS
 from cornersmooth.model import Program
-from cornersmooth.settings import Settings
-from cornersmooth.settings.limits import Limits
+from cornersmooth.settings import Limits, Settings
 from cornersmooth.smoothing import smooth
 
 SCHEMA = "cornersmooth-time/1"

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from cornersmooth.errors import Verdict
 from cornersmooth.model import Floats, Ints
 from cornersmooth.nc_reader.elements import Problem
-from cornersmooth.verdict import Verdict
 from cornersmooth.verify.findings import AXIS_OFF, Findings, Where
 from cornersmooth.verify.task import Task
 

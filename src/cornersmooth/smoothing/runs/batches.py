@@ -16,7 +16,7 @@ from functools import cached_property
 
 import numpy as np
 
-from cornersmooth.arrays.slices import some_rows
+from cornersmooth.arrays import some_rows
 from cornersmooth.arrays.vectors import dot, norm
 from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.geometry.ragged import ranges, spread, starts

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cornersmooth.arrays.slices import some_rows
+from cornersmooth.arrays import some_rows
 from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.geometry.ragged import ranges, spread
 from cornersmooth.model import Bools, Floats, Ints

@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.arrays.slices import some_runs
+from cornersmooth.arrays import some_runs
 from cornersmooth.arrays.vectors import angle_between, norm, unit
 from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.geometry.ragged import batches, search, spread, starts

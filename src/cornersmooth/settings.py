@@ -1,15 +1,54 @@
-"""Every tolerance and option of the smoothing: name, unit, default, bounds. No other module holds such a number."""
+"""Every option of smoothing, of limits and of the frame of a program: name, unit, default, bounds, help.
+
+No other module holds such a number. The command line, keys of ``cornersmooth.toml``, reports and their schema come from
+the one declaration here.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from numbers import Real
 from typing import Any, Literal
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.methods import AUTO, CURVES_METHOD, DEFAULT_METHOD, METHODS
-from cornersmooth.settings.declared import key_of, option
+
+
+def option(
+    default: Any,
+    help: str = "",
+    *,
+    unit: str = "",
+    bounds: tuple[float, float] | None = None,
+    flags: str = "",
+    instead: str = "",
+) -> Any:
+    """Field of an option.
+
+    Parameters
+    ----------
+    help : str
+        What it is, as the command line shows it; empty where that has no such option.
+    unit : str
+        As in ``mm/s2``.
+    bounds : (float, float), optional
+        Closed, of one number or several.
+    flags : str
+        On the command line, beside the long one of the field's name; a long one here takes its place.
+    instead : str
+        Field whose value counts where this one is None.
+    """
+    return field(
+        default=default,
+        metadata={"help": help, "unit": unit, "bounds": bounds, "flags": flags, "instead": instead},
+    )
+
+
+def key_of(name: str, unit: str) -> str:
+    """Key of an option in a record, with its unit: ``accel_mm_per_s2``."""
+    return f"{name}_{unit.replace('/', '_per_')}" if unit else name
+
 
 Lines = Literal["dense", "long"]
 
@@ -284,3 +323,107 @@ TIMED_POSES = 20_000
 BOUNDS: dict[str, tuple[float, float]] = {
     item.name: item.metadata["bounds"] for item in fields(Settings) if item.metadata["bounds"]
 }
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits of the motion; the defaults are those of the paper's Example 2."""
+
+    feed: float | None = option(None, "Feed of all feed moves instead of the programmed ones.", unit="mm/min")
+    accel: float = option(1000.0, "Acceleration along the path.", unit="mm/s2")
+    jerk: float = option(5000.0, "Jerk along the path.", unit="mm/s3")
+    centripetal: float | None = option(None, "Acceleration across the path.", unit="mm/s2", instead="accel")
+    rapid: float = option(10000.0, "Speed of rapid moves.", unit="mm/min")
+    rapid_accel: float | None = option(None, "Acceleration of rapids.", unit="mm/s2", instead="accel")
+    rapid_jerk: float | None = option(None, "Jerk of rapids.", unit="mm/s3", instead="jerk")
+    angular_feed: float = option(30.0, "Speed of moves that only turn the tool axis.", unit="deg/s")
+    angular_accel: float = option(150.0, "Their acceleration.", unit="deg/s2")
+    angular_jerk: float = option(3000.0, "Their jerk.", unit="deg/s3")
+    period: float = option(
+        0.002,
+        "Interpolation period, as in 2ms: at corners that stay sharp the velocity changes by at most accel times "
+        "period. [default: 2ms]",
+        unit="s",
+    )
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            value = getattr(self, item.name)
+            if value is not None and not (math.isfinite(value) and value > 0.0):
+                raise SettingsError("CS260", f"{item.name} is {value:g}", "give a positive number")
+
+    def _value(self, name: str) -> Any:
+        """Value of a limit, or of that which counts instead."""
+        value = getattr(self, name)
+        return getattr(self, self.__dataclass_fields__[name].metadata["instead"] or name) if value is None else value
+
+    @property
+    def centripetal_accel(self) -> float:
+        """Limit of κ·v², mm/s²."""
+        return float(self._value("centripetal"))
+
+    @property
+    def rapid_limits(self) -> tuple[float, float, float]:
+        """Speed mm/s, acceleration mm/s² and jerk mm/s³ of rapid moves."""
+        return self.rapid / 60.0, self._value("rapid_accel"), self._value("rapid_jerk")
+
+    @property
+    def angular_limits(self) -> tuple[float, float, float]:
+        """Speed, acceleration and jerk of pure rotations in rad/s, rad/s², rad/s³."""
+        return math.radians(self.angular_feed), math.radians(self.angular_accel), math.radians(self.angular_jerk)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values with their units in the keys, for reports.
+
+        Returns
+        -------
+        dict
+            Numbers, or None for no limit; feeds in mm/min, all else in mm, degrees and s.
+        """
+        return {key_of(item.name, item.metadata["unit"]): self._value(item.name) for item in fields(self)}
+
+
+@dataclass(frozen=True)
+class FrameSettings:
+    """Name, work offset, texts, retracts and holes of a program. Lengths in mm."""
+
+    #: None for that of the CL file, or of the control's table
+    program: str | None = option(
+        None, "Name or number of the NC program. [default: from the name of the CL file]", flags="--program-name"
+    )
+    block_numbers: bool = option(False, "Number the blocks.")
+    #: may have ``{program}``, ``{units}`` and ``{blend}``
+    header: tuple[str, ...] = option((), "Lines to write after the head; {program} and {units} are filled in.")
+    footer: tuple[str, ...] = option((), "Lines to write before the tail.")
+    comments: bool = option(True, "Leave out what the CL file says in words.", flags="--no-comments")
+    #: None for that of the control's table, empty for none
+    work_offset: str | None = option(
+        None,
+        "Work offset, such as G55, or the number of a preset; 'none' leaves it out. [default: G54, or preset 1]",
+    )
+    #: what the program is made of, for comments before the header
+    provenance: tuple[str, ...] = ()
+    #: name of the CL file without its ending, for `program`; empty for none
+    stem: str = ""
+    skip_cycles: bool = option(
+        False, "Leave out holes whose cycle cannot be written; the program says NOT DRILLED there. [default: an error]"
+    )
+    #: taps are the control's own cycles anyway
+    cycles: str = option(
+        "moves",
+        "Holes as plain moves, or as the control's own cycles where it has such and the tool stays along Z (or in a "
+        "tilted plane).",
+    )
+    #: 0 for neither. A form with a point on the axis comes down by 20 mm at least.
+    approach: float = option(
+        0.0,
+        "How far the tool comes down along its axis to the first position after a retract. [default: straight down]",
+        unit="mm",
+    )
+    retract: float = option(
+        0.0, "How far the tool goes back along its axis before it goes up. [default: straight up]", unit="mm"
+    )
+    modal: bool = option(False, "Leave out words that repeat from block to block, where the control keeps them.")
+    line_ends: str | None = option(
+        None, "What each line of the program ends with: lf or crlf. [default: that of the control's table, lf]"
+    )
