@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 import cornersmooth as cs
+from cornersmooth.errors import Verdict
 from cornersmooth.filter import filter_program
-from cornersmooth.verdict import Verdict
 from filter.programs import PROGRAMS
 from oracle.command import BAD_INPUT, DONE, USAGE, run
 from page.making import values_of

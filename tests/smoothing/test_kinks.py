@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from cornersmooth.cl import read
+from cornersmooth.errors import Verdict
 from cornersmooth.feedrate import Limits
 from cornersmooth.feedrate.motion import taylor_along
 from cornersmooth.feedrate.path import Kind
@@ -18,7 +19,6 @@ from cornersmooth.model import Floats
 from cornersmooth.nc import choose_form
 from cornersmooth.pipeline import postprocess, read_back
 from cornersmooth.settings import Settings
-from cornersmooth.verdict import Verdict
 
 SAMPLES = Path(__file__).parents[2] / "samples"
 CORPUS = os.environ.get("CORNERSMOOTH_CORPUS", "")
