@@ -55,7 +55,7 @@ class Keep(IntEnum):
 
     NO = 0
     CUTTER_COMPENSATION = 1  #: the control offsets the path; rounding before the offset would be wrong
-    ARC = 2  #: a chord or an end of a linearised arc
+    CURVE = 2  #: on a curve of the file that is written as it is
     CONTRADICTION = 3  #: the reader found contradicting information here
 
 
@@ -107,6 +107,21 @@ class Arcs:
 
 
 @dataclass(frozen=True)
+class Curves:
+    """Side table of m linear moves that are near pieces of curves: cubics of the tip and of a point 1 mm up the axis.
+
+    The pieces are the motion; the moves are chords of them.
+    """
+
+    pose: Ints  #: (m,): Index of the pose that each piece ends in, ascending
+    bezier: Floats  #: (m, 4, 6), mm: Its control points
+    runs: Runs | None  #: The same as B-splines, where a control may take them as they are; axis points 1 mm up
+
+    def __len__(self) -> int:
+        return len(self.pose)
+
+
+@dataclass(frozen=True)
 class Source:
     """Where a program came from: the `input` part of the report."""
 
@@ -136,6 +151,7 @@ class Program:
     feed_mode: NDArray[np.uint8]  #: (n,): `FeedMode` of each feed
     keep: NDArray[np.uint8]  #: (n,): `Keep`: reason why the pose is passed exactly, 0 for none
     arcs: Arcs = field(default_factory=Arcs)  #: Geometry of the poses with kind `Move.ARC`
+    curves: Curves | None = None  #: Geometry of the linear moves that are near curves of the file; None for none
     statements: tuple[Statement, ...] = ()  #: Sorted by `Statement.pose`, then by source order
     units: Units = "mm"  #: Units of the file, and of the NC text made from it
     source: Source = field(default_factory=Source)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from cornersmooth.model import Program, Runs
+    from cornersmooth.model import Curves, Program, Runs
 
 Floats: TypeAlias = NDArray[np.float64]
 Ints: TypeAlias = NDArray[np.int64]
@@ -36,7 +36,7 @@ def joined_rows(parts: Iterable[Columns]) -> Columns:
 
 
 def some_poses(program: Program, first: int, stop: int) -> Program:
-    """Poses from `first` to before `stop`, with the arcs and statements between them.
+    """Poses from `first` to before `stop`, with the arcs, curves and statements between them.
 
     Parameters
     ----------
@@ -48,12 +48,24 @@ def some_poses(program: Program, first: int, stop: int) -> Program:
     return replace(
         some_rows(program, slice(first, stop)),
         arcs=replace(arcs, pose=arcs.pose - first),
+        curves=None if program.curves is None else _some_curves(program.curves, first, stop),
         statements=tuple(
             replace(statement, pose=max(statement.pose - first, 0))
             for statement in program.statements
             if statement.pose < stop
         ),
     )
+
+
+def _some_curves(curves: Curves, first: int, stop: int) -> Curves:
+    """Those of moves between poses, which are counted from the first one on; whole runs only."""
+    runs = curves.runs
+    if runs is not None:
+        end = np.cumsum(runs.count)
+        runs = some_runs(runs, (runs.pose[end - runs.count] >= first) & (runs.pose[end - 1] < stop))
+        runs = replace(runs, pose=runs.pose - first) if len(runs) else None
+    own = some_rows(curves, (curves.pose > first) & (curves.pose < stop))
+    return replace(own, pose=own.pose - first, runs=runs)
 
 
 def some_runs(runs: Runs, kept: Bools) -> Runs:

@@ -17,6 +17,7 @@ from cornersmooth.cl.bulk import chunks
 from cornersmooth.cl.dialects import DIALECTS, recognise
 from cornersmooth.cl.grammar import Decode, Record, joined, number, read_records
 from cornersmooth.cl.messages import error, finding
+from cornersmooth.cl.nurbs import curves_of
 from cornersmooth.cl.poses import AXIS_NOISE
 from cornersmooth.cl.reader_state import ReaderState
 from cornersmooth.cl.source import without_card_columns
@@ -290,6 +291,7 @@ def _program(state: ReaderState, wanted: Units | None) -> Program:
         feed_mode=state.feed_mode.spread(state.n).astype(np.uint8),
         keep=keep,
         arcs=replace(arcs, centre=arcs.centre * scale),
+        curves=curves_of(state.curves, scale, axis, keep != Keep.NO, kind),
         statements=tuple(state.statements),
         units=units,
         source=Source(state.file, "apt", state.dialect.name),

@@ -13,14 +13,14 @@ from cornersmooth.cl.arcs import LEAST_DECIMALS, Arc, read_arc
 from cornersmooth.cl.grammar import NUMBER, Argument, Record, joined, number
 from cornersmooth.cl.messages import error
 from cornersmooth.cl.movnrb import Spline
-from cornersmooth.cl.nurbs import CURVE_DIGITS, Curve, lines_of
+from cornersmooth.cl.nurbs import CURVE_DIGITS, DEGREE, Cubic, Curve
 from cornersmooth.cl.poses import Vector, check_range
 from cornersmooth.cl.reader_state import ReaderState
 from cornersmooth.cl.state_statements import Handler
 from cornersmooth.cl.surfaces import read_drive_arc, read_helix
 from cornersmooth.cl.words import GOTO_WORDS
 from cornersmooth.errors import InputError
-from cornersmooth.model import MM_PER_UNIT, Floats, Move
+from cornersmooth.model import MM_PER_UNIT, Floats, Ints, Move
 
 #: X1,Y2,Z3 or X1,Y2,Z3,I0,J0,K1, separated by commas or blanks
 _AFTER: Final = r"\s*{}\s*=?\s*(" + NUMBER.pattern.replace("(", "(?:").replace("(?:?:", "(?:") + ")"
@@ -192,21 +192,27 @@ def _control(state: ReaderState, record: Record) -> None:
 
 
 def finish_curve(state: ReaderState) -> None:
-    """Turn the NURBS record that just ended into lines, within `CURVE_DIGITS` (InputError CS113, CS128)."""
+    """Add the NURBS record that just ended, with lines within `CURVE_DIGITS` of it (InputError CS113, CS128)."""
     curve, state.curve = state.curve, None
     assert curve is not None
-    why = curve.complaint
-    points = None
-    if why is None:
-        tolerance = CURVE_DIGITS * 10.0 ** -max(curve.decimals, LEAST_DECIMALS)
-        points = lines_of(curve, state.last_tip(), tolerance)
-        why = "it would need too many lines" if points is None else None
-    if points is None:
-        raise error("CS128", state.file, curve.line, why=why)
+    why, tolerance = curve.complaint, CURVE_DIGITS * 10.0 ** -max(curve.decimals, LEAST_DECIMALS)
+    found = curve.cubic(state.last_tip(), tolerance) if why is None else None
+    if found is None:
+        raise error("CS128", state.file, curve.line, why=why or "it would need too many lines")
     state.note("CS145", curve.line, tolerance=tolerance)
-    axis = state.held_axis()
-    for (x, y, z), line in zip(points[0].tolist(), points[1].tolist(), strict=True):
-        state.add((x, y, z), axis, line)
+    _add_curve(state, found, curve.lines_at(found.u[1:]))
+
+
+def _add_curve(state: ReaderState, curve: Cubic, lines: Ints) -> None:
+    """Add a curve with its points (m,), of lines of the file."""
+    check_range(curve.control.ravel().tolist(), state.file, int(lines[0]))
+    state.curves.append(curve.placed(state.system, state.n - 1))
+    held = state.held_axis()
+    for row, line in zip(curve.points[1:].tolist(), lines.tolist(), strict=True):
+        way = [b - a for a, b in zip(row[:3], row[3:], strict=False)]
+        length = math.hypot(*way)
+        axis = (way[0] / length, way[1] / length, way[2] / length) if way else held
+        state.add((row[0], row[1], row[2]), axis, line)
 
 
 def _movnrb(state: ReaderState, record: Record) -> None:
@@ -247,31 +253,28 @@ def leave_spline(state: ReaderState, record: Record) -> None:
     assert spline is not None
     if not spline.passing:
         raise state.fail("CS128", record, why=f"{record.word} comes before MOVNRB/NEXT")
-    for rows in spline.points:
-        _add_rows(state, rows)
+    for x, y, z, i, j, k, line in np.vstack(spline.points).tolist() if spline.points else ():
+        state.add((x, y, z), None if math.isnan(i) else (i, j, k), int(line))
 
 
 def _end_spline(state: ReaderState, spline: Spline) -> None:
-    """Take the curve as lines, or the points where they are not on it."""
+    """Add the curve, or the points where they are not on it."""
     inch = (state.stated_units[-1][1] if state.stated_units else (state.feed_units or ["mm"])[0]) == "inch"
     tolerance = SPLINE_MM / (MM_PER_UNIT["inch"] if inch else 1.0)
-    _at_feed(state, Record(spline.line, "MOVNRB"))
-    path = spline.path(tolerance) if spline.passing else None
-    if path is None:
-        raise error("CS128", state.file, spline.line, why="it is not complete, or would need too many lines")
-    if not spline.passes_by(path, state.last_tip()):
-        state.note("CS144", spline.line, what="a curve of MOVNRB that does not pass by its points")
-        leave_spline(state, Record(spline.line, "MOVNRB"))
+    record = Record(spline.line, "MOVNRB")
+    _at_feed(state, record)
+    found = spline.cubic(np.array([*state.last_tip(), *state.last_axis]), tolerance) if spline.passing else None
+    if found is not None:
+        state.spline = None
+        state.note("CS145", spline.line, tolerance=tolerance)
+        _add_curve(state, found, np.full(len(found.u) - 1, spline.line))
         return
-    state.spline = None
-    check_range(path[:, :3].ravel().tolist(), state.file, spline.line)
-    state.note("CS145", spline.line, tolerance=tolerance)
-    _add_rows(state, np.column_stack((path[1:], np.full(len(path) - 1, spline.line))))
-
-
-def _add_rows(state: ReaderState, rows: Floats) -> None:
-    for x, y, z, i, j, k, line in rows.tolist():
-        state.add((x, y, z), None if math.isnan(i) else (i, j, k), int(line))
+    if not spline.points:
+        why = "it is not complete, or begins elsewhere than where the tool is"
+        raise state.fail("CS128", record, why=why)
+    why = "that does not pass by its points" if spline.order == DEGREE + 1 else f"of order {spline.order}"
+    state.note("CS144", spline.line, what=f"a curve of MOVNRB {why}")
+    leave_spline(state, record)
 
 
 def _at_feed(state: ReaderState, record: Record) -> None:

@@ -1,4 +1,4 @@
-"""Creo's MOVNRB records: B-splines of the tip, and of a point up the tool axis, read as lines near them.
+"""Creo's MOVNRB records: cubic B-splines of the tip, and of a point up the tool axis.
 
 ::
 
@@ -12,24 +12,23 @@
     MOVNRB / OFF
 
 Source: PTC, Creo help, "CL Output for NURBS Interpolation". All readers agree on the points: they are taken where they
-are not on the curve, or where anything else is among them, such as another feed.
+are not on the curve, where that is no cubic, or where anything else is among them, such as another feed.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
 
-from cornersmooth.cl.nurbs import MOST_LINES
+from cornersmooth.arrays.vectors import unit
+from cornersmooth.cl.nurbs import DEGREE, Cubic, bad_knots, cubic
 from cornersmooth.model import Floats
 
-#: how far points may be from the curve, and axes from its own, in units of the file and radians
+#: how far points may be from the curve, and axes from its own, in units of the file and radians; the same of its start
 NEAR: Final = 1e-3
-
-_HIGHEST_ORDER: Final = 24
+AT_START: Final = 1e-5
 
 #: statements of control points, and what they are of
 TIP, SECOND = 2, 3
@@ -52,7 +51,7 @@ class Spline:
     def complaint(self) -> str | None:
         """What is wrong with knots and control points, if anything."""
         knots, points = self.sizes
-        if not 2 <= self.order <= _HIGHEST_ORDER or knots != points + self.order:
+        if not 2 <= self.order <= points or knots != points + self.order:
             return f"order {self.order}, {knots} knots and {points} control points are no curve"
         wanted = {1: knots, TIP: 3 * points, SECOND: 3 * points * self.five}
         wrong = [kind for kind, count in wanted.items() if len(self.rows[kind]) != count]
@@ -64,46 +63,31 @@ class Spline:
             return "its knots do not ascend"
         return None
 
-    def path(self, tolerance: float) -> Floats | None:
-        """(k, 6) tips and tool axes (NaN for none) on a curve without a complaint, whose chords stay near it.
+    def cubic(self, start: Floats, tolerance: float) -> Cubic | None:
+        """The curve from where the tool is, tip and axis (6,); its first point is there but for the last digits.
 
-        None if there would be more than `MOST_LINES` a control point, or where tip and second point are the same.
+        None where it does not start there, or does not pass by its points.
         """
-        from scipy.interpolate import BSpline  # which takes long to load
-
-        degree, count = self.order - 1, self.sizes[1]
+        knots, count = np.array(self.rows[1]), self.sizes[1]
+        inside = knots[DEGREE : count + 1]
+        if self.order != DEGREE + 1 or bad_knots((inside - inside[0]) / (inside[-1] - inside[0])) is not None:
+            return None
         kinds = (TIP, SECOND) if self.five else (TIP,)
         control = np.hstack([np.array(self.rows[kind]).reshape(-1, 3) for kind in kinds])
-        knots = np.array(self.rows[1])
-        spans = np.unique(knots[degree : count + 1])
-        spline = BSpline(knots, control, degree)
-        # chord error of a piece of length h is at most h²/8·max|C″|, and C″ lies in the hull of its control points
-        bend = np.zeros(len(spans) - 1)
-        if degree > 1:
-            size = np.linalg.norm(spline.derivative(2).c.reshape(-1, len(kinds), 3), axis=2).max(axis=1)
-            first = np.searchsorted(knots, spans[:-1], side="right") - 1 - degree
-            bend = np.max([size[first + k] for k in range(degree - 1)], axis=0)
-        with np.errstate(over="ignore", invalid="ignore"):
-            pieces = np.ceil(np.diff(spans) * np.sqrt(bend / (8.0 * tolerance)))
-        if not pieces.sum() <= MOST_LINES * count:
+        if self.five and not (control[:, :3] != control[:, 3:]).any(axis=1).all():
             return None
-        pieces = np.maximum(pieces, 1).astype(np.int64)
-        begin = np.cumsum(pieces) - pieces
-        step = np.arange(pieces.sum()) - np.repeat(begin, pieces)
-        u = np.append(np.repeat(spans[:-1], pieces) + step * np.repeat(np.diff(spans) / pieces, pieces), spans[-1])
-        found: Floats = spline(u)
-        if not self.five:
-            return np.hstack((found, np.full((len(u), 3), np.nan)))
-        axis = found[:, 3:] - found[:, :3]
-        length = np.linalg.norm(axis, axis=1, keepdims=True)
-        return np.hstack((found[:, :3], axis / length)) if (length > 0.0).all() else None
-
-    def passes_by(self, path: Floats, start: tuple[float, float, float]) -> bool:
-        """Whether the path begins at a tip, and passes by the points in order and ends with the last of them."""
-        points = np.vstack(self.points) if self.points else path[-1:]
-        begin = math.dist(start, path[0, :3].tolist())
-        end = math.dist(points[-1, :3].tolist(), path[-1, :3].tolist())
-        return max(begin, end) <= NEAR and all(self._near(path, point) for point in points)
+        if knots[0] == knots[DEGREE] and np.abs(control[0, :3] - start[:3]).max() <= AT_START:
+            control[0] += np.tile(start[:3] - control[0, :3], len(kinds))
+        found = cubic(knots, control, tolerance)
+        if found is None:
+            return None
+        path = found.points
+        if self.five:
+            path[:, 3:] = unit(path[:, 3:] - path[:, :3])
+        begin = np.abs(path[0] - start[: path.shape[1]]).max()
+        end = np.abs(path[-1, :3] - np.vstack(self.points)[-1, :3]).max() if self.points else 0.0
+        near = begin <= AT_START and end <= NEAR
+        return found if near and all(self._near(path, point) for rows in self.points for point in rows) else None
 
     def _near(self, path: Floats, point: Floats) -> bool:
         """Whether a path passes by a point with its axis."""

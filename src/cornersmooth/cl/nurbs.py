@@ -1,4 +1,4 @@
-"""NX's NURBS records: a cubic B-spline of the tool tip, read as lines.
+"""Cubic B-splines of a CL file, and NX's records of them.
 
 ::
 
@@ -16,13 +16,16 @@ included, within 1 % in most curves: each curve runs at constant speed, as it sh
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from cornersmooth.model import Floats, Ints
+from cornersmooth.arrays import joined_rows
+from cornersmooth.cl.poses import AXIS_NOISE, System
+from cornersmooth.model import Curves, Floats, Ints, Move, Runs
 
 DEGREE: Final = 3
 
@@ -34,6 +37,12 @@ LEAST_STEP: Final = 1e-9
 
 #: lines for every control point at most; more would be no tool path
 MOST_LINES: Final = 1000
+
+#: steps of the parameter of a curve: knots are written with three decimals, and a control takes so long a curve at once
+_STEPS: Final = 4e6
+
+#: poses of a curve that is worth one: those of fewer lines are lines
+_FEWEST: Final = 4
 
 
 @dataclass
@@ -54,45 +63,129 @@ class Curve:
         ascend = all(low <= high for low, high in pairwise((0.0, *self.knots)))
         if not ascend or not 0 < self.knots[0] <= self.knots[-1] < math.inf:
             return "its knots do not ascend from above 0"
-        knots = np.array([0.0, *self.knots]) / self.knots[-1]
-        steps = np.diff(knots)
-        if steps[0] == 0 or ((steps > 0) & (steps < LEAST_STEP)).any():
-            return "two of its knots are nearly the same"
-        if (knots[:-2] == knots[2:]).any():
-            return "a knot is repeated more than once"
-        if np.count_nonzero(knots == knots[-1]) > 1:
-            return "its last knot is repeated"
-        return None
+        return bad_knots(np.array([0.0, *self.knots]) / self.knots[-1])
+
+    def cubic(self, start: tuple[float, float, float], tolerance: float) -> Cubic | None:
+        """The curve without a complaint, from where the tool is."""
+        inner = np.array(self.knots) / self.knots[-1]
+        knots = np.concatenate((np.zeros(DEGREE + 1), inner, np.ones(DEGREE)))
+        return cubic(knots, np.array([start, *self.points]), tolerance)
+
+    def lines_at(self, u: Floats) -> Ints:
+        """Lines of the file that places on the curve belong to."""
+        inner = np.array([0.0, 0.0, 0.0, *self.knots, *(2 * self.knots[-1:])]) / self.knots[-1]
+        greville = (inner[2:] + inner[1:-1] + inner[:-2]) / DEGREE
+        near = np.clip(np.searchsorted(greville, u), 1, len(self.lines)) - 1
+        return np.array(self.lines, np.int64)[near]
 
 
-def lines_of(curve: Curve, start: tuple[float, float, float], tolerance: float) -> tuple[Floats, Ints] | None:
-    """Points on a curve without a complaint (m, 3), whose chords stay within a tolerance of it, and their lines (m,).
+def bad_knots(knots: Floats) -> str | None:
+    """What is wrong with ascending distinct or repeated knots between the ends of a curve, from 0 to 1, if anything."""
+    steps = np.diff(knots)
+    if steps[0] == 0 or ((steps > 0) & (steps < LEAST_STEP)).any():
+        return "two of its knots are nearly the same"
+    if (knots[:-2] == knots[2:]).any():
+        return "a knot is repeated more than once"
+    if np.count_nonzero(knots == knots[-1]) > 1:
+        return "its last knot is repeated"
+    return None
 
-    The start is its first control point and is left out; the end is not. None if there would be more than `MOST_LINES`
-    points a control point.
+
+@dataclass(frozen=True)
+class Cubic:
+    """A cubic B-spline of the tip, or of tip and second point, in m pieces whose chords stay near; as written."""
+
+    knots: Floats  #: (c + 4,)
+    control: Floats  #: (c, 3 or 6)
+    u: Floats  #: (m + 1,): ends of the pieces
+    bezier: Floats  #: (m, 4, 3 or 6): control points of each piece
+    first: int = 0  #: pose that it starts from
+
+    @property
+    def points(self) -> Floats:
+        """(m + 1, 3 or 6) ends of the pieces."""
+        return np.concatenate((self.bezier[:1, 0], self.bezier[:, 3]))
+
+    def placed(self, system: System, first: int) -> Cubic:
+        """The same from a pose, in the first coordinate system."""
+        control, bezier = (
+            system.points(points.reshape(-1, 3)).reshape(points.shape) for points in (self.control, self.bezier)
+        )
+        return replace(self, control=control, bezier=bezier, first=first)
+
+
+def cubic(knots: Floats, control: Floats, tolerance: float) -> Cubic | None:
+    """Cut a curve into pieces at its knots and where chords would leave tip or second point by more than a tolerance.
+
+    None if there would be more than `MOST_LINES` a control point.
     """
     from scipy.interpolate import BSpline  # which takes long to load
 
-    control = np.array([start, *curve.points])
-    inner = np.array(curve.knots) / curve.knots[-1]
-    knots = np.concatenate((np.zeros(DEGREE + 1), inner, np.ones(DEGREE)))
-    spans = np.unique(knots)
-    # chord error of a piece of length h is at most h²/8·max|C″|, and C″ lies in the hull of its control points
     spline = BSpline(knots, control, DEGREE)
-    size = np.linalg.norm(spline.derivative(2).c, axis=1)
-    first = np.searchsorted(knots, spans[:-1], side="right") - 1 - DEGREE  # first control point of the span
-    largest = np.maximum(size[first], size[first + 1])
-    with np.errstate(over="ignore"):
-        pieces = np.ceil(np.diff(spans) * np.sqrt(largest / (8 * tolerance)))
+    slope = spline.derivative()
+    edges = np.unique(knots[DEGREE : len(control) + 1])
+    whole = _bezier(spline(edges), slope(edges), edges)
+    # a chord is off by at most an eighth of the largest second derivative, which lies in the hull of its control points
+    bend = 0.75 * _largest(np.diff(whole, 2, axis=1))
+    with np.errstate(over="ignore", invalid="ignore"):
+        pieces = np.ceil(np.sqrt(bend / tolerance))
     if not pieces.sum() <= MOST_LINES * len(control):
         return None
     pieces = np.maximum(pieces, 1).astype(np.int64)
-    begin = np.cumsum(pieces) - pieces
-    step = np.arange(1, pieces.sum() + 1) - np.repeat(begin, pieces)
-    u = np.repeat(spans[:-1], pieces) + step * np.repeat(np.diff(spans) / pieces, pieces)
-    u[np.cumsum(pieces) - 1] = spans[1:]
-    points: Floats = spline(u)
-    points[-1] = control[-1]
-    greville = (knots[2:-2] + knots[1:-3] + knots[3:-1]) / DEGREE
-    near = np.clip(np.searchsorted(greville, u), 1, len(curve.lines)) - 1
-    return points, np.array(curve.lines, np.int64)[near]
+    step = np.arange(pieces.sum()) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+    u = np.append(np.repeat(edges[:-1], pieces) + step * np.repeat(np.diff(edges) / pieces, pieces), edges[-1])
+    bezier = _bezier(spline(u), slope(u), u)
+    if knots[len(control)] == knots[-1]:
+        bezier[-1, 3] = control[-1]
+    return Cubic(knots, control, u, bezier)
+
+
+def _bezier(points: Floats, slopes: Floats, u: Floats) -> Floats:
+    """Control points of the pieces between places with points and derivatives."""
+    third = np.diff(u)[:, None] / 3.0
+    inner = points[:-1] + third * slopes[:-1], points[1:] - third * slopes[1:]
+    return np.stack((points[:-1], *inner, points[1:]), axis=1)
+
+
+def _largest(differences: Floats) -> Floats:
+    """(m,) the largest of rows (m, k, 3 or 6), of tip and second point each by itself."""
+    return np.linalg.norm(differences.reshape(*differences.shape[:2], -1, 3), axis=3).max(axis=(1, 2), initial=0.0)
+
+
+def curves_of(
+    cubics: list[Cubic], scale: float, axis: Floats, exact: NDArray[np.bool_], kind: NDArray[np.uint8]
+) -> Curves | None:
+    """The curves of a program in mm, with points 1 mm up the tool axis; under cutter compensation they are lines."""
+    poses, pieces, runs = [], [], []
+    for one in cubics:
+        pose = one.first + np.arange(len(one.u))
+        fixed = one.control.shape[1] == 3 and np.ptp(axis[pose], axis=0).max() > AXIS_NOISE
+        elsewhere = kind[pose[0]] in (Move.FROM, Move.HOLE)  # the tool does not come from that pose
+        if fixed or elsewhere or exact[pose].any() or (kind[pose[1:]] != Move.LINEAR).any():
+            continue
+        if one.control.shape[1] == 3:
+            up = axis[pose[1]] / scale
+            control, bezier = (np.concatenate((p, p + up), axis=-1) for p in (one.control, one.bezier))
+        else:
+            lever = scale * np.linalg.norm(one.control[0, 3:] - one.control[0, :3])
+            control, bezier = (
+                np.concatenate((p[..., :3], p[..., :3] + (p[..., 3:] - p[..., :3]) / lever), axis=-1)
+                for p in (one.control, one.bezier)
+            )
+        poses.append(pose[1:])
+        pieces.append(scale * bezier)
+        runs += _as_run(one, pose, scale * control)
+    if not poses:
+        return None
+    return Curves(np.concatenate(poses), np.concatenate(pieces), joined_rows(runs) if runs else None)
+
+
+def _as_run(one: Cubic, pose: Ints, control: Floats) -> list[Runs]:
+    """The whole curve, where controls take it: clamped, without repeated knots, and more than a few lines."""
+    inner = one.knots[DEGREE : len(control) + 1]
+    clamped = one.knots[0] == inner[0] and one.knots[-1] == inner[-1]
+    s, knot = (np.rint((u - inner[0]) * (_STEPS / (inner[-1] - inner[0]))) for u in (one.u, inner))
+    if not clamped or len(pose) < _FEWEST or (np.diff(s) < 1.0).any() or (np.diff(knot) < 1.0).any():
+        return []
+    count, none = np.array([len(pose)]), np.zeros(1)
+    return [Runs(pose, count, s, 1.0 / _STEPS, knot, np.array([len(knot)]), control, none, none)]

@@ -13,7 +13,7 @@ from cornersmooth.cl.dialects import Dialect
 from cornersmooth.cl.grammar import Argument, Record, joined, number
 from cornersmooth.cl.messages import error, finding
 from cornersmooth.cl.movnrb import Spline
-from cornersmooth.cl.nurbs import Curve
+from cornersmooth.cl.nurbs import Cubic, Curve
 from cornersmooth.cl.poses import Poses, System, Vector
 from cornersmooth.errors import Finding, InputError
 from cornersmooth.model import Move, Statement, Units
@@ -27,6 +27,7 @@ class ReaderState(Poses):
     arc_rule: ArcRule | None = None  #: overrides the dialect's sense of rotation
     cycle_order: tuple[str, ...] = ()  #: what the numbers without a word of CYCLE are
     arcs: list[Arc] = field(default_factory=list)  #: in the order of their end poses
+    curves: list[Cubic] = field(default_factory=list)
     statements: list[Statement] = field(default_factory=list)
     stated_units: list[tuple[int, Units, int]] = field(default_factory=list)  #: line, units, pose
     unitless_feeds: set[int] = field(default_factory=set)  #: rows of `Poses.feed` in units of the file

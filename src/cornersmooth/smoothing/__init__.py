@@ -12,23 +12,31 @@ from cornersmooth.model import Bools, Move, Program, SmoothProgram
 from cornersmooth.settings import FLIP_ANGLE, Settings
 from cornersmooth.smoothing.construction import construction_of
 from cornersmooth.smoothing.doubled import one_corner_each
+from cornersmooth.smoothing.given_curves import beside_chords, given_runs, with_runs, without
 
 
 def smooth(
     program: Program,
     settings: Settings | None = None,
     *,
+    curves: bool = False,
     progress: Callable[[int, int], None] | None = None,
     processes: int = 1,
 ) -> SmoothProgram:
     """Round every corner of the program within the tolerance; parameters as of `pipeline.smooth`.
 
-    Corners that stay sharp have a status that says why. CS183: the axis turns by nearly half a turn in one feed move.
+    With `curves` those of the CL file stay as they are. Corners that stay sharp have a status that says why.
+    CS183: the axis turns by nearly half a turn in one feed move.
     """
     settings = (Settings() if settings is None else settings).with_method()
     refuse_flips(program)
     program, settings = one_corner_each(program, settings)
-    smoothed = construction_of(settings.method).smooth(program, settings, progress, processes)
+    program, settings = beside_chords(program, settings)
+    runs, method = given_runs(program, settings) if curves else None, construction_of(settings.method)
+    if runs is None:
+        smoothed = method.smooth(program, settings, progress, processes)
+    else:
+        smoothed = with_runs(method.smooth(without(program, runs), settings, progress, processes), program, runs)
     if settings.axis_tolerance is not None:
         turned = settings.axis_scale * 2.0 * np.sin(smoothed.corners.orientation_error / 2.0)
         smoothed = replace(smoothed, corners=replace(smoothed.corners, axis_error=turned))

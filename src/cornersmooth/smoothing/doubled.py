@@ -84,8 +84,10 @@ def _steps(program: Program, axis_length: float) -> Floats:
 
 
 def _pinned(program: Program) -> Bools:
-    """(n,) whether poses stay: ends of chains, what must be passed exactly, and where the feed changes."""
+    """(n,) whether poses stay: ends of chains, what must be passed exactly, curves, and where the feed changes."""
     pinned = (program.keep != 0) | program.acted[1:]
+    if program.curves is not None:
+        pinned[program.curves.pose] = pinned[program.curves.pose - 1] = True
     pinned[program.chains.ravel()] = True
     other = (program.feed_mode[1:] != program.feed_mode[:-1]) | (program.feed[1:] != program.feed[:-1])
     pinned[:-1] |= other & ~(np.isnan(program.feed[1:]) & np.isnan(program.feed[:-1]))

@@ -134,12 +134,13 @@ def turns_part(machine: Machine) -> bool:
 
 
 def turned(program: Program, setup: Setup, pivot: Floats) -> Program:
-    """Return the motion of a program with the part clamped in another way; statements beside it are left out."""
+    """Return the motion of a program with the part clamped in another way, in lines and arcs, without statements."""
     matrix, arcs = setup.matrix, program.arcs
     return replace(
         program,
         tip=(program.tip - pivot) @ matrix.T + pivot,
         axis=program.axis @ matrix.T,
+        curves=None,
         arcs=replace(arcs, centre=(arcs.centre - pivot) @ matrix.T + pivot, normal=arcs.normal @ matrix.T),
         statements=(),
     )

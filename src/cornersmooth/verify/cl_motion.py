@@ -1,7 +1,7 @@
 """The CL motion as a polyline with a bound of how far it leaves it.
 
-Nothing is put into straight moves that hardly turn the axis, which are nearly all; arcs and large turns get inner
-vertices, as many as keep the bend of each part (see `bending`) within a share of the tolerance.
+Nothing is put into straight moves that hardly turn the axis, which are nearly all; arcs, curves and large turns get
+inner vertices, as many as keep the bend of each part (see `bending`) within a share of the tolerance.
 """
 
 from __future__ import annotations
@@ -13,10 +13,11 @@ import numpy as np
 
 from cornersmooth.model import Floats, Ints, Move, Program
 from cornersmooth.nc_reader.arcs import arc_points
+from cornersmooth.nc_reader.curves import CurveGroup
 from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.nc_reader.tool import between, unit
 from cornersmooth.settings import FLIP_ANGLE
-from cornersmooth.verify.bending import arc_bend, turn_bend
+from cornersmooth.verify.bending import arc_bend, curve_bend, turn_bend
 
 #: bend of a segment in tolerances: it is taken off the tolerance where what can be reached is worked out exactly
 CL_SHARE: Final = 1.0 / 128.0
@@ -48,6 +49,7 @@ class Original:
     program: Program
     pose: Ints  #: (m,): pose of every move; the first is where the motion starts
     trail: Trail  #: owners are indices into `pose`
+    pieces: CurveGroup | None  #: what moves near curves of the file are: their index is that of the pose
 
     def pose_at(self, place: Floats) -> tuple[Floats, Floats]:
         """Tip and unit axis (k, 3) at places of the trail, each a segment plus a fraction of it."""
@@ -64,14 +66,10 @@ class Original:
 
     def arcs_of(self, owner: Ints) -> Ints:
         """(k,) rows of the program's arcs that moves are, -1 for straight ones and for where the motion starts."""
-        pose, arcs = self.pose[owner], self.program.arcs.pose
-        if not len(arcs):
-            return np.full(len(pose), -1)
-        row = np.minimum(np.searchsorted(arcs, pose), len(arcs) - 1)
-        return np.where((arcs[row] == pose) & (owner > 0), row, -1)
+        return np.where(owner > 0, _found(self.program.arcs.pose, self.pose[owner]), -1)
 
     def at(self, owner: Ints, fraction: Floats) -> tuple[Floats, Floats]:
-        """Tip and unit axis (k, 3) at a fraction of moves: the ruled motion, or the true arc."""
+        """Tip and unit axis (k, 3) at a fraction of moves: the ruled motion, or the true arc or curve."""
         program = self.program
         end = self.pose[owner]
         start = self.pose[np.maximum(owner - 1, 0)]
@@ -89,7 +87,28 @@ class Original:
                 fraction[curved],
             )
         axis = between(program.axis, start, end, fraction)
+        if self.pieces is not None:
+            row = _found(self.pieces.index, end)
+            curved = np.flatnonzero((row >= 0) & (fraction < 1.0))
+            point = self.pieces.at_own(row[curved], fraction[curved])
+            tip[curved], axis[curved] = point[:, :3], point[:, 3:] - point[:, :3]
         return tip, unit(axis)
+
+
+def _found(keys: Ints, wanted: Ints) -> Ints:
+    """(k,) places of numbers among ascending keys, -1 for none."""
+    if not len(keys):
+        return np.full(len(wanted), -1)
+    row = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+    return np.where(keys[row] == wanted, row, -1)
+
+
+def _pieces(program: Program) -> CurveGroup | None:
+    """The pieces of curves of the file."""
+    if program.curves is None:
+        return None
+    knots, points = np.repeat((0.0, 1.0), 4), program.curves.bezier
+    return CurveGroup(program.curves.pose, 4, knots, points, np.ones(points.shape[:2]))
 
 
 def original_motion(program: Program, tolerance: float, axis_length: float) -> tuple[Original, Floats, Floats]:
@@ -108,18 +127,21 @@ def original_motion(program: Program, tolerance: float, axis_length: float) -> t
     if len(curved):
         radius = np.linalg.norm(np.cross(tip[curved - 1] - program.arcs.centre[row], program.arcs.normal[row]), axis=1)
         bend[curved] += arc_bend(radius, program.arcs.sweep[row])
+    pieces = _pieces(program)
+    if pieces is not None:
+        bend[np.searchsorted(pose, pieces.index)] = curve_bend(pieces, "point", axis_length)[:, 0]
     bend = np.minimum(bend, UNBOUND)
     bend[program.kind[chosen] == Move.RAPID] = 0.0  # the way of a rapid is the machine's
     cuts = parts_of(bend, CL_SHARE * tolerance, _MOST_PARTS)
     index = np.arange(len(pose))
-    bare = Original(program, pose, Trail(index, np.broadcast_to(1.0, len(pose)), index, bend[1:]))
+    bare = Original(program, pose, Trail(index, np.broadcast_to(1.0, len(pose)), index, bend[1:]), pieces)
     if not len(pose) or cuts.max() == 1:
         return bare, tip, axis
     owner, fraction, last = divided(cuts)
     tip, axis = tip.take(owner, axis=0), axis.take(owner, axis=0)
     inner = np.flatnonzero(fraction < 1)
     tip[inner], axis[inner] = bare.at(owner[inner], fraction[inner])
-    return Original(program, pose, Trail(owner, fraction, last, (bend / cuts**2)[owner][1:])), tip, axis
+    return Original(program, pose, Trail(owner, fraction, last, (bend / cuts**2)[owner][1:]), pieces), tip, axis
 
 
 def selecting(pose: Ints) -> slice | Ints:

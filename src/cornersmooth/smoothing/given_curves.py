@@ -1,0 +1,129 @@
+"""Curves that the CL file gives: written as they are where the output has curves, in lines elsewhere.
+
+A curve that begins or ends at a corner leaves its outermost line to the rounding of that corner.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from cornersmooth.arrays import joined_rows
+from cornersmooth.arrays.vectors import angle_between, norm
+from cornersmooth.geometry.bsplines import Splines
+from cornersmooth.geometry.ragged import ranges, spread, starts
+from cornersmooth.model import Floats, Ints, Keep, LimitedBy, Program, Runs, SmoothProgram, Status
+from cornersmooth.settings import Settings
+from cornersmooth.smoothing.construction import RUN_CURVATURE, STRAIGHT_ON, find_neighbours
+from cornersmooth.smoothing.runs.rows import clamped, largest_curvature, polylines_of
+
+
+def beside_chords(program: Program, settings: Settings) -> tuple[Program, Settings]:
+    """Take what the moves are off the curves of the file off ε, as `doubled` does with what it moves."""
+    curves = program.curves
+    if curves is None:
+        return program, settings
+    points = _at_height(curves.bezier, settings.axis_length)
+    bend = 0.75 * np.diff(points, 2, axis=1).reshape(len(points), -1, 3)  # see `verify.bending`
+    off, moved = norm(bend).max(axis=1), np.zeros(len(program)) if program.moved is None else program.moved.copy()
+    for pose in (curves.pose - 1, curves.pose):
+        np.maximum.at(moved, pose, off)
+    return replace(program, moved=moved), settings.but(pose_shift=float(moved.max()))
+
+
+def given_runs(program: Program, settings: Settings) -> Runs | None:
+    """The curves of the file as runs, at the axis length, without the lines beside the corners at their ends."""
+    runs = None if program.curves is None else program.curves.runs
+    if runs is None:
+        return None
+    runs = replace(runs, control=_at_height(runs.control, settings.axis_length))
+    begins, ends = _bends(program, settings, runs)
+    pose = starts(runs.count)
+    run, place = spread(runs.count)
+    kept = (place >= begins[run]) & (place < runs.count[run] - ends[run])
+    count = runs.count - begins - ends
+    begin, end = runs.s[pose[:-1] + begins], runs.s[pose[1:] - 1 - ends]
+    splines = Splines(runs.knot, runs.knot_count)
+    _, _, _, points = clamped(splines, runs.control, np.arange(len(runs)), begin, end)
+    owner = spread(runs.knot_count)[0]
+    inner = (runs.knot > begin[owner]) & (runs.knot < end[owner])
+    owner = np.concatenate((np.arange(len(runs)), owner[inner], np.arange(len(runs))))
+    knot = np.concatenate((begin, runs.knot[inner], end))
+    order = np.lexsort((knot, owner))
+    return replace(
+        runs,
+        pose=runs.pose[kept],
+        count=count,
+        s=runs.s[kept] - np.repeat(begin, count),
+        knot=(knot - begin[owner])[order],
+        knot_count=np.bincount(owner),
+        control=points,
+    )
+
+
+def _bends(program: Program, settings: Settings, runs: Runs) -> tuple[Ints, Ints]:
+    """(r,) each, for begins and ends of runs: 1 where the path turns between curve and line beside it, else 0."""
+    around = find_neighbours(program, settings.axis_length, settings.duplicate_distance)
+    pose, control = starts(runs.count), starts(runs.knot_count + 2)
+    found = []
+    for at, outermost, next_to_it, neighbour in (
+        (pose[:-1], control[:-1], control[:-1] + 1, around.previous),
+        (pose[1:] - 1, control[1:] - 1, control[1:] - 2, around.following),
+    ):
+        beside, own = neighbour[runs.pose[at]], runs.control[outermost]
+        way = own - np.hstack((program.tip[beside], program.tip[beside] + settings.axis_length * program.axis[beside]))
+        tangent = runs.control[next_to_it] - own
+        turn = np.maximum(*(angle_between(way[:, part], tangent[:, part]) for part in (slice(3), slice(3, 6))))
+        found.append(((beside >= 0) & (turn > np.radians(STRAIGHT_ON))).astype(np.int64))
+    return found[0], found[1]
+
+
+def without(program: Program, runs: Runs) -> Program:
+    """The program with all poses of runs kept: no method touches them."""
+    keep = program.keep.copy()
+    keep[runs.pose] = Keep.CURVE
+    return replace(program, keep=keep)
+
+
+def with_runs(smoothed: SmoothProgram, program: Program, runs: Runs) -> SmoothProgram:
+    """The program, which was smoothed without its runs, with them."""
+    corners, settings = smoothed.corners, smoothed.settings
+    run, place = spread(runs.count)
+    inner = np.flatnonzero((place > 0) & (place < runs.count[run] - 1))
+    rows = np.searchsorted(corners.pose, runs.pose[inner])
+    corners.status[rows], corners.limited_by[rows] = Status.IN_RUN, LimitedBy.TOLERANCE
+    for turns, ends in zip(_bends(program, settings, runs), (place == 0, place == runs.count[run] - 1), strict=True):
+        on = np.isin(corners.pose, runs.pose[ends][turns == 0]) & (corners.status == Status.KEPT)
+        corners.status[on & (program.keep[corners.pose] == Keep.NO)] = Status.STRAIGHT
+    if RUN_CURVATURE in corners.extra:
+        lines = polylines_of(runs, program, settings.axis_length)
+        bends = largest_curvature(lines, Splines(runs.knot, runs.knot_count), runs.control)
+        corners.extra[RUN_CURVATURE][rows] = bends[inner]
+    return replace(smoothed, program=program, runs=runs if smoothed.runs is None else _in_order(smoothed.runs, runs))
+
+
+def _in_order(one: Runs, other: Runs) -> Runs:
+    """Runs of both, in path order."""
+    runs = joined_rows((one, other))
+    order = np.argsort(runs.pose[starts(runs.count)[:-1]], kind="stable")
+    pose, knot, control = (
+        ranges(starts(count)[:-1][order], count[order]) for count in (runs.count, runs.knot_count, runs.knot_count + 2)
+    )
+    return replace(
+        runs,
+        pose=runs.pose[pose],
+        count=runs.count[order],
+        s=runs.s[pose],
+        knot=runs.knot[knot],
+        knot_count=runs.knot_count[order],
+        control=runs.control[control],
+        tip_bound=runs.tip_bound[order],
+        axis_bound=runs.axis_bound[order],
+    )
+
+
+def _at_height(points: Floats, height: float) -> Floats:
+    """Points (..., 6) of tip and 1 mm up the tool axis, with the latter at another height."""
+    tip, other = points[..., :3], points[..., 3:]
+    return np.concatenate((tip, tip + height * (other - tip)), axis=-1)
