@@ -1,4 +1,4 @@
-"""MOVNRB of Creo: its curves are read as lines near them; its points where anything speaks against the curves."""
+"""MOVNRB of Creo: its curves are the motion; its points where anything speaks against the curves."""
 
 from __future__ import annotations
 
@@ -7,12 +7,15 @@ import io
 import numpy as np
 import pytest
 
-from cornersmooth import postprocess
+from cornersmooth import postprocess, verify
+from cornersmooth.arrays import some_poses
 from cornersmooth.cl import read
+from cornersmooth.cl.nurbs import cubic
 from cornersmooth.errors import InputError, Verdict
 from cornersmooth.model import Floats, Program
 from cornersmooth.nc import choose_form
 from cornersmooth.settings import Settings
+from cornersmooth.smoothing.sharp import sharp_rows
 
 LOW = np.array([[0, 0, 0], [10, 0, 0], [20, 5, 0], [30, 5, 1], [38, 0, 2], [45, -3, 2.0]])
 HIGH = np.array([[0, 0, 10], [10, 1, 10], [22, 5, 10], [33, 5, 10], [42, 0, 11], [50, -3, 11.0]])
@@ -94,11 +97,104 @@ def test_the_curves_are_read_as_lines_near_them(five: bool, split: str) -> None:
     assert (np.diff(program.line) >= 0).all()
 
 
-def test_it_is_written_within_the_tolerance_in_lines_and_curves() -> None:
-    for control, form in (("fanuc", "g1"), ("siemens", "bspline")):
-        stream = io.BytesIO()
-        chosen = choose_form(control, form)
-        assert postprocess(text(True), stream, Settings(tolerance=0.02), form=chosen).verdict is Verdict.PASSED
+def test_pieces_are_the_curve() -> None:
+    found = cubic(np.array(KNOTS), np.hstack((LOW, HIGH)), 5e-4)
+    assert found is not None
+    middle = (found.u[1:] + found.u[:-1]) / 2
+    at = found.bezier.transpose(0, 2, 1) @ np.array([1, 3, 3, 1]) / 8
+    exact = np.array([[*point_of(LOW, float(u)), *point_of(HIGH, float(u))] for u in middle])
+    assert np.abs(at - exact).max() < 1e-12
+    assert set(KNOTS) <= set(found.u)
+    away = np.linalg.norm((at - (found.bezier[:, 0] + found.bezier[:, 3]) / 2).reshape(-1, 2, 3), axis=2)
+    assert 2e-4 < away.max() <= 5e-4
+
+
+def alone(five: bool) -> bytes:
+    """A curve between rapids."""
+    whole = text(five).replace(b"FEDRAT / 800.0,  MMPM\n", b"FEDRAT / 800.0,  MMPM\nRAPID\n")
+    return whole.replace(b"MOVNRB / OFF\n", b"MOVNRB / OFF\nRAPID\n")
+
+
+def written(data: bytes, control: str, form: str, tolerance: float = 0.02) -> str:
+    stream = io.BytesIO()
+    found = postprocess(data, stream, Settings(tolerance=tolerance), form=choose_form(control, form))
+    assert found.verdict is Verdict.PASSED
+    return stream.getvalue().decode()
+
+
+def test_the_control_points_of_the_file_are_in_the_program() -> None:
+    blocks = written(alone(True), "fanuc", "g6.2")
+    for low, high in zip(LOW, HIGH, strict=True):
+        top = low + (high - low) * (100.0 / np.linalg.norm(HIGH[0] - LOW[0]))  # where this form has its second point
+        words = [f"{letter}{value:.4f}" for letter, value in zip("XYZUVW", [*low, *top], strict=True)]
+        assert " ".join(words) in blocks
+    assert blocks.count("G6.2") == 1
+
+
+@pytest.mark.parametrize(
+    ("control", "form"),
+    [("fanuc", "g1"), ("fanuc", "g6.2"), ("siemens", "bspline"), ("siemens", "poly"), ("heidenhain", "spl")],
+)
+@pytest.mark.parametrize("tolerance", [0.02, 0.001])
+def test_it_is_written_within_the_tolerance_of_the_curve(control: str, form: str, tolerance: float) -> None:
+    assert written(text(form not in ("spl",)), control, form, tolerance)
+
+
+def test_a_corner_at_its_end_is_rounded() -> None:
+    found = postprocess(text(True), io.BytesIO(), Settings(tolerance=0.02), form=choose_form("fanuc", "g6.2"))
+    assert len(sharp_rows(found.smoothed)) == 0
+    corners = found.smoothed.corners
+    assert corners.rounded[corners.pose == 1].all()
+    assert found.smoothed.runs is not None
+    assert len(found.smoothed.runs) == 3
+
+
+def test_what_leaves_the_curve_is_found() -> None:
+    data, chosen = alone(True), choose_form("fanuc", "g6.2")
+    stream = io.BytesIO()
+    postprocess(data, stream, Settings(tolerance=0.02), form=chosen)
+    program = read(data, name="x.ncl")
+    wrong = stream.getvalue().replace(b"X20.0000 Y5.0000 Z0.0000", b"X20.0000 Y5.0600 Z0.0000")
+    assert wrong != stream.getvalue()
+    for blocks, passed in ((stream.getvalue(), True), (wrong, False)):
+        found = verify(program, blocks, tolerance=0.02, axis_length=10.0, control="fanuc")
+        assert (found.verdict is Verdict.PASSED) == passed
+
+
+def test_curves_stay_with_their_poses_and_systems() -> None:
+    whole = read(text(True), name="x.ncl")
+    assert whole.curves is not None
+    assert whole.curves.runs is not None
+    part = some_poses(whole, 1, len(whole))
+    assert part.curves is not None
+    assert part.curves.runs is not None
+    assert (part.curves.pose == whole.curves.pose - 1).all()
+    assert part.curves.runs.pose[0] == 0
+    cut = some_poses(whole, 5, len(whole)).curves
+    assert cut is not None
+    assert cut.runs is None
+    assert len(cut) == len(whole.curves) - 4
+    inch = read(text(True, change=("UNITS / MM", "UNITS / INCHES")), name="x.ncl")
+    assert inch.curves is not None
+    assert inch.curves.runs is not None
+    assert inch.curves.runs.control[-1, :3] == pytest.approx(25.4 * LOW[-1])
+    assert np.linalg.norm(inch.curves.runs.control[0, 3:] - inch.curves.runs.control[0, :3]) == pytest.approx(1.0)
+
+
+def test_the_points_are_taken_of_a_curve_that_is_no_cubic() -> None:
+    rows = text(True).replace(b"ON, 4, 10, 0, 6", b"ON, 3, 9, 0, 6")
+    rows = rows.replace(b"MOVNRB / 1, 0.0000000000, ", b"MOVNRB / 1, ", 1)
+    program = read(rows, name="x.ncl")
+    assert len(program) == 7
+    assert program.curves is None
+    assert [one.text for one in program.findings if one.code == "CS144"] == ["a curve of MOVNRB of order 3: ignored"]
+
+
+def test_a_curve_from_elsewhere_without_points_is_an_error() -> None:
+    rows = text(True, change=("MOVNRB / 2, 0.0000000000,", "MOVNRB / 2, 0.5000000000,"))
+    begin, end = rows.index(b"NEXT\n") + 5, rows.index(b"MOVNRB / OFF")
+    with pytest.raises(InputError, match=r"error\[CS128\]: .*begins elsewhere"):
+        read(rows[:begin] + rows[end:], name="x.ncl")
 
 
 @pytest.mark.parametrize("five", [False, True])

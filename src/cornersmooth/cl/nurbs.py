@@ -41,9 +41,6 @@ MOST_LINES: Final = 1000
 #: steps of the parameter of a curve: knots are written with three decimals, and a control takes so long a curve at once
 _STEPS: Final = 4e6
 
-#: poses of a curve that is worth one: those of fewer lines are lines
-_FEWEST: Final = 4
-
 
 @dataclass
 class Curve:
@@ -181,11 +178,11 @@ def curves_of(
 
 
 def _as_run(one: Cubic, pose: Ints, control: Floats) -> list[Runs]:
-    """The whole curve, where controls take it: clamped, without repeated knots, and more than a few lines."""
+    """The whole curve, where controls take it: clamped, and without repeated knots."""
     inner = one.knots[DEGREE : len(control) + 1]
     clamped = one.knots[0] == inner[0] and one.knots[-1] == inner[-1]
     s, knot = (np.rint((u - inner[0]) * (_STEPS / (inner[-1] - inner[0]))) for u in (one.u, inner))
-    if not clamped or len(pose) < _FEWEST or (np.diff(s) < 1.0).any() or (np.diff(knot) < 1.0).any():
+    if not clamped or (np.diff(s) < 1.0).any() or (np.diff(knot) < 1.0).any():
         return []
     count, none = np.array([len(pose)]), np.zeros(1)
     return [Runs(pose, count, s, 1.0 / _STEPS, knot, np.array([len(knot)]), control, none, none)]

@@ -32,7 +32,8 @@ def smooth(
     refuse_flips(program)
     program, settings = one_corner_each(program, settings)
     program, settings = beside_chords(program, settings)
-    runs, method = given_runs(program, settings) if curves else None, construction_of(settings.method)
+    program, settings, runs = given_runs(program, settings) if curves else (program, settings, None)
+    method = construction_of(settings.method)
     if runs is None:
         smoothed = method.smooth(program, settings, progress, processes)
     else:

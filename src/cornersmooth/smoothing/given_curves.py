@@ -1,6 +1,6 @@
 """Curves that the CL file gives: written as they are where the output has curves, in lines elsewhere.
 
-A curve that begins or ends at a corner leaves its outermost line to the rounding of that corner.
+A curve that begins or ends at a corner leaves its outermost lines to the rounding of that corner.
 """
 
 from __future__ import annotations
@@ -9,14 +9,21 @@ from dataclasses import replace
 
 import numpy as np
 
-from cornersmooth.arrays import joined_rows
-from cornersmooth.arrays.vectors import angle_between, norm
+from cornersmooth.arrays import joined_rows, some_runs
+from cornersmooth.arrays.vectors import angle_between, norm, unit
 from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.geometry.ragged import ranges, spread, starts
-from cornersmooth.model import Floats, Ints, Keep, LimitedBy, Program, Runs, SmoothProgram, Status
+from cornersmooth.model import Bools, Floats, Ints, Keep, LimitedBy, Program, Runs, SmoothProgram, Status
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.construction import RUN_CURVATURE, STRAIGHT_ON, find_neighbours
 from cornersmooth.smoothing.runs.rows import clamped, largest_curvature, polylines_of
+
+#: lines that a curve leaves to the rounding of a corner at its end. The pose between them goes along the tangent at the
+#: curve by this part of a line: then both motions are off by as much, namely by so many times what a chord is
+_LINES, _ALONG, _MOVED = 2, 2.0 / 3.0, 2.0
+
+#: poses of a curve that is worth one
+_FEWEST = 4
 
 
 def beside_chords(program: Program, settings: Settings) -> tuple[Program, Settings]:
@@ -32,13 +39,50 @@ def beside_chords(program: Program, settings: Settings) -> tuple[Program, Settin
     return replace(program, moved=moved), settings.but(pose_shift=float(moved.max()))
 
 
-def given_runs(program: Program, settings: Settings) -> Runs | None:
-    """The curves of the file as runs, at the axis length, without the lines beside the corners at their ends."""
+def given_runs(program: Program, settings: Settings) -> tuple[Program, Settings, Runs | None]:
+    """The curves of the file as runs, at the axis length; those that end at corners are shorter by two lines there.
+
+    The pose between these lines goes to where the tangent of the curve leads, and counts as moved.
+    """
     runs = None if program.curves is None else program.curves.runs
     if runs is None:
-        return None
+        return program, settings, None
+    assert program.moved is not None
     runs = replace(runs, control=_at_height(runs.control, settings.axis_length))
+    pose, off = starts(runs.count), program.moved[runs.pose]
     begins, ends = _bends(program, settings, runs)
+    for turns, at in ((begins, pose[:-1, None] + np.arange(3)), (ends, pose[1:, None] - 1 - np.arange(3))):
+        room = _MOVED * off[np.minimum(at, len(off) - 1)].max(axis=1) <= settings.common_tolerance / 2.0
+        turns *= np.where(room, _LINES, 0)
+    left = runs.count - begins - ends >= _FEWEST
+    if not left.any():
+        return program, settings, None
+    runs = _shorter(some_runs(runs, left), begins[left], ends[left])
+    program = _towards(program, runs, begins[left] > 0, 1)
+    program = _towards(program, runs, ends[left] > 0, -1)
+    assert program.moved is not None
+    return program, settings.but(pose_shift=float(program.moved.max())), runs
+
+
+def _towards(program: Program, runs: Runs, which: Bools, ahead: int) -> Program:
+    """Move the poses beside the begins (ahead 1) or ends (-1) of some runs to where their tangents lead."""
+    assert program.moved is not None
+    place, control = starts(runs.count), starts(runs.knot_count + 2)
+    at, own = (place[:-1], control[:-1]) if ahead > 0 else (place[1:] - 1, control[1:] - 1)
+    end, own = runs.pose[at[which]], own[which]
+    beside, way = end - ahead, runs.control[own] - runs.control[own + ahead]
+    size = norm(program.tip[beside] - program.tip[end]) + norm(program.axis[beside] - program.axis[end])
+    unit_size = norm(way[:, :3]) + norm(way[:, 3:] - way[:, :3]) / norm(runs.control[own, 3:] - runs.control[own, :3])
+    point = runs.control[own] + (_ALONG * size / unit_size)[:, None] * way
+    tip, axis, moved = program.tip.copy(), program.axis.copy(), program.moved.copy()
+    tip[beside], axis[beside] = point[:, :3], unit(point[:, 3:] - point[:, :3])
+    for pose in (end, beside, beside - ahead):
+        moved[pose] = np.maximum(moved[pose], _MOVED * program.moved[[end, beside, beside - ahead]].max(axis=0))
+    return replace(program, tip=tip, axis=axis, moved=moved)
+
+
+def _shorter(runs: Runs, begins: Ints, ends: Ints) -> Runs:
+    """Runs without so many lines (r,) at their begins and ends."""
     pose = starts(runs.count)
     run, place = spread(runs.count)
     kept = (place >= begins[run]) & (place < runs.count[run] - ends[run])
