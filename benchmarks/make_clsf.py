@@ -89,7 +89,7 @@ def make_file(points: int) -> Iterator[bytes]:
         tip, axis = make_passes(first, CHUNK)
         values = np.concatenate((tip, axis), axis=2).reshape(-1, 6)[: points - first * PASS]
         ticks = to_ticks(values, ROW.decimals)
-        yield ROW.rows(ticks, BEFORE, np.tile(phase, CHUNK)[: len(ticks)], [b"\n"], 0)[0]
+        yield ROW.rows(ticks, BEFORE, np.tile(phase, CHUNK)[: len(ticks)], [b"\n"], 0)
     yield FOOTER
 
 

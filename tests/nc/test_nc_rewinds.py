@@ -12,7 +12,7 @@ import pytest
 from cornersmooth.cl import read
 from cornersmooth.kinematics import Machine, load_machine
 from cornersmooth.nc import choose_form, fit_settings, write
-from cornersmooth.nc.rewinds import LONGEST_DETOUR, rows_that_swing, swinging
+from cornersmooth.nc.rotary_words import LONGEST_DETOUR, rows_that_swing, swinging
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from cornersmooth.verify import verify

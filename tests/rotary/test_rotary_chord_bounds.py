@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cornersmooth.kinematics import Machine, load_machine, machine_names, tip_position, tool_axis
-from cornersmooth.rotary.chord_bounds import axis_bend, ruled_bend, tip_bend
+from cornersmooth.rotary.subdivision import axis_bend, ruled_bend, tip_bend
 from kinematics.random_machines import random_machine
 
 STEPS = 200

@@ -227,7 +227,7 @@ def _blocks(
 
     def rows(
         chosen: Bools, letters: Sequence[str], numbers: Ints, places: Sequence[int], out: Bools, ends: Sequence[str]
-    ) -> tuple[bytes, Ints]:
+    ) -> list[bytes]:
         blank = gap if leaves or not spelling.codes else ""
         written = tuple(f"{blank if k == 0 else gap}{letter}".encode() for k, letter in enumerate(letters))
         style = RowFormat(
@@ -236,7 +236,7 @@ def _blocks(
         texts = [head.removesuffix(gap) if blank else head for head in heads]
         lines = [f"{turn}{tail}\n".encode() for turn in ends for tail in tails]
         ids = tail_id[chosen] + len(tails) * (code[chosen] == 2) * (len(ends) > 1)
-        return style.rows(numbers, [text.encode() for text in texts], head_id[chosen], lines, ids, out)
+        return style.each(numbers, [text.encode() for text in texts], head_id[chosen], lines, ids, out)
 
     straight = ~arc
     made = [rows(straight, names, ticks[pieces.end[straight]], decimals, left_out[straight], [""])]

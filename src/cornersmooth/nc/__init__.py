@@ -31,7 +31,7 @@ from cornersmooth.nc.long_rows import coarse_rows, long_rows
 from cornersmooth.nc.messages import Findings
 from cornersmooth.nc.modals import Modals
 from cornersmooth.nc.motion import Motion
-from cornersmooth.nc.planes import Planes, check_travel_in_planes, check_travel_without_axes, plan_planes
+from cornersmooth.nc.planes import Planes, check_travel_of_words, plan_planes
 from cornersmooth.nc.program_frame import BLEND_STEP, POINT_APPROACH, Frame, Stream
 from cornersmooth.nc.rotary_rows import arc_angles, rotary_rows
 from cornersmooth.nc.rotary_words import rotary_way, within_reach
@@ -190,7 +190,7 @@ def write(
     statements = StatementWriter(chosen, program, findings, modals, comments=comments, skip_cycles=skip)
     upright = upright_poses(program, chosen, drills=native)
     planes = plan_planes(program, smoothed.settings, chosen, upright, findings, drills=native)
-    check_travel_in_planes(planes, program, chosen, findings)
+    check_travel_of_words(planes, program, chosen, findings)
     of_rows = Findings()  # rows are made in a thread of their own: their findings come last
     rows, circles = _rows(smoothed, chosen, planes, upright, of_rows)
     add_warnings(chosen, smoothed, circles, upright, findings)
@@ -221,8 +221,6 @@ def _rows(
 ) -> tuple[Iterator[Rows], Circles]:
     """Rows as they come, and how their arcs are written; findings of rows come later."""
     program, settings = smoothed.program, smoothed.settings
-    if form.machine is not None and not form.rotary:
-        check_travel_without_axes(form.machine, program)
     circles, long = plan_circles(program, settings, form, planes, upright), settings.lines == "long"
     if form.curves:
         rows = curve_rows(smoothed, circles, divide=form.curve in _TURNING)
@@ -254,16 +252,10 @@ def _one_ahead(chunks: Iterator[tuple[Rows, Ints]]) -> Iterator[tuple[Rows, Ints
 
 
 class _BackgroundWriter:
-    """A stream that is written to while the next text is made; an error shows with one of the next writes."""
-
-    #: bytes gathered before they are handed on
-    _CHUNK = 1 << 18
+    """A stream that is written to while the next text is made; an error shows with the next write."""
 
     def __init__(self, stream: Stream) -> None:
-        self._stream = stream
-        self._pool = ThreadPoolExecutor(1)
-        self._waiting: list[bytes] = []
-        self._size = 0
+        self._stream, self._pool = stream, ThreadPoolExecutor(1)
         self._done: Future[object] | None = None
 
     def __enter__(self) -> _BackgroundWriter:
@@ -272,18 +264,15 @@ class _BackgroundWriter:
     def __exit__(self, kind: object, error: object, trace: object) -> None:
         try:
             if kind is None:
-                if self._done is not None:
-                    self._done.result()
-                self._stream.write(b"".join(self._waiting))
+                self._wait()
         finally:
             self._pool.shutdown()
 
+    def _wait(self) -> None:
+        if self._done is not None:
+            self._done.result()
+
     def write(self, data: bytes, /) -> None:
         """Take the bytes; wait for those handed on before."""
-        self._waiting.append(data)
-        self._size += len(data)
-        if self._size >= self._CHUNK:
-            if self._done is not None:
-                self._done.result()
-            self._done = self._pool.submit(self._stream.write, b"".join(self._waiting))
-            self._waiting, self._size = [], 0
+        self._wait()
+        self._done = self._pool.submit(self._stream.write, data)

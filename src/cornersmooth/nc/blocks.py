@@ -82,14 +82,14 @@ class Blocks:
         apart = [(shape.rows, *shape.numbers) for shape in shapes if shape.numbers is not None]
         closed = [at.closing.encode() + text for text in tail] if at.closing else tail
         if not apart:
-            return at.format.rows(at.shown(rows.ticks), head, head_id, closed, tail_id, left_out)[0]
+            return at.format.rows(at.shown(rows.ticks), head, head_id, closed, tail_id, left_out)
         which = np.zeros(count, np.int64)
         for number, (own, _, _) in enumerate(apart, 1):
             which[own] = number
         plain = which == 0
         out = None if left_out is None else left_out[plain]
-        made = [at.format.rows(at.shown(rows.ticks[plain]), head, head_id[plain], closed, tail_id[plain], out)]
-        made += [form.rows(numbers, head, head_id[own], tail, tail_id[own]) for own, form, numbers in apart]
+        made = [at.format.each(at.shown(rows.ticks[plain]), head, head_id[plain], closed, tail_id[plain], out)]
+        made += [form.each(numbers, head, head_id[own], tail, tail_id[own]) for own, form, numbers in apart]
         return interleave(which, made)
 
     def _changes(self, rows: BlockRows, at: Coordinates) -> list[Part]:

@@ -94,7 +94,7 @@ class Coordinates:
         closing = self.motion.shortest[1] if columns[-1] in self.modulo else ""
         head, tail = f"{self.motion.rapid}{self.gap}".encode(), f"{closing}{self.motion.rapid_end}".encode()
         none = np.zeros(1, np.int64)
-        text, _ = self._format(columns).rows(self.shown(ticks)[chosen][None], [head], none, [tail], none)
+        text = self._format(columns).rows(self.shown(ticks)[chosen][None], [head], none, [tail], none)
         return f"{words}{self.gap if words else ''}{text.decode()}"
 
     def shown(self, ticks: Ints) -> Ints:

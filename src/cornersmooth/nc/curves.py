@@ -173,10 +173,10 @@ class SplFormat:
     def __init__(self, letters: Sequence[str], decimals: Sequence[int], coefficient: int) -> None:
         self._letters, self._decimals, self._digits = letters, decimals, coefficient
 
-    def rows(
+    def each(
         self, ticks: Ints, prefix: Sequence[bytes], prefix_id: Ints, suffix: Sequence[bytes], suffix_id: Ints
-    ) -> tuple[bytes, Ints]:
-        """Text, and where each row starts in it."""
+    ) -> list[bytes]:
+        """Text of each row."""
         axes = len(self._letters)
         texts = []
         for row, numbers in enumerate(ticks.tolist()):
@@ -189,8 +189,7 @@ class SplFormat:
                 for place, number in enumerate(numbers[axes:])
             ]
             texts.append(prefix[int(prefix_id[row])] + " ".join(words).encode() + suffix[int(suffix_id[row])])
-        offsets = np.concatenate(([0], np.cumsum([len(text) for text in texts]))).astype(np.int64)
-        return b"".join(texts), offsets
+        return texts
 
     def _coefficient(self, ticks: int) -> str:
         value = ticks / 10.0**self._digits

@@ -20,7 +20,7 @@ from cornersmooth.nc.coordinates import BlockRows, Coordinates
 from cornersmooth.nc.curves import bezier_points
 from cornersmooth.nc.messages import Findings, refused
 from cornersmooth.nc.modals import Modals
-from cornersmooth.nc.rewinds import UPRIGHT, check_first_block, retracts_before
+from cornersmooth.nc.rotary_words import UPRIGHT, check_first_block, retracts_before
 from cornersmooth.nc.warnings import MotionWarnings
 from cornersmooth.smoothing.sampling import Rows
 

@@ -20,13 +20,13 @@ import numpy as np
 
 from cornersmooth.arrays.vectors import norm
 from cornersmooth.errors import InputError
-from cornersmooth.geometry.arcs import arc_points, divided
+from cornersmooth.geometry.arcs import poses_and_arcs
 from cornersmooth.kinematics import Machine, machine_position, solutions, tool_axis
 from cornersmooth.model import Bools, Floats, Ints, Keep, Move, Numbers, Program
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.hole_cycles import has_cycles
 from cornersmooth.nc.messages import Findings
-from cornersmooth.nc.statement_args import ToolTravel, tool_starts
+from cornersmooth.nc.statement_args import check_tool_travel, tool_starts
 from cornersmooth.settings import Settings
 from cornersmooth.text import format_number
 
@@ -197,22 +197,25 @@ def _rotary_angles(machine: Machine, axis: Floats) -> Floats | None:
     return min(found, key=turned, default=None)
 
 
-def check_travel_in_planes(planes: Planes, program: Program, form: Form, findings: Findings) -> None:
-    """Refuse poses in tilted planes beyond the travel (CS374), whichever of its angles the control takes.
+def check_travel_of_words(planes: Planes, program: Program, form: Form, findings: Findings) -> None:
+    """Refuse poses in tilted planes, and of machines without rotary axes, beyond the travel (CS374).
 
-    CS379 warns where only some of the angles will do. Without a machine with travel nothing is known.
+    In a plane whichever of its angles the control takes; CS379 warns where only some of them will do. Without a machine
+    with travel nothing is known.
     """
     machine = form.machine
     if machine is None or not machine.travel:
         return
-    travel = ToolTravel(program, machine)
+    pose, tip, _ = poses_and_arcs(program, _ARC_STEP)
+    moving = program.kind[pose] != Move.FROM
+    if not form.rotary:
+        check_tool_travel(program, machine, tip[moving], np.zeros((int(moving.sum()), 2)), pose[moving])
     for number, plane in enumerate(planes.planes):
-        places = np.flatnonzero((planes.of == number) & (program.kind != Move.FROM))
-        tip, poses = _on_the_way(program, places)
+        rows = np.flatnonzero((planes.of[pose] == number) & moving)
         fit, refused = [], None
         for angles in [plane.angles] if plane.angles is not None else _angles(machine, plane.frame[:, 2]):
             try:
-                travel.check(tip, np.tile(angles, (len(tip), 1)), poses)
+                check_tool_travel(program, machine, tip[rows], np.tile(angles, (len(rows), 1)), pose[rows])
                 fit.append(angles)
             except InputError as error:
                 refused = refused or error
@@ -221,21 +224,7 @@ def check_travel_in_planes(planes: Planes, program: Program, form: Form, finding
         if refused is not None:
             names = zip(machine.names, fit[0].tolist(), strict=True)
             angle_words = " ".join(f"{name}{angle:.3f}" for name, angle in names)
-            findings.note("CS379", int(program.line[poses[0]]), angles=angle_words)
-
-
-def check_travel_without_axes(machine: Machine, program: Program) -> None:
-    """Refuse a program beyond the travel of a machine without rotary axes (CS374)."""
-    tip, poses = _on_the_way(program, np.flatnonzero(program.kind != Move.FROM))
-    ToolTravel(program, machine).check(tip, np.zeros((len(tip), 2)), poses)
-
-
-def _on_the_way(program: Program, poses: Ints) -> tuple[Floats, Ints]:
-    """Tips of poses and of places on the arcs that lead to them, (k, 3) mm, and the pose of each."""
-    arcs = np.flatnonzero(np.isin(program.arcs.pose, poses))
-    rows, share = divided(np.ceil(program.arcs.sweep[arcs] / _ARC_STEP).astype(np.int64))
-    between, _ = arc_points(program, arcs[rows], share)
-    return np.concatenate((program.tip[poses], between)), np.concatenate((poses, program.arcs.pose[arcs[rows]]))
+            findings.note("CS379", int(program.line[pose[rows[0]]]), angles=angle_words)
 
 
 def _angles(machine: Machine, axis: Floats) -> list[Floats]:

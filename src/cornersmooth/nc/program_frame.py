@@ -9,8 +9,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
-import numpy as np
-
 from cornersmooth.errors import OutputError, SettingsError
 from cornersmooth.model import Move, Program
 from cornersmooth.nc.control import LINE_ENDS, Blocks, Control, ProgramTable, TextStyle
@@ -61,17 +59,9 @@ class Frame(FrameSettings):
     """What a user wants around the motion, as blocks."""
 
     def values(self, form: Form, program: Program, settings: Settings) -> dict[str, str]:
-        """What stands for braces in blocks around the motion and in those of extras; refuses a program name (CS216).
+        """What stands for braces in blocks around the motion and in those of extras.
 
-        Returns
-        -------
-        dict of str
-            For each name in braces what stands for it, as it is written.
-
-        Raises
-        ------
-        SettingsError
-            CS216: the control takes no such program name.
+        CS216: the control takes no such program name.
         """
         table = form.table.program
         if self.program is not None and not re.fullmatch(table.name_pattern or ".*", self.program):
@@ -87,43 +77,21 @@ class Frame(FrameSettings):
         }
 
     def program_of(self, form: Form) -> str:
-        """Name or number of the program, given or from the name of the CL file.
-
-        Returns
-        -------
-        str
-            As it is given, or digits and letters of the file name that the control takes.
-        """
+        """Name or number of the program, given or from the name of the CL file."""
         table = form.table.program
         return self.program or name_of_file(self.stem, table) or table.name
 
     def kept_as(self, form: Form) -> str | None:
-        """Name or number by which the control keeps the program; None where only a comment says it.
-
-        Returns
-        -------
-        str or None
-            As the control lists its programs.
-        """
+        """Name or number by which the control keeps the program; None where only a comment says it."""
         blocks = [block for block in form.table.program.start if "{program}" in block]
         comment = form.table.layout.comment[0].strip()
         return self.program_of(form) if any(not block.startswith(comment) for block in blocks) else None
 
     def texts(self, form: Form, values: dict[str, str]) -> dict[str, Blocks]:
-        """Blocks of the steps that a user gives: work offset, header and footer.
+        """Blocks of the steps that a user gives, by the name of the step: work offset, header and footer.
 
         CS216: the control has no such work offset, no retract to go to or come from along the tool, or no step for
         header or footer; or a line of these has unknown braces or characters that an NC program cannot hold.
-
-        Returns
-        -------
-        dict of tuples of str
-            Blocks by the name of their step.
-
-        Raises
-        ------
-        SettingsError
-            CS216, as above.
         """
         table = form.table.program
         if (self.approach or self.retract) and not table.retract:
@@ -153,37 +121,20 @@ class Frame(FrameSettings):
         }
 
     def refuse_tool(self, form: Form, program: Program) -> None:
-        """Refuse a header that loads a tool where the program then takes the length of another (CS249).
-
-        Raises
-        ------
-        SettingsError
-            CS249.
-        """
+        """Refuse a header that loads a tool where the program then takes the length of another (CS249)."""
         moving = program.kind != Move.FROM
         loaded = any(not moving[:pose].any() for pose, _ in tool_loads(program))
         if loaded or not any("{offset}" in block for block in form.mode.on):
             return
         for line in self.header:
-            found = _TOOL_WORD.search(_COMMENT.sub("", line))
-            if found is not None:
+            if _TOOL_WORD.search(_COMMENT.sub("", line)):
                 what = f"the header loads a tool, {line!r}, and the program takes the length of tool 1"
                 raise SettingsError("CS249", what, "leave it out of the header, and give --tool-number")
 
     def with_offset_of(self, program: Program, form: Form) -> Frame:
-        """Return the same with the work offset that a program asks for.
+        """Return the same with the work offset that a program asks for, if any.
 
         CS216: the control has no such work offset. CS248: another is given.
-
-        Returns
-        -------
-        Frame
-            This one where the program asks for none.
-
-        Raises
-        ------
-        SettingsError
-            CS216 and CS248, as above.
         """
         number = work_offset_of(program)
         if number is None or self.work_offset == "":
@@ -198,25 +149,13 @@ class Frame(FrameSettings):
         return replace(self, work_offset=name)
 
     def named_offset(self, table: Control) -> str:
-        """Work offset for the head of a text; empty for that of the table that the control's is like.
-
-        Returns
-        -------
-        str
-            Such as ``"G55"``.
-        """
+        """Work offset for the head of a text; empty for that of the table that the control's is like."""
         offset = table.program.work_offset if self.work_offset is None else self.work_offset
         usual = load_control(table.dialect).program.work_offset if table.dialect in control_names() else ""
         return "" if offset == usual else offset.replace(" ", "_") or "none"
 
     def start(self, stream: Stream, form: Form) -> FramedText:
-        """One text, nothing written yet.
-
-        Returns
-        -------
-        FramedText
-            Ready for the first block.
-        """
+        """One text, nothing written yet."""
         layout = form.table.layout
         number = layout.block_number or ("N{number} " if self.block_numbers else "")
         end = LINE_ENDS[self.line_ends or layout.line_ends]
@@ -254,26 +193,23 @@ class FramedText:
         if self.number:
             text = self._numbered(text)
         longest = self.layout.longest_block
-        if longest and _longest_line(text) > longest:
+        if longest and max(map(len, text.split(b"\n"))) > longest:
             text = b"".join(self._folded(line) for line in text.splitlines(keepends=True))
         self.stream.write(text if self.end == b"\n" else text.replace(b"\n", self.end))
 
     def _numbered(self, text: bytes) -> bytes:
-        before, _, behind = self.number.partition("{number}")
-        head, tail = before.encode(), behind.encode()
-        lines = text.splitlines(keepends=True)
         parts = []
-        number, step, last = self.next_number, self.layout.number_step, self.layout.number_last
-        for line in lines:
-            if line in (b"%\n", b"\n") or (self.layout.unnumbered and re.match(self.layout.unnumbered, line.decode())):
+        number, layout = self.next_number, self.layout
+        for line in text.decode().splitlines(keepends=True):
+            if line in ("%\n", "\n") or (layout.unnumbered and re.match(layout.unnumbered, line)):
                 parts.append(line)
             else:
-                parts.append(b"%b%d%b%b" % (head, number, tail, line))
-                number += step
-                if last and number > last:
-                    number = self.layout.number_start
+                parts.append(self.number.format(number=number) + line)
+                number += layout.number_step
+                if layout.number_last and number > layout.number_last:
+                    number = layout.number_start
         self.next_number = number
-        return b"".join(parts)
+        return "".join(parts).encode()
 
     def _folded(self, line: bytes) -> bytes:
         """Line in parts that are short enough, where the control knows such."""
@@ -291,12 +227,6 @@ class FramedText:
             parts.append(rest[:at] + end)
             rest = rest[at + 1 :]
         return b"\n".join([*parts, rest]) + b"\n"
-
-
-def _longest_line(text: bytes) -> int:
-    """Characters of the longest line, without its end."""
-    ends = np.flatnonzero(np.frombuffer(text, np.uint8) == ord("\n"))
-    return int(np.diff(ends, prepend=-1).max()) - 1 if len(ends) else 0
 
 
 def _filled(lines: Sequence[str], values: dict[str, str]) -> list[str]:

@@ -18,7 +18,7 @@ from cornersmooth.nc.form import TIP_SHARE, Form
 from cornersmooth.nc.long_rows import LONG_CHUNK, has_law, line_limits, rounded_lines
 from cornersmooth.nc.messages import Findings
 from cornersmooth.nc.rotary_words import RotaryWay, machine_of
-from cornersmooth.nc.statement_args import ToolTravel
+from cornersmooth.nc.statement_args import check_tool_travel
 from cornersmooth.rotary import FilledPath, fill, insertions, rapid_moves
 from cornersmooth.settings import TIMED_POSES, Settings
 from cornersmooth.smoothing.long_lines import LineLimits, Vertices, fewest_lines, segments_of_rows, vertices
@@ -70,7 +70,7 @@ def rotary_rows(
     if not len(way.move):
         return
     program, settings = smoothed.program, smoothed.settings
-    machine, travel = machine_of(form).with_longest_tool(), ToolTravel(program, machine_of(form))
+    machine = machine_of(form).with_longest_tool()
     max_step = largest_turn(settings)
     limits = line_limits(settings, form, max_step)
     # in long programs as many lines take too long to find
@@ -114,7 +114,7 @@ def rotary_rows(
         pose, inserted = filled.pose[own], filled.inserted[own]
         tip, angles = filled.tip[own], filled.angles[own]
         seen = slice(None) if in_planes is None else ~in_planes[move[pose]]
-        travel.check(tip[seen], angles[seen], move[pose[seen]])
+        check_tool_travel(program, machine_of(form), tip[seen], angles[seen], move[pose[seen]])
         yield Rows(
             tip=tip,
             other=angles,

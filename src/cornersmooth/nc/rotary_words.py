@@ -1,19 +1,32 @@
-"""Rotary words of rows: the angles of the form's machine, chosen with a look ahead over the whole path."""
+"""Rotary words of rows: the angles of the form's machine, chosen with a look ahead, and where they turn above the part.
+
+Both ends of a rapid hold the tool where it should be, but between them it may stand elsewhere: a table that turns back
+by 300 degrees leads a tool that leans by 30 degrees all the way round. The tool goes up first, and turns there.
+
+The block that leads a tilted tool from the height of the retract to its first position has X Y Z, as tool tip control
+is on. X Y alone would be a motion in the plane of the part, which tables have tilted: the axes would go far aside, or
+down. A tool along Z goes over its position first: there both planes are one.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import Any
+from itertools import pairwise
+from typing import Any, Final
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import dot
 from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.geometry.ragged import starts
-from cornersmooth.kinematics import Machine, solutions
+from cornersmooth.kinematics import Machine, check_travel, solutions, tool_axis
+from cornersmooth.kinematics.position import nose_position
 from cornersmooth.model import Bools, Floats, Ints, Move, Program, SmoothProgram
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.messages import Findings, refused
-from cornersmooth.nc.rewinds import from_zero
+from cornersmooth.nc.planes import turned_part
+from cornersmooth.nc.statement_args import tool_starts
 from cornersmooth.rotary import rapid_moves, rewound_angles, rotary_angles, still_poses
 from cornersmooth.rotary.axis_findings import reach_error
 from cornersmooth.smoothing.sampling import Rows, all_dense_rows
@@ -139,3 +152,166 @@ def _near_limits(smoothed: SmoothProgram, form: Form) -> Bools:
         off = found.angles[..., k] - machine.limits[k, limit]
         near |= (np.abs(off - 360.0 * np.round(off / 360.0)) <= room[..., k]).any(axis=1)
     return np.maximum.reduceat(near, starts(runs.count)[:-1])
+
+
+#: degrees by which the way of the tool axis may be longer than the shortest one
+LONGEST_DETOUR: Final = 30.0
+
+#: sine of an angle at which the tool counts as parallel to a rotary axis, and degrees by which that stands
+_PARALLEL: Final = 1e-9
+
+#: places between both ends that are looked at
+_PLACES: Final = np.linspace(0.0, 1.0, 10)[1:-1]
+
+#: cosine of the angle from Z beyond which a tool is tilted
+UPRIGHT: Final = 1.0 - 1e-6
+
+#: places on the way that are looked at
+_WAY: Final = np.linspace(0.0, 1.0, 65)
+
+#: Where X Y stand before, the program does not always say: as far aside as the tool is above, at most, is a fair guess.
+_FLAT: Final = math.cos(math.radians(45.0))
+
+#: mm by which the start may be below the position: digits
+_BELOW: Final = 1e-3
+
+
+def swinging(machine: Machine, before: Floats, after: Floats) -> Bools:
+    """Moves (m,) in which the tool axis leaves the shortest way by more than `LONGEST_DETOUR`.
+
+    Rotary words (m, 2), degrees in the order of the machine's axes, run evenly from those before to those after.
+    """
+    ends = [tool_axis(machine, angles) for angles in (before, after)]
+    shortest = _angle(*ends)
+    longest = np.zeros(len(before))
+    for place in _PLACES.tolist():
+        between = tool_axis(machine, before + place * (after - before))
+        longest = np.maximum(longest, _angle(ends[0], between) + _angle(between, ends[1]))
+    return longest - shortest > LONGEST_DETOUR
+
+
+def rows_that_swing(machine: Machine, angles: Floats, rapid: Bools) -> Ints:
+    """Rows, but the first, that are rapid and reached with a swing from the row before: (r, 2) degrees -> (k,)."""
+    turn = np.abs(np.diff(angles, axis=0)).max(axis=1) > LONGEST_DETOUR / 2
+    rows = np.flatnonzero(rapid[1:] & turn) + 1
+    return rows[swinging(machine, angles[rows - 1], angles[rows])] if len(rows) else rows
+
+
+def retracts_before(form: Form, angles: Floats, rapid: Bools, line: Ints, findings: Findings, possible: bool) -> Ints:
+    """Rows of a run before which the tool goes up, so that rotary axes turn back there; says so.
+
+    `angles` (r + 1, 2), degrees, are those before the run and of its rows; `possible` where the control has a retract.
+    """
+    assert form.machine is not None
+    rows = rows_that_swing(form.machine, angles, np.concatenate(([False], rapid))) - 1
+    if not possible:
+        findings.note_each("CS340", line[rows])
+        return rows[:0]
+    findings.note_each("CS341", line[rows])
+    return rows
+
+
+def from_zero(form: Form, program: Program, axis: Floats, angles: Floats, move: Ints, rapid: Bools) -> None:
+    """Take off angles what a tool before has left, in place; what is taken off is constant between retracts.
+
+    After a retract the axes turn as they like. A tool that stays along the pole, where the first angle is free, has
+    that at zero, not where another tool needs it. Where the rotary axes go to zero before a tool, its angles are
+    without the whole turns of the tools before. Angles (r, 2) are in degrees, NaN where there is none.
+    """
+    machine = form.machine
+    assert machine is not None
+    if not form.table.program.retract:
+        return
+    endless = np.array([each.limits is None and not each.modulo for each in machine.axes])
+    endless &= "{rotary_zero}" in form.begin
+    homes = [one.pose for one in program.statements if one.word == "GOHOME" and not one.args]
+    starts = np.unique([*tool_starts(program), *homes]).astype(np.int64)
+    rows = np.searchsorted(move, starts)
+    there = rows < len(move)
+    starts, rows = starts[there], rows[there]
+    # a pose that repeats the one before is no row
+    rows = rows[(move[rows] == starts) & rapid[rows] & ~np.isnan(angles[rows]).any(axis=1)]
+    for row, end in pairwise([*rows.tolist(), len(move)]):
+        first = angles[row].copy()
+        if len(machine.names) == 2 and _along_pole(machine, axis[row:end], angles[row:end, 0]):
+            angles[row:end, 0] += np.clip(0.0, *machine.limits[0]) - first[0]
+            endless = endless & (False, True)
+        angles[row:end, endless] += -360.0 * np.round(first[endless] / 360.0)
+
+
+def _along_pole(machine: Machine, axis: Floats, first: Floats) -> bool:
+    """Whether the tool is parallel to the first rotary axis all the while, and that stands."""
+    if np.nanmax(first) - np.nanmin(first) > _PARALLEL:
+        return False
+    across = axis - dot(axis, np.broadcast_to(machine.axes[0].unit, axis.shape))[:, None] * machine.axes[0].unit
+    return bool(np.abs(across).max() <= _PARALLEL)
+
+
+def _angle(a: Floats, b: Floats) -> Floats:
+    """Degrees between unit vectors, row by row."""
+    return np.degrees(np.arccos(np.clip(dot(a, b), -1.0, 1.0)))
+
+
+def check_first_block(
+    form: Form,
+    machine: Machine | None,
+    tip: Floats,
+    axis: Floats,
+    angles: Floats | None,
+    place: Floats | None,
+    where: tuple[str | None, int],
+    findings: Findings,
+) -> None:
+    """Refuse the first block of a tool, or warn of it; `where` is file and line of its CL statement.
+
+    It ends with the tip (3,), mm, and the tool axis (3,) in the part and the rotary words (2,), degrees, if there are
+    any. `place` (2,) mm is where X and Y of the spindle nose stand before, if known; the machine has the length of the
+    tool. CS374: it leaves the travel from wherever it starts. CS391: whether it stays within the travel depends on that
+    place. CS392: it comes from below its end; tables and fixtures are below the part, and turned beside the tool.
+    """
+    before = angles
+    if machine is not None and angles is not None and "{rotary_zero}" in form.begin:
+        before = np.clip(0.0, *machine.limits.T)
+    places = np.zeros((0, 3)) if machine is None or before is None else _starts(machine, tip, before, place)
+    if machine is None or before is None or angles is None or not len(places):
+        if _rise(machine, axis, before) < _FLAT:
+            findings.note("CS392", where[1])
+        return
+    turned = before + _WAY[:, None] * (angles - before)
+    frame = turned_part(machine, before)
+    zero = nose_position(machine, np.zeros((1, 3)), before[None])[0]
+    tips = [frame @ (start - zero) for start in places]
+    refused: list[InputError] = []
+    for start in tips:
+        way = start + _WAY[:, None] * (tip - start)
+        try:
+            check_travel(machine, way, turned, np.full(len(way), where[1]), where[0])
+        except InputError as error:
+            refused.append(error)
+    if len(refused) == len(tips):
+        what = f"in the first block of a tool, from the height of the retract: {refused[0].what}"
+        raise InputError(refused[0].code, what, refused[0].hint, file=where[0], line=where[1])
+    if refused:
+        findings.note("CS391", where[1])
+    if any(start[2] < tip[2] - _BELOW for start in tips):
+        findings.note("CS392", where[1])
+
+
+def _starts(machine: Machine, tip: Floats, before: Floats, place: Floats | None) -> Floats:
+    """Where the spindle nose may stand before, (k, 3) mm; none where the machine's file does not say enough."""
+    travel = {item.name: (item.low, item.high) for item in machine.travel}
+    nowhere = (math.nan, math.nan)
+    top = dict(machine.home).get("Z", travel.get("Z", nowhere)[1])
+    over = nose_position(machine, tip[None], before[None])[0, :2]
+    ends = np.array([(x, y) for x in travel.get("X", nowhere) for y in travel.get("Y", nowhere)])
+    places = np.vstack((ends, ends.mean(axis=0), over)) if place is None else place[None]
+    starts = np.column_stack((places, np.full(len(places), top)))
+    return starts[~np.isnan(starts).any(axis=1)]
+
+
+def _rise(machine: Machine | None, axis: Floats, before: Floats | None) -> float:
+    """How far the block comes down along Z of the part for each mm of Z of the machine, at the least."""
+    if machine is None:
+        return float(axis[2])  # tables may have turned the part
+    angles = solutions(machine, axis[None]).angles[0] if before is None else before[None]
+    return min(float(turned_part(machine, one)[2, 2]) for one in angles)

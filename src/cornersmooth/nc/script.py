@@ -44,9 +44,8 @@ class Script:
 
     def hand_on(self, stream: Stream) -> None:
         """Write to a stream what was written since it was handed on last."""
-        text, self.motion.text = self.motion.text[::-1], []
-        while text:  # what is written is kept no longer
-            stream.write(text.pop())
+        stream.write(b"".join(self.motion.text))
+        self.motion.text = []
 
     def run(self, rows: Rows, ticks: Ints) -> None:
         """Write a block of rows, with their numbers in ticks, and the statements before and between them."""

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from functools import cached_property
 from itertools import pairwise
 from typing import Final
 
@@ -81,13 +79,6 @@ def milliseconds(amount: float, in_revolutions: bool, speed: float | None) -> in
     return max(1, round(time)) if time > 0.0 else 0
 
 
-def revolutions(cutting_speed: float, unit: str, diameter: float) -> float | None:
-    """Revolutions per minute that give a cutting speed (SFM, SMM) at a diameter in mm; None without a diameter."""
-    if not diameter > 0.0:
-        return None
-    return cutting_speed * _MM_PER_MINUTE[unit] / (math.pi * diameter)
-
-
 def spindle_args(statement: Statement) -> tuple[list[str], list[float]]:
     """Words and numbers of SPINDL without gears and limits, which are the control's own affair."""
     words, numbers = words_of(statement), numbers_of(statement)
@@ -97,6 +88,15 @@ def spindle_args(statement: Statement) -> tuple[list[str], list[float]]:
             for number in number_after(statement, word):
                 numbers.remove(number)
     return words, numbers
+
+
+def spindle_speed(statement: Statement, diameter: float) -> float | None:
+    """Revolutions per minute of SPINDL, or what gives its cutting speed at a diameter, mm; None for neither."""
+    words, numbers = spindle_args(statement)
+    unit = cutting_unit(words)
+    if len(numbers) != 1 or not numbers[0] > 0.0 or (unit and not diameter > 0.0):
+        return None
+    return float(round(numbers[0] * _MM_PER_MINUTE[unit] / (math.pi * diameter))) if unit else numbers[0]
 
 
 def cutting_unit(words: list[str]) -> str:
@@ -165,26 +165,14 @@ def tool_starts(program: Program) -> list[int]:
     return sorted({min(pose, len(program)) for pose in starts})
 
 
-@dataclass(frozen=True)
-class ToolTravel:
-    """The travel of a machine for the tools of a program, each with its own length."""
+def check_tool_travel(program: Program, machine: Machine, tip: Floats, angles: Floats, move: Ints) -> None:
+    """Refuse rows (r,) of poses, tips in mm and angles in degrees, that the linear axes cannot reach (CS374).
 
-    program: Program
-    machine: Machine
-
-    @cached_property
-    def _tools(self) -> Ints:
-        """(n,) number of the tool that moves to each pose, -1 before the first."""
-        loads = tool_loads(self.program) if self.machine.tool_lengths else []
-        begins = np.array([pose for pose, _ in loads], np.int64)
-        numbers = np.array([-1, *(number for _, (number, _) in loads)], np.int64)
-        return numbers[np.searchsorted(begins, np.arange(len(self.program)), side="right")]
-
-    def check(self, tip: Floats, angles: Floats, move: Ints) -> None:
-        """Refuse rows (r,) of poses, tips in mm and angles in degrees, that the linear axes cannot reach (CS374)."""
-        if not self.machine.travel:
-            return
-        tools, file = self._tools[move], self.program.source.name
-        for number in np.unique(tools).tolist():
-            rows = tools == number
-            check_travel(self.machine.with_tool(number), tip[rows], angles[rows], self.program.line[move[rows]], file)
+    Each tool has its own length.
+    """
+    loads = tool_loads(program) if machine.travel and machine.tool_lengths else []
+    numbers = np.array([-1, *(number for _, (number, _) in loads)], np.int64)
+    tools = numbers[np.searchsorted(np.array([pose for pose, _ in loads], np.int64), move, side="right")]
+    for number in np.unique(tools).tolist():
+        rows, file = tools == number, program.source.name
+        check_travel(machine.with_tool(number), tip[rows], angles[rows], program.line[move[rows]], file)

@@ -26,8 +26,8 @@ from cornersmooth.nc.statement_args import (
     loaded_tool,
     milliseconds,
     numbers_of,
-    revolutions,
     spindle_args,
+    spindle_speed,
     spoken_text,
     whole_number,
     words_of,
@@ -167,26 +167,12 @@ class StatementWriter:
     def _first_speed(self, between: tuple[Statement, ...]) -> float | None:
         """First speed that some statements give, rev/min."""
         diameter = self._diameter
-        try:
-            for statement in between:
-                if statement.word in ("CUTTER", "TLDATA"):
-                    self.cutter(statement)
-                elif statement.word == "SPINDL" and (speed := self._speed_of(statement)):
-                    return speed
-            return None
-        finally:
-            self._diameter = diameter
-
-    def _speed_of(self, statement: Statement) -> float | None:
-        """Revolutions per minute that SPINDL gives; None for none."""
-        words, numbers = spindle_args(statement)
-        return self._turns(words, numbers[0]) if len(numbers) == 1 and numbers[0] > 0.0 else None
-
-    def _turns(self, words: list[str], number: float) -> float | None:
-        """Revolutions per minute, or what gives a cutting speed (SFM, SMM); None without the tool's diameter."""
-        unit = cutting_unit(words)
-        speed = revolutions(number, unit, self._diameter) if unit else number
-        return speed if speed is None or not unit else float(round(speed))
+        for statement in between:
+            if statement.word in ("CUTTER", "TLDATA"):
+                diameter = self._diameter_of(statement)
+            elif statement.word == "SPINDL" and (speed := spindle_speed(statement, diameter)):
+                return speed
+        return None
 
     def _speed_text(self, speed: float) -> str:
         return format_number(speed, self.form.table.digits.speed, trim=True).rstrip(".")
@@ -214,10 +200,14 @@ class StatementWriter:
 
     def cutter(self, statement: Statement) -> list[str]:
         """CUTTER/d,r,e,... and TLDATA/MILL,d,...: the diameter is kept."""
+        self._diameter = self._diameter_of(statement)
+        return self.comment(statement.text)
+
+    def _diameter_of(self, statement: Statement) -> float:
+        """Diameter of CUTTER or TLDATA, mm; 0 for none."""
         numbers = numbers_of(statement)
         mill = statement.word == "CUTTER" or {"MILL", "DRILL"} & set(words_of(statement))
-        self._diameter = numbers[0] * self.program.mm_per_unit if mill and numbers else 0.0
-        return self.comment(statement.text)
+        return numbers[0] * self.program.mm_per_unit if mill and numbers else 0.0
 
     def spindle(self, statement: Statement) -> list[str] | None:
         """SPINDL in every order of its words."""
@@ -234,7 +224,7 @@ class StatementWriter:
             return list(self.words.spindle_off) or None
         if len(numbers) > 1 or any(number < 0.0 for number in numbers):
             return None
-        speed = self._turns(words, numbers[0]) if numbers else None
+        speed = spindle_speed(statement, self._diameter)
         if numbers and speed is None:
             return None
         if numbers and (cutting := cutting_unit(words)):

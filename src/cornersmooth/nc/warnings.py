@@ -15,7 +15,7 @@ from cornersmooth.nc.circles import Circles
 from cornersmooth.nc.coordinates import BlockRows
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.messages import Findings
-from cornersmooth.nc.rewinds import UPRIGHT
+from cornersmooth.nc.rotary_words import UPRIGHT
 from cornersmooth.rotary import rapid_moves
 from cornersmooth.settings import FLIP_ANGLE
 

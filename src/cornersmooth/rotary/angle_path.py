@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cornersmooth.arrays.slices import joined_rows
 from cornersmooth.errors import Finding, InputError
 from cornersmooth.kinematics.machine import Machine
 from cornersmooth.kinematics.poses import (
@@ -90,9 +91,8 @@ def rotary_angles(
     run = np.cumsum(rapid | left, dtype=np.int32)
     branch, swaps = np.full(n, -1, np.int8), np.zeros(0, np.int64)
     if len(steady):
-        steady_poses = _Steady(machine, axis, steady, both, run, line, file)
-        angles, branch[steady], swaps = steady_poses.angles(tolerance, divide=divide)
-        del both, steady_poses
+        angles, branch[steady], swaps = _Steady(machine, axis, steady, both, run, line, file).angles(tolerance, divide)
+        del both
         if len(at_pole):
             known, angles = angles, np.full((n, 2), np.nan)
             angles[steady] = known
@@ -206,7 +206,7 @@ class _Steady:
     line: Ints
     file: str | None
 
-    def angles(self, tolerance: float, *, divide: bool) -> tuple[Floats, NDArray[np.int8], Ints]:
+    def angles(self, tolerance: float, divide: bool) -> tuple[Floats, NDArray[np.int8], Ints]:
         """Angles (s, 2) and branches (s,), and poses before which a rapid changes branch."""
         machine, axis, steady, unwrapped, run = self.machine, self.axis, self.steady, self.unwrapped, self.run
         dislike = _dislike(machine, unwrapped[0])
@@ -226,7 +226,7 @@ class _Steady:
         enter, leave = unwrapped[begins], unwrapped[np.append(begins[1:], len(steady)) - 1]
         meet_at_pole(machine, axis, steady, begins, ~np.concatenate(free), enter, leave)
         low, high = np.minimum.reduceat(unwrapped, begins, axis=0), np.maximum.reduceat(unwrapped, begins, axis=0)
-        way = WideSteps(*(np.concatenate([getattr(part, name) for part in wide]) for name in ("row", "low", "high")))
+        way = joined_rows(wide)
         owner = np.searchsorted(begins, way.row, side="right") - 1
         np.minimum.at(low, owner, way.low)
         np.maximum.at(high, owner, way.high)
@@ -331,10 +331,7 @@ def _fill_cone(
 
 def _lengths(tip: Floats) -> Floats:
     """Length of the path up to each pose: (n, 3) -> (n,) mm."""
-    step = np.zeros(len(tip))
-    for here in _chunks(len(tip) - 1):
-        step[here.start + 1 : here.stop + 1] = np.linalg.norm(np.diff(tip[here.start : here.stop + 1], axis=0), axis=1)
-    return np.cumsum(step)
+    return np.cumsum(np.linalg.norm(np.diff(tip, axis=0, prepend=tip[:1]), axis=1))
 
 
 def _chunks(n: int) -> Iterator[slice]:

@@ -14,6 +14,7 @@ import numpy as np
 from cornersmooth.kinematics.machine import Machine
 from cornersmooth.kinematics.poses import pole_angle, solutions, wrap
 from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.rotary.subdivision import ruled_axis
 
 #: What a full turn back of an axis in a rapid costs, in degrees of rotation: so much that rotation never outweighs it.
 REWIND_COST = 1e9
@@ -280,10 +281,9 @@ def unwrap(machine: Machine, axis: Floats, start: Ints, end: Ints, angles: Float
     if len(wide):
         # A wide step: the sum of the short ones on the way says which way round it goes.
         share = (np.arange(1, WIDE_STEP_POINTS + 1) / (WIDE_STEP_POINTS + 1))[:, None, None]
-        between = axis[start[wide]] * (1 - share) + axis[end[wide]] * share
-        length = np.linalg.norm(between, axis=2, keepdims=True)
-        between = np.where(length > 0, between / np.where(length > 0, length, 1.0), axis[start[wide]])
-        on_way = solutions(machine, between.reshape(-1, 3)).angles.reshape(WIDE_STEP_POINTS, -1, 2, 2)
+        on_way = solutions(
+            machine, ruled_axis(axis[start[wide]], axis[end[wide]], share).reshape(-1, 3)
+        ).angles.reshape(WIDE_STEP_POINTS, -1, 2, 2)
         steps = np.diff(np.concatenate((angles[wide][None], on_way, angles[wide + 1][None])), axis=0)
         steps -= 360 * np.round(steps / 360)
         change[wide] = np.round((steps.sum(axis=0) - step[wide]) / 360)

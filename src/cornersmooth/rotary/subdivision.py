@@ -3,8 +3,11 @@
 In a straight block every axis runs evenly from word to word. With tool centre point control the tip then runs straight,
 but the tool axis follows its rotary angles and not the shortest turn; without it the tip leaves its line too.
 
-A division is enough only where that is proved: by bounds of the derivatives alone (`chord_bounds`), or by so many
+A division is enough only where that is proved: by bounds of the derivatives alone, or by so many
 samples that the same bounds leave nearly nothing to what lies between them. They say, too, how many parts to try.
+
+A vector function on [0, 1] with |f″| ≤ M leaves its chord on a stretch of length h by at most M·h²/8. So the difference
+of two motions is between N + 1 even samples no larger than at them but for (M₁ + M₂)/(8 N²).
 """
 
 from __future__ import annotations
@@ -14,14 +17,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cornersmooth.arrays.vectors import dot, unit
+from cornersmooth.arrays.slices import joined_rows, some_rows
+from cornersmooth.arrays.vectors import dot, norm, unit
 from cornersmooth.geometry.ragged import spread
 from cornersmooth.kinematics.machine import Machine
 from cornersmooth.kinematics.poses import angle_between, continued, solutions, tool_axis, wrap
 from cornersmooth.kinematics.position import machine_position, tip_position
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.rotary.axis_findings import limit_error
-from cornersmooth.rotary.chord_bounds import axis_bend, ruled_bend, tip_bend
 
 #: Rounds of division.
 ROUNDS = 28
@@ -34,6 +37,8 @@ SMOOTH, SMOOTH_TURN, AIM = 0.1, 30.0, 0.93
 SURE = 0.5
 #: Share of the tolerance that a proof leaves to what lies between its samples, and the most intervals between them.
 PROOF, MOST_SAMPLES = 0.02, 256
+#: A way that comes nearer to the origin than this share of its length goes through it.
+JUMP = 1e-12
 #: Samples that are worked on at a time.
 CHUNK = 1 << 15
 
@@ -88,15 +93,15 @@ def insertions(
     open_ = motion.segments(angles, np.flatnonzero(~rapid[1:]), branches=False)
     for number in range(ROUNDS + 1):
         parts = motion.parts(open_)
-        open_, parts = open_.take(parts > 1), parts[parts > 1]
+        open_, parts = some_rows(open_, parts > 1), parts[parts > 1]
         if not len(parts) or number == ROUNDS:
             break
         if not number:
             open_ = motion.segments(angles, open_.segment, branches=True)
         open_, inserted = motion.divide(open_, parts)
         found.append(inserted)
-    new = open_.take(np.zeros(0, np.int64)).and_those(found)
-    new = new.take(np.lexsort((new.start, new.segment)))
+    new = joined_rows((some_rows(open_, slice(0)), *found))
+    new = some_rows(new, np.lexsort((new.start, new.segment)))
     segment, fraction, inner = new.segment, new.start, new.start_angles
     limits = machine.limits
     inside = np.clip(inner, limits[:, 0], limits[:, 1])
@@ -133,10 +138,7 @@ def fill(tip: Floats, axis: Floats, angles: Floats, more: Insertions) -> FilledP
 def ruled(tip: Floats, axis: Floats, segment: Ints, fraction: Floats) -> tuple[Floats, Floats]:
     """Tip and unit axis of the ruled motion at fractions of segments: both ends of the axis run linearly."""
     share = fraction[:, None]
-    direction = axis[segment] * (1 - share) + axis[segment + 1] * share
-    length = np.linalg.norm(direction, axis=1, keepdims=True)
-    direction = np.where(length > 0, direction / np.where(length > 0, length, 1.0), axis[segment])
-    return tip[segment] * (1 - share) + tip[segment + 1] * share, direction
+    return tip[segment] * (1 - share) + tip[segment + 1] * share, ruled_axis(axis[segment], axis[segment + 1], share)
 
 
 @dataclass(frozen=True)
@@ -155,14 +157,6 @@ class Intervals:
     def turn(self) -> Floats:
         """(p, 2) degrees."""
         return np.abs(self.end_angles - self.start_angles)
-
-    def take(self, which: Bools | Ints) -> Intervals:
-        """Return the chosen ones."""
-        return Intervals(*(values[which] for values in vars(self).values()))
-
-    def and_those(self, others: list[Intervals]) -> Intervals:
-        """Return these and others."""
-        return Intervals(*(np.concatenate([vars(one)[name] for one in (self, *others)]) for name in vars(self)))
 
 
 @dataclass(frozen=True)
@@ -201,7 +195,7 @@ class RuledMotion:
             group = doubtful[samples == number]
             size = max(1, CHUNK // (number + 1))
             for some in (group[begin : begin + size] for begin in range(0, len(group), size)):
-                parts[some] = np.maximum(parts[some], self._needed(intervals.take(some), bends[:, some], number))
+                parts[some] = np.maximum(parts[some], self._needed(some_rows(intervals, some), bends[:, some], number))
         return np.minimum(parts, PARTS)
 
     def _needed(self, part: Intervals, bends: Floats, number: int) -> Ints:
@@ -211,7 +205,7 @@ class RuledMotion:
         """
         shape = (len(part.segment), number + 1)
         samples = np.tile(np.arange(number + 1) / number, shape[0])
-        repeated = part.take(np.repeat(np.arange(shape[0]), number + 1))
+        repeated = some_rows(part, np.repeat(np.arange(shape[0]), number + 1))
         ends = [np.repeat(end, number + 1, axis=0) for end in self._ends(part)]
         proved, least = np.zeros(shape[0], np.bool_), np.full(shape, np.inf)
         for along, tip, axis in (
@@ -250,14 +244,9 @@ class RuledMotion:
         """Tip and linear words at both ends of each interval: four times (p, 3), mm; nothing where the tip is kept."""
         if self.tip_tolerance is None:
             return []
-        start, _ = ruled(self.tip, self.axis, part.segment, part.start)
-        end, _ = ruled(self.tip, self.axis, part.segment, part.end)
-        return [
-            start,
-            end,
-            machine_position(self.machine, start, part.start_angles),
-            machine_position(self.machine, end, part.end_angles),
-        ]
+        tips = [ruled(self.tip, self.axis, part.segment, share)[0] for share in (part.start, part.end)]
+        angles = part.start_angles, part.end_angles
+        return [*tips, *(machine_position(self.machine, *end) for end in zip(tips, angles, strict=True))]
 
     def _errors(self, part: Intervals, ends: list[Floats], fraction: Floats) -> Iterator[tuple[Floats, Floats, Floats]]:
         """Errors at one share of each interval, the ruled motion paired with the real one in two ways.
@@ -290,7 +279,7 @@ class RuledMotion:
         still = np.flatnonzero((self.tip[part.segment] == self.tip[part.segment + 1]).all(axis=1))
         along = fraction.copy()
         if len(still):
-            some = part.take(still)
+            some = some_rows(part, still)
             start, end = self._lever(some.segment, some.start), self._lever(some.segment, some.end)
             normal = np.cross(start, end)
             gone, left = (dot(np.cross(*pair), normal) for pair in ((start, axis[still]), (axis[still], end)))
@@ -303,13 +292,13 @@ class RuledMotion:
         """Divide each interval into so many equal parts: the new intervals, and those that start with a new point."""
         owner, number = spread(count)
         share = (number / count[owner])[:, None]
-        old = intervals.take(owner)
+        old = some_rows(intervals, owner)
         start = old.start + (old.end - old.start) * share[:, 0]
         words = old.start_angles * (1 - share) + old.end_angles * share
         branch = old.start_branch.copy()
         new = np.flatnonzero(number > 0)
         # A point between a pose in the cone and one outside is on the branch of the latter.
-        at = old.take(new)
+        at = some_rows(old, new)
         known = np.where(at.start_branch < 0, at.end_branch, at.start_branch)
         known[(at.start_branch >= 0) & (at.end_branch >= 0) & (at.start_branch != at.end_branch)] = -1
         _, axis = ruled(self.tip, self.axis, at.segment, start[new])
@@ -319,4 +308,86 @@ class RuledMotion:
         end, end_words, end_branch = old.end.copy(), old.end_angles.copy(), old.end_branch.copy()
         end[~last], end_words[~last], end_branch[~last] = start[new], words[new], branch[new]
         divided = Intervals(old.segment, start, end, words, end_words, branch, end_branch)
-        return divided, divided.take(new)
+        return divided, some_rows(divided, new)
+
+
+def axis_bend(machine: Machine, turn: Floats, start: Floats, end: Floats, slack: Floats) -> Floats:
+    """Bound (n,) on the second derivative of the tool axis when both rotary axes turn evenly, by `turn` (n, 2) rad.
+
+    Tool axes (n, 3) at both ends may be off by the slack, rad.
+    """
+    turn = np.abs(turn)
+    away = np.minimum(np.maximum(_sine(machine, start), _sine(machine, end)) + slack + turn[:, 1] / 2, 1.0)
+    bound: Floats = away * turn[:, 0] ** 2 + 2 * turn[:, 0] * turn[:, 1] + turn[:, 1] ** 2
+    return bound
+
+
+def ruled_axis(start: Floats, end: Floats, share: Floats) -> Floats:
+    """Unit axes (..., 3) at shares of ways on which both ends run evenly; the first axis where they cancel out."""
+    direction = start * (1 - share) + end * share
+    length = np.linalg.norm(direction, axis=-1, keepdims=True)
+    return np.where(length > 0, direction / np.where(length > 0, length, 1.0), start)
+
+
+def ruled_bend(start: Floats, end: Floats) -> Floats:
+    """Bound (n,) on the second derivative of the direction of points that run evenly from `start` to `end` (n, 3).
+
+    Infinite where the point comes to the origin: the direction jumps there.
+    """
+    way = end - start
+    square = dot(way, way)
+    nearest = np.clip(-dot(start, way) / np.where(square > 0, square, 1.0), 0.0, 1.0)
+    shortest = np.linalg.norm(start + nearest[:, None] * way, axis=1)
+    moving = shortest > np.sqrt(square) * JUMP
+    shortest = np.where(moving, shortest, 1.0)
+    # With the distance h of the line from the origin the direction turns at ω = h|way|/r², and |ω′| = 2ω|r′|/r.
+    turning = np.linalg.norm(np.cross(start, way), axis=1) / shortest**2
+    outwards = np.maximum(_along(start, way), _along(end, way))
+    return np.where(moving, turning**2 + 2 * turning * outwards / shortest, np.where(square > 0, np.inf, 0.0))
+
+
+def tip_bend(machine: Machine, start: Floats, end: Floats, turn: Floats) -> Floats:
+    """Bound (n,) on the second derivative of the tip in the part when all five axes run evenly, mm.
+
+    `start` and `end` (n, 3), mm, are words of the linear axes (`machine_position`); turns (n, 2) are in rad.
+    """
+    turn = np.abs(turn)
+    size, speed, bend = np.zeros((3, len(turn)))  # of the way of the tip and its derivatives, as `position._swing` goes
+    for index in (1, 0):
+        axis = machine.axes[index]
+        if axis.carrier == "head":
+            lever = float(np.linalg.norm(machine.tool_length * machine.tool + np.array(axis.point)))
+            size, speed, bend = _turned(size + lever, speed, bend, turn[:, index])
+            size = size + lever
+    before = np.zeros(3)  # the point that the size counts from
+    speed = speed + np.linalg.norm(end - start, axis=1)
+    swing, first = size, True
+    for index in (1, 0):
+        axis = machine.axes[index]
+        if axis.carrier == "table":
+            point = np.array(axis.point)
+            if first:  # both ends of the straight way of the linear axes
+                words = [np.linalg.norm(side + machine.part_zero - point, axis=1) for side in (start, end)]
+                size, first = swing + np.maximum(*words), False
+            else:
+                size = size + float(np.linalg.norm(point - before))
+            size, speed, bend = _turned(size, speed, bend, turn[:, index])
+            before = point
+    return bend
+
+
+def _turned(size: Floats, speed: Floats, bend: Floats, turn: Floats) -> tuple[Floats, Floats, Floats]:
+    """Size and derivatives of R(q) p, with q′ = `turn`, from those of p."""
+    return size, turn * size + speed, turn**2 * size + 2 * turn * speed + bend
+
+
+def _sine(machine: Machine, axis: Floats) -> Floats:
+    """Sine of the angle between the tool axis and the first rotary axis."""
+    x, y, z = machine.axes[0].unit
+    return norm(axis @ np.array(((0.0, z, -y), (-z, 0.0, x), (y, -x, 0.0))))
+
+
+def _along(point: Floats, way: Floats) -> Floats:
+    """Speed with which a point that runs along `way` leaves the origin."""
+    length = np.linalg.norm(point, axis=1)
+    return np.abs(dot(point, way)) / np.where(length > 0, length, 1.0)

@@ -1,23 +1,22 @@
 """Rows of words with numbers, such as ``G1 X9.9838 Y-0.8170 F250.``, many at a time.
 
 Every row of a block is laid out in the same columns of a byte matrix, cells as wide as the largest number of their
-column: word, sign, digits in groups of four from tables. What a row does not need stays zero, and one pass over the
-matrix drops the zeros.
+column: word, sign, digits from right to left in groups of up to four, copied from tables as one element each. What a
+row does not need stays zero, and one pass over the matrix drops the zeros.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
-from typing import Final
+from functools import cache, lru_cache
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cornersmooth.errors import OutputError
 from cornersmooth.model import Bools, Ints
-from cornersmooth.text.layout import WORD, Bytes, Layout, lay_out, put
 from cornersmooth.text.ticks import MOST_DECIMALS, TICK_LIMIT
 
 #: rows laid out at a time
@@ -26,8 +25,11 @@ BLOCK: Final = 8192
 #: rows side by side in `_by_column`
 FOLD: Final = 256
 
-#: bytes of a row that are counted in one byte for each column of words
-WIDEST: Final = 255 * WORD
+#: bytes of a text that are copied at once
+WORD: Final = 8
+
+#: stands behind each row that is taken by itself
+_END: Final = b"\1"
 
 
 class Choices:
@@ -102,8 +104,8 @@ class RowFormat:
         suffix: Sequence[bytes],
         suffix_id: ArrayLike,
         left_out: Bools | None = None,
-    ) -> tuple[bytes, Ints]:
-        """Write rows: prefix, words with their numbers, suffix. Give the text, and where rows start and the last ends.
+    ) -> bytes:
+        """Text of rows: prefix, words with their numbers, suffix.
 
         `ticks` (m, c) are numbers in steps of their last digit, from `to_ticks`. Prefixes and suffixes, which carry the
         line end, are chosen by ids (m,) or (). Words that a row has not are `left_out` (m, c); where its prefix is
@@ -114,7 +116,7 @@ class RowFormat:
             raise ValueError(f"ticks of shape {ticks.shape} for {len(self.words)} words")
         m = len(ticks)
         if not m:
-            return b"", np.zeros(1, np.int64)
+            return b""
         heads = Choices(prefix, prefix_id, m, align_right=True)
         tails = Choices(suffix, suffix_id, m, align_right=False)
         layout, drop = self._lay_out(ticks, heads.width, tails.width), None
@@ -123,10 +125,20 @@ class RowFormat:
             blank = np.array([word[:1] == b" " for word in self.words])
             first = np.argmin(left_out, axis=1)
             drop = left_out, np.where(empty & blank[first], first, -1)
-        blocks = list(_write_blocks(ticks, layout, heads, tails, drop))
-        offsets = np.zeros(m + 1, np.int64)
-        np.cumsum(np.concatenate([lengths for _, lengths in blocks]), out=offsets[1:])
-        return b"".join([text for text, _ in blocks]), offsets
+        return b"".join(_write_blocks(ticks, layout, heads, tails, drop))
+
+    def each(
+        self,
+        ticks: Ints,
+        prefix: Sequence[bytes],
+        prefix_id: ArrayLike,
+        suffix: Sequence[bytes],
+        suffix_id: ArrayLike,
+        left_out: Bools | None = None,
+    ) -> list[bytes]:
+        """Text of each of these rows."""
+        ended = [text + _END for text in suffix]
+        return self.rows(ticks, prefix, prefix_id, ended, suffix_id, left_out).split(_END)[:-1]
 
     def _lay_out(self, ticks: Ints, head: int, tail: int) -> Layout:
         """Lay out rows for (m, c) ticks between so many bytes at either end."""
@@ -135,10 +147,7 @@ class RowFormat:
             raise OutputError("CS301", "a number is too large to be written", "please report this with the input file")
         largest = [max(-low, high) for low, high in zip(lowest, highest, strict=True)]
         digits = tuple(len(str(n // 10**places)) for n, places in zip(largest, self.decimals, strict=True))
-        layout = lay_out(self, digits, tuple(low < 0 for low in lowest), head, tail)
-        if len(layout.template) > WIDEST:
-            raise ValueError(f"rows of {len(layout.template)} bytes are wider than {WIDEST}")
-        return layout
+        return lay_out(self, digits, tuple(low < 0 for low in lowest), head, tail)
 
 
 def _by_column(extreme: np.ufunc, ticks: Ints) -> list[int]:
@@ -153,12 +162,12 @@ def _by_column(extreme: np.ufunc, ticks: Ints) -> list[int]:
 
 def _write_blocks(
     ticks: Ints, layout: Layout, heads: Choices, tails: Choices, drop: tuple[Bools, Ints] | None
-) -> Iterator[tuple[bytes, Ints]]:
-    """Write rows a block at a time; give the text of each block and the sizes of its rows.
+) -> Iterator[bytes]:
+    """Write rows a block at a time.
 
     `drop` is what rows have not: (m, c) words, and the blank of a word (m,), -1 for none.
     """
-    m, width = len(ticks), len(layout.template)
+    m = len(ticks)
     matrix = np.repeat(layout.template[None, :], min(BLOCK, m), axis=0)
     for start in range(0, m, BLOCK):
         stop = min(start + BLOCK, m)
@@ -174,34 +183,169 @@ def _write_blocks(
                 block[words[:, column], first:last] = 0
                 block[blank == column, first] = 0
         tails.write(start, stop, block, layout.tail)
-        used = block != 0
-        # compress takes the same time for every pattern; a Boolean index is slower for many short runs
-        text = block.reshape(-1).compress(used.reshape(-1)).tobytes()
-        yield text, _count_by_row(used.view(np.uint64).reshape(-1, width // WORD))
+        yield block.tobytes().translate(None, b"\0")
 
 
-def _count_by_row(used: NDArray[np.uint64]) -> Ints:
-    """Count the true bytes of each row: eight sums in the bytes of a word, which are then added."""
-    sums = used[:, 0].copy()
-    for column in range(1, used.shape[1]):
-        sums += used[:, column]
-    low = np.uint64(0x00FF00FF00FF00FF)
-    pairs = (sums & low) + (sums >> np.uint64(8) & low)
-    return (pairs * np.uint64(0x0001000100010001) >> np.uint64(48)).astype(np.int64)
+def interleave(which: Ints, rows: Sequence[list[bytes]]) -> bytes:
+    """Put rows together in order: `which` (n,) says from which list each comes."""
+    following = [iter(some) for some in rows]
+    return b"".join([next(following[own]) for own in which.tolist()])
 
 
-def interleave(which: Ints, texts: Sequence[tuple[bytes, Ints]]) -> bytes:
-    """Put texts of rows together in order: `which` (n,) is the text that has each row.
+if TYPE_CHECKING:
+    from cornersmooth.text.rows import RowFormat
 
-    Texts come with the places (m + 1,) where their rows begin and end.
+Bytes = NDArray[np.uint8]
+#: entries are unsigned integers of as many bytes as the group has characters
+Table = NDArray[np.unsignedinteger[Any]]
+
+#: digits in a full group
+GROUP = 4
+
+
+@cache
+def whole_table(digits: int) -> Table:
+    """(3, 10**digits) digits before the point, of a group of 1, 2 or 4.
+
+    By what stands around the group: row 0 drops all leading zeros, row 1 keeps the last digit, row 2 keeps all.
     """
-    edges = [0, *(1 + np.flatnonzero(which[1:] != which[:-1])).tolist(), len(which)]
-    at = [0] * len(texts)
-    parts = []
-    for first, last in pairwise(edges):
-        own = int(which[first])
-        text, offsets = texts[own]
-        stop = at[own] + last - first
-        parts.append(text[offsets[at[own]] : offsets[stop]])
-        at[own] = stop
-    return b"".join(parts)
+    shown = _characters(digits)
+    significant = np.logical_or.accumulate(shown != ord("0"), axis=1)
+    bare = np.where(significant, shown, 0)
+    units = bare.copy()
+    units[:, -1] = shown[:, -1]
+    return _pack(bare, units, shown)
+
+
+@cache
+def part_table(digits: int, point: bool) -> Table:
+    """(2, 10**digits) digits after the point, of a group of 1 to 4; `point` puts the point in front of them.
+
+    Row 0 keeps all digits, row 1 drops trailing zeros.
+    """
+    shown = _characters(digits)
+    significant = np.logical_or.accumulate(shown[:, ::-1] != ord("0"), axis=1)[:, ::-1]
+    trimmed = np.where(significant, shown, 0)
+    if point:
+        shown, trimmed = (np.insert(group, 0, ord("."), axis=1) for group in (shown, trimmed))
+    return _pack(shown, trimmed)
+
+
+def _characters(digits: int) -> NDArray[np.uint8]:
+    """(10**digits, digits) ASCII digits of 0, 1, 2, ..."""
+    power = 10 ** np.arange(digits)[::-1]
+    return (np.arange(10**digits)[:, None] // power % 10 + ord("0")).astype(np.uint8)
+
+
+def _pack(*groups: NDArray[np.uint8]) -> Table:
+    stacked = np.ascontiguousarray(np.stack(groups), np.uint8)
+    packed: Table = stacked.view(f"u{stacked.shape[-1]}")[..., 0]
+    packed.flags.writeable = False
+    return packed
+
+
+def put(matrix: Bytes, column: int, values: NDArray[Any]) -> None:
+    """Store one element for each row, its bytes from `column` on."""
+    matrix[:, column : column + values.itemsize].view(values.dtype)[:, 0] = values
+
+
+@dataclass(frozen=True)
+class Group:
+    """Digits that are written together: their column, how many, and the texts of all their values in every style."""
+
+    column: int
+    digits: int
+    table: Table
+
+    def put(self, matrix: Bytes, values: Ints, style: Ints | Bools | int) -> None:
+        """Write (r,) values; `style` chooses the row of the table, one for all or one for each."""
+        if isinstance(style, int):
+            put(matrix, self.column, self.table[int(style)].take(values))
+        else:
+            put(matrix, self.column, self.table.reshape(-1).take(values + style * 10**self.digits))
+
+    def split(self, numbers: Ints) -> tuple[Ints, Ints]:
+        """Cut off the last digits: what is left, and the group's values."""
+        left = numbers // 10**self.digits
+        return left, numbers - left * 10**self.digits
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One number of a row: the column of its sign (None where it needs none), its groups from right to left."""
+
+    form: RowFormat
+    sign: int | None
+    whole: tuple[Group, ...]
+    part: tuple[Group, ...]
+
+    def write(self, ticks: Ints, matrix: Bytes) -> None:
+        """Write (r,) numbers into (r, width) rows."""
+        if self.sign is not None:
+            other = ord("+") if self.form.plus else 0
+            matrix[:, self.sign] = (ticks < 0).view(np.uint8) * np.uint8(ord("-") - other) + np.uint8(other)
+        left = np.abs(ticks)
+        ended: Bools | bool = self.form.trim  # whether digits may be dropped: only zeros follow
+        for group in self.part:
+            left, values = group.split(left)
+            group.put(matrix, values, ended)
+            if self.form.trim:
+                ended = (values == 0) & ended
+        # a zero before the point stays where the layout has one, and where it is all there is
+        alone: Bools | bool = ended if self.part and not self.form.leading_zero else True
+        for group in self.whole[:-1]:
+            left, values = group.split(left)
+            group.put(matrix, values, np.where(left > 0, 2, alone))
+            alone = False
+        self.whole[-1].put(matrix, left, alone)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Columns of a row."""
+
+    template: Bytes  #: (width,): A row with its constant characters; zero bytes where others are written
+    cells: tuple[Cell, ...]
+    spans: tuple[tuple[int, int], ...]  #: first column of each word with its number, and the one behind it
+    tail: int  #: first column of what stands behind the numbers; what stands before them begins in column 0
+
+
+@lru_cache(maxsize=256)
+def lay_out(form: RowFormat, digits: tuple[int, ...], negative: tuple[bool, ...], head: int, tail: int) -> Layout:
+    """Lay out rows: `head` columns, each word with a number, `tail` columns.
+
+    Every number has at most so many `digits` before the point, and a place for its sign where some of its column are
+    `negative`.
+    """
+    row = bytearray(head)
+
+    def add(characters: bytes) -> int:
+        row.extend(characters)
+        return len(row) - len(characters)
+
+    cells, spans = [], []
+    for word, places, before_point, some_negative in zip(form.words, form.decimals, digits, negative, strict=True):
+        start = add(word)
+        sign = add(b"\0") if form.plus or some_negative else None
+        whole = [Group(add(bytes(n)), n, whole_table(n)) for n in _groups(before_point, leading=(1, 2, GROUP))]
+        part: list[Group] = []
+        for n in _groups(places, leading=(1, 2, 3, GROUP)):
+            with_point = n % 2 == 1  # elements have 2 or 4 bytes: the point makes an odd group even
+            if not part and not with_point:
+                add(b".")
+            part.append(Group(add(bytes(n + with_point)), n, part_table(n, with_point)))
+        if not part and form.trim:
+            add(b".")
+        cells.append(Cell(form, sign, tuple(whole[::-1]), tuple(part[::-1])))
+        spans.append((start, len(row)))
+    behind = add(bytes(tail))
+    return Layout(np.frombuffer(bytes(row), np.uint8), tuple(cells), tuple(spans), behind)
+
+
+def _groups(digits: int, leading: tuple[int, ...]) -> list[int]:
+    """Sizes of the groups of a run of digits: full ones, and first the smallest of `leading` that holds the rest."""
+    if not digits:
+        return []
+    full = (digits - 1) // GROUP
+    first = next(size for size in leading if size >= digits - full * GROUP)
+    return [first] + [GROUP] * full
