@@ -60,6 +60,7 @@ _SCRIPTS = (
     "charts.js",
     "places.js",
     "problems.js",
+    "list.js",
     "corners.js",
     "runs.js",
     "drive.js",

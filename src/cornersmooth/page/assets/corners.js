@@ -6,14 +6,11 @@ const TURNS = 9;
 /** Corners of an open group that are in the document. */
 const MOST_ROWS = 100;
 
-class Corners {
+class Corners extends List {
   /** @param {Meta} meta @param {Record<string, Values>} arrays @param {(place: Place, fly: boolean) => void} chosen */
   constructor(meta, arrays, chosen) {
-    this.meta = meta;
-    this.arrays = arrays;
+    super(meta, arrays, Object.values(meta.corners?.counts ?? {}).reduce((sum, count) => sum + count, 0), "corner");
     this.chosen = chosen;
-    this.list = element("list");
-    this.selected = -1;
     /** @type {number[][]} corners of each group */
     this.groups = [];
     /** @type {number[]} the group of each corner */
@@ -27,16 +24,11 @@ class Corners {
       this.groups[known.get(key)].push(i);
       this.groupOf.push(known.get(key));
     }
-    const total = Object.values(meta.corners?.counts ?? {}).reduce((sum, count) => sum + count, 0);
-    element("corners").querySelector("h2").textContent = `${total.toLocaleString("en")} ${total === 1 ? "corner" : "corners"}`;
     this.draw();
-    this.list.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
-      const step = { ArrowDown: 1, ArrowUp: -1, PageDown: 10, PageUp: -10 }[event.key];
-      if (step === undefined) return;
-      event.preventDefault();
-      event.stopPropagation();
-      this.step(step);
-    });
+  }
+
+  get count() {
+    return this.groupOf.length;
   }
 
   /** Class of the amount that corners of a kind are ordered by. @param {number} i */
@@ -129,31 +121,21 @@ class Corners {
     this.selected = i;
     if (i >= 0) {
       if (fly) this.open.add(this.groupOf[i]);
-      this.fill(i);
-      this.chosen(placeOf(this.arrays, "c", i), fly);
+      const place = placeOf(this.arrays, "c", i);
+      const head = made("h2");
+      head.append(this.dot(i), made("span", `${i ? "" : "worst corner, "}${this.title(i)}`));
+      this.fill(head, place, this.facts(i));
+      this.chosen(place, fly);
     }
     this.draw();
   }
 
-  /** The next corner in the order of what matters, or one farther on. @param {number} by */
-  step(by) {
-    const count = this.groupOf.length;
-    if (!count) return;
-    this.select(Math.min(Math.max(this.selected < 0 ? 0 : this.selected + by, 0), count - 1));
-    this.list.querySelector("[aria-pressed=true]")?.scrollIntoView({ block: "nearest" });
-  }
-
-  /** @param {number} i */
-  fill(i) {
+  /** What the panel says of a corner. @param {number} i @returns {[string, string][]} */
+  facts(i) {
     const a = this.arrays;
-    const panel = element("panel");
-    const head = made("h2");
-    head.append(this.dot(i), made("span", `${i ? "" : "worst corner, "}${this.title(i)}`));
-    const facts = made("dl");
     const limit = told(this.meta.tolerance);
     const place = [0, 1, 2].map((j) => (a.c_tip[3 * i + j] + this.meta.centre[j]).toFixed(4)).join("  ");
-    /** @type {[string, string][]} */
-    const rows = [
+    return [
       ["lines", `${this.meta.origin} ${a.c_line[i]}${a.c_nc[i] ? `, NC ${a.c_nc[i]}` : ""}`],
       ["turn", `${degrees(a.c_turn[i])} at the tip, ${degrees(a.c_axis_turn[i])} at the axis point`],
       ["length", told(a.c_length[i], "mm")],
@@ -161,7 +143,5 @@ class Corners {
       ["off at axis point", `${offset(a.c_axis_off[i])} of ${limit} mm`],
       ["place, mm", place],
     ];
-    for (const [label, value] of rows) facts.append(made("dt", label), made("dd", value));
-    panel.replaceChildren(head, insetOf(this.meta, a, placeOf(a, "c", i)), facts);
   }
 }

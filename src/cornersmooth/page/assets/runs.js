@@ -2,29 +2,24 @@
 
 /** @typedef {{first: number, last: number, nc_first: number, nc_last: number, way: number[], off: number, before: number | null, after: number | null}} Run */
 
-class Runs {
+class Runs extends List {
   /** @param {Meta} meta @param {Record<string, Values>} arrays @param {(place: Place, run: Run, fly: boolean) => void} chosen */
   constructor(meta, arrays, chosen) {
-    this.meta = meta;
-    this.arrays = arrays;
+    const runs = meta.runs ?? [];
+    super(meta, arrays, runs.length, "run");
     this.chosen = chosen;
-    this.list = element("list");
-    this.selected = -1;
-    this.runs = meta.runs ?? [];
+    this.runs = runs;
     const box = element("corners");
     box.classList.add("runs");
     box.setAttribute("aria-label", "Runs that were smoothed");
-    box.querySelector("h2").textContent = `${grouped(this.runs.length)} ${this.runs.length === 1 ? "run" : "runs"} smoothed`;
+    box.querySelector("h2").append(" smoothed");
     const timed = this.runs.some((run) => gainOf(run) !== null);
     ["old lines", "blocks", "off, mm", timed ? "saves" : ""].forEach((text, k) => (box.querySelector(".head").children[k].textContent = text));
     this.draw();
-    this.list.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
-      const step = { ArrowDown: 1, ArrowUp: -1 }[event.key];
-      if (step === undefined) return;
-      event.preventDefault();
-      event.stopPropagation();
-      this.step(step);
-    });
+  }
+
+  get count() {
+    return this.runs.length;
   }
 
   draw() {
@@ -50,7 +45,6 @@ class Runs {
     const run = this.runs[k];
     if (run) {
       const place = placeOf(this.arrays, "w", worstOf(this.arrays, run));
-      const facts = made("dl");
       const gain = gainOf(run);
       /** @type {[string, string][]} */
       const rows = [
@@ -59,19 +53,10 @@ class Runs {
         ["off, largest", `${offset(run.off)} of ${told(this.meta.tolerance)} mm`],
         ...(gain === null ? [] : /** @type {[string, string][]} */ ([["time", `${told(run.after ?? NaN, "s", 4)} instead of ${told(run.before ?? NaN, "s", 4)}: ${gain < 0 ? "takes" : "saves"} ${told(Math.abs(gain), "s")}${gain < 0 ? " more" : ""}`]])),
       ];
-      for (const [label, value] of rows) facts.append(made("dt", label), made("dd", value));
-      const head = made("h2", `run ${k + 1}, where it is off most`);
-      element("panel").replaceChildren(head, insetOf(this.meta, this.arrays, place), facts);
+      this.fill(made("h2", `run ${k + 1}, where it is off most`), place, rows);
       this.chosen(place, run, fly);
     }
     this.draw();
-  }
-
-  /** @param {number} by */
-  step(by) {
-    if (!this.runs.length) return;
-    this.select(Math.min(Math.max(this.selected + by, 0), this.runs.length - 1));
-    this.list.querySelector("[aria-pressed=true]")?.scrollIntoView({ block: "nearest" });
   }
 }
 
