@@ -8,12 +8,10 @@ from __future__ import annotations
 
 import os
 import shlex
-import traceback
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import partial
-from pathlib import Path
 from typing import Any, Literal
 
 Severity = Literal["note", "warning", "error"]
@@ -56,15 +54,6 @@ def message(
     return "\n".join(map(printable, lines if hint or rest else lines[:1]))
 
 
-def install_hint(extra: str) -> str:
-    """Say how to install an extra, which only some work needs: of the checkout that this runs from, or the package."""
-    checkout = Path(__file__).resolve().parents[2]
-    if (checkout / "pyproject.toml").is_file() and (checkout / "src" / "cornersmooth").is_dir():
-        here = "." if checkout == Path.cwd() else str(checkout)
-        return f"install it with: {command_text(['pip', 'install', '-e', f'{here}[{extra}]'])}"
-    return f"install it with: {command_text(['pip', 'install', f'cornersmooth[{extra}]'])}"
-
-
 def command_text(words: list[str]) -> str:
     """Give a command line as the shell of this system reads it."""
     if os.name != "nt":
@@ -76,6 +65,8 @@ def command_text(words: list[str]) -> str:
 
 def internal_error(failure: Exception, source: str = "") -> str:
     """Text for an error that is a fault of the program."""
+    import traceback  # it takes long to load
+
     last = traceback.extract_tb(failure.__traceback__)[-1]
     place = f"{os.path.basename(last.filename)}:{last.lineno}"
     what = f"internal error, {type(failure).__name__} at {place}: {failure}"

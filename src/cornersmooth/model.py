@@ -160,13 +160,8 @@ class Program:
     moved: Floats | None = None
 
     def __post_init__(self) -> None:
-        n = len(self.tip)
-        shapes = {
-            "tip": (n, 3),
-            "axis": (n, 3),
-            **dict.fromkeys(("kind", "feed", "line", "feed_mode", "keep"), (n,)),
-        }
-        for name, shape in shapes.items():
+        for name in ("tip", "axis", "kind", "feed", "line", "feed_mode", "keep"):
+            shape = (len(self), 3) if name in ("tip", "axis") else (len(self),)
             if getattr(self, name).shape != shape:
                 raise ValueError(f"Program.{name} has shape {getattr(self, name).shape}, not {shape}")
 
@@ -274,9 +269,7 @@ class Program:
     def acted(self) -> Bools:
         """(n+1,) bool: whether a statement that acts is between pose i-1 and pose i."""
         flags = np.zeros(len(self) + 1, np.bool_)
-        for statement in self.statements:
-            if statement.acts:
-                flags[statement.pose] = True
+        flags[[statement.pose for statement in self.statements if statement.acts]] = True
         return flags
 
     @cached_property

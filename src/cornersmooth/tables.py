@@ -29,6 +29,7 @@ Record = TypeVar("Record")
 #: makes a field of the value of a key; its second argument says where the value stands
 Check = Callable[[Any, str], Any]
 
+#: largest whole number, where a field does not say another
 _MOST = 1_000_000
 
 #: characters of a table at most

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 from cornersmooth import __version__
 from cornersmooth.cli.files import STANDARD
 from cornersmooth.cli.job import Job, Outcome, run_job
-from cornersmooth.errors import SettingsError, install_hint, message
+from cornersmooth.errors import SettingsError, command_text, message
 from cornersmooth.system.output import make_folder, remove_leftovers, temporary_name
 
 if TYPE_CHECKING:
@@ -89,7 +89,8 @@ def _connect(scheduler: str) -> tuple[Client, Any]:
     try:
         from distributed import Client, as_completed
     except ImportError as missing:
-        raise SettingsError("CS243", "a scheduler needs Dask distributed", install_hint("cluster")) from missing
+        hint = f"install it with: {command_text(['pip', 'install', 'cornersmooth[cluster]'])}"
+        raise SettingsError("CS243", "a scheduler needs Dask distributed", hint) from missing
     for name in ("distributed", "distributed.client"):  # what matters is in the message of the file
         logging.getLogger(name).setLevel(logging.CRITICAL)
     given: dict[str, Any] = {"scheduler_file": scheduler} if os.path.isfile(scheduler) else {"address": scheduler}

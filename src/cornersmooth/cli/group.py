@@ -22,8 +22,8 @@ from cornersmooth.system.output import ClosedPipe, reason
 if TYPE_CHECKING:
     from cornersmooth.cli import Shutdown
 
+#: as of a program that SIGINT has ended
 EXIT_INTERRUPTED = 130
-
 
 #: as of a program that is ended by the signal of a closed pipe: who reads has enough
 EXIT_CLOSED_PIPE = 141

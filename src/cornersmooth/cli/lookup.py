@@ -153,6 +153,7 @@ KINDS: Final = {
     "warning": "The program is written. The warning is not about the metal.",
     "note": "The program is written. -v prints notes.",
 }
+#: columns of a text on a terminal
 _WIDTH: Final = 80
 
 

@@ -29,6 +29,7 @@ AXIS_NOISE: Final = 1e-5
 #: a corner that turns by more than this, rad, is a sharp one to the machine: of real paths, 91 to 99 % turn by less
 SHARP: Final = np.radians(10.0)
 
+#: levels of a spread: least, 5 %, median, 95 %, most
 PERCENTS: Final = (0, 5, 50, 95, 100)
 
 #: last printed decimal of CL files, units of the file; an arc that rises by more is a helix
