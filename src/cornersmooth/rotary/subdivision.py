@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cornersmooth.arrays.slices import joined_rows, some_rows
+from cornersmooth.arrays import joined_rows, some_rows
 from cornersmooth.arrays.vectors import dot, norm, unit
 from cornersmooth.geometry.ragged import spread
 from cornersmooth.kinematics.machine import Machine
