@@ -324,3 +324,13 @@ def test_states_over_holes_that_are_left_out_are_not_verified() -> None:
         found = verify(program(LEFT_OUT), some, tolerance=0.02, skip_cycles=True)
         assert found.verdict is Verdict.NOT_VERIFIED
         assert found.unverified.endswith("only over holes that are left out: coolant FLOOD of CL line 7")
+
+
+@pytest.mark.parametrize("control", ["fanuc", "mitsubishi", "siemens", "heidenhain"])
+def test_a_vector_before_tip_control_on_the_way_back(control: str) -> None:
+    """A rapid with the words of a vector, before the control takes such words: it stops there."""
+    lines = right(TWO_TOOLS, control)
+    on = where(lines, r"G43\.5|TRAORI|FUNCTION TCPM")
+    over = next(k for k in range(on, len(lines)) if re.search(r"^(\d+ )?(G0|LN) X", lines[k]))
+    moved = (*lines[:on], lines[over], *lines[on:over], *lines[over + 1 :])
+    assert not passes(TWO_TOOLS, control, moved)

@@ -159,6 +159,9 @@ class Reader:
                 whole, run = run, self.retracts.arrive(run, self._words(before), free=self._turns_alone)
                 approach = frozenset(whole.line.tolist()).difference(run.line.tolist())
                 if not len(run.kind):
+                    if self.state.rotary is None:  # a vector is no rapid's on the way back either
+                        how = self.state, self.dialect, before.code, approach, self.unlooked
+                        self._tell_once(control_problems(table, *how))
                     continue
                 if self.state.rotary is not None and len(run.kind) < len(whole.kind):  # on the way back axes turn, too
                     before = before.but(second=tuple(whole.second[-len(run.kind) - 1].tolist()))
