@@ -106,6 +106,13 @@ def direct(
     return plan_path(path, limits, machine=machine, progress=progress)
 
 
+def passed(path: Path, limits: Limits, machine_axes: MachineAxes | None) -> Path:
+    """Path with the speeds at which its junctions are passed, by the way and by the axes of a machine."""
+    if machine_axes is not None:
+        path = replace(path, junction_speed=np.minimum(path.junction_speed, machine_axes.jump_speeds(limits.period)))
+    return replace(path, junction_speed=_not_crowded(path, limits.period))
+
+
 def _not_crowded(path: Path, period: float) -> Floats:
     """Speeds (m + 1,) at which jumps that follow one another within a period ask for no more together than one may.
 
@@ -187,9 +194,7 @@ def _plan_part(
     progress: Progress | None,
 ) -> tuple[Path, list[Floats]]:
     """Plan from a stop to a stop: the path with its speeds at junctions, and phases of the law."""
-    if machine_axes is not None:
-        path = replace(path, junction_speed=np.minimum(path.junction_speed, machine_axes.jump_speeds(limits.period)))
-    path = replace(path, junction_speed=_not_crowded(path, limits.period))
+    path = passed(path, limits, machine_axes)
     found = path_limits(path, limits, machine_axes, resolution or FINER)
     level = found.level
     parts = [_level_runs(found, np.flatnonzero(level))]

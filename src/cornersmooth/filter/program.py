@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -16,7 +17,7 @@ from cornersmooth.filter.fewest import fewest
 from cornersmooth.filter.motion import Job
 from cornersmooth.filter.runs import Left, ProgramReader, Reading
 from cornersmooth.filter.spelling import SAMPLE, Spelling
-from cornersmooth.filter.times import by_own_law, no_runs, planned_times, run_times, time_as_it_is
+from cornersmooth.filter.times import by_own_law, least_time, no_runs, planned_times, run_times, time_as_it_is
 from cornersmooth.filter.writing import smoothed
 from cornersmooth.kinematics import Machine
 from cornersmooth.nc import fit_settings
@@ -35,8 +36,10 @@ THREE_AXES: Final = Machine("three axes", ())
 #: how many times more cuts than poses of CL files are looked at where times need no plan
 _BY_LAW: Final = 10
 
-#: by what part planned times may differ that are the same
+#: by what part planned times may differ that are the same, and how much faster it must be with more lines: times are
+#: as near to those that are planned closely
 _EQUAL: Final = 1e-3
+_FASTER: Final = 1e-2
 
 #: words that let LinuxCNC blend
 _BLENDING: Final = re.compile(rb"(?i)G64[ \t]*P[ \t]*(\d*\.?\d+)(?:[ \t]*Q[ \t]*(\d*\.?\d+))?")
@@ -109,7 +112,8 @@ def filter_program(
     verify : bool
         Whether both programs are read and compared. Runs that do not pass stay as they are.
     axes : Machine, optional
-        Say the time under the limits of the axes of this machine.
+        Take what is fastest under the limits of the axes of this machine, and say its time, both by
+        `feedrate.even_ramps`; `verify_programs` plans more closely, which takes a hundred times the work.
     most : int, optional
         Only whole runs from the middle are smoothed, of no more cuts than this.
     paths : bool
@@ -133,14 +137,20 @@ def filter_program(
     job, old = read_program(data, form, settings, tip_from_start=tip_from_start, inch=inch, processes=processes)
     if most is not None:
         left_all_but(old, most)
-    ways = [_way(job, old, *fewest(job, old, old.runs), verify=verify)] if settings.lines is None else []
-    if not ways:
-        ways = [_way(job, old, *smoothed(job, old), verify=verify)]
-    elif axes is not None and old.runs and not old.absent:
-        rows = replace(job, spelling=_fine(job.spelling, form, settings, inch=old.runs[0].state.unit != 1.0))
-        ways.append(_way(rows, old, *smoothed(rows, old), verify=verify))
-    best = ways[0] if len(ways) == 1 or axes is None else _way(job, old, *_best(job, old, ways, axes), verify=verify)
-    return _result(job, old, best, axes, paths=paths)
+    texts, why = (fewest if settings.lines is None else smoothed)(job, old, old.runs)
+    times: dict[tuple[int, bytes], tuple[float, float]] = {}
+    if settings.lines is None and axes is not None and old.runs and not old.absent:
+        texts, why, times = _fastest(job, old, texts, why, axes)
+    way = _way(job, old, texts, why, verify=verify)
+    seconds = None
+    if axes is not None and way.where:
+        texts_of = [] if by_own_law(job) else [(place.run.first, way.text(place)) for place in way.where]
+        known = [times[text] for text in texts_of if text in times]
+        if len(known) == len(way.where):
+            seconds = sum(before for before, _ in known), sum(after for _, after in known)
+        else:
+            seconds = planned_times(job, old, way.after, way.where, axes, closely=False)
+    return _result(job, old, way, seconds, paths=paths)
 
 
 @dataclass(frozen=True)
@@ -181,26 +191,40 @@ def _way(job: Job, old: Reading, texts: dict[int, bytes], why: dict[int, str], *
         why |= {first: f"verification found: {text}" for first, text in bad.items()}
 
 
-def _best(job: Job, old: Reading, ways: Sequence[_Way], axes: Machine) -> tuple[dict[int, bytes], dict[int, str]]:
-    """Of each run the fastest text; of those that take as long, the one with the fewest blocks."""
+def _fastest(
+    job: Job, old: Reading, texts: dict[int, bytes], why: dict[int, str], axes: Machine
+) -> tuple[dict[int, bytes], dict[int, str], dict[tuple[int, bytes], tuple[float, float]]]:
+    """Of each run the text with the fewest blocks that is fast, and no slower than the run; times of texts.
+
+    Corners are smoothed in runs that take longer than their feeds ask for.
+    """
+    rows = replace(job, spelling=_fine(job.spelling, job.form, job.settings, inch=old.runs[0].state.unit != 1.0))
     found: dict[int, list[tuple[float, int, bytes | None]]] = {}
-    for way in ways:
-        times = run_times(job, old, way.after, way.where, axes)
-        for place, (before, after) in zip(way.where, times.tolist(), strict=True):
-            some = found.setdefault(place.run.first, [(before, place.run.lines, None)])
-            some.append((after, place.stop - place.first, way.text(place)))
-    texts: dict[int, bytes] = {}
-    why = dict(ways[0].why)
-    for first, some in found.items():
-        fastest = min(seconds for seconds, _, _ in some)
-        text = min((blocks, k) for k, (seconds, blocks, _) in enumerate(some) if seconds <= fastest * (1.0 + _EQUAL))
-        chosen = some[text[1]][2]
-        if chosen is None:
+    left, why = why, dict(why)
+    for which, some in ((job, (texts, left)), (rows, None)):
+        slow = [
+            run
+            for run in old.runs
+            if min((seconds for seconds, *_ in found.get(run.first, [])), default=math.inf)
+            > (1.0 + _FASTER) * least_time(job, run)
+        ]
+        way = _way(which, old, *(some or smoothed(rows, old, slow)), verify=False)
+        for place, (before, after) in zip(
+            way.where, run_times(job, old, way.after, way.where, axes).tolist(), strict=True
+        ):
+            own = found.setdefault(place.run.first, [(before, place.run.lines, None)])
+            own.append((after, place.stop - place.first, way.text(place)))
+    chosen: dict[int, bytes] = {}
+    times: dict[tuple[int, bytes], tuple[float, float]] = {}
+    for first, own in found.items():
+        fast = min((1.0 + _FASTER) * min(seconds for seconds, *_ in own), (1.0 + _EQUAL) * own[0][0])
+        seconds, _, text = min((one for one in own if one[0] <= fast), key=lambda one: one[1])
+        if text is None:
             why[first] = "nothing makes it faster"
         else:
-            texts[first] = chosen
+            chosen[first], times[first, text] = text, (own[0][0], seconds)
             why.pop(first, None)
-    return texts, why
+    return chosen, why, times
 
 
 def verify_programs(
@@ -222,7 +246,10 @@ def verify_programs(
     after = job.reader.read(new, [place.stop for place in where])
     checked = Checked(tuple(wrong)) if wrong else check(job, before, after, where)
     way = _Way(after, where, {}, checked)
-    found = _result(job, before, way, None if wrong else axes, paths=paths and not wrong)
+    seconds = None
+    if axes is not None and where and not wrong:
+        seconds = planned_times(job, before, after, where, axes, closely=True)
+    found = _result(job, before, way, seconds, paths=paths and not wrong)
     return replace(found, compared=True)
 
 
@@ -288,8 +315,8 @@ def left_all_but(reading: Reading, most: int) -> None:
     reading.runs[:] = reading.runs[first:stop]
 
 
-def _result(job: Job, old: Reading, way: _Way, axes: Machine | None, *, paths: bool) -> Filtered:
-    """What became of a program; how long its runs take, and what the control does in them, as far as needed."""
+def _result(job: Job, old: Reading, way: _Way, seconds: tuple[float, float] | None, *, paths: bool) -> Filtered:
+    """What became of a program, and what the control does in its runs where that is wanted."""
     new, where, why = way.after, way.where, way.why
     for run in old.runs:
         if run.first in why:
@@ -305,7 +332,7 @@ def _result(job: Job, old: Reading, way: _Way, axes: Machine | None, *, paths: b
         left=old.left(),
         checked=way.checked,
         units_said="units" in old.said,
-        seconds=planned_times(job, old, new, where, axes) if axes is not None and where else None,
+        seconds=seconds,
         motions=pair(job, old, new, drawn) if paths and where else None,
         changed=tuple((place.run.first + 1, place.run.stop, place.first + 1, place.stop) for place in drawn),
         rounding=max((place.run.state.unit * _rounding(new, place) for place in where), default=0.0),
@@ -352,9 +379,10 @@ def compare_filtered(
         row = Row.of(candidate)
         try:
             found = filter_program(data, candidate.form, candidate.settings, **how, axes=axes, most=most)
+            times = verify_programs(data, found.data, candidate.form, candidate.settings, **how, axes=axes).seconds
         except CornersmoothError as failure:
             return replace(row, verdict=getattr(failure, "what", str(failure)))
-        saved = 0.0 if found.seconds is None else found.seconds[0] - found.seconds[1]
+        saved = 0.0 if times is None else times[0] - times[1]
         assert found.checked is not None
         point = found.checked.axis_point
         return replace(

@@ -28,15 +28,15 @@ _ROUNDING: Final = re.compile(rb"G6[014]\b")
 _FEED: Final = re.compile(rb"F([\d.]+)$")
 
 
-def smoothed(job: Job, reading: Reading) -> tuple[dict[int, bytes], dict[int, str]]:
+def smoothed(job: Job, reading: Reading, runs: Sequence[Run]) -> tuple[dict[int, bytes], dict[int, str]]:
     """Blocks for runs, and why others are left, by the first line of each."""
     if reading.absent:
-        return {}, {run.first: f"{reading.absent[0]} is never given" for run in reading.runs}
+        return {}, {run.first: f"{reading.absent[0]} is never given" for run in runs}
     made: dict[int, bytes] = {}
     why: dict[int, str] = {}
     groups: dict[tuple[object, ...], list[Run]] = {}
     # what can be written together: near each other, so that memory is bounded, with the same units and turn
-    for run, turn in zip(reading.runs, _turns(job.form.machine, reading.runs), strict=True):
+    for run, turn in zip(runs, _turns(job.form.machine, runs), strict=True):
         key = (int(reading.start[run.first]) // CHUNK, run.state.unit, bool(run.state.rounding), turn)
         groups.setdefault(key, []).append(run)
     for group in groups.values():
