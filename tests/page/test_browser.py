@@ -586,7 +586,7 @@ def test_a_filtered_program_shows_its_runs(look, tmp_path):
         assert f"{own['first']}–{own['last']}" in row.inner_text()
         assert own["before"] > own["after"] > 0.0
         assert 0.0 < own["off"] <= 0.02
-    assert "saves" in looked.page.inner_text("#verdict")
+    assert " s instead of " in looked.page.inner_text("#verdict")
     # a click goes there, with both paths in one picture, and the charts look at the run
     rows.nth(1).click()
     looked.settle()

@@ -50,7 +50,7 @@ def test_the_verdict_names_the_sharp_corner(page, result):
     assert meta["verdict"].startswith(
         "PASSED, 2 to check: within 0.02 mm everywhere; 1 corner stays sharp, first :12 reversal 17"
     )
-    assert "saves" not in meta["verdict"]  # no limits of axes are known
+    assert " time on " not in meta["verdict"]  # no limits of axes are known
     assert meta["badge"] == "PASSED"
     facts = dict(meta["facts"])
     assert facts["SHA-256 of the CL file"] == hashlib.sha256(b"part").hexdigest()
@@ -299,14 +299,9 @@ def test_the_time_is_that_of_the_whole_program_or_none(tmp_path, monkeypatch):
     planned = re.search(r" time on table-ac (\d+\.\d) s instead of (\d+\.\d) s \(.*\)\n +limited by ", verdicts[1])
     assert planned
     assert verdicts[2] == ""
-    # the page has planned all of it
+    # the page has planned all of it, and says it in the same words
     assert verdicts[3] == verdicts[1]
-    saves = re.search(
-        r"saves (\d+\.\d) s of (\d+\.\d) s", values_of((tmp_path / "long.html").read_text())[0]["verdict"]
-    )
-    assert saves
-    assert saves[2] == planned[2]
-    assert float(saves[1]) == pytest.approx(float(planned[2]) - float(planned[1]), abs=0.11)
+    assert planned[0].strip().split("\n")[0] in values_of((tmp_path / "long.html").read_text())[0]["verdict"]
 
 
 def test_a_text_off_the_path_is_broken_in_words(tmp_path):

@@ -27,9 +27,9 @@ from cornersmooth.report.verdict import (
     LIMITS_TOLD,
     Judgement,
     Saving,
-    first_line,
     judge,
-    saving_text,
+    sharp_line,
+    time_text,
     trusted_blocks,
 )
 from cornersmooth.settings import Limits, Settings
@@ -52,6 +52,10 @@ def smoothed_page(
     Speeds are planned within the limits of `axes`, or of the machine of the form. `tool` replaces that of the file.
     """
     form, settings = result.form, result.smoothed.settings
+    contents = result.report(saving=saving, limits=axes)
+    text = "; ".join((contents["verdict_text"], sharp_line(contents)))
+    if saving is not None:
+        text += "; " + time_text(saving, contents["times"]["limits"])
     subject = Subject(
         program=result.program,
         nc=read_written(result),
@@ -66,7 +70,7 @@ def smoothed_page(
     return _told(
         subject,
         _name(result.path) or result.program.source.name,
-        first_line(result.report(), saving),
+        text,
         result.verdict,
         (form.table.name, form.name, form.machine),
         findings=result.findings,
@@ -130,7 +134,7 @@ def verified_page(
     judgement = judge(found, findings) if judgement is None else judgement
     facts, text = _measured_facts(found, origin.split()[0]), judgement.text
     if saving is not None:
-        text += "; " + saving_text(saving)
+        text += "; " + time_text(saving, None if machine is None else machine.name)
     if surface is not None:
         text += "; " + _surface_text(surface)
         facts += [("tool", surface.tool.describe()), ("cutting edge", f"{surface.edge:g} mm")]

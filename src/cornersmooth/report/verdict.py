@@ -143,14 +143,6 @@ def trusted_blocks(found: Verification) -> Iterator[Finding]:
         yield Finding("CS573", "warning", 0, text, len(where))
 
 
-def first_line(contents: Mapping[str, Any], saving: Saving | None = None) -> str:
-    """Say in one line how it went: the verdict, the sharp corners, the time saved."""
-    parts = [contents["verdict_text"], sharp_line(contents)]
-    if saving is not None:
-        parts.append(saving_text(saving))
-    return "; ".join(parts)
-
-
 def sharp_line(contents: Mapping[str, Any]) -> str:
     """Say how many corners stay sharp."""
     count = contents["summary"]["sharp"]
@@ -181,17 +173,6 @@ def method_text(summary: Mapping[str, Any]) -> str:
     if runs := summary.get("runs"):
         text += f", {runs:,} {'run' if runs == 1 else 'runs'} with {summary['corners_in_runs']:,} corners"
     return "; ".join((text, *(f"{one['text']} ({one['count']:,} times)" for one in summary["instead"])))
-
-
-def saving_text(saving: Saving) -> str:
-    """Say what smoothing saves of the time of the direct path."""
-    direct, written, saved = saving.direct, saving.written, saving.direct - saving.written
-    if abs(saved) < 0.05:
-        text = f"takes {written:.1f} s as {saving.against or 'the direct path'} would"
-    else:
-        text = f"saves {saved:.1f} s of" if saved > 0.0 else f"takes {-saved:.1f} s more than"
-        text += f" {direct:.1f} s" + (f" of {saving.against}" if saving.against else "")
-    return text + limits_text(saving.limits)
 
 
 def limits_text(limits: Sequence[tuple[str, float]]) -> str:
