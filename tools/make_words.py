@@ -23,9 +23,9 @@ def shown(text: str) -> str:
     return f"`{text}`".replace("|", "\\|")
 
 
-def cells(row: str, *, block: bool) -> str:
+def cells(row: str) -> str:
     """What a row says, as cells of a table: what the word is, what it does, what is beside it, and its rules."""
-    head, rules, says = ("", *row.split(";", 1)) if block else row.split(";", 2)
+    head, rules, says = row.split(";", 2)
     effects, _, letters = head.partition(":")
     beside = [
         shown(letter.rstrip("!=~")) + NEEDED * ("!" in letter) for letter in letters.split() if letter[0].isupper()
@@ -50,19 +50,12 @@ def section(control: str) -> Iterator[str]:
         yield f"Comments may not begin with {shown(table['orders'])}."
     if "like" in table:
         yield f"What is not named here is as for {table['like']}."
-    if said := table.get("means"):
-        yield "Words of spindle and coolant are compared with the statements. These words have a meaning beside"
-        yield "the motion:\n"
-        yield "| word | meaning |\n|---|---|"
-        yield from (f"| {shown(word)} | {text or 'nothing'} |" for word, text in said.items())
-    if table.keys() & {"words", "blocks"}:
+    listed = {words: row for words, row in table.get("words", {}).items() if not row or ";" in row}
+    if listed:
         yield "\n| word | what it is | what it sets or does | beside it | rules |\n|---|---|---|---|---|"
-    for key in ("words", "blocks"):
-        for words, row in table.get(key, {}).items():
-            name = " ".join(
-                map(shown, [words.strip("/")] if words[0] == "/" or key == "blocks" else words.split(" | "))
-            )
-            yield f"| {name} | {cells(row, block=key == 'blocks') if row else 'the control has no such words | | |'} |"
+    for words, row in listed.items():
+        name = " ".join(map(shown, [words.strip("/")] if words[0] == "/" else words.split(" | ")))
+        yield f"| {name} | {cells(row) if row else 'the control has no such words | | |'} |"
     yield ""
 
 

@@ -14,14 +14,13 @@ from cornersmooth.control.listing import listing
 from cornersmooth.control.program import Act, Text
 from cornersmooth.control.rows import Rows
 from cornersmooth.control.state import State
-from cornersmooth.control.table import UNKNOWN, Row, table_of
+from cornersmooth.control.table import UNKNOWN, UNLISTED, Row, table_of
 from cornersmooth.control.unread import execute
 from cornersmooth.filter.runs import ProgramReader
 from cornersmooth.nc_reader import word_tables
 from cornersmooth.nc_reader.dialects import dialect_of
 from cornersmooth.nc_reader.word_tables import CONTROLS
 from cornersmooth.nc_words.blocks import WordRules
-from cornersmooth.nc_words.rules import UNLISTED, word_list
 
 GOLDEN = sorted((Path(__file__).parents[1] / "nc" / "golden").glob("*.nc"))
 AXES = ("X", "Y", "Z", "A", "C")
@@ -43,10 +42,10 @@ def test_rows_are_well_formed(control: str) -> None:
     assert table.row("G0" if control != "heidenhain" else "RAPID").sets == (("motion", "rapid"),)
 
 
-@pytest.mark.parametrize("text", ["tipp=off", "tip=of", "places", "units=inches", "feed", "tip=off; length"])
+@pytest.mark.parametrize("text", ["tipp=off", "tip=of", "places", "units=inches", "feed", "tip=off; length; off"])
 def test_a_row_with_a_slip_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match="not one of"):
-        Row.of("G43", text)
+        Row.all_of("G43", text)
 
 
 @pytest.mark.parametrize("control", CONTROLS)
@@ -111,29 +110,29 @@ def test_a_table_that_is_like_another_has_its_rows_and_takes_some_back(
     shutil.copytree(lists, tmp_path / "lists")
     (tmp_path / "lists" / "shop.toml").write_text(
         'like = "haas"\n[grammar]\n[words]\n"G254" = ""\n"M321" = "nothing; alone; the pallet"\n'
-        '"G43.4" = "tip=angles length: H\\\\d+!=; state=tool_length ends; tip control"\n'
+        '"G43.4" = "tool_length=. tip=angles length: H\\\\d+!=;; tip control"\n'
     )
     monkeypatch.setattr(word_tables, "_LISTS", tmp_path / "lists")
     word_tables.word_table.cache_clear()
     try:
         shop, haas = table_of.__wrapped__("shop"), table_of("haas")
-        listed, others = word_list.__wrapped__("shop"), word_list("haas")
     finally:
         word_tables.word_table.cache_clear()
         word_tables.means_of.cache_clear()
-    rules = [WordRules(words, (), dialect_of("haas").lexer, 0.01) for words in (listed, others)]
+    rules = [WordRules(table, (), dialect_of("haas").lexer, 0.01) for table in (shop, haas)]
     (mine, _), (theirs, _) = (one.of(["G43.4", "H1"]) for one in rules)
-    assert mine[1].ends
+    assert mine[1].tip_on
     assert theirs[1] is UNLISTED
     ((_, pallet),), ((_, any_function),) = (one.of(["M321"]) for one in rules)
     assert pallet.alone
     assert any_function.compared
     assert [one.of(["G254"])[0][1] is UNLISTED for one in rules] == [True, False]
     assert haas.row("G43.4") is UNKNOWN
-    assert shop.row("G43.4") == Row.of("G43.4", "tip=angles length: H")
+    assert shop.row("G43.4").sets == (("tool_length", "."), ("tip", "angles"))
+    assert shop.row("G43.4").beside == {"H"}
     assert shop.row("G234") == haas.row("G234")
     assert shop.row("G254") is UNKNOWN
-    assert shop.row("M321") == Row.of("M321", "nothing")
+    assert shop.row("M321").does == {"nothing"}
     assert shop.row("M88").sets == (("coolant", "THRU"),)
 
 

@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 
 from cornersmooth.cl import read
+from cornersmooth.control.table import table_of
 from cornersmooth.errors import Verdict
 from cornersmooth.kinematics import load_machine
 from cornersmooth.nc import choose_form, control_tables
 from cornersmooth.nc_reader import word_tables
-from cornersmooth.nc_words import rules
 from cornersmooth.pipeline import postprocess
 from cornersmooth.settings import Settings
 from cornersmooth.tables import Shelf
@@ -39,11 +39,11 @@ FINI
 
 #: a coolant that no CAM system has: its word in the writer's table, what the reader's list says, blocks of the program
 AIR = {
-    "fanuc": ('XAIR = ["M977"]', 'M977 = "coolant XAIR"', ["M977", "M8", "M977", "M9"]),
-    "siemens": ('XAIR = ["M978"]', 'M978 = "coolant XAIR"', ["M978", "M8", "M978", "M9"]),
+    "fanuc": ('XAIR = ["M977"]', 'M977 = "coolant=XAIR;; compared"', ["M977", "M8", "M977", "M9"]),
+    "siemens": ('XAIR = ["M978"]', 'M978 = "coolant=XAIR;; compared"', ["M978", "M8", "M978", "M9"]),
     "haas": (
         'XAIR = ["M983"]',
-        'M983 = "coolant XAIR"\nM984 = "coolant OFF XAIR"',
+        'M983 = "coolant=XAIR;; compared"\nM984 = "coolant=OFF;; compared"',
         ["M983", "M984", "M8", "M9", "M983", "M984"],
     ),
 }
@@ -53,7 +53,7 @@ AIR = {
 def _with_air(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[None]:
     """Tables of both sides with one entry more; HEIDENHAIN has none."""
     written = Shelf.built_in
-    caches = (control_tables._built_in, word_tables.word_table, word_tables.means_of, rules.word_list)
+    caches = (control_tables._built_in, word_tables.word_table, word_tables.means_of, table_of)
 
     def table(self: Shelf, name: str) -> str:
         text = written(self, name)
@@ -63,7 +63,7 @@ def _with_air(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[None]
 
     for control in word_tables.CONTROLS:
         text = word_tables._LISTS.joinpath(f"{control}.toml").read_text(encoding="utf-8")
-        text = text.replace("[means]", f"[means]\n{AIR[control][1]}") if control in AIR else text
+        text = text.replace("[words]", f"[words]\n{AIR[control][1]}") if control in AIR else text
         (tmp_path / f"{control}.toml").write_text(text, encoding="utf-8")
     monkeypatch.setattr(Shelf, "built_in", table)
     monkeypatch.setattr(word_tables, "_LISTS", tmp_path)

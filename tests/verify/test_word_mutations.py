@@ -11,11 +11,11 @@ from pathlib import Path
 import pytest
 
 from cornersmooth.cl import read
+from cornersmooth.control.table import table_of
 from cornersmooth.nc import Frame, fit_settings, write
 from cornersmooth.nc_reader.block_tables import read_lines
 from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.nc_words.check import WordCheck
-from cornersmooth.nc_words.rules import word_list
 from cornersmooth.nc_words.states import GONE_ON
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
@@ -41,8 +41,8 @@ def test_a_sample_of_the_mutants_is_judged_rightly(control: str) -> None:
 
 def test_every_control_asks_for_a_head() -> None:
     for control in CONTROLS:
-        heads = {rule.state for rule in word_list(control).words if rule.first}
-        assert heads >= ({"units", "positions", "plane"} if control != "heidenhain" else set())
+        heads = {row.group for row in table_of(control).listed if row.first}
+        assert heads >= ({"units", "distance", "plane"} if control != "heidenhain" else set())
 
 
 def test_blocks_of_the_user_are_taken_on_trust_and_named() -> None:

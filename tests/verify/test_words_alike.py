@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from cornersmooth.control.table import table_of
 from cornersmooth.nc_reader.word_tables import CONTROLS
-from cornersmooth.nc_words.rules import word_list
 from oracle.command import DONE, run
 
 FIVE = """LOAD/TOOL,3,ADJUST,3
@@ -103,8 +103,8 @@ def test_second_numbers_of_the_controls_own_smoothing_have_a_share(
 
 @pytest.mark.parametrize("control", CONTROLS)
 def test_each_number_of_a_word_list_is_compared_or_has_a_share_or_a_reason(control: str) -> None:
-    listed = word_list(control)
-    for rule in (*listed.words, *listed.blocks):
+    table = table_of(control)
+    for rule in (*table.listed, *table.blocks):
         text = rule.pattern.pattern
         shares = rule.pattern.groupindex.keys()
         assert shares <= {"length", "angle"}
@@ -219,5 +219,5 @@ def test_an_offset_that_was_not_compared_is_said(control: str, offset: str, othe
 )
 def test_z_goes_to_a_position_of_the_machine_in_retracts_alone(control: str, block: str) -> None:
     """To any other height of the machine only where its file says so."""
-    listed = word_list(control)
-    assert not any(rule.pattern.fullmatch(block) for rule in listed.blocks)
+    table = table_of(control)
+    assert not any(rule.pattern.fullmatch(block) for rule in table.blocks)

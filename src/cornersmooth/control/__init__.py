@@ -5,7 +5,7 @@ Unknown is a value of every group, and what each word without a row makes of all
 ================= =====================================================================================================
 what is decided   where
 ================= =====================================================================================================
-what a word does  `table`, of `[words]`, `[does]`, `[means]` in ``nc_reader/word_lists``
+what a word does  `table`, of `[words]` in ``nc_reader/word_lists``
 one block         `state`: groups, the place, and the feed, before and after it
 what no lexer     `unread`: variables, jumps, paths of a kind that is not known
 knows

@@ -8,11 +8,10 @@ from typing import Final
 
 import numpy as np
 
-from cornersmooth.control.state import VECTOR, State
+from cornersmooth.control.state import MOTIONS, VECTOR, State
 from cornersmooth.model import Bools, Floats, Ints
 
-#: values of the group of motion by what stands for them in a column; NaN stands for all others
-_MOTIONS: Final = {0.0: "rapid", 1.0: "line", 2.0: "arc", 3.0: "arc"}
+#: what stands for motions in a column; NaN stands for all others
 _CODES: Final = {"rapid": 0.0, "line": 1.0, "arc": 2.0}
 
 
@@ -37,7 +36,7 @@ class Rows:
         if count == 0:
             return self.before.copy()
         place = dict(zip(self.before.axes, self.place[count].tolist(), strict=True))
-        groups = self.before.groups | {"motion": _MOTIONS.get(float(self.code[count - 1]))}
+        groups = self.before.groups | {"motion": MOTIONS.get(float(self.code[count - 1]))}
         return replace(self.before, groups=groups, place=place, feed=float(self.feed[count - 1]))
 
 

@@ -22,7 +22,7 @@ _STARTS: Final[Mapping[str, str | None]] = {
     "units": "mm",
     "feed": "minute",
     "tip": "off",
-    "compensation": "off",
+    "compensation": "OFF",
 }
 #: value of a group that no word has set yet
 PRESET: Final = "preset"
@@ -36,12 +36,33 @@ _CHANGES: Final = {"units": ("length", "feed"), "feed": ("feed",), "offset": ("s
 #: axes of the length of a tool by the plane that holds
 _ALONG: Final = {PRESET: "Z", "G17": "Z", "G18": "YZ", "G19": "XZ"}
 
+#: values of the group of motion by G words; all others are not known
+MOTIONS: Final = {0.0: "rapid", 1.0: "line", 2.0: "arc", 3.0: "arc"}
+
 #: motions that cut
 CUTS: Final = ("line", "arc")
+
+#: groups whose value has the letters that belong to its word
+_LETTERED: Final = ("offset", "path", "smoothing")
 
 #: letters of a tool vector, and of all axes that a machine may have
 VECTOR: Final = frozenset("IJK")
 _AXES: Final = "XYZABC"
+_ROTARY: Final = frozenset("ABC")
+
+
+@dataclass(frozen=True)
+class Said:
+    """The word that has set a group last, whatever became of it since."""
+
+    row: Row
+    text: str  #: the word, with those beside it that say more of it
+    line: int  #: from 1; 0 where nobody counts
+
+    @property
+    def off(self) -> bool:
+        """Whether it switches the group off."""
+        return self.row.off and self.row.pattern.fullmatch(self.text) is not None
 
 
 @dataclass
@@ -54,7 +75,9 @@ class State:
     #: last word of each axis, in units of the program; where the machine is, if that is known
     place: dict[str, float] = field(default_factory=dict)
     feed: float = math.nan  #: as written
-    said: frozenset[str] = frozenset()  #: groups that words of the program have set, whatever became of them
+    said: dict[str, Said] = field(default_factory=dict)  #: by groups
+    #: last words of rotary axes, wherever these are since, but where the control has turned them
+    angles: dict[str, float] = field(default_factory=dict)
     #: frames that no word of the program names: what it calls leaves them off, for nothing would end them
     unnamed: frozenset[str] = frozenset()
 
@@ -71,7 +94,8 @@ class State:
 
     def copy(self) -> State:
         """Return the same state, to be changed on its own."""
-        return State(self.table, self.axes, dict(self.groups), dict(self.place), self.feed, self.said, self.unnamed)
+        own = dict(self.groups), dict(self.place), self.feed, dict(self.said), dict(self.angles)
+        return State(self.table, self.axes, *own, self.unnamed)
 
     @property
     def unit(self) -> float:
@@ -107,14 +131,22 @@ class State:
         self.lose_place(letter for letter, value in self.place.items() if value != other.place[letter])
         self.groups = {name: value if other.groups[name] == value else None for name, value in self.groups.items()}
         self.feed = self.feed if self.feed == other.feed else math.nan
-        self.said &= other.said
+        self.said = {group: said for group, said in self.said.items() if group in other.said}
+
+    def pass_blocks(self, code: float | None, angles: Mapping[str, float]) -> None:
+        """Go on behind motion blocks: the last G word of group 01 and the last rotary words in them, where given."""
+        self.lose_place("XYZ")
+        self.place |= angles
+        self.angles |= angles
+        if code is not None:
+            self.groups["motion"] = MOTIONS.get(code)
 
     def execute(self, line: Line) -> bool:
         """Execute a line of words; return whether it may cut."""
         before = self.copy() if line.skipped else self
         if line.tape:
             self.lose_all()
-        cuts = self._words(line.words) if line.words else False
+        cuts = self._words(line.words, line.number) if line.words else False
         if line.skipped:  # the operator chooses
             self.or_not(before)
         return cuts
@@ -124,16 +156,17 @@ class State:
         given = {word.name: word.value for word in words}
         of_motion = {*self.axes, "F", *_AXES}
         named = [(word, name) for word in words if (name := _name(word)) not in of_motion]
-        return [(word, name, self.table.row(name, given, alone=len(words) == 1)) for word, name in named]
+        alone = len(words) == 1
+        return [(word, name, self.table.row(name, word.spelling, given, alone=alone)) for word, name in named]
 
-    def _words(self, words: tuple[Word, ...]) -> bool:
+    def _words(self, words: tuple[Word, ...], line: int) -> bool:
         given = {word.name: word.value for word in words}
         named = self.rows(words)
-        rows = [row for _, _, row in named]
-        does = {effect for row in rows for effect in self._set(row, words)}
+        beside = frozenset[str]().union(*(row.beside for _, _, row in named))
+        named = [(word, name, row) for word, name, row in named if name not in beside]
+        does = {effect for word, _, row in named for effect in self._set(word, row, words, line)}
         # what belongs to other words of the block, or to the motion that holds
-        beside = self.table.arguments.get(self.groups["motion"] or "", frozenset[str]())
-        beside = beside.union(*(row.beside for row in rows))
+        beside |= self.table.arguments.get(self.groups["motion"] or "", frozenset())
         does |= {effect for _, name, row in named if name not in beside for effect in row.does}
         if does & {"anything", "unknown"}:
             self.lose_all(frames="unknown" in does)
@@ -146,6 +179,8 @@ class State:
             self.feed = given.get("F", math.nan)
         if "tool" in does and self.groups["tip"] != "off":
             self.groups["tip"] = None
+        self.angles = {} if "turn" in does else self.angles
+        self.angles |= {letter: given[letter] for letter in _ROTARY & given.keys()}
         axes = [letter for letter in self.axes if letter in given and letter not in beside]
         if "machine" in does:
             # tip control keeps the tip in the part, which turns with the tables: then all of its place may change
@@ -159,12 +194,13 @@ class State:
                 self.groups[f"{FRAME}{letter}"] = f"axis {letter}, which the machine has not"
         return bool(axes) and self.groups["motion"] in CUTS and "machine" not in does
 
-    def _set(self, row: Row, words: Iterable[Word]) -> set[str]:
+    def _set(self, word: Word, row: Row, words: Sequence[Word], line: int) -> set[str]:
         """Set the groups of a word; return what the change does beside."""
         does: set[str] = set()
         for group, value in row.sets:
-            if group in ("offset", "path") and value is not None:
-                own = (word.text.replace(" ", "") for word in words if word.name in row.beside)
+            value = word.spelling if value == "." else value
+            if group in _LETTERED and value is not None:
+                own = (other.text.replace(" ", "") for other in words if other.name in row.beside)
                 value = " ".join((value, *own))
             # LinuxCNC takes the feed as zero behind any word of its kind, the same one included
             if self.groups.get(group) != value or value is None or group == "feed":
@@ -172,7 +208,9 @@ class State:
             if group.startswith(FRAME):
                 does.add("place")
             self.groups[group] = value
-            self.said |= {group}
+            if value is not None:
+                more = (other.spelling for other in words if other.name in row.more)
+                self.said[group] = Said(row, " ".join((word.spelling, *more)), line)
         return does
 
     def _go(self, given: Mapping[str, float], axes: Iterable[str], does: set[str]) -> None:
@@ -193,9 +231,7 @@ def _name(word: Word) -> str:
     """Name of a word in the table."""
     if word.name in ("G", "M"):
         return f"{word.name}{word.value:g}"
-    if word.name == "side":
-        return f"side {word.value:g}"
-    if word.name == "block":
+    if word.name in ("side", "block"):
         return word.text.upper()
     if len(word.name) > 1 and re.search(r"\(\s*\)", word.text):
         return f"{word.name}()"

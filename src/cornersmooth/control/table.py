@@ -1,36 +1,42 @@
-"""What each word of a control does to what the control remembers: a row a word.
+"""What each word of a control does to what the control remembers, and what verification asks of it: a row a word.
 
-The rows are `[words]` and `[does]` of the control's table in ``nc_reader/word_lists``: words that verification accepts,
-and others. A row begins with ``"WORDS" = "EFFECTS: LETTERS"``; what comes behind it, `nc_words.rules` explains::
+The rows are `[words]` of the control's table in ``nc_reader/word_lists``::
 
     "G44" = "tip=off axis: H"
+    "G43" = "tool_length=. tip=off axis: H\\\\d+!=; plane=17 tool; length; H is compared with the statements"
 
 WORDS
-    Words with `` | `` between them, as the control's lexer names them: ``G1``, ``M6``, ``T``, ``TRAORI``, a whole block
-    of Klartext. ``PLANE *`` stands for all that begin so, ``/.../`` for all that a regular expression matches. Words
-    that are named themselves come first, then rows in order. ``ROT alone`` is a word that has no other beside it,
-    ``G10 R`` one that has that letter, ``G54.2 P0`` that word.
+    Words with `` | `` between them, as the control's lexer names them: ``G1``, ``M6``, ``TRAORI``, a whole block of
+    Klartext. ``PLANE *`` stands for all that begin so, ``/.../`` for all that a regular expression matches. Words that
+    are named themselves come first, then rows in order. ``ROT alone`` is a word that has no other beside it, ``G10 R``
+    one that has that letter, ``G54.2 P0`` that word.
 EFFECTS
     ``GROUP=VALUE`` sets a modal group. The value ``.`` is the word itself, ``?`` is not known. All others: `LOSES`.
+    What is compared with the CL file names its word: ``coolant=FLOOD``, ``stop=OPSTOP``.
 LETTERS
     What belongs to the word in its block, and so is no place and no feed.
+RULES; WHAT IT IS
+    The row of a word that verification accepts: fields of `Row`, ``alone``, ``plane=17``, with ``_`` for blanks. Those
+    of a group are the same for all controls: `_OF_GROUPS`; ``-first`` takes one back. ``T\\d+`` is a word of its first
+    letter, ``/.../`` a pattern of its text, blanks left out; of a whole block with the rule ``block``. Letters have a
+    pattern of what comes behind them: ``H\\d+``. Behind it, ``!`` says that one such word must be there, ``=`` that it
+    is compared with the CL file, ``~`` that it may change from block to block. Small letters only belong to the word:
+    they are not accepted.
 
-A control that is ``like`` another has its rows, too, behind its own; ``""`` takes one back. Words of spindle, coolant,
-stops, registers and the end are in `[means]`. A word without a row may do anything.
-
-What a change of a group does beside is the same for all controls, and is in `state`.
+A control that is ``like`` another has its rows, too, behind its own; ``""`` takes one back. A word without a row may do
+anything. What a change of a group does beside is the same for all controls, and is in `state`.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cache, cached_property, lru_cache
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from functools import cache, cached_property
 from itertools import chain
-from typing import Final
+from typing import Any, Final, Self
 
-from cornersmooth.nc_reader.word_tables import means_of, word_table
+from cornersmooth.nc_reader.word_tables import word_table
 
 #: groups of words that turn, scale or mirror the places of the part begin so
 FRAME: Final = "frame."
@@ -42,8 +48,9 @@ GROUPS: Final[Mapping[str, str]] = {
     "units": "mm inch",
     "feed": "minute inverse revolution",
     "tip": "off angles vectors both",
-    "compensation": "off on",
+    "compensation": "OFF LEFT RIGHT",
     **dict.fromkeys(("offset", "path", "plane", "spindle", "coolant", "orientation", "coordinates", "way"), ""),
+    **dict.fromkeys(("tool_length", "edge", "cycles", "smoothing"), ""),
 }
 
 #: what each effect leaves unknown
@@ -55,44 +62,171 @@ LOSES: Final[Mapping[str, str]] = {
     "length": "XYZ count anew, those of the block already",
     "shift": "all axes count anew, those of the block already",
     "place": "the machine may be anywhere; places of the block are not those of the part",
+    "turn": "as `place`: the control turns the rotary axes, and nobody says where to",
     "machine": "the axes of the block go to places of the machine, all axes where it names none",
     "tool": "as `place`, and whether tip control is still on",
     "anything": "all, but for frames that the program does not name: jumps and calls leave these as they are",
     "unknown": "all",
 }
 
-#: what a word of `[means]` does by its kind, where it is not the group of the kind
-_OF_KIND: Final = {"stop": "stop", "end": "anything", "register": "length", "offset": "length"}
-_COMPENSATION: Final = {"OFF": "off", "LEFT": "on", "RIGHT": "on"}
+#: effects with a name in the CL file
+_ALIKE: Final = {"end": "anything", "register": "length", "offset": "length"}
 
-_REMEMBERED: Final = 4096
+#: rules that are the same for all words of a group, whatever the control
+_OF_GROUPS: Final[Mapping[str, str]] = {
+    **dict.fromkeys(("units", "distance", "offset", "path"), "first"),
+    **dict.fromkeys(("feed", "plane"), "first follows"),
+    **dict.fromkeys(("compensation", "cycles"), "follows"),
+    **dict.fromkeys(("spindle", "coolant"), "compared follows"),
+    "frame": "follows outside",
+}
+
+#: a number, where a row has a letter alone
+_NUMBER: Final = r"[-+]?[\d.]+"
+
+#: rules that are no text
+_KINDS: Final[Mapping[str, Callable[[str], Any]]] = {
+    **dict.fromkeys(("needs", "must", "after", "next", "previous", "extra"), re.compile),
+    "share": float,
+    "plane": int,
+}
+
+#: words of a list that are what they are, and no pattern
+_LITERAL: Final = re.compile(r"[GM][\d.]+|R0|[A-Z_]{2}.*")
 
 
 @dataclass(frozen=True)
 class Row:
-    """What a word does."""
+    """What a word does, and what verification asks of it; of a letter beside another word that alone."""
 
     sets: tuple[tuple[str, str | None], ...] = ()  #: groups and their values; None where it is not known which
     does: frozenset[str] = frozenset()  #: of `LOSES`
     beside: frozenset[str] = frozenset()  #: letters of words of its own
+    more: frozenset[str] = frozenset()  #: those of them without which it is another word
+
+    pattern: re.Pattern[str] = re.compile("(?!)")  #: of its text, where verification accepts it
+    says: str = field(default="", compare=False)  #: what it means, for the documentation
+
+    # the block: words that must stand beside it (`needs` finds the row, and may say more of that word)
+    needs: re.Pattern[str] | None = None
+    must: re.Pattern[str] | None = None
+    block: bool = False  #: it is a whole block
+    alone: bool = False  #: no other words may stand beside it
+    #: what the numbers in its groups may be of the tolerance: ``length`` of ε, ``angle`` of that of the tool axis
+    share: float | None = None
+    extra: re.Pattern[str] | None = None  #: words of its block that switch on what somebody must have asked for
+    never: bool = False  #: the control has no such word
+
+    # blocks before and after
+    after: re.Pattern[str] | None = None  #: a word that must have been said since the last time
+    previous: re.Pattern[str] | None = None  #: the block before
+    next: re.Pattern[str] | None = None  #: the next block
+    plane: int = 0  #: the G word of planes that must be in force where it is taken
+
+    # its group: where the tool moves, that must be what it was at the first motion
+    follows: bool = False  #: but not this one: it follows the CL file, and others compare it
+    tool: bool = False  #: it may differ from tool to tool in a program with a `cycle`
+    cycle: bool = False  #: a hole cycle of the control, a tilted plane, cutter compensation
+    late: bool = False  #: after a retract it may come as late as in the block that first moves Z
+    compared: bool = False  #: others compare the word with the CL file
+    first: bool = False  #: one of its group must come before the first motion
+    preset: str = ""  #: the usual one of these
+    drops: str = ""  #: a group that the control forgets with it, and that must be said after it
+    off: bool = False  #: it switches the group off, which must hold at the end
+    outside: bool = False  #: it may not be said under tool tip control
+
+    # where the tool is
+    #: the tool goes away, and none but an approach may follow, in which work offset or tool length are said again
+    retract: bool = False
+    high: bool = False  #: only after a retract; a control with such a word wants the tool high at the end, too
+    moves: bool = False  #: the tool moves, though the block names no axis
+    #: the rotary axes must have been sent to zero before: where a parameter says so, the part program turns with the
+    #: angles of that moment
+    zero: bool = False
 
     @classmethod
-    @lru_cache(_REMEMBERED)
-    def of(cls, word: str, text: str) -> Row:
-        """Take a row of the table apart; ValueError where it is none."""
-        effects, _, beside = text.partition(":")
-        sets, does = [], set()
+    def all_of(cls, word: str, text: str) -> list[Self]:
+        """Take a row of the table apart: that of its word, and those of letters that may be beside it.
+
+        ValueError where it is none.
+        """
+        head, listed, rest = text.partition(";")
+        rules, _, says = rest.partition(";")
+        effects, _, letters = head.partition(":")
+        sets: list[tuple[str, str | None]] = []
+        does: set[str] = set()
         for effect in effects.split():
             group, given, value = effect.partition("=")
             if given and _is_value(group, value):
-                sets.append((group, None if value == "?" else word if value == "." else value))
-            elif effect in LOSES:
-                does.add(effect)
+                sets.append((group, None if value == "?" else value))
+            elif (name := _ALIKE.get(effect, "stop" if group == "stop" else effect)) in LOSES:
+                does |= {name, *(("place",) if name == "turn" else ())}
             else:
                 raise ValueError(
                     f"{word!r} does {effect!r}: not one of {', '.join(LOSES)}, and no group with its value"
                 )
-        return cls(tuple(sets), frozenset(does), frozenset(beside.split()))
+        own = {letter: letter for letter in letters.split()}
+        if listed:  # a pattern of what comes behind the letter, which is a small one where it is not accepted
+            own = {letter: re.match("[A-Za-z]*", letter)[0].upper() for letter in own}  # type: ignore[index]
+        more = frozenset(name for letter, name in own.items() if letter[0].isupper() and not set(letter) & {*"=~"})
+        row = cls(tuple(sets), frozenset(does), frozenset(own.values()), more)
+        is_frame, is_off = row.group.startswith(FRAME), row.group != "" and dict(row.sets)[row.group] == "off"
+        of_group = _OF_GROUPS.get("frame" if is_frame else row.group, "")
+        row = replace(row, off=is_off, cycle=is_frame and not is_off, follows="follows" in of_group.split())
+        return row._listed(word, letters.split(), f"{of_group} {rules}", says.strip()) if listed else [row]
+
+    def _listed(self, word: str, letters: Sequence[str], rules: str, says: str) -> list[Self]:
+        """The rows of a word that verification accepts, with what it asks of it, and of letters beside it."""
+        values: dict[str, Any] = {}
+        for name, given, text in (rule.partition("=") for rule in rules.split()):
+            if name.removeprefix("-") not in _RULES:
+                raise ValueError(f"{word!r} has the rule {name!r}: not one of {', '.join(sorted(_RULES))}")
+            value = _KINDS.get(name, str)(text.replace("_", " ")) if given else not name.startswith("-")
+            values[name.removeprefix("-")] = value
+        values["alone"] = values.get("alone", False) or values.get("block", False)
+        share = values.pop("share", None)
+        pattern = word[1:-1] if word[0] == "/" else re.escape(word) if _LITERAL.fullmatch(word) else word
+        rows, needed = [], []
+        for letter in letters:
+            plain = letter.rstrip("!=~")
+            text, marks = f"{plain}{_NUMBER}" if len(plain) == 1 else plain, letter[len(plain) :]
+            if plain[0].islower():
+                continue
+            needed += [text] * ("!" in marks)
+            rows.append(
+                type(self)(
+                    pattern=re.compile(text),
+                    says=says,
+                    needs=re.compile(pattern),
+                    share=share if "(?P<" in text else None,
+                    compared="=" in marks,
+                    follows="~" in marks,
+                )
+            )
+        if needed:
+            values["must"] = re.compile("|".join(needed))
+        values["share"] = share if "(?P<" in pattern else None
+        return [replace(self, pattern=re.compile(pattern), says=says, **values), *rows]
+
+    @cached_property
+    def group(self) -> str:
+        """The group that verification follows; empty for none."""
+        first = self.sets[0][0] if self.sets else ""
+        return "" if first == "motion" or self.changes_tool else first
+
+    @cached_property
+    def tip_on(self) -> bool:
+        """Whether tool tip control is on with it."""
+        return dict(self.sets).get("tip", "off") != "off"
+
+    @property
+    def changes_tool(self) -> bool:
+        """Whether another tool is taken."""
+        return self.compared and (self.high or self.after is not None)
+
+
+#: names of rules
+_RULES: Final = frozenset(one.name for one in fields(Row)) - {"sets", "does", "beside", "more", "pattern", "says"}
 
 
 def _is_value(group: str, value: str) -> bool:
@@ -105,19 +239,24 @@ def _is_value(group: str, value: str) -> bool:
 #: what a word without a row does
 UNKNOWN: Final = Row(does=frozenset(("unknown",)))
 
+#: the row of words that verification does not accept, or not beside these
+UNLISTED: Final = Row()
+
 
 @dataclass(frozen=True)
 class Table:
     """The rows of a control."""
 
     control: str
-    named: Mapping[str, str]  #: effects of words by their names
-    patterns: tuple[tuple[re.Pattern[str], str], ...]  #: of words by a pattern, in order
+    named: Mapping[str, Row]  #: of words by their names
+    patterns: tuple[tuple[re.Pattern[str], Row], ...]  #: of words by a pattern, in order
+    listed: tuple[Row, ...]  #: of words that verification accepts; what is the control's own comes first
+    blocks: tuple[Row, ...]  #: of whole blocks that it accepts
     groups: tuple[str, ...]  #: all that are set by a word
     #: letters that belong to a motion while it holds
     arguments: Mapping[str, frozenset[str]]
 
-    def row(self, name: str, beside: Mapping[str, float] | None = None, *, alone: bool = False) -> Row:
+    def row(self, name: str, text: str = "", beside: Mapping[str, float] | None = None, *, alone: bool = False) -> Row:
         """What a word does in a block with some letters and their numbers; `alone` where it has no other word."""
         numbers = (beside or {}).items()
         others = (
@@ -126,12 +265,11 @@ class Table:
         )
         for key in chain((f"{name} alone",) * alone, *others) if name in self._with_others else ():
             if key in self.named:
-                return Row.of(name, self.named[key])
+                return self.named[key]
         if name in self.named:
-            return Row.of(name, self.named[name])
-        found = (text for pattern, text in self.patterns if pattern.fullmatch(name))
-        text = next(found, None)
-        return UNKNOWN if text is None else Row.of(name, text)
+            return self.named[name]
+        found = (row for pattern, row in self.patterns if pattern.fullmatch(name) or row.pattern.fullmatch(text))
+        return next(found, UNKNOWN)
 
     @cached_property
     def _with_others(self) -> frozenset[str]:
@@ -142,9 +280,9 @@ class Table:
     def frame_words(self) -> Mapping[str, re.Pattern[str]]:
         """What stands in each line that names a frame, in capitals, by its group."""
         parts: dict[str, list[str]] = {}
-        rows = [(_sign(name.split(" ")[0].removesuffix("()")), text) for name, text in self.named.items()]
-        for sign, text in (*rows, *((pattern.pattern, text) for pattern, text in self.patterns)):
-            for group, _ in Row.of("", text).sets:
+        rows = [(_sign(name.split(" ")[0].removesuffix("()")), row) for name, row in self.named.items()]
+        for sign, row in (*rows, *((pattern.pattern, row) for pattern, row in self.patterns)):
+            for group, _ in row.sets:
                 if group.startswith(FRAME):
                     parts.setdefault(group, []).append(sign)
         return {group: re.compile("|".join(signs)) for group, signs in parts.items()}
@@ -159,30 +297,55 @@ def _sign(name: str) -> str:
 @cache
 def table_of(control: str) -> Table:
     """The table of a control, one of `CONTROLS`."""
-    named: dict[str, str] = {}
-    patterns = []
-    for word, text in word_table(control)["does"].items():
+    listed: dict[tuple[str, re.Pattern[str] | None], Row] = {}
+    named: dict[str, Row] = {}
+    patterns: list[tuple[re.Pattern[str], Row]] = []
+    blocks: list[Row] = []
+    for word, text in word_table(control)["words"].items():
         if not text:
             continue
-        if word.startswith("/") and word.endswith("/"):
-            patterns.append((re.compile(word[1:-1]), text))
+        row, *letters = Row.all_of(word, text)
+        if row.block:
+            blocks.append(row)
+            continue
+        is_listed = row.pattern is not UNLISTED.pattern
+        for one in (row, *letters) if is_listed else ():
+            listed.setdefault((one.pattern.pattern, one.needs), one)
+        if not row.sets and not row.does:
+            continue
+        if word[0] == "/":
+            patterns.append((re.compile(word[1:-1]), row))
         elif word.endswith("*"):
-            patterns.append((re.compile(re.escape(word[:-1]) + ".*"), text))
+            patterns.append((re.compile(re.escape(word[:-1]) + ".*"), row))
         else:
-            named[word] = text
-    named |= {word: _of_means(*meaning) for word, meaning in means_of(control).items()}
-    rows = [Row.of("", text) for text in (*named.values(), *(text for _, text in patterns))]
+            named.setdefault(word[0] if is_listed and not _LITERAL.fullmatch(word) else word, row)
+    rows = [*named.values(), *(row for _, row in patterns)]
     arguments: dict[str, frozenset[str]] = {}
     for row in rows:
         for group, value in row.sets:
             if group == "motion" and value is not None:
                 arguments[value] = arguments.get(value, frozenset()) | row.beside
     groups = sorted({group for row in rows for group, _ in row.sets})
-    return Table(control, named, tuple(patterns), tuple(groups), arguments)
+    return Table(control, named, tuple(patterns), tuple(listed.values()), tuple(blocks), tuple(groups), arguments)
 
 
-def _of_means(kind: str, value: str) -> str:
-    """Effects of a word that `[means]` has."""
-    if kind == "compensation":
-        return f"compensation={_COMPENSATION[value]}"
-    return _OF_KIND.get(kind, f"{kind}={value}")
+def any_of(pattern: re.Pattern[str], words: Iterable[str]) -> bool:
+    """Whether any of the words is of a pattern."""
+    return any(map(pattern.fullmatch, words))
+
+
+def shown(pattern: re.Pattern[str]) -> str:
+    """Regular expression in the user's words."""
+    text = pattern.pattern
+    for old, new in _PLAIN:
+        text = text.replace(old, new)
+    return text
+
+
+_PLAIN: Final = (
+    (r"(?=\d*[1-9])", ""),
+    *((old, "…") for old in (r"\d+", r"\d{1,8}", r"\d{1,5}", r"[\d.]+", r"\w+", ".*", "(\\.\\d*)?")),
+    (r"\.", "."),
+    ("(?:", "("),
+    ("|", " or "),
+)

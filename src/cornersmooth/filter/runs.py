@@ -122,7 +122,7 @@ class Reading(Text):
     why: NDArray[np.uint16] = field(init=False)
     reasons: list[str] = field(default_factory=list)
     at: dict[int, State] = field(default_factory=dict)  #: before the lines that were chosen
-    said: frozenset[str] = frozenset()  #: groups that the program has set (`State.said`)
+    said: frozenset[str] = frozenset()  #: groups that the program has set
     absent: tuple[str, ...] = ()  #: linear axes that the program never names
 
     def __post_init__(self) -> None:
@@ -209,7 +209,7 @@ class ProgramReader:
             last = item.after(count) if isinstance(item, Rows) else item.after
         found.at |= dict.fromkeys(stops_left, last)
         found.at = {line: replace(state, place=state.place | still) for line, state in found.at.items()}
-        found.said = last.said
+        found.said = frozenset(last.said)
         return found
 
     def _take_rows(self, found: Reading, rows: Rows, corners: Bools, cause: str) -> None:
@@ -287,7 +287,7 @@ class ProgramReader:
         even = all(groups.get(group, PRESET) in _EVEN.get(wanted, ()) for group in ("orientation", "coordinates"))
         if not even and wanted in (ANGLES, VECTOR):
             return f"the control turns the tool by a law of its own between {_TOLD[wanted]}"
-        if groups["compensation"] != "off":
+        if groups["compensation"] != "OFF":
             return "the radius of the cutter is taken account of"
         return "feed per revolution (G95)" if groups["feed"] == "revolution" else ""
 

@@ -13,10 +13,10 @@ from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, get_args
 
+from cornersmooth.control.table import Row, table_of
 from cornersmooth.errors import SettingsError
 from cornersmooth.nc.control import STEPS, Blocks, Control, Digits, FormTable, Mode, Motion, Orientation, Words
 from cornersmooth.nc_reader import CONTROLS
-from cornersmooth.nc_words.rules import WordRule, word_list
 from cornersmooth.tables import Shelf, Table, check_pattern, filled, is_file
 
 _FORM_KEYS = ("description", "curve", "upright", "plane", *get_args(Orientation))
@@ -192,15 +192,15 @@ def _trusted(given: Any, where: str, dialect: str) -> frozenset[str]:
     Refused are patterns of other words, of none, or of words that may move the tool or that the control knows.
     """
     found: set[str] = set()
-    rules = word_list(dialect).words if dialect in CONTROLS else ()
+    rows = table_of(dialect).listed if dialect in CONTROLS else ()
 
-    def rule_of(word: str) -> WordRule | None:
-        return next((rule for rule in rules if rule.pattern.fullmatch(word)), None)
+    def row_of(word: str) -> Row | None:
+        return next((row for row in rows if row.pattern.fullmatch(word)), None)
 
     def wrong(why: object) -> SettingsError:
         return _SHELF.wrong(f"{where}: {why}", 'give machine functions, as in ["M208"]')
 
-    any_function = rule_of(f"M{_LARGEST}")
+    any_function = row_of(f"M{_LARGEST}")
     for pattern in _SHELF.texts(given, where):
         try:
             check_pattern(pattern)
@@ -212,7 +212,7 @@ def _trusted(given: Any, where: str, dialect: str) -> frozenset[str]:
         for word in sorted(own, key=lambda word: int(word[1:])):
             if _MOVING.fullmatch(word) or (dialect == "heidenhain" and _PATH_FUNCTIONS.fullmatch(word)):
                 raise wrong(f"{pattern!r} holds {word}, which may move the tool")
-            if _FIXED.fullmatch(word) or rule_of(word) is not any_function:
+            if _FIXED.fullmatch(word) or row_of(word) is not any_function:
                 raise wrong(f"{pattern!r} holds {word}, which verification compares with the CL file")
         found |= own
     return frozenset(found)

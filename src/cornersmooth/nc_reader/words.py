@@ -50,6 +50,13 @@ class Word(NamedTuple):
         """Whether the word has no number of its own."""
         return self.start == self.stop
 
+    @property
+    def spelling(self) -> str:
+        """Its text as tables have it: blanks left out, codes without leading zeros."""
+        if self.name in ("G", "M") and self.text[:1] == self.name and not {*"+-"} & {*self.text}:  # no code has a sign
+            return f"{self.name}{self.value:g}"
+        return self.text if self.name == "block" else self.text.replace(" ", "").replace("\t", "")
+
 
 def tools_first(words: Iterable[Word]) -> list[Word]:
     """Words of a block in the order in which they act: M6 takes the tool that T chooses, wherever that stands."""

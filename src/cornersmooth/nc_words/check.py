@@ -9,6 +9,8 @@ from typing import Final
 
 import numpy as np
 
+from cornersmooth.control.state import State
+from cornersmooth.control.table import UNLISTED, Row, any_of, shown, table_of
 from cornersmooth.errors import InputError
 from cornersmooth.nc_reader.lexer import Lexer
 from cornersmooth.nc_reader.word_tables import word_table
@@ -16,8 +18,7 @@ from cornersmooth.nc_reader.words import Line, Table
 from cornersmooth.nc_words.blocks import NOT_LISTED, Ruled, WordRules
 from cornersmooth.nc_words.machine_positions import MachinePositions
 from cornersmooth.nc_words.parts import Parts
-from cornersmooth.nc_words.rules import UNLISTED, WordList, WordRule, any_of, shown, word_list, word_text
-from cornersmooth.nc_words.states import LINEAR, ROTARY, WordStates
+from cornersmooth.nc_words.states import LINEAR, ROTARY, StateRules
 from cornersmooth.statements.comparison import KINDS
 
 #: words that bear on no motion: tool, spindle, stops, coolant (ISO 6983-1, M0 to M9 and M19)
@@ -64,14 +65,13 @@ class WordCheck:
         axis_tolerance: float = 0.0,
     ) -> None:
         self._positions = MachinePositions(None, 1.0) if positions is None else positions
-        listed = word_list(control)
-        self.list: WordList = replace(listed, words=(*self._positions.switch, *listed.words))
-        self._rules = WordRules(self.list, self._positions.rules, lexer, tolerance, axis_tolerance)
+        table, keys = self._positions.table(table_of(control)), word_table(control)
+        self._rules = WordRules(table, self._positions.rules, lexer, tolerance, axis_tolerance)
         self.lexer = lexer
         trusted = set(trusted)
         own = set(map(self._text, trusted))
         self._own = [re.compile(re.escape(text).replace(_ANY, r"[-+]?[\d.]+")) for text in own if text]
-        self._states = WordStates(self.list, self._positions, trusted | own)
+        self._states = StateRules(State(table, ("X", "Y", "Z", *"ABC")), self._positions, trusted | own)
         self._left, self._accepted = trusted, accepted
         self.problems, self._wrong = self._states.problems, self._states.wrong
         #: blocks taken on trust, line and text, and those of them that may bear on the motion
@@ -79,16 +79,17 @@ class WordCheck:
         kinds = KINDS & trusted
         self._moving = _own_table(kinds & _OF_MOTION)
         self.trusted += [(0, text) for text in _own_table(kinds - _OF_MOTION)]
-        self.parts = Parts(control, lexer)
+        self.parts = Parts(lexer)
         self._line = 0  # of the last block
-        self._wanted = self.list.begin  # blocks of the begin that are still to come
+        #: what stands before the program, what a comment begins with that is obeyed, and blocks of the end
+        self._header, self._orders = re.compile(keys.get("header", "(?!)")), keys.get("orders", "(?!)")
+        self._ends = tuple(map(re.compile, keys["end"]))
+        self._wanted = tuple(map(re.compile, keys["begin"]))  # blocks of the begin that are still to come
         self._opening = ""
         self._tail: list[tuple[int, str]] = []
         self._before: tuple[int, str, Ruled] = 0, "", []
-        self._code = -1.0
         self._weights = None if weights is None else tuple(weights)
-        table = word_table(control)
-        self._needed, self._whole = table["grammar"].get("curves_need"), table.get("whole", "")
+        self._needed, self._whole = keys["grammar"].get("curves_need"), keys.get("whole", "")
         #: by how much the control may round on its own, in units of the program: added to what is measured
         self.rounding = 0.0
 
@@ -122,7 +123,7 @@ class WordCheck:
             line = self.lexer.line(block.encode("latin-1", "replace"), 0, None)
         except InputError:  # no words: the reader will say so where it meets them
             return ""
-        return " ".join(map(word_text, line.words))
+        return " ".join(word.spelling for word in line.words)
 
     # runs of motion blocks, and lines
 
@@ -132,7 +133,8 @@ class WordCheck:
         self._line = int(table.line[-1])
         self._follow(self._line, "", [])
         self._check_weights(table)
-        self.parts.table(table)
+        machine = self._states.machine
+        self.parts.table(table, machine)
         self._positions.leave(table.columns.keys())
         rows = [len(table)]
         if self._states.attentive:
@@ -141,8 +143,8 @@ class WordCheck:
             down = int(np.argmax(~np.isnan(table.column("Z")[first:]))) if self._states.above else 0
             rows = sorted({0, first, first + down, len(table)})
         for row in rows:
-            self._states.angles |= table.last_before(row, ROTARY)
-            self._code = table.last_before(row + 1, "G").get("G", self._code)
+            given = table.last_before(row + 1, {"G", *ROTARY})
+            machine.pass_blocks(given.pop("G", None), given)
             if row < len(table):
                 self._move(int(table.line[row]), table.row(row))
 
@@ -167,46 +169,54 @@ class WordCheck:
         for comment in line.comments:
             self._states.comment(comment)
             self.parts.comment(comment)
-            if self.list.orders is not None and self.list.orders.match(comment):
+            if re.match(self._orders, comment, re.IGNORECASE):
                 self._wrong(NOT_LISTED, number, f"a comment that the control obeys: {comment[:40]}")
             if _CONTROL_CHARACTERS.search(comment):
                 self._wrong(NOT_LISTED, number, "a comment with a character that ends a block or is none")
-        words = [word_text(word) for word in line.words] or ["%"] * line.tape
+        words = [word.spelling for word in line.words] or ["%"] * line.tape
         text = " ".join(words)
         own = bool(words) and any(pattern.fullmatch(text) for pattern in self._own)
         if line.skipped and not own:
             self._wrong(NOT_LISTED, number, "block skip: what the control does depends on a switch")
         if not words:
             return line
-        self.parts.line(line)
+        machine, after = self._states.machine, self._executed(line)
+        self.parts.line(line, machine, after)
         before, ruled = len(self.problems), self._rules.of(words)
         self._functions(number, words, ruled)
         if not self._frames(number, text):
             self._follow(number, text, ruled)
-            metric = self._states.holds("units", "G21") and self._states.holds("feed mode", "G94")
+            metric = self._states.holds("units", "G21") and self._states.holds("feed", "G94")
             self.problems += self._rules.problems(line, words, ruled, self._whole if metric else "")
-            self._states.take(number, words, ruled)
+            self._states.take(number, words, ruled, after)
         self._line = number
         if own:
-            line = self._on_trust(line, words, ruled, before)
-            ruled = self._rules.of([word_text(word) for word in line.words])
+            trusted = self._on_trust(line, words, ruled, before)
+            if trusted is not line:  # what it establishes counts
+                self._states.machine, line = machine, trusted
+                self._states.machine = self._executed(line)
+            ruled = self._rules.of([word.spelling for word in line.words])
         elif self._positions.rules:
-            retract = any(rule.retract and rule in self.list.blocks for _, rule in ruled)
+            retract = any(row.retract and row not in self._positions.rules for _, row in ruled)
             self.problems += self._positions.take(line, text, retract=retract)
-        codes = [word.value for word in line.words if word.name == "G" and word.value in (0.0, 1.0, 2.0, 3.0)]
-        self._code = codes[-1] if codes else self._code
-        self._move(number, {word.name: word.value for word in line.words}, [rule for _, rule in ruled])
+        self._move(number, {word.name: word.value for word in line.words}, [row for _, row in ruled])
         return line
+
+    def _executed(self, line: Line) -> State:
+        """What holds after a line."""
+        after = self._states.machine.copy()
+        after.execute(line)
+        return after
 
     def _functions(self, number: int, words: Sequence[str], ruled: Ruled) -> None:
         """Take note of what the control rounds by words of a block, and of functions that nobody asked for."""
-        for word, rule in ruled:
-            shared = rule.pattern.fullmatch(word)
+        for word, row in ruled:
+            shared = row.pattern.fullmatch(word)
             if shared and (length := shared.groupdict().get("length")):
                 # LinuxCNC: without Q lines are merged within P, too
                 self.rounding = max(self.rounding, float(length) * (1.0 + ("G64" in words and "Q0" not in words)))
             # a block that counts as a whole says nothing of by how much
-            if rule.extra and any_of(rule.extra, words) and (rule.alone or not self._intended(" ".join(words))):
+            if row.extra and any_of(row.extra, words) and (row.alone or not self._intended(" ".join(words))):
                 self.trusted.append((number, " ".join(words)))
 
     def _intended(self, block: str) -> bool:
@@ -225,7 +235,7 @@ class WordCheck:
         What it establishes counts. With a word that is not on the list, not in its place, or that the CL file would
         have to ask for, the block is taken on trust, and the reader gets no more of it than is understood.
         """
-        if not (line.skipped or len(self.problems) > before or any(rule.compared for _, rule in ruled)):
+        if not (line.skipped or len(self.problems) > before or any(row.compared for _, row in ruled)):
             return line
         del self.problems[before:]
         block = line.number, " ".join(words)
@@ -234,26 +244,26 @@ class WordCheck:
             self.unsure.append(block)
         if len(ruled) < len(words):
             return line
-        left = [rule is UNLISTED or rule.compared for _, rule in ruled]
+        left = [row is UNLISTED or row.compared for _, row in ruled]
         tool = "tool" in self._left  # stops for a tool are told by its number
         kept = [word for word, out in zip(line.words, left, strict=True) if not out or (tool and word.name == "T")]
         return replace(line, words=tuple(kept))
 
-    def _move(self, line: int, given: Mapping[str, float], rules: Sequence[WordRule] = ()) -> None:
+    def _move(self, line: int, given: Mapping[str, float], rows: Sequence[Row] = ()) -> None:
         """Look at where the words of a block send the axes; those beside a word that is alone do not move the tool."""
         self._states.turn(line, given)
-        moves, drills = any(rule.moves for rule in rules), any(rule.cycle for rule in rules)
-        if moves or (LINEAR & given.keys() and not any(rule.alone for rule in rules)):
-            self._states.motion(line, given, 1.0 if moves else self._code, drills=drills)
+        moves, drills = any(row.moves for row in rows), any(row.cycle for row in rows)
+        if moves or (LINEAR & given.keys() and not any(row.alone for row in rows)):
+            self._states.motion(line, given, drills=drills)
 
     def _follow(self, line: int, text: str, ruled: Ruled) -> None:
         """Look at what a block and that before want of each other."""
         number, before, theirs = self._before
-        for _, rule in theirs:
-            if rule.next is not None and not rule.next.fullmatch(text):
-                self._wrong(NOT_LISTED, number, f"{shown(rule.pattern)} without {shown(rule.next)} after it")
-        for word, rule in ruled:
-            if rule.previous is not None and not rule.previous.fullmatch(before):
+        for _, row in theirs:
+            if row.next is not None and not row.next.fullmatch(text):
+                self._wrong(NOT_LISTED, number, f"{shown(row.pattern)} without {shown(row.next)} after it")
+        for word, row in ruled:
+            if row.previous is not None and not row.previous.fullmatch(before):
                 self._wrong(NOT_LISTED, line, f"{word} does not follow what it belongs to")
         self._before = line, text, ruled
 
@@ -261,7 +271,7 @@ class WordCheck:
 
     def _frames(self, number: int, text: str) -> bool:
         """Whether a block is one that begins or ends the program, where it belongs."""
-        if not self._line and self.list.header is not None and self.list.header.fullmatch(text):
+        if not self._line and self._header.fullmatch(text):
             return True
         if wanted := self._wanted:
             place = next((k for k, pattern in enumerate(wanted) if pattern.fullmatch(text)), None)
@@ -272,7 +282,7 @@ class WordCheck:
             if place is not None:
                 self._opening = self._opening or text
                 return True
-        if any(pattern.fullmatch(text) for pattern in self.list.end):
+        if any(pattern.fullmatch(text) for pattern in self._ends):
             self._tail.append((number, text))
             return True
         for line, ending in self._tail:
@@ -283,7 +293,7 @@ class WordCheck:
     def _end(self) -> None:
         """Look at what holds when all is read."""
         first = self._tail[0][0] if self._tail else self._line
-        ends, texts = self.list.end, [text for _, text in self._tail]
+        ends, texts = self._ends, [text for _, text in self._tail]
         if texts and texts[-1] != _TAPE:
             ends = tuple(pattern for pattern in ends if pattern.pattern != _TAPE)
         if len(texts) != len(ends) or not all(map(re.Pattern.fullmatch, ends, texts)):

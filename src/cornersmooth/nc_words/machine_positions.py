@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Iterator, Mapping, Set
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
+from cornersmooth.control.table import Row, Table
 from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.nc_reader.words import Line
-from cornersmooth.nc_words.rules import WordRule
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine
 
 #: code of positions of the machine that its file does not have, or that are missing
 POSITIONS: Final = "CS583"
-
-#: state of blocks that switch tip control of the kinematics
-_KINEMATICS: Final = "tip control of the kinematics"
 
 _AXES: Final = r"( [XYZABC][-+]?\d*\.?\d*)+"
 
@@ -59,20 +57,27 @@ class MachinePositions:
         self._axes = () if machine is None else machine.axes
         #: with its rotary axes
         self.machine = machine if self._axes else None
-        blocks = (machine.tip_control or ()) if machine is not None and self._axes and switches else ()
+        self._switch = (machine.tip_control or ()) if machine is not None and self._axes and switches else ()
         #: whether words are those of the tip without any that switches that on
-        self.keeps_tip = bool(switches and tcp and not blocks)
-        #: rules for words that switch tip control of the kinematics
-        self.switch: tuple[WordRule, ...] = (*_switch(blocks[:1], ends=True), *_switch(blocks[1:], ends=False))
-        #: rules for blocks that the control's own list need not have
-        self.rules: tuple[WordRule, ...] = ()
+        self.keeps_tip = bool(switches and tcp and not self._switch)
+        #: rows of blocks that the control's own table need not have
+        self.rules: tuple[Row, ...] = ()
         if home or change:
             says = "position of the machine, as its file has it"
             self.rules = tuple(
-                WordRule(re.compile(pattern), says, alone=True, retract=retract)
+                Row(pattern=re.compile(pattern), says=says, block=True, alone=True, retract=retract)
                 for block in _BLOCKS
                 for retract, pattern in ((True, f"(?=.* Z[-+.\\d]){block}"), (False, block))
             )
+
+    def table(self, table: Table) -> Table:
+        """Table of the control with the words that switch tip control of these kinematics."""
+        for block, tip in zip(self._switch, ("both", "off"), strict=False):
+            word, *others = block.split()
+            beside = " ".join(f"{other}!" for other in others)
+            rows = Row.all_of(word, f"tip={tip} place: {beside}; alone follows; tip control of the kinematics")
+            table = replace(table, named={**table.named, word: rows[0]}, listed=(*rows, *table.listed))
+        return table
 
     def away(self, angles: Mapping[str, float]) -> list[str]:
         """Names of axes that are not at zero, or at a full turn of an axis that turns without end."""
@@ -118,20 +123,3 @@ class MachinePositions:
                 text = f"{word.name} goes to {word.value:g} of the machine, whose file says {wanted}"
                 yield Problem(POSITIONS, 0, line.number, text)
             self._at[word.name] = word.value
-
-
-def _switch(blocks: Sequence[str], *, ends: bool) -> Iterator[WordRule]:
-    """Rules for the words of a block that switches tip control on (`ends`: another tool may not follow) or off."""
-    for block in blocks:
-        word, *others = map(re.compile, map(re.escape, block.split()))
-        yield WordRule(
-            word,
-            "tip control on" if ends else "tip control off",
-            state=_KINEMATICS,
-            must=others[0] if others else None,
-            alone=True,
-            follows=True,
-            ends=ends,
-            off=not ends,
-        )
-        yield from (WordRule(other, "tip control", needs=word) for other in others)

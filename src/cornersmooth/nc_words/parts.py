@@ -17,11 +17,10 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from cornersmooth.control.state import CUTS, State
-from cornersmooth.control.table import FRAME, Row, table_of
+from cornersmooth.control.table import FRAME, Row
 from cornersmooth.nc_reader.lexer import Lexer
 from cornersmooth.nc_reader.words import Line, Table
 from cornersmooth.nc_reader.words import table_of as table_of_rows
-from cornersmooth.nc_words.rules import word_text
 from cornersmooth.provenance import PARTS, PARTS_WORD
 
 #: hexadecimal digits of a part
@@ -60,9 +59,8 @@ class _Part:
 class Parts:
     """Follows one program; lines are its blocks in order."""
 
-    def __init__(self, control: str, lexer: Lexer) -> None:
+    def __init__(self, lexer: Lexer) -> None:
         self._lexer = lexer
-        self._state = State(table_of(control), ("X", "Y", "Z", *_ROTARY))
         self._parts: list[_Part] = []
         self._part = _Part()
         self._cuts = False  # whether the part is within cuts
@@ -78,69 +76,57 @@ class Parts:
         if match := PARTS_WORD.search(text):
             self._wanted = self._wanted or match[1].lower()
 
-    def table(self, table: Table) -> None:
-        """Take a run of motion blocks."""
-        self._state.place |= table.last_before(len(table), _ROTARY)
+    def table(self, table: Table, machine: State) -> None:
+        """Take a run of motion blocks; the machine is before it."""
         rows = range(min(len(table), _APPROACH)) if self._above else range(1)
         for row in rows if self._still or self._above else ():
             self._moves(int(table.line[row]), set(table.row(row)))
         cuts = table.column("G") > 0.0
-        if cuts.any() or (self._state.groups["motion"] in CUTS and not (table.column("G") == 0.0).any()):
+        if cuts.any() or (machine.groups["motion"] in CUTS and not (table.column("G") == 0.0).any()):
             self._cut(int(table.line[cuts.argmax()]))
-        code = table.last_before(len(table), "G").get("G")
-        if code is not None:
-            self._state.groups["motion"] = "rapid" if code == 0.0 else "line"
 
-    def line(self, line: Line) -> None:
-        """Take any other line."""
+    def line(self, line: Line, machine: State, after: State) -> None:
+        """Take any other line; the machine is before it, and `after` it."""
         columns = self._lexer.motion(line)
         if columns is not None:  # a motion block with a comment
             numbers = {name: word if isinstance(word, float) else word.value for name, word in columns.items()}
-            self.table(table_of_rows([(line.number, numbers)]))
+            self.table(table_of_rows([(line.number, numbers)]), machine)
             return
-        rows = self._state.rows(line.words)
+        rows = machine.rows(line.words)
         does = {effect for _, _, row in rows for effect in row.does}
         beside = frozenset[str]().union(*(row.beside for _, _, row in rows))
-        if "dwell" in does or any(_FRAME.match(name) for _, name, _ in rows):
+        if line.tape or "dwell" in does or any(_FRAME.match(name) for _, name, _ in rows):
             return
         beside |= _PLACES
         rows = [(word, name, row) for word, name, row in rows if name not in beside and not _compared(name, row)]
         if "machine" in does and self._cuts:
             self._close(line.number, cuts=False)
-        before, turned = dict(self._state.groups), self._turned()
-        if rows or "stop" in does or any(word.name == "G" for word in line.words):
-            self._state.execute(line)
-        if any(row.sets == (("motion", None),) for _, _, row in rows):  # a hole cycle, or a curve: measured
-            self._cut(line.number)
+        if any(("motion", None) in row.sets and row.group in ("", "cycles") for _, _, row in rows):
+            self._cut(line.number)  # a hole cycle, or a curve: measured
             return
+        before, now = machine.groups, after.groups
         for word, _, row in rows:
             changed = any(
-                _value(before[group]) != _value(self._state.groups[group]) or group.startswith(FRAME)
-                for group, _ in row.sets
+                _value(before[group]) != _value(now[group]) or group.startswith(FRAME) for group, _ in row.sets
             )
             if row.does or changed:
-                own = [word_text(other) for other in line.words if other.name in row.beside]
-                text = " ".join(("/" * line.skipped + word_text(word), *own))
+                own = [other.spelling for other in line.words if other.name in row.beside]
+                text = " ".join(("/" * line.skipped + word.spelling, *own))
                 if not row.does and {group for group, _ in row.sets} <= _SWITCHED:
                     self._switched.append(text)
                 else:
                     self._take(line.number, text, stays="tool" not in row.does and "machine" not in does)
         moved = {word.name for word in line.words} & _PLACES
         if "machine" in does:
-            self._take(line.number, " ".join(sorted(map(word_text, line.words))))
+            self._take(line.number, " ".join(sorted(word.spelling for word in line.words)))
             self._above = True
         elif moved:
-            self._state.place |= {word.name: word.value for word in line.words if word.name in _ROTARY}
             self._moves(line.number, moved)
-            if self._state.groups["motion"] in CUTS:
+            if now["motion"] in CUTS:
                 self._cut(line.number)
-        if turned and (before["tip"] != self._state.groups["tip"] or does & {"anything", "tool"}):
+        turned = " ".join(f"{name}{machine.place[name]:g}" for name in _ROTARY if not math.isnan(machine.place[name]))
+        if turned and (before["tip"] != now["tip"] or does & {"anything", "tool"}):
             self._take(line.number, turned)
-
-    def _turned(self) -> str:
-        """Where the rotary axes are."""
-        at = {name: self._state.place[name] for name in _ROTARY}
-        return " ".join(f"{name}{value:g}" for name, value in at.items() if not math.isnan(value))
 
     def _take(self, line: int, word: str, *, stays: bool = False) -> None:
         """Take a word; `stays`: the machine does not move by it."""

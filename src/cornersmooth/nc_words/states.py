@@ -1,27 +1,29 @@
-"""States of the control as the words of a program set them, and what must hold where the tool moves, changes or stops.
+"""What must hold of the groups of a control where the tool moves, changes or stops.
 
-A word sets a state to a value; its rule (`rules`) says when it must have been said, until when it may hold, and at
-which places of the program it may be: after a retract, on the way down, under tool tip control.
+The machine (`control.state`) remembers what words have said of each group; the row of a word (`control.table`) says
+when it must have been said, until when it may hold, and at which places of the program it may be: after a retract, on
+the way down, under tool tip control.
 
 Posts have many ways to begin, to change tools and to end, and most of them are right. What has changed in a program
 whose head says how it was made, `parts` finds; around its retracts it must be right also without digests
-(`WordStates._around_retracts`).
+(`StateRules._around_retracts`).
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence, Set
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
+from cornersmooth.control.state import Said, State
+from cornersmooth.control.table import Row, any_of, shown
 from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.nc_reader.rotary import tool_vectors
 from cornersmooth.nc_words.blocks import NOT_LISTED, Ruled
 from cornersmooth.nc_words.machine_positions import MachinePositions
-from cornersmooth.nc_words.rules import WordList, WordRule, any_of, shown
+from cornersmooth.statements.tokens import ENDINGS
 
 #: a retract with the same tool, which only GOHOME of the CL file asks for
 GONE_ON: Final = "a retract that another motion of the same tool follows"
@@ -32,11 +34,27 @@ NOT_ESTABLISHED: Final = "CS572"
 #: name of the blocks around the motion, among what is left to the user
 FRAME: Final = "program frame"
 
-#: states that are spoken of by name; planes are those to which the control turns the rotary axes
-_OFFSET: Final = "work offset"
-_LENGTH: Final = "tool length"
-_PLANES: Final = frozenset(("tilted plane", "swivelled plane"))
-_DYNAMIC: Final = "dynamic work offset"
+#: groups of planes to which the control turns the rotary axes
+_PLANES: Final = ("frame.rotation", "frame.plane", "frame.swivel")
+_DYNAMIC: Final = "frame.dynamic"
+
+#: how groups are called where they are not by their names
+_TITLES: Final[Mapping[str, str]] = {
+    **dict.fromkeys(_PLANES, "tilted plane"),
+    _DYNAMIC: "dynamic work offset",
+    "distance": "positions",
+    "feed": "feed mode",
+    "tip": "tool tip control",
+    "compensation": "cutter compensation",
+    "offset": "work offset",
+    "path": "path control",
+    "way": "ways of rotary axes",
+    "orientation": "interpolation of the tool axis",
+    "coordinates": "coordinates of the tool axis",
+    "tool_length": "tool length",
+    "edge": "cutting edge",
+    "smoothing": "smoothing of the control",
+}
 
 #: comments that say how a program was made, and the words in them
 _MADE: Final = re.compile(r"CORNERSMOOTH \S+: \w+=", re.IGNORECASE)
@@ -53,51 +71,35 @@ _DECIMAL: Final = re.compile(r"(?<![G\d])\d+\.\d*")
 _UPRIGHT: Final = 1.0 - 1e-6
 
 
-@dataclass(frozen=True)
-class _Held:
-    """What has been said last of a state."""
+class StateRules:
+    """Follows one program on a machine.
 
-    text: str  # the word, with those beside it that say more of it
-    rule: WordRule
-    line: int
-
-    @property
-    def off(self) -> bool:
-        """Whether it switches the state off."""
-        return self.rule.off and self.rule.pattern.fullmatch(self.text) is not None
-
-
-class WordStates:
-    """Follows the states of one program.
-
-    States, blocks and kinds of words that are `left` are the user's own; `FRAME`: the blocks around the motion are.
+    Groups, blocks and kinds of words that are `left` are the user's own; `FRAME`: the blocks around the motion are.
     """
 
-    def __init__(self, listed: WordList, positions: MachinePositions, left: Set[str]) -> None:
-        self._list, self._positions, self._left = listed, positions, left
+    def __init__(self, machine: State, positions: MachinePositions, left: Set[str]) -> None:
+        #: what holds between two blocks
+        self.machine = machine
+        self._listed, self._positions, self._left = machine.table.listed, positions, left
         self.problems: list[Problem] = []
         #: what is taken on trust, line and text, and what of it may bear on the motion
         self.trusted: list[tuple[int, str]] = []
         self.unsure: list[tuple[int, str]] = []
-        self._retracts = any(rule.high for rule in listed.words)
-        self._late = {rule.state for rule in listed.words if rule.late}
-        self._approach = {rule.state for rule in listed.words if rule.off} | {_OFFSET, "cutting edge"}
+        self._retracts = any(row.high for row in self._listed)
+        self._late = {row.group for row in self._listed if row.late}
+        self._approach = {row.group for row in self._listed if row.off} | {"offset", "edge"}
         self._made: dict[str, str] = {}  # what the head of a program of our own says
-        self._said: set[str] = set()  # words so far; those that must come again before each of their kind, since then
-        self._held: dict[str, _Held] = {}
-        self._first: dict[str, str] | None = None  # states at the first motion; "" for those that may come later
-        self._others: dict[
-            _Held, tuple[str, str]
-        ] = {}  # what holds and did not at the first motion, and what is wrong with it
-        self._cycles = False  # whether the program has any, so that some states may differ from tool to tool
-        #: where the rotary axes have been sent, as far as that is said
-        self.angles: dict[str, float] = {}
+        self._words: set[str] = set()  # so far; those that must come again before each of their kind, since then
+        self._first: dict[str, str] | None = None  # groups at the first motion; "" for those that may come later
+        # what holds and did not at the first motion, and what is wrong with it
+        self._others: dict[Said, tuple[str, str]] = {}
+        self._cycles = False  # whether the program has any, so that some groups may differ from tool to tool
         self._retract = 0  # line of a retract that no approach has followed
         self._high = False  # the tool has not moved since a retract
         self.above = False  # Z has not
         self._moved = 0  # line of the last motion
         self._changed = True  # words have been said since
-        #: states that words have ended since, with these: they must be said again before the next motion
+        #: groups that words have ended since, with these: they must be said again before the next motion
         self._ended: dict[str, str] = {}
 
     # complaints
@@ -121,30 +123,39 @@ class WordStates:
     # what holds
 
     @property
+    def _held(self) -> dict[str, Said]:
+        """What has been said last of each group that verification follows."""
+        return {group: said for group, said in self.machine.said.items() if said.row.group == group}
+
+    @property
     def _tip_control(self) -> list[str]:
         """Word of tool tip control that holds, if any."""
-        return [held.text for held in self._held.values() if held.rule.ends]
+        return [said.text for said in self._held.values() if said.row.tip_on]
 
     @property
     def work_offset(self) -> str:
         """The work offset that holds, as it is written; empty for none."""
-        return self._held[_OFFSET].text if _OFFSET in self._held else ""
+        said = self.machine.said.get("offset")
+        return "" if said is None else said.text
 
     @property
     def made(self) -> Mapping[str, str]:
         """What the head of a program of our own says."""
         return self._made
 
-    def holds(self, state: str, text: str) -> bool:
-        """Whether a state has been set so."""
-        return state in self._held and self._held[state].text == text
+    def holds(self, group: str, text: str) -> bool:
+        """Whether a group has been set so."""
+        return group in self.machine.said and self.machine.said[group].text == text
+
+    def _is_left(self, group: str) -> bool:
+        """Whether a group is the user's own."""
+        return _TITLES.get(group, group) in self._left
 
     @property
     def unsure_offset(self) -> str:
         """Work offset that nothing was compared with; empty for none."""
-        held = self._held.get(_OFFSET)
-        known = self._made and self._made.get("OFFSET") != "NONE" and _OFFSET not in self._left
-        return "" if held is None or known else held.text
+        known = self._made and self._made.get("OFFSET") != "NONE" and not self._is_left("offset")
+        return "" if known else self.work_offset
 
     @property
     def attentive(self) -> bool:
@@ -158,99 +169,97 @@ class WordStates:
         if self._first is None and _MADE.match(text):
             self._made = dict(_MADE_WORDS.findall(text.upper())) | self._made
 
-    def take(self, line: int, words: Sequence[str], ruled: Ruled) -> None:
-        """Take over what a block says, and complain of what is not in its place."""
+    def take(self, line: int, words: Sequence[str], ruled: Ruled, after: State) -> None:
+        """Go on to the state after a block, and complain of what in it is not in its place."""
         self._changed = True
-        self._said |= set(words)
-        self._cycles |= any(rule.cycle for _, rule in ruled)
-        for word, rule in ruled:
-            self._place(line, word, rule)
-        for word, rule in ruled:
-            self._set(line, word, rule, ruled)
+        self._words |= set(words)
+        self._cycles |= any(row.cycle for _, row in ruled)
+        for word, row in ruled:
+            self._place(line, word, row)
+        self.machine = after
+        for word, row in ruled:
+            self._set(line, word, row)
         self._check_plane(line, ruled)
 
     def _check_plane(self, line: int, ruled: Ruled) -> None:
         """Complain of words that are taken in another plane than theirs, and of that while the tool is compensated."""
-        plane, side = self._held.get("plane"), self._held.get("cutter compensation")
-        held = [] if side is None else [(side.text, side.rule)]
-        for word, rule in dict.fromkeys([*ruled, *held]) if plane is not None else ():
-            if rule.plane and plane is not None and plane.text != f"G{rule.plane}":
-                self.wrong(NOT_LISTED, line, f"{word} under {plane.text}, where G{rule.plane} must be in force")
+        plane, side = self.machine.said.get("plane"), self.machine.said.get("compensation")
+        held = [] if side is None else [(side.text, side.row)]
+        for word, row in dict.fromkeys([*ruled, *held]) if plane is not None else ():
+            if row.plane and plane is not None and plane.text != f"G{row.plane}":
+                self.wrong(NOT_LISTED, line, f"{word} under {plane.text}, where G{row.plane} must be in force")
 
-    def _place(self, line: int, word: str, rule: WordRule) -> None:
+    def _place(self, line: int, word: str, row: Row) -> None:
         """Complain of a word that is not in its place, as things are before its block."""
-        if rule.after is not None:
-            before = {said for said in self._said if rule.after.fullmatch(said)}
+        if row.after is not None:
+            before = {said for said in self._words if row.after.fullmatch(said)}
             if not before:
-                self.wrong(NOT_LISTED, line, f"{word} without {shown(rule.after)} before it")
-            self._said -= before
-        if rule.zero and (not self.angles or self._positions.away(self.angles)):
+                self.wrong(NOT_LISTED, line, f"{word} without {shown(row.after)} before it")
+            self._words -= before
+        if row.zero and (not self.machine.angles or self._positions.away(self.machine.angles)):
             self.unframed(NOT_LISTED, line, f"{word} without the rotary axes at zero before it")
-        if rule.high and not self._high:
+        if row.high and not self._high:
             self.unframed(NOT_LISTED, line, f"{word} without a retract before it")
-        if rule.turns:
-            self.angles = {}
-        if rule.retract:
+        if row.retract:
             # of FANUC the length of the tool holds in the retract, with its tip control
-            own = [held.text for held in self._held.values() if held.rule.ends and held.rule.state != _LENGTH]
+            own = [said.text for group, said in self._held.items() if said.row.tip_on and group != "tool_length"]
             self._around_retracts(line, *(f"{word} under {tip}" for tip in own if "Z" in word))
             self._retract, self._high, self.above = line, True, True
-        if rule.changes_tool or rule.outside:
+        if row.changes_tool or row.outside:
             self._retract = 0
-            tell = self.unframed if rule.changes_tool else self.wrong
+            tell = self.unframed if row.changes_tool else self.wrong
             for tip in self._tip_control:
                 tell(NOT_LISTED, line, f"{word} under {tip}")
-        spindle = self._held.get("spindle")
-        if rule.changes_tool and spindle is not None and spindle.rule.runs and spindle.line > self._moved:
+        spindle = self.machine.said.get("spindle")
+        runs = spindle is not None and dict(spindle.row.sets)["spindle"] not in ENDINGS
+        if row.changes_tool and runs and spindle is not None and spindle.line > self._moved:
             self.wrong(NOT_LISTED, line, f"{word} stops the spindle that was started before it")
 
-    def _set(self, line: int, word: str, rule: WordRule, ruled: Ruled) -> None:
-        """Take over the state that a word sets."""
-        if rule.drops in self._held:
-            self._ended[rule.drops] = word
-        if rule.state:
-            beside = [(other, its) for other, its in ruled if its.needs and its.needs.fullmatch(word)]
-            more = [other for other, its in beside if not (its.compared or its.follows)]
-            self._held[rule.state] = _Held(" ".join([word, *more]), rule, line)
-            self._ended.pop(rule.state, None)
-            if rule.off and rule.state == _LENGTH and self._first is not None and self._retracts and not self.above:
-                self._around_retracts(line, f"{word} before the retract: it may move the tool by its length")
-            if not rule.off and rule.state in self._approach:  # GOHOME: the same tool comes back as a new one does
-                self._retract = 0
+    def _set(self, line: int, word: str, row: Row) -> None:
+        """Take note of what a word begins and ends."""
+        if row.drops in self.machine.said:
+            self._ended[row.drops] = word
+        self._ended.pop(row.group, None)
+        off = row.off and row.pattern.fullmatch(word) is not None
+        if off and row.group == "tool_length" and self._first is not None and self._retracts and not self.above:
+            self._around_retracts(line, f"{word} before the retract: it may move the tool by its length")
+        if not row.off and row.group in self._approach:  # GOHOME: the same tool comes back as a new one does
+            self._retract = 0
 
-    def _unsaid(self) -> Iterator[tuple[str, str]]:
-        """States, and words of which one must have come before the first motion."""
-        rules = [rule for rule in self._list.words if rule.first]
-        for state in dict.fromkeys(rule.state for rule in rules):
-            wanted = [rule.pattern for rule in rules if rule.state == state]
-            if not any(any_of(pattern, self._said) for pattern in wanted):
-                usual = next((rule.preset for rule in rules if rule.state == state and rule.preset), "")
-                yield state, f"one such as {usual}" if usual else " or ".join(map(shown, wanted))
+    def _missing(self) -> Iterator[tuple[str, str]]:
+        """Groups, and words of which one must have come before the first motion."""
+        rows = [row for row in self._listed if row.first]
+        for group in dict.fromkeys(row.group for row in rows):
+            wanted = [row.pattern for row in rows if row.group == group]
+            if not any(any_of(pattern, self._words) for pattern in wanted):
+                usual = next((row.preset for row in rows if row.group == group and row.preset), "")
+                yield group, f"one such as {usual}" if usual else " or ".join(map(shown, wanted))
 
     # where axes turn, and where the tool moves
 
     def turn(self, line: int, words: Mapping[str, float]) -> None:
-        """Take over rotary words; they may not turn the axes alone where a retract has left the tool."""
-        self.angles |= {name: words[name] for name in ROTARY & words.keys()}
+        """Look at rotary words: they may not turn the axes alone where a retract has left the tool."""
         if self.above and ROTARY & words.keys() and not LINEAR & words.keys():
             self._around_retracts(line, *(f"the rotary axes turn under {word}" for word in self._tip_control))
 
-    def motion(self, line: int, words: Mapping[str, float], code: float, *, drills: bool) -> None:
-        """Look at what holds where the tool moves by the words of a block, and by the G word of group 01 in force.
+    def motion(self, line: int, words: Mapping[str, float], *, drills: bool) -> None:
+        """Look at what holds where the tool moves by the words of a block.
 
         `drills`: in a cycle of the control, so it does not go there at once.
         """
         if self._high and not drills:
             self._around_retracts(line, *self._comes_down(words))
-        for state, word in self._ended.items():
-            if state not in self._left:
-                self.unframed(NOT_ESTABLISHED, line, f"{state}: it must come after {word}, which deselects it")
+        for group, word in self._ended.items():
+            if not self._is_left(group):
+                text = f"{_TITLES[group]}: it must come after {word}, which deselects it"
+                self.unframed(NOT_ESTABLISHED, line, text)
         self.above &= "Z" not in words
         late = set()
-        if self.above and code == 0.0 and "Z" not in words:
-            late = {state for state in self._late & self._held.keys() if self._held[state].off}
+        kind = self.machine.groups["motion"]
+        if self.above and kind == "rapid" and "Z" not in words:
+            late = {group for group, said in self._held.items() if group in self._late and said.off}
         first = self._begin(line, late) if self._first is None else self._first
-        self._compare(late, first, arc=code in (2.0, 3.0))
+        self._compare(late, first, arc=kind == "arc")
         if self._retract and not late:
             self.wrong(NOT_LISTED, self._retract, GONE_ON)
             self._retract = 0
@@ -263,23 +272,24 @@ class WordStates:
         self.unframed(NOT_LISTED, line, *self._wrong_offset())
         if self._retracts and not self._high:
             self._around_retracts(line, "the first motion without a retract before it")
-        self._first = {state: "" if state in late else held.text for state, held in self._held.items()}
-        for state, wanted in self._unsaid():
-            if state not in self._left:
-                self.unframed(NOT_ESTABLISHED, line, f"{state}: {wanted} must come before the first motion")
+        self._first = {group: "" if group in late else said.text for group, said in self._held.items()}
+        for group, wanted in self._missing():
+            if not self._is_left(group):
+                text = f"{_TITLES.get(group, group)}: {wanted} must come before the first motion"
+                self.unframed(NOT_ESTABLISHED, line, text)
         return self._first
 
     def _compare(self, late: Set[str], first: dict[str, str], *, arc: bool) -> None:
         """Complain of states that are not what they were at the first motion, where nobody else compares them."""
-        for state, held in self._held.items():
-            if state not in late and first.get(state) == "":
-                first[state] = held.text
-            if state in late or held.text == first.get(state):
+        for group, said in self._held.items():
+            if group not in late and first.get(group) == "":
+                first[group] = said.text
+            if group in late or said.text == first.get(group):
                 continue
-            if held.rule.before and held.line > self._moved and not arc:
-                self.wrong(NOT_LISTED, held.line, f"{held.text} where no arc follows")
-            if not held.rule.follows:
-                self._others.setdefault(held, (state, first.get(state, "nothing")))
+            if group == "plane" and said.line > self._moved and not arc:
+                self.wrong(NOT_LISTED, said.line, f"{said.text} where no arc follows")
+            if not said.row.follows:
+                self._others.setdefault(said, (group, first.get(group, "nothing")))
 
     def _comes_down(self, words: Mapping[str, float]) -> Iterator[str]:
         """What is wrong with the first motion after a retract, by the words of a block."""
@@ -291,8 +301,8 @@ class WordStates:
 
     def _tilted(self, words: Mapping[str, float]) -> bool | None:
         """Whether X and Y lie in another plane in the part than on the machine; None where that is not known."""
-        on = {held.rule.state: held.text for held in self._held.values() if not held.off}
-        plane = [text for state, text in on.items() if state in _PLANES]
+        on = {group: said.text for group, said in self._held.items() if not said.off}
+        plane = [text for group, text in on.items() if group in _PLANES]
         if plane:
             return any(map(float, _DECIMAL.findall(plane[0])))
         if not (self._positions.keeps_tip or self._tip_control or _DYNAMIC in on):
@@ -301,29 +311,29 @@ class WordStates:
             axis = np.array([words[name] for name in "IJK"])
             return bool(axis[2] < _UPRIGHT * np.linalg.norm(axis))
         machine = self._positions.machine
-        if machine is None or not set(machine.names) <= self.angles.keys():
+        if machine is None or not set(machine.names) <= self.machine.angles.keys():
             return None
-        given = [self.angles.get(axis.name, 0.0) for axis in machine.axes]
+        given = [self.machine.angles.get(axis.name, 0.0) for axis in machine.axes]
         return bool(tool_vectors(machine, np.array([given]))[0, 2] < _UPRIGHT)
 
     def _wrong_offset(self) -> Iterator[str]:
         """What is wrong with the work offset, one for the whole program."""
-        held = next((held for held in self._held.values() if held.rule.state == _OFFSET), None)
-        wanted = self._made.get("OFFSET") or next((rule.preset for rule in self._list.words if rule.preset), "NONE")
-        if held is None or not self._made or _OFFSET in self._left or wanted == "NONE":
+        held = self.work_offset
+        wanted = self._made.get("OFFSET") or next((row.preset for row in self._listed if row.preset), "NONE")
+        if not held or not self._made or self._is_left("offset") or wanted == "NONE":
             return
-        if re.split(r"=\+?", held.text)[-1].replace(" ", "_") != wanted:
-            yield f"{held.text}, where the program was made for {wanted.replace('_', ' ')}"
+        if re.split(r"=\+?", held)[-1].replace(" ", "_") != wanted:
+            yield f"{held}, where the program was made for {wanted.replace('_', ' ')}"
 
     def end(self, line: int) -> None:
         """Look at what holds where the program ends; `line` is that of its end."""
-        for held, (state, other) in self._others.items():
-            if not (held.rule.tool and self._cycles):
-                text = f"{state}: {held.text} where {other} holds for the whole program"
-                self.wrong(NOT_LISTED, held.line, text)
-        for state, held in self._held.items():
-            if not held.off and any(rule.off for rule in self._list.words if rule.state == state):
-                text = f"{state}: {held.text} of line {held.line} still holds at the end"
+        for said, (group, other) in self._others.items():
+            if not (said.row.tool and self._cycles):
+                text = f"{_TITLES.get(group, group)}: {said.text} where {other} holds for the whole program"
+                self.wrong(NOT_LISTED, said.line, text)
+        for group, said in self._held.items():
+            if not said.off and any(row.off for row in self._listed if row.group == group):
+                text = f"{_TITLES.get(group, group)}: {said.text} of line {said.line} still holds at the end"
                 self.unframed(NOT_ESTABLISHED, line, text)
         if not self._high and self._retracts:
             self.unframed(NOT_ESTABLISHED, line, "the tool is not retracted at the end")
