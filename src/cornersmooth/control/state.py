@@ -52,7 +52,7 @@ _ROTARY: Final = frozenset("ABC")
 
 
 @dataclass(frozen=True)
-class Said:
+class LastWord:
     """The word that has set a group last, whatever became of it since."""
 
     row: Row
@@ -75,7 +75,7 @@ class State:
     #: last word of each axis, in units of the program; where the machine is, if that is known
     place: dict[str, float] = field(default_factory=dict)
     feed: float = math.nan  #: as written
-    said: dict[str, Said] = field(default_factory=dict)  #: by groups
+    last_words: dict[str, LastWord] = field(default_factory=dict)  #: by groups
     #: last words of rotary axes, wherever these are since, but where the control has turned them
     angles: dict[str, float] = field(default_factory=dict)
     #: frames that no word of the program names: what it calls leaves them off, for nothing would end them
@@ -94,7 +94,7 @@ class State:
 
     def copy(self) -> State:
         """Return the same state, to be changed on its own."""
-        own = dict(self.groups), dict(self.place), self.feed, dict(self.said), dict(self.angles)
+        own = dict(self.groups), dict(self.place), self.feed, dict(self.last_words), dict(self.angles)
         return State(self.table, self.axes, *own, self.unnamed)
 
     @property
@@ -131,7 +131,7 @@ class State:
         self.lose_place(letter for letter, value in self.place.items() if value != other.place[letter])
         self.groups = {name: value if other.groups[name] == value else None for name, value in self.groups.items()}
         self.feed = self.feed if self.feed == other.feed else math.nan
-        self.said = {group: said for group, said in self.said.items() if group in other.said}
+        self.last_words = {group: last for group, last in self.last_words.items() if group in other.last_words}
 
     def pass_blocks(self, code: float | None, angles: Mapping[str, float]) -> None:
         """Go on behind motion blocks: the last G word of group 01 and the last rotary words in them, where given."""
@@ -210,7 +210,7 @@ class State:
             self.groups[group] = value
             if value is not None:
                 more = (other.spelling for other in words if other.name in row.more)
-                self.said[group] = Said(row, " ".join((word.spelling, *more)), line)
+                self.last_words[group] = LastWord(row, " ".join((word.spelling, *more)), line)
         return does
 
     def _go(self, given: Mapping[str, float], axes: Iterable[str], does: set[str]) -> None:

@@ -118,7 +118,7 @@ class Row:
     never: bool = False  #: the control has no such word
 
     # blocks before and after
-    after: re.Pattern[str] | None = None  #: a word that must have been said since the last time
+    after: re.Pattern[str] | None = None  #: a word that must have come since the last time
     previous: re.Pattern[str] | None = None  #: the block before
     next: re.Pattern[str] | None = None  #: the next block
     plane: int = 0  #: the G word of planes that must be in force where it is taken
@@ -131,9 +131,9 @@ class Row:
     compared: bool = False  #: others compare the word with the CL file
     first: bool = False  #: one of its group must come before the first motion
     preset: str = ""  #: the usual one of these
-    drops: str = ""  #: a group that the control forgets with it, and that must be said after it
+    drops: str = ""  #: a group that the control forgets with it, and that must come after it
     off: bool = False  #: it switches the group off, which must hold at the end
-    outside: bool = False  #: it may not be said under tool tip control
+    outside: bool = False  #: it may not stand under tool tip control
 
     # where the tool is
     #: the tool goes away, and none but an approach may follow, in which work offset or tool length are said again

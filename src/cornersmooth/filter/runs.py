@@ -209,7 +209,7 @@ class ProgramReader:
             last = item.after(count) if isinstance(item, Rows) else item.after
         found.at |= dict.fromkeys(stops_left, last)
         found.at = {line: replace(state, place=state.place | still) for line, state in found.at.items()}
-        found.said = frozenset(last.said)
+        found.said = frozenset(last.last_words)
         return found
 
     def _take_rows(self, found: Reading, rows: Rows, corners: Bools, cause: str) -> None:

@@ -1,7 +1,7 @@
 """What must hold of the groups of a control where the tool moves, changes or stops.
 
-The machine (`control.state`) remembers what words have said of each group; the row of a word (`control.table`) says
-when it must have been said, until when it may hold, and at which places of the program it may be: after a retract, on
+The machine (`control.state`) remembers the last word of each group; the row of a word (`control.table`) tells when it
+must have come, until when it may hold, and at which places of the program it may be: after a retract, on
 the way down, under tool tip control.
 
 Posts have many ways to begin, to change tools and to end, and most of them are right. What has changed in a program
@@ -17,7 +17,7 @@ from typing import Final
 
 import numpy as np
 
-from cornersmooth.control.state import Said, State
+from cornersmooth.control.state import LastWord, State
 from cornersmooth.control.table import Row, any_of, shown
 from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.nc_reader.rotary import tool_vectors
@@ -92,14 +92,14 @@ class StateRules:
         self._words: set[str] = set()  # so far; those that must come again before each of their kind, since then
         self._first: dict[str, str] | None = None  # groups at the first motion; "" for those that may come later
         # what holds and did not at the first motion, and what is wrong with it
-        self._others: dict[Said, tuple[str, str]] = {}
+        self._others: dict[LastWord, tuple[str, str]] = {}
         self._cycles = False  # whether the program has any, so that some groups may differ from tool to tool
         self._retract = 0  # line of a retract that no approach has followed
         self._high = False  # the tool has not moved since a retract
         self.above = False  # Z has not
         self._moved = 0  # line of the last motion
-        self._changed = True  # words have been said since
-        #: groups that words have ended since, with these: they must be said again before the next motion
+        self._changed = True  # there have been words since
+        #: groups that words have ended since, with these: they must come again before the next motion
         self._ended: dict[str, str] = {}
 
     # complaints
@@ -123,20 +123,20 @@ class StateRules:
     # what holds
 
     @property
-    def _held(self) -> dict[str, Said]:
-        """What has been said last of each group that verification follows."""
-        return {group: said for group, said in self.machine.said.items() if said.row.group == group}
+    def _followed(self) -> dict[str, LastWord]:
+        """The last word of each group that verification follows."""
+        return {group: last for group, last in self.machine.last_words.items() if last.row.group == group}
 
     @property
     def _tip_control(self) -> list[str]:
         """Word of tool tip control that holds, if any."""
-        return [said.text for said in self._held.values() if said.row.tip_on]
+        return [last.text for last in self._followed.values() if last.row.tip_on]
 
     @property
     def work_offset(self) -> str:
         """The work offset that holds, as it is written; empty for none."""
-        said = self.machine.said.get("offset")
-        return "" if said is None else said.text
+        last = self.machine.last_words.get("offset")
+        return "" if last is None else last.text
 
     @property
     def made(self) -> Mapping[str, str]:
@@ -145,7 +145,7 @@ class StateRules:
 
     def holds(self, group: str, text: str) -> bool:
         """Whether a group has been set so."""
-        return group in self.machine.said and self.machine.said[group].text == text
+        return group in self.machine.last_words and self.machine.last_words[group].text == text
 
     def _is_left(self, group: str) -> bool:
         """Whether a group is the user's own."""
@@ -183,16 +183,16 @@ class StateRules:
 
     def _check_plane(self, line: int, ruled: Ruled) -> None:
         """Complain of words that are taken in another plane than theirs, and of that while the tool is compensated."""
-        plane, side = self.machine.said.get("plane"), self.machine.said.get("compensation")
-        held = [] if side is None else [(side.text, side.row)]
-        for word, row in dict.fromkeys([*ruled, *held]) if plane is not None else ():
+        plane, side = self.machine.last_words.get("plane"), self.machine.last_words.get("compensation")
+        kept = [] if side is None else [(side.text, side.row)]
+        for word, row in dict.fromkeys([*ruled, *kept]) if plane is not None else ():
             if row.plane and plane is not None and plane.text != f"G{row.plane}":
                 self.wrong(NOT_LISTED, line, f"{word} under {plane.text}, where G{row.plane} must be in force")
 
     def _place(self, line: int, word: str, row: Row) -> None:
         """Complain of a word that is not in its place, as things are before its block."""
         if row.after is not None:
-            before = {said for said in self._words if row.after.fullmatch(said)}
+            before = {last for last in self._words if row.after.fullmatch(last)}
             if not before:
                 self.wrong(NOT_LISTED, line, f"{word} without {shown(row.after)} before it")
             self._words -= before
@@ -202,7 +202,7 @@ class StateRules:
             self.unframed(NOT_LISTED, line, f"{word} without a retract before it")
         if row.retract:
             # of FANUC the length of the tool holds in the retract, with its tip control
-            own = [said.text for group, said in self._held.items() if said.row.tip_on and group != "tool_length"]
+            own = [last.text for group, last in self._followed.items() if last.row.tip_on and group != "tool_length"]
             self._around_retracts(line, *(f"{word} under {tip}" for tip in own if "Z" in word))
             self._retract, self._high, self.above = line, True, True
         if row.changes_tool or row.outside:
@@ -210,14 +210,14 @@ class StateRules:
             tell = self.unframed if row.changes_tool else self.wrong
             for tip in self._tip_control:
                 tell(NOT_LISTED, line, f"{word} under {tip}")
-        spindle = self.machine.said.get("spindle")
+        spindle = self.machine.last_words.get("spindle")
         runs = spindle is not None and dict(spindle.row.sets)["spindle"] not in ENDINGS
         if row.changes_tool and runs and spindle is not None and spindle.line > self._moved:
             self.wrong(NOT_LISTED, line, f"{word} stops the spindle that was started before it")
 
     def _set(self, line: int, word: str, row: Row) -> None:
         """Take note of what a word begins and ends."""
-        if row.drops in self.machine.said:
+        if row.drops in self.machine.last_words:
             self._ended[row.drops] = word
         self._ended.pop(row.group, None)
         off = row.off and row.pattern.fullmatch(word) is not None
@@ -257,7 +257,7 @@ class StateRules:
         late = set()
         kind = self.machine.groups["motion"]
         if self.above and kind == "rapid" and "Z" not in words:
-            late = {group for group, said in self._held.items() if group in self._late and said.off}
+            late = {group for group, last in self._followed.items() if group in self._late and last.off}
         first = self._begin(line, late) if self._first is None else self._first
         self._compare(late, first, arc=kind == "arc")
         if self._retract and not late:
@@ -272,7 +272,7 @@ class StateRules:
         self.unframed(NOT_LISTED, line, *self._wrong_offset())
         if self._retracts and not self._high:
             self._around_retracts(line, "the first motion without a retract before it")
-        self._first = {group: "" if group in late else said.text for group, said in self._held.items()}
+        self._first = {group: "" if group in late else last.text for group, last in self._followed.items()}
         for group, wanted in self._missing():
             if not self._is_left(group):
                 text = f"{_TITLES.get(group, group)}: {wanted} must come before the first motion"
@@ -281,15 +281,15 @@ class StateRules:
 
     def _compare(self, late: Set[str], first: dict[str, str], *, arc: bool) -> None:
         """Complain of states that are not what they were at the first motion, where nobody else compares them."""
-        for group, said in self._held.items():
+        for group, last in self._followed.items():
             if group not in late and first.get(group) == "":
-                first[group] = said.text
-            if group in late or said.text == first.get(group):
+                first[group] = last.text
+            if group in late or last.text == first.get(group):
                 continue
-            if group == "plane" and said.line > self._moved and not arc:
-                self.wrong(NOT_LISTED, said.line, f"{said.text} where no arc follows")
-            if not said.row.follows:
-                self._others.setdefault(said, (group, first.get(group, "nothing")))
+            if group == "plane" and last.line > self._moved and not arc:
+                self.wrong(NOT_LISTED, last.line, f"{last.text} where no arc follows")
+            if not last.row.follows:
+                self._others.setdefault(last, (group, first.get(group, "nothing")))
 
     def _comes_down(self, words: Mapping[str, float]) -> Iterator[str]:
         """What is wrong with the first motion after a retract, by the words of a block."""
@@ -301,7 +301,7 @@ class StateRules:
 
     def _tilted(self, words: Mapping[str, float]) -> bool | None:
         """Whether X and Y lie in another plane in the part than on the machine; None where that is not known."""
-        on = {group: said.text for group, said in self._held.items() if not said.off}
+        on = {group: last.text for group, last in self._followed.items() if not last.off}
         plane = [text for group, text in on.items() if group in _PLANES]
         if plane:
             return any(map(float, _DECIMAL.findall(plane[0])))
@@ -318,22 +318,22 @@ class StateRules:
 
     def _wrong_offset(self) -> Iterator[str]:
         """What is wrong with the work offset, one for the whole program."""
-        held = self.work_offset
+        kept = self.work_offset
         wanted = self._made.get("OFFSET") or next((row.preset for row in self._listed if row.preset), "NONE")
-        if not held or not self._made or self._is_left("offset") or wanted == "NONE":
+        if not kept or not self._made or self._is_left("offset") or wanted == "NONE":
             return
-        if re.split(r"=\+?", held)[-1].replace(" ", "_") != wanted:
-            yield f"{held}, where the program was made for {wanted.replace('_', ' ')}"
+        if re.split(r"=\+?", kept)[-1].replace(" ", "_") != wanted:
+            yield f"{kept}, where the program was made for {wanted.replace('_', ' ')}"
 
     def end(self, line: int) -> None:
         """Look at what holds where the program ends; `line` is that of its end."""
-        for said, (group, other) in self._others.items():
-            if not (said.row.tool and self._cycles):
-                text = f"{_TITLES.get(group, group)}: {said.text} where {other} holds for the whole program"
-                self.wrong(NOT_LISTED, said.line, text)
-        for group, said in self._held.items():
-            if not said.off and any(row.off for row in self._listed if row.group == group):
-                text = f"{_TITLES.get(group, group)}: {said.text} of line {said.line} still holds at the end"
+        for last, (group, other) in self._others.items():
+            if not (last.row.tool and self._cycles):
+                text = f"{_TITLES.get(group, group)}: {last.text} where {other} holds for the whole program"
+                self.wrong(NOT_LISTED, last.line, text)
+        for group, last in self._followed.items():
+            if not last.off and any(row.off for row in self._listed if row.group == group):
+                text = f"{_TITLES.get(group, group)}: {last.text} of line {last.line} still holds at the end"
                 self.unframed(NOT_ESTABLISHED, line, text)
         if not self._high and self._retracts:
             self.unframed(NOT_ESTABLISHED, line, "the tool is not retracted at the end")
