@@ -17,7 +17,7 @@ from cornersmooth.feedrate.planner import passed
 from cornersmooth.feedrate.resolution import ROUGHLY
 from cornersmooth.kinematics import Machine, endless
 from cornersmooth.model import Floats
-from cornersmooth.settings.limits import Limits
+from cornersmooth.settings import Limits
 
 
 def ramp_times(path: Path, limits: Limits, machine: Machine) -> Floats:
