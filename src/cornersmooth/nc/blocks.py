@@ -53,7 +53,10 @@ class Blocks:
         before = [part for part in self._changes(rows, at) if len(part[0]) > 1]  # mostly nothing changes
         if at.form.curve in MODAL_CURVES:
             if before and at.form.curve == "g6.2":
-                before.insert(0, self._end_of_curve(rows, at, before))
+                # G1 where blocks stand right behind a curve: G06.2 is modal, and takes nothing but control points
+                behind_curve = np.concatenate(([modals["spline"]], rows.curve[:-1] > 0))
+                behind_curve &= np.logical_or.reduce([ids > 0 for _, ids in before])
+                before.insert(0, ([b"", f"{at.motion.line}\n".encode()], behind_curve.astype(np.int64)))
             modals.now["spline"] = bool(rows.curve[-1])
         if words:
             before.append(([b"", f"{words}{at.gap}".encode()], (np.arange(count) == 0).astype(np.int64)))
@@ -114,12 +117,6 @@ class Blocks:
             on_arc = np.flatnonzero(rows.arc >= 0)
             changes.append(self._change("plane", on_arc, self.circles.plane[rows.arc[on_arc]], len(rows)))
         return changes
-
-    def _end_of_curve(self, rows: BlockRows, at: Coordinates, before: Sequence[Part]) -> Part:
-        """G1 where blocks stand right behind a curve: G06.2 is modal, and takes nothing but control points."""
-        behind = np.concatenate(([self.modals["spline"]], rows.curve[:-1] > 0))
-        changed = np.logical_or.reduce([ids > 0 for _, ids in before])
-        return [b"", f"{at.motion.line}\n".encode()], (behind & changed).astype(np.int64)
 
     def _change(self, group: str, rows: Ints, values: Ints, count: int) -> Part:
         """Blocks before those of `count` rows, in ascending order, from which on a group has another value."""

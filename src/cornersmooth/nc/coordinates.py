@@ -121,7 +121,7 @@ class Coordinates:
             tip = tip @ self.plane.frame
         if form.orientation == "point":
             other = tip + self.stretch * (other - tip)
-        elif form.vectors and form.table.digits.vector_length != 1:
+        elif form.orientation == "vector" and form.table.digits.vector_length != 1:
             other = form.table.digits.vector_length * other
         if form.rotary and form.machine is not None and form.machine.names != form.other_words:
             other = other[:, ::-1]

@@ -19,7 +19,7 @@ from cornersmooth.kinematics import Machine
 from cornersmooth.model import MM_PER_UNIT, Move, Program, Units
 from cornersmooth.nc.control import Blocks, Control, CurveStyle, Extra, FormTable, Mode, Orientation
 from cornersmooth.nc.control_tables import load_control
-from cornersmooth.nc.statement_args import loaded_tool
+from cornersmooth.nc.statement_args import tool_loads
 from cornersmooth.settings import Settings
 from cornersmooth.tables import closest
 
@@ -68,11 +68,6 @@ class Form:
     def long_lines(self) -> bool:
         """Whether the form can be written in long lines: the tip runs straight on them whatever the axis does."""
         return not self.curve and self.orientation in ("vector", "angles")
-
-    @property
-    def vectors(self) -> bool:
-        """Whether the words after the tip are a tool vector."""
-        return self.orientation == "vector"
 
     @property
     def rotary(self) -> bool:
@@ -204,8 +199,9 @@ def choose_form(
         raise SettingsError("CS232", what, "leave out --planes")
     orientation, mode = _mode(table, chosen, machine, tcp)
     chosen_extras = tuple(_extra(table, name, extra) for extra in dict.fromkeys(extras))
-    if machine is not None and machine.names:
-        _check_axes(table, mode, machine)
+    if machine is not None and machine.modulo and not mode.motion.shortest:
+        what = f"{table.name} has no words by which {' and '.join(machine.modulo)} goes the shorter way"
+        raise SettingsError("CS215", what, "leave out modulo in the machine file")
     plane = _plane(table, chosen, machine) if planes else None
     found = Form(table, name, chosen.curve, orientation, mode, machine, chosen_extras, chosen.upright, rewind, plane)
     _check_rewind(found)
@@ -234,14 +230,6 @@ def _without_rotary_axes(table: Control, form: FormTable) -> Mode:
         hint = f"use -f {lines}" if lines else "leave out --machine"
         raise SettingsError("CS215", f"{here} has no blocks without words of the tool axis", hint)
     return mode
-
-
-def _check_axes(table: Control, mode: Mode, machine: Machine) -> None:
-    """Refuse modulo axes that the control does not turn the shorter way."""
-    axes = " and ".join(machine.modulo)
-    if axes and not mode.motion.shortest:
-        what = f"{table.name} has no words by which {axes} goes the shorter way"
-        raise SettingsError("CS215", what, "leave out modulo in the machine file")
 
 
 def _check_rewind(form: Form) -> None:
@@ -302,20 +290,19 @@ def check_program(form: Form, program: Program, settings: Settings) -> None:
 
 def _check_lengths(machine: Machine, program: Program) -> None:
     """Refuse a program with tools whose lengths are not known, where these go into every position."""
-    loads = [statement for statement in program.statements if statement.word in ("LOADTL", "LOAD", "TURRET")]
+    loads = [(statement, tool[0]) for statement, tool in tool_loads(program)]
     known = dict(machine.tool_lengths)
-    numbers = [(loaded_tool(statement) or (-1, -1))[0] for statement in loads]
-    missing = [one for one, number in zip(loads, numbers, strict=True) if number not in known]
+    missing = [statement for statement, number in loads if number not in known]
     if known and missing:
         what = f"a tool that [tool_lengths] of {machine.name} does not have, and whose length goes into every position"
         hint = "write its length into the machine file"
         raise SettingsError("CS219", what, hint, file=program.source.name, line=missing[0].line)
-    tools = set(numbers)
-    if len(tools) > 1 and not known:
-        what = f"{len(tools)} tools, and {machine.name} has one tool_length that goes into every position"
+    others = [statement for statement, number in loads if number != loads[0][1]]
+    if others and not known:
+        tools = len({number for _, number in loads})
+        what = f"{tools} tools, and {machine.name} has one tool_length that goes into every position"
         hint = "write [tool_lengths] into the machine file, or let the control keep the tool tip"
-        line = next(one.line for one, number in zip(loads, numbers, strict=True) if number != numbers[0])
-        raise SettingsError("CS219", what, hint, file=program.source.name, line=line)
+        raise SettingsError("CS219", what, hint, file=program.source.name, line=others[0].line)
 
 
 def _refusal(

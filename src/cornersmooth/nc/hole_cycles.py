@@ -27,6 +27,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -216,7 +217,7 @@ class HoleCycles:
     findings: Findings
     skip: bool = False  #: whether cycles that cannot be written are left out with a warning; an error otherwise
     now: Cycle | None = None  #: the cycle in force, None where it is not understood
-    _statement: Statement | None = None  #: the last CYCLE
+    line: int = 0  #: of the last CYCLE statement, 0 for none
     _args: tuple[float | str, ...] = ()
     _on: bool = False
 
@@ -226,7 +227,7 @@ class HoleCycles:
 
     def begin(self, statement: Statement, speed: float | None) -> None:
         """CYCLE with the words of a cycle, ON, or INIT, at a speed of the spindle in revolutions per minute."""
-        self._statement = statement
+        self.line = statement.line
         self._on |= words_of(statement) != ["INIT"]
         self._args = in_force(self._args, statement.args, self.program)
         self.read(speed)
@@ -244,11 +245,6 @@ class HoleCycles:
         if not self.skip:
             raise refused("CS342", self.program, self.line or line, why=why)
         self.findings.note("CS315", line, holes, why=why)
-
-    @property
-    def line(self) -> int:
-        """Line of the last CYCLE statement, 0 for none."""
-        return 0 if self._statement is None else self._statement.line
 
 
 #: sides of the path on which cutter compensation keeps the tool
@@ -290,31 +286,21 @@ def upright_poses(program: Program, form: Form, *, drills: bool) -> Bools:
 
 def has_cycles(program: Program, form: Form, part: slice, *, drills: bool) -> bool:
     """Whether any hole of a part of the poses can be a cycle of the control; `drills` as in `upright_poses`."""
-    if not (program.kind[part] == Move.HOLE).any():
-        return False
-    cycles_in_force = _said_cycles(program)
-    for k, (first, args, clockwise) in enumerate(cycles_in_force):
-        until = cycles_in_force[k + 1][0] if k + 1 < len(cycles_in_force) else len(program)
+    args: tuple[float | str, ...] = ()
+    stated, clockwise = list[tuple[int, tuple[float | str, ...], bool]](), False  # a tap turns the spindle clockwise
+    for statement in program.statements if (program.kind[part] == Move.HOLE).any() else ():
+        if statement.word == "SPINDL":
+            clockwise = not {"OFF", "NOMORE", "CCLW", "LOCK", "ORIENT"} & set(words_of(statement))
+        elif statement.word == "CYCLE" and words_of(statement)[:1] not in (["OFF"], ["NOMORE"]):
+            args = in_force(args, statement.args, program)
+            stated.append((statement.pose, args, clockwise))
+    for (first, args, clockwise), (until, _, _) in pairwise([*stated, (len(program), (), False)]):
         poses = np.arange(max(first, part.start), min(until, part.stop))
         poses = poses[program.kind[poses] == Move.HOLE]
         cycle = read_cycle(args, program, None) if len(poses) else None
         if cycle is not None and (clockwise if cycle.tap else drills) and kind_of(cycle, form, program, poses[:1]):
             return True
     return False
-
-
-def _said_cycles(program: Program) -> list[tuple[int, tuple[float | str, ...], bool]]:
-    """Pose and arguments in force of CYCLE statements, and whether the spindle turns clockwise, as a tap needs it."""
-    cycles_in_force: list[tuple[int, tuple[float | str, ...], bool]] = []
-    args: tuple[float | str, ...] = ()
-    clockwise = False
-    for statement in program.statements:
-        if statement.word == "SPINDL":
-            clockwise = not {"OFF", "NOMORE", "CCLW", "LOCK", "ORIENT"} & set(words_of(statement))
-        elif statement.word == "CYCLE" and words_of(statement)[:1] not in (["OFF"], ["NOMORE"]):
-            args = in_force(args, statement.args, program)
-            cycles_in_force.append((statement.pose, args, clockwise))
-    return cycles_in_force
 
 
 def _can_stand_upright(form: Form) -> bool:

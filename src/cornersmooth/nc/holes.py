@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import accumulate, chain, pairwise, repeat, takewhile
 
 import numpy as np
 
@@ -223,32 +224,18 @@ def hole_moves(
     Heights (h,) above the holes, mm: to which the tool comes, where feeding begins, and from which it goes.
     """
     enter, clearance, leave = above
-    heights, rapid, dwell = [enter, clearance], [True, True], [False, False]
-
-    def go(height: Floats, *, fast: bool) -> None:
-        heights.append(height)
-        rapid.append(fast)
-        dwell.append(False)
-
-    done = 0.0
-    for depth in _peck_depths(cycle):
-        if done > 0.0:
-            if cycle.full_retract:
-                go(clearance, fast=True)
-                go(np.minimum(clearance, PECK_GAP - done), fast=True)
-            else:
-                go(np.minimum(clearance, PECK_GAP - done), fast=True)
-        go(np.full(len(poses), -depth), fast=False)
-        done = depth
-    dwell[-1] = cycle.dwell > 0
-    if cycle.feed_out:
-        go(clearance, fast=False)
-    go(leave, fast=True)
-    height = np.stack(heights, axis=1)
+    moves = [(enter, True), (clearance, True)]  # heights, and whether in rapid
+    for before, depth in pairwise((0.0, *_peck_depths(cycle))):
+        if before > 0.0:
+            moves += [(clearance, True)] * cycle.full_retract + [(np.minimum(clearance, PECK_GAP - before), True)]
+        moves.append((np.full(len(poses), -depth), False))
+    dwell = (np.arange(len(moves) + 1 + cycle.feed_out) == len(moves) - 1) & (cycle.dwell > 0)
+    moves += [(clearance, False)] * cycle.feed_out + [(leave, True)]
+    height = np.stack([height for height, _ in moves], axis=1)
     tip = program.tip[poses][:, None, :] + height[..., None] * program.axis[poses][:, None, :]
     count = len(poses)
-    hole = np.repeat(np.arange(count), len(rapid))
-    return hole, tip.reshape(-1, 3), np.tile(rapid, count), np.tile(dwell, count)
+    hole = np.repeat(np.arange(count), len(moves))
+    return hole, tip.reshape(-1, 3), np.tile([rapid for _, rapid in moves], count), np.tile(dwell, count)
 
 
 def crossings(program: Program, poses: Ints, travel: Floats, came: float) -> tuple[Floats, Floats]:
@@ -282,11 +269,5 @@ def travel_height(program: Program, poses: Ints, approach: Ints) -> Floats:
 
 def _peck_depths(cycle: Cycle) -> list[float]:
     """Depths to which the tool feeds, one after another."""
-    depths = []
-    depth, steps = 0.0, list(cycle.steps)
-    while steps:
-        depth += steps.pop(0) if len(steps) > 1 else steps[0]
-        if depth >= cycle.depth - LEAST_PECK:
-            break
-        depths.append(depth)
-    return [*depths, cycle.depth]
+    pecks = accumulate(chain(cycle.steps, repeat(cycle.steps[-1]))) if cycle.steps else ()
+    return [*takewhile(lambda depth: depth < cycle.depth - LEAST_PECK, pecks), cycle.depth]

@@ -123,7 +123,7 @@ class Frame(FrameSettings):
     def refuse_tool(self, form: Form, program: Program) -> None:
         """Refuse a header that loads a tool where the program then takes the length of another (CS249)."""
         moving = program.kind != Move.FROM
-        loaded = any(not moving[:pose].any() for pose, _ in tool_loads(program))
+        loaded = any(not moving[: load.pose].any() for load, _ in tool_loads(program))
         if loaded or not any("{offset}" in block for block in form.mode.on):
             return
         for line in self.header:

@@ -73,7 +73,9 @@ def rotary_way(rows: Rows, smoothed: SmoothProgram, form: Form, findings: Findin
         if left.any():
             tip, axis, move = tip[source], axis[source], move[source]
             rapid = rapid[source] | left
-            _note_rewinds(machine, path.angles, left, program.line[move], findings)
+            lines, back = program.line[move[left]], int(np.argmax(left))
+            turn = np.abs(path.angles[back] - path.angles[back - 1])
+            findings.note_each("CS376", lines, name=machine.names[int(np.argmax(turn))], turn=float(turn.max()))
     else:
         path = rotary_angles(machine, tip, axis, **how)
     findings.add_all(path.findings)
@@ -103,13 +105,6 @@ def _check_reach(machine: Machine, program: Program, axis: Floats, move: Ints, t
     if len(rows):
         line = int(program.line[move[rows[0]]])
         raise refused("CS361", program, line, axis=machine.names[0], machine=machine.name)
-
-
-def _note_rewinds(machine: Machine, angles: Floats, left: Bools, line: Ints, findings: Findings) -> None:
-    rows = np.flatnonzero(left)
-    turn = np.abs(angles[rows] - angles[rows - 1])
-    column = int(np.argmax(turn[0]))
-    findings.note_each("CS376", line[rows], name=machine.names[column], turn=float(turn[0, column]))
 
 
 def within_reach(smoothed: SmoothProgram, form: Form) -> SmoothProgram:

@@ -136,11 +136,11 @@ def loaded_tool(statement: Statement) -> tuple[int, int] | None:
     return number, number if offset is None else offset
 
 
-def tool_loads(program: Program) -> list[tuple[int, tuple[int, int]]]:
-    """Pose, and tool and length register, of every statement that loads a tool."""
+def tool_loads(program: Program) -> list[tuple[Statement, tuple[int, int]]]:
+    """Statements that load a tool, with tool and length register: TOOLNO where no other word does."""
     words = TOOL_WORDS if TOOL_WORDS & {statement.word for statement in program.statements} else {"TOOLNO"}
-    loads = [(statement.pose, loaded_tool(statement)) for statement in program.statements if statement.word in words]
-    return [(pose, tool) for pose, tool in loads if tool is not None]
+    loads = [(statement, loaded_tool(statement)) for statement in program.statements if statement.word in words]
+    return [(statement, tool) for statement, tool in loads if tool is not None]
 
 
 def ahead_of_tools(program: Program) -> frozenset[int]:
@@ -158,9 +158,9 @@ def ahead_of_tools(program: Program) -> frozenset[int]:
 def tool_starts(program: Program) -> list[int]:
     """Poses at which another tool begins, the first pose among them; ascending."""
     starts, tool = [0], None
-    for pose, loaded in tool_loads(program):
+    for statement, loaded in tool_loads(program):
         if loaded != tool:
-            starts.append(pose)
+            starts.append(statement.pose)
             tool = loaded
     return sorted({min(pose, len(program)) for pose in starts})
 
@@ -172,7 +172,7 @@ def check_tool_travel(program: Program, machine: Machine, tip: Floats, angles: F
     """
     loads = tool_loads(program) if machine.travel and machine.tool_lengths else []
     numbers = np.array([-1, *(number for _, (number, _) in loads)], np.int64)
-    tools = numbers[np.searchsorted(np.array([pose for pose, _ in loads], np.int64), move, side="right")]
+    tools = numbers[np.searchsorted(np.array([load.pose for load, _ in loads], np.int64), move, side="right")]
     for number in np.unique(tools).tolist():
         rows, file = tools == number, program.source.name
         check_travel(machine.with_tool(number), tip[rows], angles[rows], program.line[move[rows]], file)

@@ -29,6 +29,7 @@ from cornersmooth.nc.statement_args import (
     spindle_args,
     spindle_speed,
     spoken_text,
+    tool_loads,
     whole_number,
     words_of,
 )
@@ -142,9 +143,8 @@ class StatementWriter:
 
         Where the table says so, the tool of the next change is brought near, if the CL file selects none.
         """
-        between, following = self._until_next_tool(statement)
-        after, staged = (None if following is None else loaded_tool(following)), self.words.tool_select
-        if not self.words.stage_tool or after is None or after[0] == number or any(s.word == "SELECT" for s in between):
+        (between, after), staged = self._until_next_tool(statement), self.words.tool_select
+        if not self.words.stage_tool or after in (None, number) or any(s.word == "SELECT" for s in between):
             staged = ()
         speed = None
         if any("{speed}" in block for block in self.words.tool_change):
@@ -152,16 +152,16 @@ class StatementWriter:
             if not speed:
                 raise refused("CS354", self.program, statement.line, tool=number)
         blocks = [block.format(tool=number, speed=self._speed_text(speed or 0.0)) for block in self.words.tool_change]
-        return blocks + [block.format(tool=after[0]) for block in staged if after is not None]
+        return blocks + [block.format(tool=after) for block in staged]
 
-    def _until_next_tool(self, load: Statement) -> tuple[tuple[Statement, ...], Statement | None]:
-        """Statements between a tool change and the next one, and that, if there is one."""
-        statements = self.program.statements
+    def _until_next_tool(self, load: Statement) -> tuple[tuple[Statement, ...], int | None]:
+        """Statements between a tool change and the next one, and the tool of that, if there is one."""
+        statements, own = self.program.statements, loaded_tool(load)
         begin = next(k for k, statement in enumerate(statements) if statement is load) + 1
-        loading, own = {"TOOLNO"} if self.toolno_loads else TOOL_WORDS, (None, loaded_tool(load))
-        for k, statement in enumerate(statements[begin:]):
-            if statement.word in loading and loaded_tool(statement) not in own:
-                return statements[begin : begin + k], statement
+        loads = {id(statement): tool for statement, tool in tool_loads(self.program)}
+        for k, statement in enumerate(statements[begin:], begin):
+            if (tool := loads.get(id(statement), own)) not in (None, own):
+                return statements[begin:k], tool[0]
         return statements[begin:], None
 
     def _first_speed(self, between: tuple[Statement, ...]) -> float | None:

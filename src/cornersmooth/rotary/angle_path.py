@@ -96,7 +96,7 @@ def rotary_angles(
         if len(at_pole):
             known, angles = angles, np.full((n, 2), np.nan)
             angles[steady] = known
-            length = _lengths(tip)
+            length = np.cumsum(np.linalg.norm(np.diff(tip, axis=0, prepend=tip[:1]), axis=1))  # up to each pose
             for here in _chunks(len(at_pole)):
                 _fill_cone(machine, length, axis, angles, at_pole[here], steady, run)
     else:
@@ -327,11 +327,6 @@ def _fill_cone(
     second = closest_second(machine, axis[poses], first)
     angles[poses, 0] = first
     angles[poses, 1] = second + 360 * np.round((guess - second) / 360)
-
-
-def _lengths(tip: Floats) -> Floats:
-    """Length of the path up to each pose: (n, 3) -> (n,) mm."""
-    return np.cumsum(np.linalg.norm(np.diff(tip, axis=0, prepend=tip[:1]), axis=1))
 
 
 def _chunks(n: int) -> Iterator[slice]:
