@@ -18,10 +18,8 @@ from cornersmooth.settings import Settings
 
 #: share of the tolerance that a chord may take where `Settings.chord` would allow more: the rest is for arithmetic
 _MOST_OF_TOLERANCE = 0.9
-
 #: largest turn about the arc's axis in one chord, rad: coarser chords of small arcs would not look like an arc
 _LARGEST_STEP = math.pi / 2.0
-
 #: parameters at which curves are compared with their arcs: the middle and the ends are on them
 _PROBES = np.linspace(0.0, 1.0, 17)[1:-1]
 

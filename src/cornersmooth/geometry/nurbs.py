@@ -18,8 +18,7 @@ import numpy as np
 
 from cornersmooth.model import Bools, Corners, Floats, Ints, Program
 
-#: distance of the second control point from the corner over that of the first
-RATIO: Final = 2.0 / 3.0
+RATIO: Final = 2.0 / 3.0  #: distance of the second control point from the corner over that of the first
 
 
 def deviation_factor(weights: Floats) -> Floats:

@@ -16,8 +16,7 @@ import numpy as np
 from cornersmooth.errors import SettingsError
 from cornersmooth.model import Floats, Program, Statement
 
-#: a cutter as Creo writes it: in a comment
-_COMMENTED = re.compile(r"->\s*CUTTER\s*/\s*(.*)", re.IGNORECASE)
+_COMMENTED = re.compile(r"->\s*CUTTER\s*/\s*(.*)", re.IGNORECASE)  #: a cutter as Creo writes it: in a comment
 
 
 @dataclass(frozen=True)

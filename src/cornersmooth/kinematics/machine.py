@@ -14,8 +14,7 @@ from cornersmooth.arrays.vectors import unit as unit_vector
 from cornersmooth.errors import SettingsError
 from cornersmooth.model import Floats
 
-#: addresses of the linear axes
-LINEAR = ("X", "Y", "Z")
+LINEAR = ("X", "Y", "Z")  #: addresses of the linear axes
 
 
 @dataclass(frozen=True)
@@ -68,9 +67,7 @@ class Dynamics:
 
 
 Vector = tuple[float, float, float]
-
-#: Two directions closer than this (rad) count as parallel: no second rotary axis can do its work then.
-PARALLEL = 1e-3
+PARALLEL = 1e-3  #: Two directions closer than this (rad) count as parallel: no second rotary axis can do its work then.
 
 
 @dataclass(frozen=True)
@@ -138,11 +135,8 @@ class RotaryAxis:
         return math.inf if self.limits is None else self.limits[1]
 
 
-#: block that switches tip control of the kinematics
-_SWITCH: Final = r"[MG][1-9]\d*(\.\d)?( P\d+)?"
-
-#: stands for a rotary axis that a machine has not
-_NO_AXIS: Final = RotaryAxis("", (0.0, 0.0, 1.0), "none")
+_SWITCH: Final = r"[MG][1-9]\d*(\.\d)?( P\d+)?"  #: block that switches tip control of the kinematics
+_NO_AXIS: Final = RotaryAxis("", (0.0, 0.0, 1.0), "none")  #: stands for a rotary axis that a machine has not
 
 
 @dataclass(frozen=True)

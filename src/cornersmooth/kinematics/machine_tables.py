@@ -10,7 +10,6 @@ from cornersmooth.kinematics.machine import LINEAR, Dynamics, Machine, RotaryAxi
 from cornersmooth.tables import Shelf, Table
 
 Row = TypeVar("Row")
-
 _SHELF = Shelf(
     "machine",
     __package__,

@@ -18,9 +18,7 @@ from cornersmooth.model import Floats
 
 _WORD = re.compile(r"([A-Za-z])\s*=?\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)")
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
-
-#: degrees below which angles are the same
-_SAME = 1e-9
+_SAME = 1e-9  #: degrees below which angles are the same
 
 
 def parse_pose(machine: Machine, text: str) -> dict[str, float]:

@@ -19,10 +19,8 @@ from cornersmooth.model import Bools, Floats, Ints
 
 #: A machine has a pole where k can lie along a₁; sides that differ by less (rad) meet there up to rounding.
 POLE_MATCH = 1e-9
-#: Chords of unit vectors are known to this.
-ROUNDING = 1e-7
-#: Axes that are solved at a time: what is computed on the way stays in the processor's cache.
-CHUNK = 1 << 13
+ROUNDING = 1e-7  #: Chords of unit vectors are known to this.
+CHUNK = 1 << 13  #: Axes that are solved at a time: what is computed on the way stays in the processor's cache.
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,7 @@ from cornersmooth.kinematics.machine import LINEAR, Machine
 from cornersmooth.kinematics.poses import radians, rotate
 from cornersmooth.model import Floats, Ints
 
-#: mm beyond the travel that are rounding
-_ROUNDING = 1e-6
+_ROUNDING = 1e-6  #: mm beyond the travel that are rounding
 
 
 def machine_position(machine: Machine, tip: Floats, angles: Floats) -> Floats:

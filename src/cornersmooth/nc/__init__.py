@@ -60,12 +60,8 @@ __all__ = [
 ]
 
 
-#: poses from which on it saves time to compute in a thread what is written next
-_MANY = 4096
-
-#: curve styles without weights
-_POLYNOMIAL = ("poly", "spl")
-
+_MANY = 4096  #: poses from which on it saves time to compute in a thread what is written next
+_POLYNOMIAL = ("poly", "spl")  #: curve styles without weights
 #: curve styles of controls that may turn the tool in their own way on a line between two axis points
 _TURNING = ("bspline", "poly")
 

@@ -20,11 +20,8 @@ from cornersmooth.nc.modals import Modals
 from cornersmooth.nc.program_frame import BLEND_STEP
 from cornersmooth.text import format_number, interleave, to_ticks
 
-#: curve styles whose word holds until another kind of motion
-MODAL_CURVES = ("g6.2", "bspline")
-
-#: steps of the last digit that a number may be below a whole one and still is it
-_ROUNDING = 1e-6
+MODAL_CURVES = ("g6.2", "bspline")  #: curve styles whose word holds until another kind of motion
+_ROUNDING = 1e-6  #: steps of the last digit that a number may be below a whole one and still is it
 
 
 @dataclass

@@ -12,8 +12,7 @@ from cornersmooth.nc.messages import Findings, refused
 from cornersmooth.nc.modals import Modals
 from cornersmooth.nc.statement_args import numbers_of, whole_number, words_of
 
-#: words for planes, with the G code of each
-_PLANES: Final = {"XYPLAN": 17, "ZXPLAN": 18, "YZPLAN": 19}
+_PLANES: Final = {"XYPLAN": 17, "ZXPLAN": 18, "YZPLAN": 19}  #: words for planes, with the G code of each
 
 
 def begin_compensation(

@@ -12,28 +12,18 @@ from cornersmooth.model import FeedMode, Units
 from cornersmooth.settings import BOUNDS, Lines
 from cornersmooth.tables import Bound, Pattern
 
-#: lines of a program, with places in braces
-Blocks = tuple[str, ...]
-
+Blocks = tuple[str, ...]  #: lines of a program, with places in braces
 #: what stands beside the tip in a motion block: the tool vector, a second point on the tool axis, the words of two
 #: rotary axes with the tip (tool tip control) or with the linear axes of the machine, or nothing
 Orientation = Literal["vector", "point", "angles", "machine", "fixed"]
-
-#: what lines may end with
-LINE_ENDS: Mapping[str, bytes] = {"lf": b"\n", "crlf": b"\r\n"}
-
-#: how curves are written; empty for lines
-CurveStyle = Literal["", "g6.2", "bspline", "poly", "spl"]
-
-#: feed modes of the words: those of `model.FeedMode`, and inverse time
-INVERSE_TIME = 2
-
+LINE_ENDS: Mapping[str, bytes] = {"lf": b"\n", "crlf": b"\r\n"}  #: what lines may end with
+CurveStyle = Literal["", "g6.2", "bspline", "poly", "spl"]  #: how curves are written; empty for lines
+INVERSE_TIME = 2  #: feed modes of the words: those of `model.FeedMode`, and inverse time
 _FEED_MODES = {
     "per_minute": int(FeedMode.PER_MINUTE),
     "per_revolution": int(FeedMode.PER_REVOLUTION),
     "inverse_time": INVERSE_TIME,
 }
-
 Decimals = Annotated[int, Bound(high=9)]
 Share = Annotated[float, Bound(math.ulp(0.0), 1.0, "give a part of 1")]
 

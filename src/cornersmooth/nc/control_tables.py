@@ -47,20 +47,13 @@ _CYCLE_BRACES: Table = dict.fromkeys(
     ("x", "y", "travel", "top", "clearance", "bottom", "setup", "above", "depth", "step", "feed", "seconds", "pitch"),
     "",
 ) | {"milliseconds": 1, "speed": ""}
-#: the same in blocks of extras
-_EXTRA_BRACES: Table = {"blend": "0.001", "turn": "0.01"}
-
-#: largest number of a machine function
-_LARGEST = 9999
-
+_EXTRA_BRACES: Table = {"blend": "0.001", "turn": "0.01"}  #: the same in blocks of extras
+_LARGEST = 9999  #: largest number of a machine function
 #: functions that mean the same on every machine (ISO 6983-1; M17 ends a subprogram)
 _FIXED = re.compile(r"M(\d|17|19|30)")
-
 #: functions that move the tool, change what coordinates mean, or jump to other blocks
 _MOVING = re.compile(r"M(9[6-9]|198|428|429|430)")
-
-#: path functions of Klartext
-_PATH_FUNCTIONS = re.compile(r"M(89|9\d|1[0-4]\d)")
+_PATH_FUNCTIONS = re.compile(r"M(89|9\d|1[0-4]\d)")  #: path functions of Klartext
 
 
 class _Controls(Shelf):
@@ -247,15 +240,11 @@ _KINDS: dict[str, tuple[str, ...]] = {
     "compensation_right": ("compensation", "register"),
     "compensation_off": ("compensation",),
 }
-
 #: fields of which only new blocks are the table's own: stops for a tool are named by the words of the tool
 _TOOLS = {"tool_change", "tool_select", "stop", "optional_stop"}
-
 #: blocks around the motion
 _FRAME = ("start", "begin", "tool_end", "between_tools", "end", "retract", "work_offset_block")
-
-#: name of the frame of the program in what is left to a table
-FRAME = "program frame"
+FRAME = "program frame"  #: name of the frame of the program in what is left to a table
 
 
 def own_words(table: Control) -> tuple[str, ...]:

@@ -23,12 +23,8 @@ from cornersmooth.nc.statement_args import tool_loads
 from cornersmooth.settings import Settings
 from cornersmooth.tables import closest
 
-#: share of ε, at the axis point, that rotary axes may take between and at the written words
-ROTARY_SHARE = 0.1
-
-#: share of ε that the tip may leave its line where the control knows nothing of the tip
-TIP_SHARE = 0.1
-
+ROTARY_SHARE = 0.1  #: share of ε, at the axis point, that rotary axes may take between and at the written words
+TIP_SHARE = 0.1  #: share of ε that the tip may leave its line where the control knows nothing of the tip
 #: share of ε that verification takes off for the lines that stand for blocks of rotary words, and for its proof
 LINE_SHARE = 0.005
 
@@ -138,8 +134,7 @@ class Form:
         return float(10.0**-self.table.digits.angle)
 
 
-#: mm along the tool that a cut is left by, at least: less is not clear of it
-LEAST_REWIND: Final = 1.0
+LEAST_REWIND: Final = 1.0  #: mm along the tool that a cut is left by, at least: less is not clear of it
 
 
 def choose_form(

@@ -38,9 +38,7 @@ from cornersmooth.nc.form import Form
 from cornersmooth.nc.messages import Findings, refused
 from cornersmooth.nc.statement_args import milliseconds, tool_starts, words_of
 
-#: more pecks in one hole are a misunderstanding
-_MOST_PECKS = 1000
-
+_MOST_PECKS = 1000  #: more pecks in one hole are a misunderstanding
 _KINDS = {"DRILL", "FACE", "SPOT", "CSINK", "REAM", "BORE", "DEEP", "DEEP2", "BRKCHP", "TAP"}
 _PECKING = {"DEEP", "DEEP2", "BRKCHP"}
 _AT_FEED = {"REAM", "BORE"}
@@ -57,10 +55,8 @@ _FEEDS = {
     "IPR": (25.4, FeedMode.PER_REVOLUTION),
     "PERREV": (None, FeedMode.PER_REVOLUTION),
 }
-
 #: words of which a later one takes the place of all the others
 _FAMILIES = ({*_DEPTHS}, {*_RETURNS}, {*_STEPS}, {"RAPTO", "CLEAR"}, {*_FEEDS}, {"DWELL"})
-
 #: dialects in which the fixed order is that of ISO 4343; elsewhere a table of the post-processor says what numbers mean
 _FIXED_ORDER = ("plain", "hsm")
 
@@ -247,11 +243,8 @@ class HoleCycles:
         self.findings.note("CS315", line, holes, why=why)
 
 
-#: sides of the path on which cutter compensation keeps the tool
-_SIDES: Final = (["LEFT"], ["RIGHT"])
-
-#: by how much a tool axis along Z may be off, and a position at angles of zero, mm
-_ALONG_Z, _SAME_PLACE = 1e-9, 1e-9
+_SIDES: Final = (["LEFT"], ["RIGHT"])  #: sides of the path on which cutter compensation keeps the tool
+_ALONG_Z, _SAME_PLACE = 1e-9, 1e-9  #: by how much a tool axis along Z may be off, and a position at angles of zero, mm
 
 
 def upright_poses(program: Program, form: Form, *, drills: bool) -> Bools:

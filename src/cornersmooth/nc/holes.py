@@ -30,14 +30,9 @@ from cornersmooth.nc.statement_writer import StatementWriter
 from cornersmooth.smoothing.sampling import Rows
 from cornersmooth.text import format_number
 
-#: mm left above the last depth before feeding goes on, and moved up to break a chip
-PECK_GAP = 0.5
-
-#: mm: the last peck takes what would be left; a tool only rubs there
-LEAST_PECK = 0.01
-
-#: axes whose directions differ by less, in the cosine, are the same for the height of travel
-_SAME_AXIS = 1e-9
+PECK_GAP = 0.5  #: mm left above the last depth before feeding goes on, and moved up to break a chip
+LEAST_PECK = 0.01  #: mm: the last peck takes what would be left; a tool only rubs there
+_SAME_AXIS = 1e-9  #: axes whose directions differ by less, in the cosine, are the same for the height of travel
 
 
 @dataclass

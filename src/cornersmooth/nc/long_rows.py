@@ -20,12 +20,8 @@ from cornersmooth.smoothing.long_lines import LineLimits, Vertices, fewest_lines
 from cornersmooth.smoothing.outside_lines import faster_lines
 from cornersmooth.smoothing.sampling import ArcBlocks, Rows, all_dense_rows
 
-#: rows handed on at a time: many long lines are tested at once
-LONG_CHUNK = 1 << 17
-
-#: chord tolerance that leaves transitions with as few lines as their change of axis allows, mm
-_COARSE = 1.0
-
+LONG_CHUNK = 1 << 17  #: rows handed on at a time: many long lines are tested at once
+_COARSE = 1.0  #: chord tolerance that leaves transitions with as few lines as their change of axis allows, mm
 #: longest change of a tool vector in one line: controls that turn it evenly in angle and those that turn it evenly in
 #: its words are less than 1e-5 rad apart then (θ³/54)
 _LARGEST_STEP = 0.08

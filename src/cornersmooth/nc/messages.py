@@ -99,7 +99,6 @@ WARNINGS: Final = {
         "are clear of it, or bring X and Y near before"
     ),
 }
-
 NOTES: Final = {
     "CS396": (
         "rounded corners are many short lines, and a control that does not look ahead slows down on them; give --with "
@@ -118,7 +117,6 @@ NOTES: Final = {
     "CS367": "point inserted so that {names} keep the tool within the tolerance",
     "CS372": "block merged with its neighbour: shorter than inverse time (G93) can say",
 }
-
 #: code: (what is wrong, what to do)
 REFUSALS: Final[dict[str, tuple[str, str]]] = {
     "CS336": (

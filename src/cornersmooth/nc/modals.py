@@ -20,9 +20,7 @@ from cornersmooth.text import format_number
 
 #: blocks of the steps `rotary_zero` and `rotary_start`; nothing without rotary axes
 RotaryBlocks = Mapping[str, Blocks]
-
 _NO_ROTARY: RotaryBlocks = {}
-
 #: steps that change groups, and those of them that a tool leaves as they are where it only goes home
 _STEPS = {
     f"{{{name}}}" for name in "retract tip_control_on functions_off tip_control_off spindle_off coolant_off".split()

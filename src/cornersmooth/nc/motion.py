@@ -24,8 +24,7 @@ from cornersmooth.nc.rotary_words import UPRIGHT, check_first_block, retracts_be
 from cornersmooth.nc.warnings import MotionWarnings
 from cornersmooth.smoothing.sampling import Rows
 
-#: a pose that no program has
-NOWHERE = 1 << 62
+NOWHERE = 1 << 62  #: a pose that no program has
 
 
 @dataclass

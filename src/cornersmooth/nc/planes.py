@@ -30,14 +30,9 @@ from cornersmooth.nc.statement_args import check_tool_travel, tool_starts
 from cornersmooth.settings import Settings
 from cornersmooth.text import format_number
 
-#: tool axes that differ by less are one, and all of a run are so near to its first
-_SAME: Final = 1e-7
-
-#: moves with which the tool may come to another axis: it goes up before
-_FREE: Final = (Move.RAPID, Move.HOLE)
-
-#: moves that cut nothing
-_IDLE: Final = (Move.RAPID, Move.FROM)
+_SAME: Final = 1e-7  #: tool axes that differ by less are one, and all of a run are so near to its first
+_FREE: Final = (Move.RAPID, Move.HOLE)  #: moves with which the tool may come to another axis: it goes up before
+_IDLE: Final = (Move.RAPID, Move.FROM)  #: moves that cut nothing
 
 
 #: turn on an arc from one place that is looked at to the next, rad: between them it goes 1e-5 of its radius farther

@@ -14,12 +14,9 @@ from cornersmooth.nc.form import Form
 from cornersmooth.nc.rotary_rows import INVERSE_TIME_DECIMALS
 from cornersmooth.text import format_number
 
-#: figures of a planned feed, and the part of the programmed one from which on it is that
-_FIGURES: Final = 4
+_FIGURES: Final = 4  #: figures of a planned feed, and the part of the programmed one from which on it is that
 _ALL_BUT: Final = 0.999
-
-#: feed word at the end of a line, with its number
-_FEED: Final = re.compile(rb" ?F(\d+\.?\d*|\.\d+)$")
+_FEED: Final = re.compile(rb" ?F(\d+\.?\d*|\.\d+)$")  #: feed word at the end of a line, with its number
 
 
 @dataclass(frozen=True)

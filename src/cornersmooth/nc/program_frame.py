@@ -20,16 +20,11 @@ from cornersmooth.statements.work_offsets import spellings, work_offset_of
 from cornersmooth.tables import filled as filled_in
 from cornersmooth.text import format_number
 
-#: decimals of how far the control may round the corners of lines, and the step of the last
-_BLEND_DECIMALS = 5
+_BLEND_DECIMALS = 5  #: decimals of how far the control may round the corners of lines, and the step of the last
 BLEND_STEP = 10.0**-_BLEND_DECIMALS
-
 #: mm along the tool in forms with a point on the axis, which go to their first position on all axes at once
 POINT_APPROACH = 20.0
-
-#: characters of a name from that of a file: SINUMERIK takes 24
-_LONGEST_NAME = 24
-
+_LONGEST_NAME = 24  #: characters of a name from that of a file: SINUMERIK takes 24
 #: numbers of programs from names of files: FANUC's parameters NE8 and NE9 lock those from 8000 to 9999
 _HIGHEST_NUMBER = 7999
 
@@ -37,13 +32,9 @@ _HIGHEST_NUMBER = 7999
 #: a word that loads a tool, and what of a line is a comment
 _TOOL_WORD = re.compile(r"(?<![A-Z])T[ ]?[\d#\[]", re.IGNORECASE)
 _COMMENT = re.compile(r"\([^)]*\)|;.*")
-
-#: characters of a comment's text in one block; controls truncate or refuse long ones
-_LONGEST = 120
-
+_LONGEST = 120  #: characters of a comment's text in one block; controls truncate or refuse long ones
 #: brackets end a comment, ``%`` a file, ``;`` a block on some controls; ``~`` lets a block go on in the next line
 _REPLACED = str.maketrans("()%;~", "[]/,-")
-
 _SPELLED = {"ß": "ss", "Ø": "O", "ø": "o", "Æ": "AE", "æ": "ae", "Œ": "OE", "œ": "oe", "đ": "d", "Đ": "D", "ł": "l"}
 
 

@@ -25,31 +25,19 @@ from cornersmooth.smoothing.long_lines import LineLimits, Vertices, fewest_lines
 from cornersmooth.smoothing.sampling import Rows
 from cornersmooth.text import to_ticks
 
-#: dense rows handed on at a time
-_CHUNK = 1 << 15
-
-#: deg/min that no rotary axis exceeds where we time its blocks ourselves
-_FASTEST_TURN = 36_000.0
-
+_CHUNK = 1 << 15  #: dense rows handed on at a time
+_FASTEST_TURN = 36_000.0  #: deg/min that no rotary axis exceeds where we time its blocks ourselves
 #: degrees that a rotary axis turns in one block of a cut at most: far from the half turn where some controls go the
 #: other way round
 LARGEST_TURN = 60.0
-
-#: shortest times of a block that short ones are merged to
-_SHORTEST_TIMES = 1.5
-
+_SHORTEST_TIMES = 1.5  #: shortest times of a block that short ones are merged to
 #: part of the tolerance, and turn of an axis in degrees, that such a block may have
 _MERGED_SHARE, _MERGED_TURN = 0.8, 5.0
-
-#: decimals of F of inverse time: FANUC takes 0.001 to 9999.999
-INVERSE_TIME_DECIMALS = 3
-
+INVERSE_TIME_DECIMALS = 3  #: decimals of F of inverse time: FANUC takes 0.001 to 9999.999
 #: parts of a long step at whose ends lines may end, and how long it is beside the longer one of its
 #: neighbours, and beside what the axis turns at the axis point
 _STATIONS, _LONG_STEP = 2, 0.1
-
-#: turns below this many degrees are none
-_NO_TURN = 1e-9
+_NO_TURN = 1e-9  #: turns below this many degrees are none
 
 
 def rotary_rows(

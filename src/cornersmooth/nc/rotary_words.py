@@ -32,8 +32,7 @@ from cornersmooth.rotary.axis_findings import reach_error
 from cornersmooth.smoothing.sampling import Rows, all_dense_rows
 from cornersmooth.system.processes import return_free_memory
 
-#: what a curve may turn the axis, over ε at H: tip and axis point may be off to opposite sides
-_SWING = 2.0
+_SWING = 2.0  #: what a curve may turn the axis, over ε at H: tip and axis point may be off to opposite sides
 
 
 @dataclass(frozen=True)
@@ -149,26 +148,15 @@ def _near_limits(smoothed: SmoothProgram, form: Form) -> Bools:
     return np.maximum.reduceat(near, starts(runs.count)[:-1])
 
 
-#: degrees by which the way of the tool axis may be longer than the shortest one
-LONGEST_DETOUR: Final = 30.0
-
+LONGEST_DETOUR: Final = 30.0  #: degrees by which the way of the tool axis may be longer than the shortest one
 #: sine of an angle at which the tool counts as parallel to a rotary axis, and degrees by which that stands
 _PARALLEL: Final = 1e-9
-
-#: places between both ends that are looked at
-_PLACES: Final = np.linspace(0.0, 1.0, 10)[1:-1]
-
-#: cosine of the angle from Z beyond which a tool is tilted
-UPRIGHT: Final = 1.0 - 1e-6
-
-#: places on the way that are looked at
-_WAY: Final = np.linspace(0.0, 1.0, 65)
-
+_PLACES: Final = np.linspace(0.0, 1.0, 10)[1:-1]  #: places between both ends that are looked at
+UPRIGHT: Final = 1.0 - 1e-6  #: cosine of the angle from Z beyond which a tool is tilted
+_WAY: Final = np.linspace(0.0, 1.0, 65)  #: places on the way that are looked at
 #: Where X Y stand before, the program does not always say: as far aside as the tool is above, at most, is a fair guess.
 _FLAT: Final = math.cos(math.radians(45.0))
-
-#: mm by which the start may be below the position: digits
-_BELOW: Final = 1e-3
+_BELOW: Final = 1e-3  #: mm by which the start may be below the position: digits
 
 
 def swinging(machine: Machine, before: Floats, after: Floats) -> Bools:

@@ -11,17 +11,10 @@ import numpy as np
 from cornersmooth.kinematics import Machine, check_travel
 from cornersmooth.model import Floats, Ints, Move, Program, Statement
 
-#: longest dwell that is written, ms: one day
-_LONGEST = 86_400_000
-
-#: cutting speeds in mm per minute
-_MM_PER_MINUTE = {"SMM": 1000.0, "SFM": 12.0 * 25.4}
-
-#: words of SPINDL whose number is no speed
-_LIMITS = ("RANGE", "MAXRPM")
-
-#: words of SPINDL about gears and limits of the speed
-GEARS = frozenset(("RANGE", "MAXRPM", "HIGH", "LOW", "MEDIUM"))
+_LONGEST = 86_400_000  #: longest dwell that is written, ms: one day
+_MM_PER_MINUTE = {"SMM": 1000.0, "SFM": 12.0 * 25.4}  #: cutting speeds in mm per minute
+_LIMITS = ("RANGE", "MAXRPM")  #: words of SPINDL whose number is no speed
+GEARS = frozenset(("RANGE", "MAXRPM", "HIGH", "LOW", "MEDIUM"))  #: words of SPINDL about gears and limits of the speed
 
 
 def numbers_of(statement: Statement) -> list[float]:
@@ -104,14 +97,9 @@ def cutting_unit(words: list[str]) -> str:
     return next((unit for unit in ("SFM", "SMM") if unit in words), "")
 
 
-#: words that load a tool
-TOOL_WORDS: Final = frozenset({"LOADTL", "LOAD", "TURRET"})
-
-#: words of `TOOL_WORDS` with the number of a length register
-_REGISTERS: Final = ("ADJUST", "OSETNO")
-
-#: words at which the program waits for time or the operator
-_WAITING: Final = frozenset({"STOP", "OPSTOP", "DELAY"})
+TOOL_WORDS: Final = frozenset({"LOADTL", "LOAD", "TURRET"})  #: words that load a tool
+_REGISTERS: Final = ("ADJUST", "OSETNO")  #: words of `TOOL_WORDS` with the number of a length register
+_WAITING: Final = frozenset({"STOP", "OPSTOP", "DELAY"})  #: words at which the program waits for time or the operator
 
 
 def loaded_tool(statement: Statement) -> tuple[int, int] | None:

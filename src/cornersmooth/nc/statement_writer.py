@@ -38,9 +38,7 @@ from cornersmooth.text import format_number
 
 #: words whose text is for the machinist: comments without the word
 _TEXT_WORDS = frozenset("$$ PPRINT REMARK TPRINT LETTER DISPLY".split())
-
-#: words that say nothing beside what the NC text shows anyway
-_SILENT = frozenset({"END-OF-PATH", "FINI", "REWIND"})
+_SILENT = frozenset({"END-OF-PATH", "FINI", "REWIND"})  #: words that say nothing beside what the NC text shows anyway
 
 
 @dataclass
@@ -363,7 +361,6 @@ class StatementWriter:
 
 
 Handler = Callable[[StatementWriter, Statement], list[str] | None]
-
 _HANDLERS: dict[str, Handler] = {
     "LOADTL": StatementWriter.load,
     "LOAD": StatementWriter.load,

@@ -35,8 +35,7 @@ from cornersmooth.rotary.branch_choice import (
     unwrap,
 )
 
-#: Poses worked on at a time, so that memory is needed for their angles and little else.
-CHUNK = 1 << 15
+CHUNK = 1 << 15  #: Poses worked on at a time, so that memory is needed for their angles and little else.
 #: Rounds of dividing cuts, after which limits are an error; a round divides all cuts that are too far by themselves.
 REWIND_ROUNDS = 100
 

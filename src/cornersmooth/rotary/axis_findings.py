@@ -11,10 +11,8 @@ from cornersmooth.model import Bools, Floats, Ints
 
 #: A cut counts as near the pole where the first rotary axis turns by so many times what the tool axis turns by.
 NEAR_POLE = 20.0
-#: Turns of a rotary axis below this (degrees) are rounding.
-NO_TURN = 1e-6
-#: Poses looked at at a time.
-CHUNK = 1 << 15
+NO_TURN = 1e-6  #: Turns of a rotary axis below this (degrees) are rounding.
+CHUNK = 1 << 15  #: Poses looked at at a time.
 
 
 def reach_error(machine: Machine, axis: Floats, beyond: float, line: int, file: str | None) -> InputError:

@@ -20,16 +20,14 @@ from cornersmooth.rotary.subdivision import ruled_axis
 REWIND_COST = 1e9
 #: What a start on the solution that is not preferred costs, in degrees of rotation: more than any start turn.
 PREFERENCE_COST = 1e3
-#: What each turn costs by which a path starts away from zero: it only breaks ties.
-START_TURN_COST = 1e-3
+START_TURN_COST = 1e-3  #: What each turn costs by which a path starts away from zero: it only breaks ties.
 #: Words may pass their limits by so much (degrees): rounding of the solution, far below the last digit of a word.
 LIMIT_SLACK = 1e-9
 #: An axis with room for more turns is taken as endless first; only where that fails its turns are searched.
 MANY_TURNS = 8
 #: More states than these are not searched: axes with many turns are then kept within `MANY_TURNS` of zero.
 MOST_STATES = 1000
-#: Numbers that the costs of the steps between states may take up at a time.
-CHUNK = 1 << 20
+CHUNK = 1 << 20  #: Numbers that the costs of the steps between states may take up at a time.
 
 
 @dataclass(frozen=True)
@@ -239,8 +237,7 @@ def _farthest(angles: Floats, low: Floats, high: Floats, limits: Floats) -> int:
 
 #: A step of an angle larger than this (degrees) is followed on its way, to see which way round it goes and how far.
 WIDE_STEP = 30.0
-#: So many points are looked at on the way.
-WIDE_STEP_POINTS = 15
+WIDE_STEP_POINTS = 15  #: So many points are looked at on the way.
 
 
 def meet_at_pole(

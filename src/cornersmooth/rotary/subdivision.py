@@ -26,10 +26,8 @@ from cornersmooth.kinematics.position import machine_position, tip_position
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.rotary.axis_findings import limit_error
 
-#: Rounds of division.
-ROUNDS = 28
-#: The most parts that an interval is divided into at once.
-PARTS = 64
+ROUNDS = 28  #: Rounds of division.
+PARTS = 64  #: The most parts that an interval is divided into at once.
 #: The error of a smooth motion at a quarter of its way is ¾ of its largest. Where that holds to SMOOTH of it, and no
 #: axis turns by more than SMOOTH_TURN (degrees), the error falls with the square of the number of parts, to AIM.
 SMOOTH, SMOOTH_TURN, AIM = 0.1, 30.0, 0.93
@@ -37,10 +35,8 @@ SMOOTH, SMOOTH_TURN, AIM = 0.1, 30.0, 0.93
 SURE = 0.5
 #: Share of the tolerance that a proof leaves to what lies between its samples, and the most intervals between them.
 PROOF, MOST_SAMPLES = 0.02, 256
-#: A way that comes nearer to the origin than this share of its length goes through it.
-JUMP = 1e-12
-#: Samples that are worked on at a time.
-CHUNK = 1 << 15
+JUMP = 1e-12  #: A way that comes nearer to the origin than this share of its length goes through it.
+CHUNK = 1 << 15  #: Samples that are worked on at a time.
 
 
 @dataclass(frozen=True)

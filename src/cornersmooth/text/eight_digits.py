@@ -13,17 +13,11 @@ from numpy.typing import NDArray
 
 Bytes = NDArray[np.uint8]
 Words = NDArray[np.uint64]
-
-#: digits that one word holds
-DIGITS: Final = 8
-
+DIGITS: Final = 8  #: digits that one word holds
 _NIBBLES: Final = 0x0F0F0F0F0F0F0F0F
-
 #: keeps the values of the last k digits of a word, k from 0 to 8
 LAST_DIGITS: Final = np.array([(((1 << (8 * k)) - 1) << (64 - 8 * k)) & _NIBBLES for k in range(9)], np.uint64)
-
-#: what to keep of pairs and of fours
-_PAIRS, _FOURS = np.uint64(0x00FF00FF00FF00FF), np.uint64(0x0000FFFF0000FFFF)
+_PAIRS, _FOURS = np.uint64(0x00FF00FF00FF00FF), np.uint64(0x0000FFFF0000FFFF)  #: what to keep of pairs and of fours
 
 
 def words_of(text: Bytes) -> NDArray[np.void]:

@@ -16,31 +16,21 @@ import numpy as np
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.text.eight_digits import DIGITS, LAST_DIGITS, Bytes, Words, join_digits, words_of
 
-#: bytes taken at a time: the block and the arrays made from it stay in the second-level cache
-BLOCK: Final = 1 << 16
-
-#: bytes searched at a time for the separator that a block ends with
-_LOOK_BACK: Final = 256
-
+BLOCK: Final = 1 << 16  #: bytes taken at a time: the block and the arrays made from it stay in the second-level cache
+_LOOK_BACK: Final = 256  #: bytes searched at a time for the separator that a block ends with
 #: bytes in front of a block in its work area, so that the words of its first field are fetched like all others
 _MARGIN: Final = 16
-
 #: what a number may consist of; `float` alone would also take ``1_000``, ``nan`` and ``inf``
 _ALPHABET: Final = b"0123456789+-.eEdD"
 _FORTRAN: Final = bytes.maketrans(b"dD", b"eE")
-
 _WHITE: Final = b" \t\r\n"
 _SEPARATOR, _POINT, _SIGN, _OTHER = range(4)
 _KIND: Final = np.full(256, _OTHER, np.uint8)
 _KIND[list(_WHITE + b",")] = _SEPARATOR
 _KIND[list(b".")] = _POINT
 _KIND[list(b"+-")] = _SIGN
-
-#: powers of ten that float64 holds exactly
-_POWER: Final = np.array([float(f"1e{n}") for n in range(23)])
-
-#: mantissas below are exact in float64
-_EXACT: Final = 2.0**53
+_POWER: Final = np.array([float(f"1e{n}") for n in range(23)])  #: powers of ten that float64 holds exactly
+_EXACT: Final = 2.0**53  #: mantissas below are exact in float64
 
 
 class NumberError(ValueError):

@@ -19,17 +19,10 @@ from cornersmooth.errors import OutputError
 from cornersmooth.model import Bools, Ints
 from cornersmooth.text.ticks import MOST_DECIMALS, TICK_LIMIT
 
-#: rows laid out at a time
-BLOCK: Final = 8192
-
-#: rows side by side in `_by_column`
-FOLD: Final = 256
-
-#: bytes of a text that are copied at once
-WORD: Final = 8
-
-#: stands behind each row that is taken by itself
-_END: Final = b"\1"
+BLOCK: Final = 8192  #: rows laid out at a time
+FOLD: Final = 256  #: rows side by side in `_by_column`
+WORD: Final = 8  #: bytes of a text that are copied at once
+_END: Final = b"\1"  #: stands behind each row that is taken by itself
 
 
 class Choices:
@@ -196,11 +189,8 @@ if TYPE_CHECKING:
     from cornersmooth.text.rows import RowFormat
 
 Bytes = NDArray[np.uint8]
-#: entries are unsigned integers of as many bytes as the group has characters
-Table = NDArray[np.unsignedinteger[Any]]
-
-#: digits in a full group
-GROUP = 4
+Table = NDArray[np.unsignedinteger[Any]]  #: entries are unsigned integers of as many bytes as the group has characters
+GROUP = 4  #: digits in a full group
 
 
 @cache

@@ -16,10 +16,7 @@ from cornersmooth.model import Floats, Ints
 #: a tick, so that a tie can be seen
 TICK_LIMIT: Final = 10**15
 MOST_DECIMALS: Final = 15
-
-#: numbers rounded at a time
-BLOCK: Final = 1 << 15
-
+BLOCK: Final = 1 << 15  #: numbers rounded at a time
 #: 2^27 + 1 splits a float64 into two halves whose products are exact (T. J. Dekker, Numer. Math. 18 (1971) 224)
 _SPLITTER: Final = 134217729.0
 
