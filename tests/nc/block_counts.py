@@ -11,12 +11,12 @@ import io
 import sys
 from pathlib import Path
 
+from cornersmooth import smooth
 from cornersmooth.cl import read
 from cornersmooth.errors import CornersmoothError
 from cornersmooth.kinematics import load_machine
-from cornersmooth.nc import Frame, choose_form, fit_settings, write
+from cornersmooth.nc import Frame, choose_form, write
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing import smooth
 from nc.cases import without_limits
 from oracle.files import OWN, SAMPLES, corpus_folder
 
@@ -34,7 +34,7 @@ def blocks_of(path: Path, name: str, tolerance: float) -> int | str:
         program = read(path.read_bytes(), name=path.name)
         found = without_limits(load_machine(machine[0])) if machine else None
         chosen = choose_form(control, form, machine=found)
-        smoothed = smooth(program, fit_settings(Settings(tolerance=tolerance), chosen, program.units))
+        smoothed = smooth(program, Settings(tolerance=tolerance), form=chosen)
         return write(smoothed, io.BytesIO(), form=chosen, frame=Frame(skip_cycles=True)).blocks
     except CornersmoothError as refusal:
         return refusal.code
