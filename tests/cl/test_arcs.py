@@ -216,6 +216,16 @@ def test_nurbs_of_a_straight_line_and_of_a_parabola() -> None:
     assert straight.tip[:, 0].tolist() == [0, 3]
 
 
+@pytest.mark.parametrize("units", ["", "UNITS/INCHES\n"])
+def test_lines_near_a_curve_in_inches_of_few_digits(units: str) -> None:
+    text = "GOTO/0.,0.,0.\nNURBS/\nKNOT/1.\nCNTRL/1.,1.,0.\nCNTRL/2.,1.,0.\nCNTRL/3.,0.,0.\n"
+    result = program(units + ("" if units else "FEDRAT/IPM,30.\n") + text)
+    x, y = result.tip[:, 0] / 25.4, result.tip[:, 1] / 25.4
+    middle = (x[1:] + x[:-1]) / 2
+    sag = 25.4 * np.abs(middle - middle**2 / 3 - (y[1:] + y[:-1]) / 2)
+    assert 1e-4 < sag.max() <= 5e-4
+
+
 def test_nx_nurbs_file(corpus: Path) -> None:
     """Curves leave the lines before them without a kink, and end where the file says."""
     result = read(corpus / "nx_clsf_nurbs.cls")

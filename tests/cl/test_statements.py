@@ -760,6 +760,7 @@ def test_three_numbers_of_creo_are_upright_without_an_option(head: str) -> None:
     result = program(CREO.format(head=head, more=""))
     assert result.source.dialect == "creo"
     assert result.axis.tolist() == [[0.6, 0, 0.8], [0.6, 0, 0.8], [0, 0, 1]]
+    assert "CS130" not in [one.code for one in result.findings]
 
 
 def test_camera_is_the_coordinate_system_of_creo() -> None:

@@ -94,6 +94,7 @@ def read_apt(
         dialect=known,
         short_axis_up=known.short_axis == "up",
         off_known=known.multax_off is not None,
+        wanted_units=units,
         arc_rule=arc_rule,
         lenient=lenient,
         cycle_order=cycle_order,
@@ -104,7 +105,7 @@ def read_apt(
     _end(state)
     if not state.n:
         raise error("CS101", name, 1)
-    return _program(state, units)
+    return _program(state)
 
 
 def _run(data: bytes, state: ReaderState, decode: Decode, fast: bool) -> None:
@@ -261,8 +262,8 @@ def _decoder(data: bytes) -> Decode:
     return lambda line: line.decode("utf-8")
 
 
-def _program(state: ReaderState, wanted: Units | None) -> Program:
-    units, unit_findings = _units(state, wanted)
+def _program(state: ReaderState) -> Program:
+    units, unit_findings = _units(state)
     scale = MM_PER_UNIT[units]
     tip = state.tips()
     axis, axis_findings = state.axes()
@@ -310,9 +311,9 @@ def _fed_from_elsewhere(tip: Floats, kind: NDArray[np.uint8]) -> Ints:
     return np.flatnonzero(stated & feeds & away & (stands >= 0))
 
 
-def _units(state: ReaderState, wanted: Units | None) -> tuple[Units, list[Finding]]:
+def _units(state: ReaderState) -> tuple[Units, list[Finding]]:
     """Units of the file: as wanted, as stated, as the feeds suggest, or as the dialect has them."""
-    stated = state.stated_units
+    stated, wanted = state.stated_units, state.wanted_units
     guess, why = state.dialect.units, f"as usual for {state.dialect.name} files"
     if state.feed_units:
         guess, why = state.feed_units[0], "as in its feeds"

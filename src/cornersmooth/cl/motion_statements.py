@@ -9,11 +9,11 @@ from typing import Final
 
 import numpy as np
 
-from cornersmooth.cl.arcs import LEAST_DECIMALS, Arc, read_arc
+from cornersmooth.cl.arcs import Arc, read_arc
 from cornersmooth.cl.grammar import NUMBER, Argument, Record, joined, number
 from cornersmooth.cl.messages import error
 from cornersmooth.cl.movnrb import Spline
-from cornersmooth.cl.nurbs import CURVE_DIGITS, DEGREE, Cubic, Curve
+from cornersmooth.cl.nurbs import DEGREE, Cubic, Curve
 from cornersmooth.cl.poses import Vector, check_range
 from cornersmooth.cl.reader_state import ReaderState
 from cornersmooth.cl.state_statements import Handler
@@ -28,8 +28,8 @@ _LETTERED: Final = re.compile(
     "".join(map(_AFTER.format, "XYZ")) + "(?:" + "".join(map(_AFTER.format, "IJK")) + r")?\s*", re.IGNORECASE
 )
 
-#: mm: how far lines may be from the curves of MOVNRB
-SPLINE_MM: Final = 5e-4
+#: mm: how far lines may be from curves
+CHORD: Final = 5e-4
 
 #: sine of the angle at which a tool axis meets a plane at least
 _PARALLEL: Final = 1e-6
@@ -187,24 +187,28 @@ def _control(state: ReaderState, record: Record) -> None:
     check_range(point, state.file, record.line)
     state.curve.points.append(point)
     state.curve.lines.append(record.line)
-    digits = (len(token.partition(".")[2].strip()) for token in record.text.partition("/")[2].split(","))
-    state.curve.decimals = max(state.curve.decimals, *digits)
 
 
 def finish_curve(state: ReaderState) -> None:
-    """Add the NURBS record that just ended, with lines within `CURVE_DIGITS` of it (InputError CS113, CS128)."""
+    """Add the NURBS record that just ended, with lines near it (InputError CS113, CS128)."""
     curve, state.curve = state.curve, None
     assert curve is not None
-    why, tolerance = curve.complaint, CURVE_DIGITS * 10.0 ** -max(curve.decimals, LEAST_DECIMALS)
-    found = curve.cubic(state.last_tip(), tolerance) if why is None else None
+    why = curve.complaint
+    found = curve.cubic(state.last_tip(), _chord(state)) if why is None else None
     if found is None:
         raise error("CS128", state.file, curve.line, why=why or "it would need too many lines")
-    state.note("CS145", curve.line, tolerance=tolerance)
-    _add_curve(state, found, curve.lines_at(found.u[1:]))
+    _add_curve(state, found, curve.line, curve.lines_at(found.u[1:]))
 
 
-def _add_curve(state: ReaderState, curve: Cubic, lines: Ints) -> None:
-    """Add a curve with its points (m,), of lines of the file."""
+def _chord(state: ReaderState) -> float:
+    """Return `CHORD` in the units of the file, as far as these are known."""
+    stated = [units for _, units, _ in state.stated_units[-1:]]
+    return CHORD / MM_PER_UNIT[state.wanted_units or (*stated, *state.feed_units, state.dialect.units)[0]]
+
+
+def _add_curve(state: ReaderState, curve: Cubic, line: int, lines: Ints) -> None:
+    """Add a curve that begins at a line of the file with its points (m,), of others."""
+    state.note("CS145", line, tolerance=CHORD)
     check_range(curve.control.ravel().tolist(), state.file, int(lines[0]))
     state.curves.append(curve.placed(state.system, state.n - 1))
     held = state.held_axis()
@@ -259,15 +263,12 @@ def leave_spline(state: ReaderState, record: Record) -> None:
 
 def _end_spline(state: ReaderState, spline: Spline) -> None:
     """Add the curve, or the points where they are not on it."""
-    inch = (state.stated_units[-1][1] if state.stated_units else (state.feed_units or ["mm"])[0]) == "inch"
-    tolerance = SPLINE_MM / (MM_PER_UNIT["inch"] if inch else 1.0)
     record = Record(spline.line, "MOVNRB")
     _at_feed(state, record)
-    found = spline.cubic(np.array([*state.last_tip(), *state.last_axis]), tolerance) if spline.passing else None
+    found = spline.cubic(np.array([*state.last_tip(), *state.last_axis]), _chord(state)) if spline.passing else None
     if found is not None:
         state.spline = None
-        state.note("CS145", spline.line, tolerance=tolerance)
-        _add_curve(state, found, np.full(len(found.u) - 1, spline.line))
+        _add_curve(state, found, spline.line, np.full(len(found.u) - 1, spline.line))
         return
     if not spline.points:
         why = "it is not complete, or begins elsewhere than where the tool is"

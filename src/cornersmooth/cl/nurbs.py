@@ -29,9 +29,6 @@ from cornersmooth.model import Curves, Floats, Ints, Move, Runs
 
 DEGREE: Final = 3
 
-#: the lines stay this many printed digits near the curve
-CURVE_DIGITS: Final = 5
-
 #: knots are equal or differ by this part of the last one; NX prints seven decimals
 LEAST_STEP: Final = 1e-9
 
@@ -50,7 +47,6 @@ class Curve:
     knots: list[float] = field(default_factory=list)
     points: list[tuple[float, float, float]] = field(default_factory=list)
     lines: list[int] = field(default_factory=list)
-    decimals: int = 0
 
     @property
     def complaint(self) -> str | None:

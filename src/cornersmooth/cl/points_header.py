@@ -149,7 +149,9 @@ def from_header(text: str, file: str, line: int, rotary: tuple[str, ...] = ()) -
     if (
         second is None and not angles and not {left[c] for c in rest} <= _PASSES
     ):  # an axis in a spelling we do not know must not become +Z in silence
-        raise error("CS156", file, line, why=f"no tool axis in {', '.join(unused)}")
+        raise error(
+            "CS156", file, line, why=f"no tool axis in {', '.join(unused)}{_of_a_machine({left[c] for c in rest})}"
+        )
     axis = [left[c] for c in second or ()]
     if scalar := _scalar([left[c] for c in rest], set(axis)):
         raise error("CS165", file, line, names=", ".join((*axis, scalar)))
@@ -179,8 +181,14 @@ def _rotary(
     found = [_ANGLES.get((unit[1] or unit[2] or "").strip()) if unit else None for unit in units]
     degrees = tuple(value for value in found if value is not None)
     if len(degrees) < len(columns):
-        raise error("CS156", file, line, why=f"{', '.join(sorted(rotary))} are angles without [deg] or [rad]")
+        raise error(
+            "CS156", file, line, why=f"{', '.join(sorted(rotary))} are angles without [deg] or [rad] behind their names"
+        )
     return columns, degrees
+
+
+def _of_a_machine(names: set[str]) -> str:
+    return "; angles of its rotary axes need --machine" if len(names & {"a", "b", "c"}) > 1 else ""
 
 
 def is_header(text: str) -> bool:

@@ -24,6 +24,7 @@ class ReaderState(Poses):
     """State of the reading of one file."""
 
     dialect: Dialect
+    wanted_units: Units | None = None  #: override those of the file
     arc_rule: ArcRule | None = None  #: overrides the dialect's sense of rotation
     cycle_order: tuple[str, ...] = ()  #: what the numbers without a word of CYCLE are
     arcs: list[Arc] = field(default_factory=list)  #: in the order of their end poses

@@ -97,7 +97,7 @@ class Holes:
         """
         motion = self.motion
         if cycle is None:
-            return "", "its words are not understood"
+            return "", "its words are not understood; numbers without words need --cycle-order"
         kind = kind_of(cycle, motion.at.form, motion.program, poses)
         if not kind:
             return "", "a tap, and the control has no such cycle for it"
