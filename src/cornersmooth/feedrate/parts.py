@@ -1,9 +1,9 @@
 """The time of a long motion from plans of its parts, in bounded work.
 
 What a plan does at a place depends on little around it: from a cut the motion comes up to speed within the distance
-that it needs to brake. So a path is cut into parts, and each is planned with its surroundings. All parts are planned
-roughly, and some of them as closely as a whole plan is, until the ratio of both is known (a ratio estimate: Cochran,
-Sampling Techniques, ch. 6). Of very long paths one of so many neighbouring parts is planned at all.
+that it needs to brake. So a path is cut into parts, and each is planned with its surroundings. Parts in random order
+are planned roughly, until the ratio of their times to those at the feed is known, and some of them as closely as a
+whole plan is, until the ratio of both is (ratio estimates: Cochran, Sampling Techniques, ch. 6).
 """
 
 from __future__ import annotations
@@ -18,16 +18,17 @@ from cornersmooth.feedrate.planner import Progress, plan_along
 from cornersmooth.feedrate.reached import limiting
 from cornersmooth.feedrate.resolution import FINER, ROUGHLY
 from cornersmooth.feedrate.scurve import stopping_distance
-from cornersmooth.model import Ints
+from cornersmooth.model import Floats
 from cornersmooth.settings import Limits
 from cornersmooth.system.processes import map_in_processes
 
-#: elements of a part, and around it at least and at most
-PART, BESIDE, MOST_BESIDE = 512, 16, 256
-#: parts that are planned at all at most, and standard error of the ratio with which no more are planned closely
-MOST, ENOUGH = 1000, 1.5e-3
-#: parts that are planned closely at a time, and at least and at most
-_AT_ONCE, _LEAST, _MOST_CLOSELY = 4, 8, 32
+#: elements of a part at least and at most, over those in the distance to brake; around it at least and at most
+SHORTEST, PART, BESIDE, MOST_BESIDE = 128, 512, 16, 256
+_TO_BRAKE = 4.0
+#: standard error of a ratio with which no more parts are planned; as many at a time, and at least, roughly and closely
+ENOUGH, _ROUGHLY, _CLOSELY = 1.5e-3, (16, 32), (4, 8)
+#: parts that are planned closely at most
+_MOST_CLOSELY = 32
 
 
 @dataclass(frozen=True)
@@ -51,10 +52,11 @@ def time_of_parts(
 
     The result does not depend on the number of processes.
     """
-    border = np.linspace(0, len(path), -(-len(path) // PART) + 1).astype(np.int64)
-    edge, level = path.edge, np.concatenate(([0.0], np.cumsum(path.length / path.speed)))
-    accel, jerk = np.array(limits.accel), np.array(limits.jerk)
+    edge, accel, jerk = path.edge, np.array(limits.accel), np.array(limits.jerk)
     brake = 2.0 * float(stopping_distance(path.speed.max(keepdims=True), accel, jerk)[0])
+    size = int(np.clip(_TO_BRAKE * brake * len(path) / max(edge[-1], brake), SHORTEST, PART))
+    border = np.linspace(0, len(path), -(-len(path) // size) + 1).astype(np.int64)
+    at_feed = np.add.reduceat(path.length / path.speed, border[:-1])
 
     def work(item: tuple[int, bool]) -> tuple[float, list[tuple[str, float]]]:
         number, closely = item
@@ -69,43 +71,30 @@ def time_of_parts(
         taken = float(np.diff(law.times_at(law.edge[[begin - low, end - low]]))[0])
         return taken, limiting(law) if closely else []
 
-    # one of so many neighbours, any of them: rows of a program come back at even distances
-    every = -(-(len(border) - 1) // MOST)
-    tried = np.arange(0, len(border) - 1, every)
-    tried = np.minimum(tried + np.random.default_rng(0).integers(every, size=len(tried)), len(border) - 2)
-    rough = np.zeros(len(tried))
-    for row, (taken, _) in enumerate(map_in_processes(work, [(one, False) for one in tried.tolist()], processes)):
-        rough[row] = taken
+    order, rough, closely = np.random.default_rng(0).permutation(len(at_feed)), np.zeros(0), np.zeros(0)
+    slowness = ratio = slowness_error = ratio_error = np.inf
+    while len(rough) < len(order) and (len(rough) < _ROUGHLY[1] or slowness_error > ENOUGH):
+        more = order[len(rough) : len(rough) + _ROUGHLY[0]]
+        rough = np.append(rough, [one for one, _ in map_in_processes(work, [(k, False) for k in more], processes)])
+        slowness, slowness_error = _ratio(rough, at_feed[order[: len(rough)]], len(order))
         if progress is not None:
-            progress(row + 1, len(tried))
-    at_feed = np.diff(level[border])[tried]
-    # neighbours tell how parts that were passed over may differ
-    passed = 1.0 - len(tried) / (len(border) - 1)
-    slowness = float(rough.sum() / at_feed.sum())
-    steps = np.diff(rough - slowness * at_feed)
-    slowness_error = float(np.sqrt(passed * np.square(steps).sum() / 2.0) / rough.sum()) if passed else 0.0
-
-    rows, closely, shares = _in_turn(len(tried)), np.zeros(0), dict[str, float]()
-    ratio, ratio_error = 1.0, np.inf
-    while len(closely) < min(_MOST_CLOSELY, len(rows)) and (len(closely) < _LEAST or ratio_error > ENOUGH):
-        more = rows[len(closely) : len(closely) + _AT_ONCE]
-        for taken, limited in map_in_processes(work, [(one, True) for one in tried[more].tolist()], processes):
+            progress(len(rough), len(order))
+    shares = dict[str, float]()
+    most = min(_MOST_CLOSELY, len(rough))
+    while len(closely) < most and (len(closely) < _CLOSELY[1] or ratio_error > ENOUGH):
+        more = order[len(closely) : min(len(closely) + _CLOSELY[0], most)]
+        for taken, limited in map_in_processes(work, [(k, True) for k in more], processes):
             closely = np.append(closely, taken)
             for name, share in limited:
                 shares[name] = shares.get(name, 0.0) + share * taken
-        own, number = rough[rows[: len(closely)]], len(closely)
-        ratio = float(closely.sum() / own.sum())
-        spread = np.square(closely - ratio * own).sum() * number / max(number - 1, 1) * (1.0 - number / len(rows))
-        ratio_error = float(np.sqrt(spread) / closely.sum())
-    seconds, whole = ratio * slowness * float(level[-1]), float(closely.sum())
-    most = sorted(((name, share / whole) for name, share in shares.items()), key=lambda pair: -pair[1])
-    return PartsTime(seconds, seconds * float(np.hypot(ratio_error, slowness_error)), tuple(most))
+        ratio, ratio_error = _ratio(closely, rough[: len(closely)], len(rough))
+    seconds, whole = ratio * slowness * float(at_feed.sum()), float(closely.sum())
+    reached = sorted(((name, share / whole) for name, share in shares.items()), key=lambda pair: -pair[1])
+    return PartsTime(seconds, seconds * float(np.hypot(ratio_error, slowness_error)), tuple(reached))
 
 
-def _in_turn(count: int) -> Ints:
-    """Rows (count,) in an order whose beginnings are all spread evenly: by their bits in reverse."""
-    bits = max(1, int(count - 1).bit_length())
-    reverse = np.zeros(1 << bits, np.int64)
-    for bit in range(bits):
-        reverse |= ((np.arange(1 << bits) >> bit) & 1) << (bits - 1 - bit)
-    return reverse[reverse < count]
+def _ratio(taken: Floats, known: Floats, count: int) -> tuple[float, float]:
+    """Ratio of times of some parts to what is known of these, and its relative standard error; of `count` in all."""
+    number, ratio = len(taken), float(taken.sum() / known.sum())
+    spread = np.square(taken - ratio * known).sum() * number / max(number - 1, 1) * (1.0 - number / count)
+    return ratio, float(np.sqrt(spread) / taken.sum())

@@ -22,11 +22,14 @@ from cornersmooth.model import Floats, Ints, Move, Program
 from cornersmooth.nc import Form
 from cornersmooth.pipeline import Progress, read_back, stage_of
 from cornersmooth.report.verdict import Saving
-from cornersmooth.settings import BOUNDS, TIMED_POSES, Settings
+from cornersmooth.settings import BOUNDS, Settings
 from cornersmooth.system.processes import useful_processes
 
 #: name of the law of LinuxCNC's planner in the tables of controls
 LINUXCNC = "linuxcnc-2.9"
+
+#: poses up to which motions are planned whole
+_WHOLE = 4_000
 
 #: of the digits of a program, mm and radians: a pose of it is the same as one of the CL file
 _SAME = 1e-3
@@ -161,7 +164,7 @@ def planned_saving(
         return None
     try:
         text = written_text(program, settings, form)
-        if len(program) > TIMED_POSES and not _linuxcnc(form):
+        if len(program) > _WHOLE and not _linuxcnc(form):
             return _in_parts(timing, text, program, progress)
         before, against = timing.unsmoothed(program, progress)
         written, limited = timing.written(text, program, progress)
