@@ -8,7 +8,7 @@ import pytest
 from cornersmooth.model import Move, Program, Source, Statement
 from cornersmooth.nc_reader import block_tables, reader
 from cornersmooth.nc_reader.ahead import Ahead
-from cornersmooth.verify import batches, stops, verify
+from cornersmooth.verify import batches, parse, verify
 
 from .writing import HEAD, TAIL, encode
 
@@ -226,7 +226,7 @@ def test_path_before_holes_is_measured_as_it_is_read(monkeypatch):
     lines = [("G0", 0, 0, 20), *(("G1", x, 3, 5) for x in range(400)), *DRILLED]
     monkeypatch.setattr(reader, "GIVEN_OUT", 4)
     monkeypatch.setattr(block_tables, "CHUNK", 60)
-    monkeypatch.setattr(stops, "TOGETHER", 4)
+    monkeypatch.setattr(parse, "TOGETHER", 4)
     monkeypatch.setattr(batches, "BATCH", 40)
     held = []
     part = Ahead.part
@@ -252,7 +252,7 @@ def test_a_long_run_of_holes_is_measured_as_it_is_read(monkeypatch):
     program, lines = many_holes(200)
     monkeypatch.setattr(reader, "GIVEN_OUT", 4)
     monkeypatch.setattr(block_tables, "CHUNK", 60)
-    monkeypatch.setattr(stops, "TOGETHER", 8)
+    monkeypatch.setattr(parse, "TOGETHER", 8)
     held = []
     part = Ahead.part
     monkeypatch.setattr(Ahead, "part", lambda ahead, *rows: (held.append(len(ahead.nc)), part(ahead, *rows))[1])

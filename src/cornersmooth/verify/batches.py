@@ -1,6 +1,6 @@
 """The written motion in batches, each with the stretches of the CL path that it is run beside.
 
-A *stretch* is the run of feed moves between two stops (see `stops`). Many short stretches make a batch; a long one is
+A *stretch* is the run of feed moves between two stops (see `parse`). Many short stretches make a batch; a long one is
 cut anywhere. The place of a cut on the CL path is guessed, so each batch can be decided by itself: where the motions
 can be run beside each other through all guessed places, they can be. Where not, it is not proved that they cannot.
 """
@@ -8,24 +8,22 @@ can be run beside each other through all guessed places, they can be. Where not,
 from __future__ import annotations
 
 from array import array
-from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Final, TypeAlias
 
 import numpy as np
 
-from cornersmooth.model import Floats, Ints, Move
+from cornersmooth.model import Floats, Move
 from cornersmooth.nc_reader.ahead import Ahead
 from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem
 from cornersmooth.nc_reader.tool import directions
-from cornersmooth.statements.tool_changes import ToolChanges
 from cornersmooth.verify.along_tool import AlongTool
 from cornersmooth.verify.decision import Batch
 from cornersmooth.verify.feeds import feed_at, out_of_hole
 from cornersmooth.verify.motions import written_motion
 from cornersmooth.verify.nearest import COLUMNS, largest_square, nearest_places
+from cornersmooth.verify.parse import BEFORE, Hole, Parse, Part
 from cornersmooth.verify.passage import AROUND, LONGER
-from cornersmooth.verify.stops import BEFORE, Hole, Part, Stops
 from cornersmooth.verify.task import ARITHMETIC, Task
 
 #: elements in a batch
@@ -49,12 +47,13 @@ class Batches:
     def __init__(self, task: Task, events: Sequence[Event], retracts: Sequence[int]) -> None:
         self.task, self._events, self.retracts = task, events, retracts
         self.problems: list[Problem] = []
-        #: as of `Stops`
+        #: as of `Parse`
         self.acts = array("q")
         self.holes: list[Hole] = []
         self.left_out: list[Problem] = []
         self.moves_left_out: set[int] = set()
         self.ways_up: dict[int, range] = {}
+        self.cuts, self.runs = array("q"), array("q")
         #: as of `AlongTool`
         self.rewinds: list[tuple[int, int]] = []
         self.still: set[int] = set()
@@ -73,10 +72,11 @@ class Batches:
         ahead = self._ahead = Ahead(nc for nc in chunks if len(nc))
         if ahead.has(0) and len(original.pose):
             along = AlongTool(ahead, self.retracts, self._events)
-            stops = Stops(self.task, ahead, ToolChanges(original.program, self._events), along)
+            stops = Parse(self.task, ahead, self._events, along)
             self.rewinds, self.still = along.rewinds, along.still
             self.acts, self.holes, self.left_out = stops.acts, stops.holes, stops.left_out
             self.moves_left_out, self.ways_up = stops.moves_left_out, stops.ways_up
+            self.cuts, self.runs = stops.cuts, stops.runs
             for part in stops.parts():
                 yield from self._take(part)
             yield from self._close(len(original.pose) - 1, ahead.count - 1)
@@ -94,8 +94,8 @@ class Batches:
 
     def _take(self, part: Part) -> Iterator[Batch]:
         """Take the stops among more elements."""
-        for move, element, opens, last in part.steps:
-            yield from self._close(move - 1, element - 1)
+        for move, element, opens, last, within in part.steps:
+            yield from self._close(move - (not within), element - (not within))
             if opens:
                 self._open(move, element)
                 self._move_last = last
@@ -201,14 +201,7 @@ class Batches:
             stretches=table,
             continued=bool(lead),
             goes_on=goes_on,
-            words=self._with_words(begin + lead, last),
         )
-
-    def _with_words(self, first: int, last: int) -> Ints:
-        """Elements from `first` to `last` with words, or a retract, behind them, ascending, each once."""
-        low = bisect_left(self._events, first + 1, key=lambda event: event.element)
-        high = bisect_right(self._events, last + 1, key=lambda event: event.element)
-        return np.unique(np.array([event.element for event in self._events[low:high]], np.int64)) - 1
 
     def _stands(self, move_last: int, element_last: int, *, cl_moves: bool) -> None:
         """Say if between two stops one motion leaves the place where the other stands: CS535, CS536."""

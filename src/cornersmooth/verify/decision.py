@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.model import Floats, Ints
+from cornersmooth.model import Floats
 from cornersmooth.nc_reader.elements import Elements
 from cornersmooth.verify.chain import Sections
 from cornersmooth.verify.motions import Motion, inner_points, written_motion
@@ -44,7 +44,6 @@ class Batch:
     #: whether the first stretch begins in the batch before: one more element stands in front of it
     continued: bool
     goes_on: bool  #: whether the last stretch goes on in the next batch
-    words: Ints  #: elements of the whole text with words behind them, ascending
 
     @property
     def first(self) -> int:

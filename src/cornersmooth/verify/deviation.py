@@ -15,12 +15,16 @@ import numpy as np
 
 from cornersmooth.model import Floats, Ints
 from cornersmooth.verify.chain import points_at
+from cornersmooth.verify.feeds import reach
 from cornersmooth.verify.findings import AXIS_OFF, Findings, Violation, Where
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.motions import digit_errors, inner_points
 from cornersmooth.verify.nearest import COLUMNS, Metric, largest_square, nearest_places, on_segments
 from cornersmooth.verify.passage import AROUND, LONGER, LOOK_BACK, Break
 from cornersmooth.verify.task import ARITHMETIC, Task
+
+#: places nearer to a vertex of the CL path are at it, in segments
+_HAIR: Final = 1e-9
 
 #: segments on either side of a place among which a nearer one is looked for
 _REACH: Final = 2
@@ -327,5 +331,7 @@ def _passed_elsewhere(match: Match, vertex: int, tip: Floats, axis: Floats) -> b
     ends = ends[slice(*np.searchsorted(length, (here - around, here + around)).tolist())]
     tips, axes = np.tile(tip, (len(ends), 1)), np.tile(axis, (len(ends), 1))
     exact, _ = digit_errors(match.nc, match.owner[ends], tips, axes, match.task.axis_length)
-    pose = np.array([vertex])
-    return any(match.may_be_at(end, pose)[0] for end in ends[exact].tolist())
+    ends = ends[exact]
+    limits, six, place = (match.lowest[ends], match.high[ends]), match.six[ends], match.place[ends]
+    first, last = (reach(match.task, six, place, limits, way) for way in (-1, 1))
+    return bool(((first <= vertex + _HAIR) & (vertex - _HAIR <= last)).any())

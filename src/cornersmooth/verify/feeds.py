@@ -42,8 +42,7 @@ def check_feeds(match: Match, found: Findings) -> None:
     good |= (first == last) & (_misfit(task, nc, element, first, first) < 0)
     if len(rows := np.flatnonzero(~good)):
         own = start[rows]
-        guessed = match.continued & (match.section[own] == 0)  # where the batch begins is not where the stretch does
-        limits = np.where(guessed, 0, match.low[own]), match.high[own]
+        limits = match.lowest[own], match.high[own]
         six = match.six[own], match.six[end[rows]]
         from_, to = (where[rows] for where in place)
         latest, earliest = reach(task, six[0], from_, limits, 1), reach(task, six[1], to, limits, -1)

@@ -69,18 +69,6 @@ def problems_of(violations: list[Violation]) -> list[Problem]:
     return [Problem(one.code, *one[2:4], _TEXT[one.code].format(one.amount), one.amount) for one in worst]
 
 
-class Spot(NamedTuple):
-    """Where an element ends on the CL path, beside a word."""
-
-    move: int  #: on which move
-    named: frozenset[int]  #: moves at whose ends it may be, and that it names to the printed digits
-    near: frozenset[int]  #: all moves at whose ends it may be
-
-    def joined(self, other: Spot) -> Spot:
-        """Those of both."""
-        return Spot(self.move, self.named | other.named, self.near | other.near)
-
-
 @dataclass
 class Runs:
     """Problems of runs of elements; a run that goes on in the next batch is one problem."""
@@ -108,7 +96,6 @@ class Findings:
     #: axis, rad; NC lines
     poses: list[Floats] = field(default_factory=list)
     unlooked: list[tuple[int, str]] = field(default_factory=list)  #: what was not looked at, and the NC line
-    words: dict[int, Spot] = field(default_factory=dict)  #: by element of the whole text with words behind it
 
     def note(self, name: str, values: Floats, cl_lines: Ints, nc_lines: Ints) -> None:
         """Take the largest of (k,) values, if it is larger than what was met."""
@@ -130,5 +117,3 @@ class Findings:
         self.feeds.follow(other.feeds)
         self.poses += other.poses
         self.unlooked += other.unlooked
-        for element, spot in other.words.items():
-            self.words[element] = spot.joined(self.words.get(element, spot))

@@ -142,11 +142,6 @@ class HoleLines:
         nc_line = self.nc_line(element) if element >= 0 else 0
         return Problem(code, int(self.line[min(move, len(self.line) - 1)]), nc_line, text, amount)
 
-    def leads(self, first: int, stop: int) -> bool:
-        """Whether moves, up to `stop` that excluded, lead anywhere from the pose of the first."""
-        tip, axis = (np.linalg.norm(values[first:stop] - values[first], axis=1) for values in (self.tip, self.axis))
-        return bool(max(tip.max(), self.axis_length * axis.max()) > self.room)
-
     def slant(self, move: int, element: int) -> float:
         """Height, mm, that a rapid loses on its way from beside a hole to above it, or gains between two holes.
 

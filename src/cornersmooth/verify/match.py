@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
@@ -13,8 +12,7 @@ from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.verify.chain import Path, passed
 from cornersmooth.verify.cl_motion import Original
 from cornersmooth.verify.decision import Batch, Decision, decide
-from cornersmooth.verify.free_space import FreeSpace, holds
-from cornersmooth.verify.passage import AROUND, MOST_BREAKS
+from cornersmooth.verify.passage import MOST_BREAKS
 from cornersmooth.verify.task import Task
 
 #: vertices on either side of one from whose places it is worked out first where it may be (speed only)
@@ -108,6 +106,11 @@ class Match(Batch, Decision):
         return np.minimum(self.stretches["start"][np.maximum(self.section, 0), 0].astype(np.int64), self.high)
 
     @cached_property
+    def lowest(self) -> Ints:
+        """(v,) first segment that a vertex may be on: where a batch begins at a cut, that is only guessed."""
+        return np.where(self.continued & (self.section == 0), 0, self.low)
+
+    @cached_property
     def high(self) -> Ints:
         """(v,) last segment of the CL path in the stretch a vertex belongs to."""
         return self.stretches["stop"][np.maximum(self.section, 0)] - 1
@@ -134,42 +137,6 @@ class Match(Batch, Decision):
         order = np.argsort(vertex, kind="stable")
         row, share = np.concatenate((row[inside], begin)), np.concatenate((share[inside], np.zeros(len(begin))))
         return vertex[order], row[order], share[order]
-
-    def may_be_at(self, vertex: int, pose: Ints) -> Bools:
-        """(k,) whether a written vertex may be at vertices of the CL path: it has more places where that turns back.
-
-        They are those from which the places of vertices far before and far behind it can be reached. Words and exact
-        poses ask for it: what holds at one of these places holds.
-        """
-        there = np.zeros(len(pose), np.bool_)
-        ends, around, far = [int(run[vertex]) for run in self.runs], _FEW, AROUND * self.tolerance
-        while self.on[vertex]:
-            first, last = max(ends[0], vertex - around), min(ends[1], vertex + around)
-            there |= self._reached(vertex, first, last, pose)
-            before, here, after = self.path.lengths_at(self.place[[first, vertex, last]]).tolist()
-            if there.all() or ((first == ends[0] or here - before > far) and (last == ends[1] or after - here > far)):
-                break
-            around *= 4
-        return there
-
-    def _reached(self, vertex: int, first: int, last: int, pose: Ints) -> Bools:
-        """(k,) the same, from the places of the first and the last of some written vertices."""
-        there = np.zeros(len(pose), np.bool_)
-        start, end = self.place[[first, last]].tolist()
-        bottom = min(int(start), self.path.segments - 1)
-        top = min(max(math.ceil(end), bottom + 1), self.path.segments)
-        bend = self.motion.bend[first:last]
-        radius = self.task.radius + float(bend.max(initial=0.0))
-        own, path = self.six[first : last + 1].T, self.path.points[bottom : top + 1].T
-        space = FreeSpace(own, path, radius, bend, np.zeros(top - bottom))
-        forward = [space.along(0, start - bottom)]
-        forward += [reached for _, reached in space.sweep(0, forward[0])]
-        if len(forward) <= last - first or not holds(forward[-1], end - bottom, top - bottom - 1):
-            return there
-        places = space.between(forward, end - bottom)[vertex - first]
-        for k, (low, high) in places.items():
-            there |= (bottom + k + low <= pose) & (pose <= bottom + k + high)
-        return there
 
     def cl_lines(self, place: Floats) -> Ints:
         """(k,) lines of the CL file that lead to places."""

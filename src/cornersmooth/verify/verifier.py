@@ -41,7 +41,7 @@ from cornersmooth.verify.match import Match
 from cornersmooth.verify.passage import MORE_BREAKS, MOST_BREAKS
 from cornersmooth.verify.result import Verification
 from cornersmooth.verify.task import Task, length_of
-from cornersmooth.verify.word_places import WordPlaces, place_words
+from cornersmooth.verify.word_places import WordPlaces
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine
@@ -53,7 +53,6 @@ CHECKS: Final[tuple[Callable[[Match, Findings], None], ...]] = (
     measure_original,
     check_feeds,
     measure_continuity,
-    place_words,
 )
 
 #: what the message has of a text without feeds, which both files may agree on

@@ -9,11 +9,10 @@ from __future__ import annotations
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Sequence, Set
 from dataclasses import replace
-from typing import Final
 
 import numpy as np
 
-from cornersmooth.model import Ints, Move
+from cornersmooth.model import Bools, Ints, Move
 from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem
 from cornersmooth.nc_reader.tool import leads_somewhere
 from cornersmooth.nc_reader.word_tables import Means
@@ -21,43 +20,7 @@ from cornersmooth.statements.asked import asked
 from cornersmooth.statements.comparison import Comparison, changed_unseen, without_word
 from cornersmooth.statements.tokens import Token, said
 from cornersmooth.verify.batches import Batches
-from cornersmooth.verify.feeds import reach
-from cornersmooth.verify.findings import Findings, Spot
-from cornersmooth.verify.match import Match
-from cornersmooth.verify.motions import digit_errors
-from cornersmooth.verify.passage import AROUND
-from cornersmooth.verify.stops import Hole
-
-#: places nearer to a vertex of the CL path are at it, in segments
-_HAIR: Final = 1e-9
-
-
-def place_words(match: Match, found: Findings) -> None:
-    """Take down where the elements with words behind them end.
-
-    A vertex may be anywhere around its place as long as the path does not leave the tolerance, or on another turn.
-    """
-    task, trail, path = match.task, match.original.trail, match.path
-    vertex = match.motion.last[match.words - match.first - match.offset]
-    element, vertex = match.words[match.on[vertex]], vertex[match.on[vertex]]
-    if not len(vertex):
-        return
-    place, six = match.place[vertex], match.six[vertex]
-    limits = np.where(match.continued & (match.section[vertex] == 0), 0, match.low[vertex]), match.high[vertex]
-    low, high = (reach(task, six, place, limits, way) for way in (-1, 1))
-    program, pose = match.original.program, match.original.pose
-    for k, one in enumerate(element.tolist()):
-        here, around = path.length_at(float(place[k])), AROUND * task.tolerance
-        window = np.arange(*np.searchsorted(path.length, (here - around, here + around)))
-        window = window[trail.fraction[window] == 1.0]
-        move = trail.owner[window]
-        own = np.full(len(move), one - match.offset)
-        exact, _ = digit_errors(match.nc, own, program.tip[pose[move]], program.axis[pose[move]], task.axis_length)
-        near = (low[k] - _HAIR <= window) & (window <= high[k] + _HAIR)
-        if len(other := np.flatnonzero(exact & ~near)):
-            near[other] = match.may_be_at(int(vertex[k]), window[other])
-        on = int(trail.owner[min(int(np.ceil(place[k])), len(trail) - 1)])
-        found.words[one] = Spot(on, frozenset(move[exact & near].tolist()), frozenset(move[near].tolist()))
+from cornersmooth.verify.findings import Findings
 
 
 class WordPlaces:
@@ -122,33 +85,34 @@ class WordPlaces:
         cl_tokens = [replace(one, place=leading.get(one.place, one.place)) for one in requested]
         events = [replace(one, element=self._moving(one.element)) for one in self._events]
         nc_tokens = sorted(said(events, means), key=lambda one: one.place)
-        spots: dict[int, Spot] = {}
-        for element in {one.element for one in self._events}:
-            if (spot := found.words.get(element - 1)) is not None:
-                begin = self._moving(element)
-                spots[begin] = spot.joined(spots.get(begin, spot))
         homes = {leading[place] for place, one in zip(places, program.statements, strict=True) if one.word == "GOHOME"}
-        behind: dict[int, set[int]] = {}
-        for place, lead in leading.items():  # the moves that end where statements are
-            first_of = place - 1
-            while first_of in batches.moves_left_out:
-                first_of -= 1
-            behind.setdefault(lead, set()).update(range(first_of, beyond[place]))
         # that of those no element names is written
         missed = {int(original.trail.owner[int(one.place)]) for one in found.violations if one.code == "CS524"}
 
-        holes = {self._moving(one.first): (one, _within(nc_tokens, one)) for one in batches.holes}
+        begins = [(self._moving(one.first), one) for one in batches.holes]
+        holes = {first: (one, _within(nc_tokens, first, one.leaves)) for first, one in begins}
         inside = {id(one) for _, some in holes.values() for one in some if one.kind in ("dwell", "tap")}
         comparison = Comparison(cl_tokens, [one for one in nc_tokens if id(one) not in inside], means, own)
-        acts = np.append(np.frombuffer(batches.acts, np.int64).reshape(-1, 2), [[moves, batches.elements]], axis=0)
+        acts = np.frombuffer(batches.acts, np.int64).reshape(-1, 2)
         # what leads nowhere in the program is no act: a rapid to where the tool is, or the same element again
-        rapid = program.kind[original.pose[np.minimum(acts[:, 0], moves - 1)]] == Move.RAPID
-        first = np.array([self._moving(one) for one in acts[:, 1].tolist()])
+        rapid = program.kind[original.pose[acts[:, 0]]] == Move.RAPID
+        first = np.array([self._moving(one) for one in acts[:, 1].tolist()], np.int64)
         kept = (~rapid | (first == acts[:, 1])) & (np.diff(first, prepend=-1) > 0)
-        acts = np.maximum.accumulate(np.column_stack((acts[:, 0], first))[kept])
+        acts = np.column_stack((acts[:, 0], first))[kept]
+        pairs = zip(batches.cuts[::2], batches.cuts[1::2], strict=True)
+        cuts = [(leading[move], self._moving(one)) for move, one in pairs]
+        rows = [*acts.tolist(), *(one for one in cuts if one[1] not in first), (moves, batches.elements)]
+        acts = np.maximum.accumulate(np.array(sorted(rows, key=lambda row: row[1]), np.int64))
         cl_places = np.array(sorted({one.place for one in cl_tokens} | homes), np.int64)
         nc_places = np.array(sorted({one.place for one in nc_tokens}), np.int64)
         cl_act, nc_act = np.searchsorted(acts[:, 0], cl_places), np.searchsorted(acts[:, 1], nc_places)
+        # words in runs for which the other file has none at that pose
+        runs = np.frombuffer(batches.runs, np.int64).reshape(-1, 4)
+        cl_in, nc_in = (
+            _within_runs(some, runs[:, k], runs[:, 2 + k]) & (some < acts[act_of, k])
+            for k, (some, act_of) in enumerate(((cl_places, cl_act), (nc_places, nc_act)))
+        )
+        cl_alone, cl_at, nc_alone, nc_at = cl_places[cl_in], cl_act[cl_in], nc_places[nc_in], nc_act[nc_in]
         of_cycles = [first for first, (one, some) in holes.items() if some or one.cycle.dwell or one.cycle.tap]
         wanted = {*cl_act.tolist(), *nc_act.tolist(), *np.searchsorted(acts[:, 1], of_cycles).tolist()}
         wanted |= {act + 1 for act in wanted if act < len(acts) and int(acts[act, 1]) in batches.ways_up}
@@ -156,14 +120,8 @@ class WordPlaces:
         before, behind_way = (-1, -1), None
         for act in sorted(one for one in wanted if one < len(acts)):
             end = int(acts[act, 0]), int(acts[act, 1])
-            meetings: list[tuple[int, int]] = []
-            if not act or int(acts[act - 1, 1]) not in holes:  # else there is no run between: moves lead nowhere
-                there = cl_places[cl_act == act].tolist(), nc_places[nc_act == act].tolist()
-                meetings = _within_run(*there, behind, spots, missed)
-                lost = [place for place in there[1] if place < end[1] and place not in spots]
-                if lost and not (batches.moves_left_out or batches.problems or found.breaks):
-                    line = next((one.line for one in events if one.element == lost[0]), 0)
-                    found.unlooked.append((line, "where the words stand on the path"))
+            alone = [some[act_of == act].tolist() for some, act_of in ((cl_alone, cl_at), (nc_alone, nc_at))]
+            meetings = [] if missed & {*range(before[0], end[0])} else _apart(before, *alone)
             if behind_way is not None and behind_way[1] < end[1]:
                 meetings.insert(0, behind_way)
             behind_way = None
@@ -212,36 +170,23 @@ class WordPlaces:
         return element
 
 
-def _within_run(
-    cl_places: list[int], nc_places: list[int], behind: dict[int, set[int]], spots: dict[int, Spot], missed: set[int]
-) -> list[tuple[int, int]]:
-    """Where both files say something within a run of feed moves: places of both up to which it belongs together.
-
-    Of `missed` poses it is enough that a word is near them. From a word on of which nothing is known, as over holes
-    that are left out, they are not distinguished.
-    """
-    found: list[tuple[int, int]] = []
-    i, move, element = 0, -1, -1
-    for place in nc_places:
-        if (spot := spots.get(place)) is None:
-            return found
-        ends = spot.named | (spot.near & missed)
-        there = (k for k in range(i, len(cl_places)) if not ends.isdisjoint(behind.get(cl_places[k], ())))
-        same = next(there, None)
-        while i < len(cl_places) and (cl_places[i] <= spot.move if same is None else i < same):
-            move, i = cl_places[i], i + 1
-            found.append((move, element))
-        if same is not None:
-            move, i = cl_places[same], same + 1
-        element = place
-        found.append((move, element))
-    return [*found, *((one, element) for one in cl_places[i:])]
+def _within_runs(places: Ints, first: Ints, end: Ints) -> Bools:
+    """(k,) whether places are within runs, which begin and end with some, ascending."""
+    run = np.searchsorted(first, places) - 1
+    inside: Bools = (run >= 0) & (places < end[run]) if len(first) else np.zeros(len(places), np.bool_)
+    return inside
 
 
-def _within(tokens: Sequence[Token], hole: Hole) -> list[Token]:
+def _apart(before: tuple[int, int], cl_places: list[int], nc_places: list[int]) -> list[tuple[int, int]]:
+    """Places of both files, behind some, where only one of them has words."""
+    last = cl_places[-1] if cl_places else before[0]
+    return [*((one, before[1]) for one in cl_places), *((last, one) for one in nc_places)]
+
+
+def _within(tokens: Sequence[Token], begins: int, leaves: int) -> list[Token]:
     """Tokens that are written within a hole; a tap is written before it begins."""
     first, stop = (
         side(tokens, place, key=lambda one: one.place)
-        for side, place in ((bisect_left, hole.first), (bisect_right, hole.leaves))
+        for side, place in ((bisect_left, begins), (bisect_right, leaves))
     )
-    return [one for one in tokens[first:stop] if one.place > hole.first or one.kind == "tap"]
+    return [one for one in tokens[first:stop] if one.place > begins or one.kind == "tap"]

@@ -1,0 +1,530 @@
+"""The program as a parse: it does the acts of the CL file one after the other, and nothing else.
+
+An *act* is a rapid, a run of feed moves, or a hole. Rapids and holes are known digit for digit, so they divide both
+motions alike; what is between two of them is decided by itself. A *stop* is the pose where a run begins: the end of a
+rapid, a hole, the very first pose.
+
+Where the next element does not begin the next act, that is the fault, at its line. What is looked for behind a fault
+decides what is named, and never whether a program passes.
+"""
+
+from __future__ import annotations
+
+import math
+from array import array
+from bisect import bisect_left, bisect_right
+from collections.abc import Generator, Iterator, Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from cornersmooth.model import Bools, Ints, Move
+from cornersmooth.nc_reader.ahead import Ahead
+from cornersmooth.nc_reader.elements import Event, Problem
+from cornersmooth.nc_reader.tool import beyond_digits, directions, moving_rapids
+from cornersmooth.statements.cycles import Drilling, drillings
+from cornersmooth.statements.tool_changes import ToolChanges
+from cornersmooth.verify.along_tool import AlongTool
+from cornersmooth.verify.feeds import feed_at, out_of_hole
+from cornersmooth.verify.holes import HoleLines
+from cornersmooth.verify.task import Task
+
+#: elements that are given out together
+TOGETHER: Final = 1 << 14
+
+#: stops and elements behind a fault among which the next that fits is looked for
+_AFTER_FAULT: Final = 64
+
+#: words that a hole may have: its dwell and its tap
+_IN_HOLES: Final = (("G", 4.0), ("G", 84.0))
+
+#: elements before those that are certain that are still looked at
+BEFORE: Final = 16
+
+
+class Step(NamedTuple):
+    """A stop that is reached."""
+
+    move: int  #: the move that ends there
+    element: int  #: the element that ends there; the first one of a hole; the first feed move out of a hole
+    opens: bool  #: whether feed moves may follow, rather than a hole
+    last: int  #: last move before the next stop
+    within: bool = False  #: whether both motions pass a pose of a run there, where both files have words
+
+
+class Hole(NamedTuple):
+    """A hole that is drilled."""
+
+    move: int
+    first: int  #: the first element that belongs to it
+    leaves: int  #: the element with which the tool leaves it
+    cycle: Drilling
+
+
+class Part(NamedTuple):
+    """Elements that are certain: up to `stop`, that excluded."""
+
+    stop: int
+    steps: list[Step]
+
+
+class Parse:
+    """Goes through the acts of the CL file and the elements of a program, at least one, side by side."""
+
+    def __init__(self, task: Task, ahead: Ahead, events: Sequence[Event], along: AlongTool) -> None:
+        self._task, self._ahead, self._events, self._along = task, ahead, events, along
+        self._changes = ToolChanges(task.original.program, events)
+        self.lines = HoleLines(task.original, ahead, task.axis_length, task.tolerance)
+        #: rapids, holes and feeds out of holes, two numbers for each: the move and the element that begin it
+        self.acts = array("q")
+        self.holes: list[Hole] = []
+        #: runs of feed moves, four numbers for each: the move and the element that they begin with, and those behind
+        self.runs = array("q")
+        #: poses within runs where both files have words: moves that statements are before, and elements behind
+        self.cuts = array("q")
+        #: CS561 for holes that the program leaves out and may leave out if requested
+        self.left_out: list[Problem] = []
+        self.moves_left_out: set[int] = set()
+        #: holes that an element may be the way up from, by the element: it also ends at the rapid behind them
+        self.ways_up: dict[int, range] = {}
+        #: CS531 a rapid goes elsewhere, CS532 one is missing, CS533 one too many; CS536 a feed move too many; of holes
+        self.problems: list[Problem] = []
+        self._steps: list[Step] = []
+        self._given = 0  #: elements given out so far
+        self._begun = -1  #: the element with which the run begins that goes on; -1 within a hole and in front of all
+        original = task.original
+        poses = [one.pose for one in original.program.statements]
+        #: moves that statements are before
+        self._stated: list[int] = np.unique(np.searchsorted(original.pose, poses)).tolist()
+        self._from: tuple[int, ...] = ()  # the move and the element that a run of feed moves begins with
+        self._cut_at, self._gone = 0, 0.0  # first move where a run may be divided next, and how far the tool is, mm
+        self._find_stops()
+
+    def _find_stops(self) -> None:
+        """Find holes, and rapids that move the tool by more than digits show or come out of a hole, from anywhere."""
+        lines, original = self.lines, self._task.original
+        hole, rapid = lines.kind == Move.HOLE, np.flatnonzero(lines.kind == Move.RAPID)
+        before = np.maximum(rapid - 1, 0)
+        turned = np.linalg.norm(lines.axis[rapid] - lines.axis[before], axis=1) * lines.axis_length > lines.room
+        moved = turned | hole[before] | beyond_digits(self._ahead.nc, lines.tip[rapid] - lines.tip[before])
+        chosen = hole.copy()
+        chosen[rapid[moved]] = chosen[:1] = True
+        fed = ~chosen
+        fed[rapid] = False
+        self.moves: Ints = np.flatnonzero(chosen)
+        self._move: list[int] = [*self.moves.tolist(), len(chosen)]
+        self._hole: list[bool] = [*hole[self.moves].tolist(), False]
+        self._holes = np.flatnonzero(hole[self.moves])  # among the stops
+        #: whether feed moves follow each stop
+        self._fed: list[bool] = np.logical_or.reduceat(fed, self.moves).tolist()
+        cycles = drillings(original.program, original.pose[hole].tolist())
+        self._cycles: dict[int, Drilling] = dict(zip(np.flatnonzero(hole).tolist(), cycles, strict=True))
+
+    # ------------------------------------------------------------------ acts
+
+    def parts(self) -> Iterator[Part]:
+        """Give out what is certain as it is read; all but the last `BEFORE` of that may be forgotten then."""
+        stop, element, last = -1, 0, len(self.moves) - 1
+        while True:
+            stop, element = yield from self._run(stop, element)
+            if stop < last and self._hole[stop + 1]:
+                stop, element = self._drill(stop + 1, element)
+            elif stop < last and self._reaches(stop + 1, element):
+                stop, element = self._reach(stop + 1, element)
+            elif self._ahead.has(element):
+                stop, element = self._fault(stop, element)
+            elif stop < last:
+                stop = self._lack(stop + 1, element)
+            else:
+                break
+            yield from self._certain(element)
+        self._end_run(self._move[-1], element)
+        yield Part(element, self._steps)
+
+    def _certain(self, element: int) -> Iterator[Part]:
+        if element - self._given >= TOGETHER:
+            yield Part(element, self._steps)
+            self._given, self._steps = element, []
+
+    def _run(self, stop: int, element: int) -> Generator[Part, None, tuple[int, int]]:
+        """Go along feed moves, and the rapids behind them, up to a hole or to what is no act of the CL file."""
+        ahead, lines, along = self._ahead, self.lines, self._along
+        met = -1  # behind the last pose before a hole
+        while ahead.has(element):
+            hole = self._hole[stop + 1]
+            if self._begun < 0 or (hole and not self._fed[stop]):  # no feed move may follow
+                return stop, self._pass_idle(stop, element)
+            if along.next_retract(element) == element:
+                behind = self._pass_idle(stop, element)
+                if behind == element and not lines.feeds(element) and lines.stands(element):
+                    break
+                element = behind
+                if not ahead.has(element):
+                    break
+            if hole and met < 0 and lines.at(self._move[stop + 1] - 1, element - 1):
+                met = element
+            end = int(min(ahead.count, element + TOGETHER, max(along.next_retract(element + 1), element + 1)))
+            rapids = moving_rapids(ahead.nc, max(element - ahead.base, 1), end - ahead.base) + ahead.base
+            if not hole and len(rapids):
+                nearest = np.searchsorted(self._holes, stop + 1)
+                last = int(self._holes[nearest]) if nearest < len(self._holes) else len(self.moves)
+                stops = self.moves[stop + 1 : min(stop + 1 + len(rapids), last)]
+                count = int(np.argmin(np.append(lines.exact(stops, rapids[: len(stops)]), False)))
+                for one in rapids[:count].tolist():
+                    self._divide(stop, element, one)
+                    stop, element = stop + 1, one + 1
+                    self._open(stop, one)
+                if count:
+                    yield from self._certain(element)
+                    continue
+            feeds_to = int(rapids[0]) if len(rapids) else end
+            if hole:
+                window = np.arange(element, feeds_to)
+                there = np.flatnonzero(lines.exact(np.full(len(window), self._move[stop + 1] - 1), window))
+                met = element + int(there[-1]) + 1 if len(there) else met
+            self._divide(stop, element, feeds_to if met < 0 else min(met, feeds_to))
+            if len(rapids):
+                element = self._pass_idle(stop, feeds_to)
+                if element == feeds_to:
+                    break
+                continue
+            element = feeds_to
+            yield from self._certain(element if met < 0 else met)
+        known = met >= 0 and (self._over(stop + 1, met) or self._may_be_left_out(stop + 1))
+        return stop, met if known else element
+
+    def _divide(self, stop: int, element: int, end: int) -> None:
+        """Divide a run where an element in front of `end` ends at the pose of a statement, and words are behind it."""
+        lines, nc, base, original = self.lines, self._ahead.nc, self._ahead.base, self._task.original
+        moves = self._stated[slice(*(bisect_left(self._stated, one) for one in (self._cut_at, self._move[stop + 1])))]
+        if not moves:
+            return
+        ways = np.linalg.norm(np.diff(nc.tip[max(element - 1 - base, 0) : end - base], axis=0), axis=1)
+        gone = self._gone + np.append(0.0, np.cumsum(ways))
+        self._gone = float(gone[-1])
+        length = self._task.path.length[original.trail.last]
+        first, last = (bisect_left(self._events, one, key=lambda event: event.element) for one in (element, end))
+        for one in sorted({event.element for event in self._events[first:last]}):
+            there = [move for move in moves if move >= self._cut_at and lines.at(move - 1, one - 1)]
+            if there:
+                way = gone[one - element] + length[self._move[stop]]
+                move = min(there, key=lambda move: abs(length[move - 1] - way))
+                self.cuts.extend((move, one))
+                self._cut_at = move + 1
+                if move - 1 > self._move[stop] and one - 1 > self._begun:
+                    self._steps.append(Step(move - 1, one - 1, True, self._move[stop + 1] - 1, within=True))
+
+    def _pass_idle(self, stop: int, element: int) -> int:
+        """First element from one on that leads anywhere: posts add others beside retracts."""
+        lines, along, following = self.lines, self._along, stop + 1
+        while self._ahead.has(element):
+            rapid = not lines.feeds(element)
+            if along.comes_back(element):
+                self._check_return(element)
+            if self._reaches(following, element):
+                break
+            idle = lines.stands(element) or (rapid and stop >= 0 and self._negligible(element))
+            if idle and not (rapid and stop >= 0 and self._comes_down_first(stop, element)):
+                element += 1
+            elif self._hole[following] and self._over(following, element):
+                break
+            elif along.stays(element):
+                lines.forget()
+            else:
+                break
+        return element
+
+    def _reaches(self, stop: int, element: int) -> bool:
+        """Whether an element leads to a rapid of the CL file, or to the first pose."""
+        lines = self.lines
+        if stop == len(self.moves) or self._hole[stop]:
+            return False
+        there = self._ahead.has(element) and (stop == 0 or not lines.feeds(element))
+        there = there and lines.at(self._move[stop], element)
+        return there and not (lines.stands(element) and self._has_tool(stop, element - 1))
+
+    def _reach(self, stop: int, element: int) -> tuple[int, int]:
+        """Take a rapid."""
+        self._open(stop, element)
+        return stop, element + 1
+
+    # ------------------------------------------------------------------ holes
+
+    def _drill(self, stop: int, element: int) -> tuple[int, int]:
+        """Take a hole: it ends where it is done as its cycle says, and where what follows can begin."""
+        ahead, lines, move = self._ahead, self.lines, self._move[stop]
+        cycle = self._cycles[move]
+        end = element
+        while ahead.has(end):
+            if not (self._over(stop, end) or (end > element and lines.stands(end))):
+                if end == element or not self._over(stop, end + 1) or self._begins(stop, end) is not None:
+                    break
+                if self._fitting(stop + 1, end).any():
+                    break
+                self._surplus(stop + 1, end)
+            end += 1
+        best, late = end, self._hole[stop + 1] and not self._fed[stop]
+        found: tuple[bool, int, bool] | None = None
+        lowest = math.inf  # of the feed moves
+        for one in range(element, end + 1):
+            if one > element and lines.feeds(one - 1):
+                lowest = min(lowest, lines.height(move, one - 1))
+            done = lowest <= lines.room - cycle.depth or (math.isinf(lowest) and self._may_be_left_out(stop))
+            following = self._begins(stop, one) if done or one == end else None
+            if following is None and one < end:
+                continue
+            problems, left = lines.check(move, range(element, self._end_of(stop, element, one)), cycle)
+            lacks = len(self.moves) if following is None else following
+            rank = left, lacks, one == element or not self._has_words(one)
+            if not problems and (found is None or rank < found or (late and rank == found)):
+                best, found = one, rank
+        if found is None and end == element and ahead.has(element) and not self._may_be_left_out(stop):
+            for one in range(element, element + _AFTER_FAULT):
+                if not ahead.has(one) or self._fitting(stop + 1, one).any():
+                    break
+                if self._over(stop, one):
+                    text = "a motion that the CL file does not have"
+                    self.problems.append(lines.problem("CS534", move, element, text))
+                    return stop - 1, one
+        return self._leave(stop, element, best)
+
+    def _end_of(self, stop: int, element: int, end: int) -> int:
+        """First element that does not belong to a hole: the way up is the hole's, wherever else it leads."""
+        lines, move = self.lines, self._move[stop]
+        before = lines.height(move, end - 1) if end > element else math.inf
+        if (before < -lines.room or not self._hole[stop + 1]) and self._ahead.has(end) and not lines.feeds(end):
+            return end + int(lines.height(move, end) > before)
+        return end
+
+    def _begins(self, stop: int, element: int) -> int | None:
+        """How many holes are left out if what follows a stop begins with an element; None if nothing does."""
+        lines, following, has = self.lines, stop + 1, self._ahead.has(element)
+        inside = self._hole[stop] and lines.height(self._move[stop], element - 1) < -lines.room
+        at_feed = inside and self._cycles[self._move[stop]].feed_out  # the way out is the hole's
+        if self._fed[stop] and has and lines.feeds(element) and not at_feed:
+            return 0
+        if self._fed[stop] and not self._done(stop, element):
+            return None
+        lacks = int(self._fed[stop])  # feed moves that lead nowhere
+        if following == len(self.moves):
+            return None if has else lacks
+        if self._hole[following]:
+            if not inside and self._over(following, element):
+                return lacks
+            behind = self._begins(following, element) if self._may_be_left_out(following) else None
+            return None if behind is None else behind + 1 + lacks
+        if self._reaches(following, element):
+            return lacks
+        return self._begins(following, element) if element and lines.at(self._move[following], element - 1) else None
+
+    def _leave(self, stop: int, begin: int, end: int) -> tuple[int, int]:
+        """Take down a hole that some elements belong to."""
+        lines, move, following = self.lines, self._move[stop], stop + 1
+        if self._begun >= 0:
+            self._steps.append(Step(move, begin, False, -1))
+        self._end_run(move, begin)
+        behind = self._end_of(stop, begin, end)
+        found, left = lines.check(move, range(begin, behind), self._cycles[move])
+        if self._along.next_retract(begin) != begin and (slant := lines.slant(move, begin)):
+            text = f"a rapid goes aslant to a hole, {slant:.4f} mm: across at the higher level, then down"
+            found.append(lines.problem("CS563", move, begin, text, slant))
+        self.problems += found
+        self._drilled(stop, begin, behind, left=left)
+        ahead, out = self._ahead, end
+        has = ahead.has(end)
+        if self._fed[stop] and has and lines.feeds(end):
+            while ahead.has(end + 1) and lines.stands(end):
+                end += 1
+            block = lines.block(end)
+            out = end - 1 if lines.at(move + 1, end - 1) else block.stop - 1
+            if out >= end and not lines.is_straight(block):
+                text = "feed moves that the CL file does not have"
+                self.problems.append(lines.problem("CS536", move, end, text))
+            if out == end:
+                nc, own = ahead.nc, end - ahead.base
+                self.problems += feed_at(self._task, nc, own, move + 1, out_of_hole(self._task, nc, own, move))
+            self._open(stop, out)
+            return stop, max(out, end - 1) + 1
+        if not self._done(stop, end):
+            self.problems.append(lines.problem("CS535", move + 1, end - 1, "feed moves of the CL file are missing"))
+        if following < len(self.moves) and not self._hole[following]:
+            if self._reaches(following, end):
+                self._open(following, end)
+                self._note_way_up(following, begin, end)
+                return following, end + 1
+            above = lines.fed_above(move, end - 1, self._cycles[move])
+            if lines.at(self._move[following], end - 1) and self._has_tool(following, end - 1) and not above:
+                there = next(one for one in range(end - 1, -1, -1) if not lines.stands(one))
+                self._open(following, there)
+                self._note_way_up(following, begin, there)
+                return following, end
+        return stop, end
+
+    # ------------------------------------------------------------------ faults
+
+    def _fitting(self, first: int, element: int) -> Bools:
+        """Which stops from one on an element may reach."""
+        lines = self.lines
+        moves = self.moves[first : first + _AFTER_FAULT]
+        elements = np.full(len(moves), element)
+        hole = lines.kind[moves] == Move.HOLE
+        rapid = lines.exact(moves, elements) & (not lines.feeds(element))
+        return np.where(hole, ~np.isnan(lines.heights(moves, elements)), rapid)
+
+    def _fault(self, stop: int, element: int) -> tuple[int, int]:
+        """What an element is that begins no act: one too many, one that ends elsewhere, or one behind a lack."""
+        lines, first, feeds = self.lines, stop + 1, self.lines.feeds(element)
+        fits = np.flatnonzero(self._fitting(first, element))
+        if len(fits):
+            for one in range(first, first + int(fits[0])):
+                self._lack(one, element)
+            return first + int(fits[0]) - 1, element
+        ahead = self._ahead
+        following = next(
+            (k for k in range(element + 1, element + _AFTER_FAULT) if not ahead.has(k) or not lines.feeds(k)), -1
+        )
+        surplus = (
+            first < len(self.moves) and following >= 0 and ahead.has(following) and self._reaches(first, following)
+        )
+        if not surplus and first < len(self.moves) and (not feeds or first == 0):
+            amount = float(lines.missed(self.moves[first : first + 1], np.array([element]))[1][0])
+            self.problems.append(
+                lines.problem("CS531", self._move[first], element, "a rapid does not end at its pose", amount)
+            )
+            return self._reach(first, element)
+        self._surplus(first, element)
+        return stop, element + 1
+
+    def _surplus(self, stop: int, element: int) -> None:
+        """An element before a stop is one too many."""
+        text = "a rapid that the CL file does not have, or a feed move written as one"
+        if self.lines.feeds(element):
+            code, text = "CS536", "feed moves that the CL file does not have"
+        else:
+            code = "CS533"
+        self.problems.append(self.lines.problem(code, self._move[stop], element, text))
+
+    def _lack(self, stop: int, element: int) -> int:
+        """A stop is missing before an element."""
+        if self._hole[stop]:
+            self._leave(stop, element, element)
+            return stop
+        lines, move, ahead = self.lines, self._move[stop], self._ahead
+        first = max(self._begun if self._begun >= 0 else element - 1, ahead.base)
+        away = ahead.nc.tip[first - ahead.base : max(element, first + 1) - ahead.base] - lines.tip[move]
+        near = first + int(np.argmin(np.linalg.norm(away, axis=1)))
+        text = "a rapid of the CL file is missing, or is written as a feed move"
+        self.problems.append(lines.problem("CS532", move, near, text))
+        return stop
+
+    def _comes_down_first(self, stop: int, element: int) -> bool:
+        """Whether the tool comes down from a retract to where it was, to go to another place in rapid from there.
+
+        Unless a rapid of the CL file that leads nowhere, the last before the next stop, has it there.
+        """
+        if not self._along.comes_down_first(element) or self.lines.stands(element + 1):
+            return False
+        move = self._move[stop + 1] - 1
+        there = move > self._move[stop] and self.lines.kind[move] == Move.RAPID
+        first, behind = self._changes.elements_of(int(self._task.original.pose[move]))
+        return not (there and first <= element < behind)
+
+    def _check_return(self, element: int) -> None:
+        """Complain of an element that goes on with a cut, but if the CL file has a pose where that was left."""
+        lines, rapid = self.lines, not self.lines.feeds(element)
+        if not lines.goes_to(element - 1, rapid=rapid):
+            at_feed = "the tool goes on at feed with a cut that it has left, and does not come from above"
+            text = "the tool comes back in rapid to where it has left a cut" if rapid else at_feed
+            self.problems.append(Problem("CS582", 0, lines.nc_line(element), text))
+
+    # ------------------------------------------------------------------ what an element may be
+
+    def _over(self, stop: int, element: int) -> bool:
+        """Whether an element ends in the line of a hole, and no tool change parts it from that."""
+        has = self._ahead.has(element) and self._has_tool(stop, element)
+        return has and self.lines.over(self._move[stop], element)
+
+    def _has_tool(self, stop: int, element: int) -> bool:
+        """Whether no tool change parts an element from a stop."""
+        first, behind = self._changes.elements_of(int(self._task.original.pose[self._move[stop]]))
+        return first <= element < behind
+
+    def _has_words(self, element: int) -> bool:
+        """Whether words stand in front of an element that do not belong into a hole."""
+        first, stop = (side(self._events, element, key=lambda one: one.element) for side in (bisect_left, bisect_right))
+        return any((one.letter, one.value) not in _IN_HOLES for one in self._events[first:stop])
+
+    def _may_be_left_out(self, stop: int) -> bool:
+        cycle = self._cycles[self._move[stop]]
+        return cycle.tap or not cycle.depth > self.lines.room
+
+    def _done(self, stop: int, element: int) -> bool:
+        """Whether no move between a hole and the next stop leads away from where the tool is before an element."""
+        return all(self.lines.at(move, element - 1) for move in range(self._move[stop] + 1, self._move[stop + 1]))
+
+    def _negligible(self, element: int) -> bool:
+        """Whether an element moves the tool by no more than digits show."""
+        nc, at = self._ahead.nc, element - self._ahead.base
+        both = slice(max(at - 1, 0), at + 1)
+        turn = self.lines.axis_length * np.ptp(directions(nc, nc.tip[both], nc.second[both]), axis=0)
+        return at > 0 and not beyond_digits(nc, np.diff(nc.tip[both], axis=0))[0] and max(turn) <= self.lines.room
+
+    # ------------------------------------------------------------------ what is taken down
+
+    def _open(self, stop: int, element: int) -> None:
+        """Take down the begin of a run: a rapid, or the way out of a hole."""
+        last, move = self._move[stop + 1] - 1, self._move[stop]
+        first = move
+        if self._hole[stop]:  # the first move that leads anywhere from where the hole is left
+            leads = (one for one in range(move + 1, last) if not self.lines.at(one, element - 1))
+            first = next(leads, last)
+        if self._hole[stop] or not self._is_way_out(element):
+            self.acts.extend((first, element))
+        self._end_run(move, element)
+        self._steps.append(Step(move, element, True, last))
+        self._from = (first, element) if self._fed[stop] else ()
+        self._begun, self._cut_at, self._gone = element, first + 1, 0.0
+
+    def _end_run(self, move: int, element: int) -> None:
+        """Take down a run of feed moves that ends before a move and an element."""
+        self.runs.extend((*self._from, move, element) if self._from else ())
+        self._from, self._begun = (), -1
+
+    def _note_way_up(self, stop: int, begin: int, element: int) -> None:
+        """Take down from which holes the element that reaches a rapid may be the way up, behind one that has begun.
+
+        It is the first that goes up, and no higher than the cycle does, or than where the tool came from.
+        """
+        lines, first, nc = self.lines, stop, self._ahead.nc
+        came_from = nc.tip[max(begin - 1 - self._ahead.base, 0)]
+        goes_up = element == begin or lines.feeds(element - 1)
+        while goes_up and first and self._hole[first - 1] and self._over(first - 1, element):
+            move = self._move[first - 1]
+            highest = max(self._cycles[move].level, float((came_from - lines.tip[move]) @ lines.axis[move]))
+            left = first == stop or (move in self.moves_left_out and element == begin)
+            if not left or lines.height(move, element) > highest + lines.tolerance:
+                break
+            first -= 1
+        if first < stop:
+            self.ways_up[element] = range(self._move[first], self._move[stop])
+
+    def _is_way_out(self, element: int) -> bool:
+        """Whether an element belongs to the block with which the tool leaves the last hole."""
+        if not self.holes:
+            return False
+        leaves, lines = self.holes[-1].leaves, self.lines
+        return element <= leaves or (leaves >= self._ahead.base and lines.nc_line(element) == lines.nc_line(leaves))
+
+    def _drilled(self, stop: int, begin: int, end: int, *, left: bool) -> None:
+        """Take down a hole."""
+        lines, move = self.lines, self._move[stop]
+        cycle, group = self._cycles[move], [one for one in range(begin, end) if lines.over(move, one)]
+        if left:
+            text = f"a hole of the CL file is not {'tapped' if cycle.tap else 'drilled'}"
+            self.left_out.append(lines.problem("CS561", move, group[0] if group else -1, text))
+            self.moves_left_out.add(move)
+        elif group:
+            fed = [one for one in group if lines.feeds(one)]
+            inside = [one + 1 for one in group if lines.height(move, one) < -lines.room] or fed[-1:] or group[:1]
+            self.holes.append(Hole(move, group[0], min(inside[-1], end), cycle))
+            self.acts.extend((move, group[0]))
