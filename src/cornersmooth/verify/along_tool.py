@@ -1,6 +1,6 @@
 """Rapids along the tool that posts add before retracts and after them.
 
-The CL file does not ask for them: those that it asks for are stops (see `stops`), and are taken as such first. The tool
+The CL file does not ask for them: those that it asks for are acts (see `parse`), and are taken as such first. The tool
 is put to where such a rapid is nearer to the part, and so stays there.
 
 Where a rotary axis has to turn back, posts leave a cut along the tool, and go on with it where they left it. Between

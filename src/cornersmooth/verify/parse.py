@@ -97,7 +97,8 @@ class Parse:
         #: moves that statements are before
         self._stated: list[int] = np.unique(np.searchsorted(original.pose, poses)).tolist()
         self._from: tuple[int, ...] = ()  # the move and the element that a run of feed moves begins with
-        self._cut_at, self._gone = 0, 0.0  # first move where a run may be divided next, and how far the tool is, mm
+        # where a run may be divided next: first element and move, and how far the tool has gone, mm
+        self._looked, self._cut_at, self._gone = 0, 0, 0.0
         self._find_stops()
 
     def _find_stops(self) -> None:
@@ -171,7 +172,7 @@ class Parse:
                 stops = self.moves[stop + 1 : min(stop + 1 + len(rapids), last)]
                 count = int(np.argmin(np.append(lines.exact(stops, rapids[: len(stops)]), False)))
                 for one in rapids[:count].tolist():
-                    self._divide(stop, element, one)
+                    self._divide(stop, one)
                     stop, element = stop + 1, one + 1
                     self._open(stop, one)
                 if count:
@@ -182,7 +183,7 @@ class Parse:
                 window = np.arange(element, feeds_to)
                 there = np.flatnonzero(lines.exact(np.full(len(window), self._move[stop + 1] - 1), window))
                 met = element + int(there[-1]) + 1 if len(there) else met
-            self._divide(stop, element, feeds_to if met < 0 else min(met, feeds_to))
+            self._divide(stop, feeds_to if met < 0 else min(met, feeds_to))
             if len(rapids):
                 element = self._pass_idle(stop, feeds_to)
                 if element == feeds_to:
@@ -193,22 +194,24 @@ class Parse:
         known = met >= 0 and (self._over(stop + 1, met) or self._may_be_left_out(stop + 1))
         return stop, met if known else element
 
-    def _divide(self, stop: int, element: int, end: int) -> None:
+    def _divide(self, stop: int, end: int) -> None:
         """Divide a run where an element in front of `end` ends at the pose of a statement, and words are behind it."""
-        lines, nc, base, original = self.lines, self._ahead.nc, self._ahead.base, self._task.original
-        moves = self._stated[slice(*(bisect_left(self._stated, one) for one in (self._cut_at, self._move[stop + 1])))]
-        if not moves:
+        element, self._looked = self._looked, max(self._looked, end)
+        stated = (bisect_left(self._stated, one) for one in (self._cut_at, self._move[stop + 1]))
+        if not (moves := self._stated[slice(*stated)]) or end <= element:
             return
-        ways = np.linalg.norm(np.diff(nc.tip[max(element - 1 - base, 0) : end - base], axis=0), axis=1)
+        lines, nc, base = self.lines, self._ahead.nc, self._ahead.base
+        first = max(element - 1, base)
+        ways = np.linalg.norm(np.diff(nc.tip[first - base : end - base], axis=0), axis=1)
         gone = self._gone + np.append(0.0, np.cumsum(ways))
         self._gone = float(gone[-1])
-        length = self._task.path.length[original.trail.last]
-        first, last = (bisect_left(self._events, one, key=lambda event: event.element) for one in (element, end))
-        for one in sorted({event.element for event in self._events[first:last]}):
+        length, last = self._task.path.length, self._task.original.trail.last
+        words = (bisect_left(self._events, one, key=lambda event: event.element) for one in (element, end))
+        for one in sorted({event.element for event in self._events[slice(*words)]}):
             there = [move for move in moves if move >= self._cut_at and lines.at(move - 1, one - 1)]
             if there:
-                way = gone[one - element] + length[self._move[stop]]
-                move = min(there, key=lambda move: abs(length[move - 1] - way))
+                way = gone[max(one - 1 - first, 0)] + length[last[self._move[stop]]]
+                move = min(there, key=lambda move: abs(length[last[move - 1]] - way))  # of those that are there again
                 self.cuts.extend((move, one))
                 self._cut_at = move + 1
                 if move - 1 > self._move[stop] and one - 1 > self._begun:
@@ -483,7 +486,7 @@ class Parse:
         self._end_run(move, element)
         self._steps.append(Step(move, element, True, last))
         self._from = (first, element) if self._fed[stop] else ()
-        self._begun, self._cut_at, self._gone = element, first + 1, 0.0
+        self._begun, self._looked, self._cut_at, self._gone = element, element + 1, first + 1, 0.0
 
     def _end_run(self, move: int, element: int) -> None:
         """Take down a run of feed moves that ends before a move and an element."""
