@@ -286,7 +286,7 @@ class Parse:
                 if not ahead.has(one) or self._fitting(stop + 1, one).any():
                     break
                 if self._over(stop, one):
-                    text = "a motion that the CL file does not have"
+                    text = "motion that the CL file does not have"
                     self.problems.append(lines.problem("CS534", move, element, text))
                     return stop - 1, one
         return self._leave(stop, element, best)
@@ -400,11 +400,8 @@ class Parse:
 
     def _surplus(self, stop: int, element: int) -> None:
         """An element before a stop is one too many."""
-        text = "a rapid that the CL file does not have, or a feed move written as one"
-        if self.lines.feeds(element):
-            code, text = "CS536", "feed moves that the CL file does not have"
-        else:
-            code = "CS533"
+        surplus = ("CS533", "a rapid that the CL file does not have, or a feed move written as one")
+        code, text = ("CS536", "feed moves that the CL file does not have") if self.lines.feeds(element) else surplus
         self.problems.append(self.lines.problem(code, self._move[stop], element, text))
 
     def _lack(self, stop: int, element: int) -> int:
