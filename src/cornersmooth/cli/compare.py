@@ -13,7 +13,7 @@ import click
 
 from cornersmooth.cl import read
 from cornersmooth.cli.files import check_inputs, check_path, told_of, write_report
-from cornersmooth.cli.options import Options
+from cornersmooth.cli.options import Options, typed
 from cornersmooth.cli.show import progress_bar, say, say_line
 from cornersmooth.errors import command_text
 from cornersmooth.feedrate import BlockLimits
@@ -149,26 +149,25 @@ def _cells(row: Row) -> tuple[str, ...]:
 
 def _command(given: Options, row: Row, machine: Any, command: str, suffix: str) -> str:
     """Options that were typed, and those of the row; a machine is called as the user has called it."""
-    context, typed = click.get_current_context(), []
-    for option in context.command.params:
+    words: list[str] = []
+    for option in click.get_current_context().command.params:
         name = str(option.name)
-        from_user = context.get_parameter_source(name) == click.core.ParameterSource.COMMANDLINE
-        if not isinstance(option, click.Option) or name in _OWN or not from_user:
+        if not isinstance(option, click.Option) or name in _OWN or not typed(name):
             continue
         spelled = option.opts[-1]
         value = getattr(given, name)
         for one in value if option.multiple else (value,):
             if option.is_flag:
-                typed.append(spelled)
+                words.append(spelled)
             else:
                 number = ",".join(f"{part:g}" for part in one) if isinstance(one, tuple) else one
-                typed += [spelled, f"{number:g}" if isinstance(number, float) else str(number)]
+                words += [spelled, f"{number:g}" if isinstance(number, float) else str(number)]
     called = machine if isinstance(machine, str) else getattr(machine, "name", "")
     options = list(row.options)
     if "--machine" in options:
         options[options.index("--machine") + 1] = called
     target = os.path.splitext(os.path.basename(given.source))[0] + (".smooth" if command == "filter" else "") + suffix
-    return command_text(["cornersmooth", command, given.source, *typed, *options, "-o", target])
+    return command_text(["cornersmooth", command, given.source, *words, *options, "-o", target])
 
 
 def _csv(table: Table, commands: list[str]) -> str:
