@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from cornersmooth.nc_reader.recognition import names_rotary_axes, needs_its_control
+from cornersmooth.nc_reader.recognition import needs_its_control
 from filter.foreign import by_words, difference
 from oracle.command import DONE, USAGE, run
 
@@ -94,35 +94,6 @@ def test_the_control_is_asked_for_where_it_would_be_a_guess(text: str, needed: b
     assert made.returncode == (USAGE if needed else DONE)
     assert (b"error[CS267]: part.nc does not say its control" in made.stderr) is needed
     assert run("filter", "part.nc", "--control", "linuxcnc", "-o", "b.nc", cwd=tmp_path).returncode == DONE
-
-
-@pytest.mark.parametrize(
-    ("line", "turns"),
-    [
-        ("G1 X1. A5.", True),
-        ("G1 X1. A-.5", True),
-        ("C #5", True),
-        ("X1 C=DC(30)", True),
-        ("A3=0 B3=0 C3=1", True),
-        ("LN X+1 TX+0.1 TY+0 TZ+1", True),
-        ("L X+1 A+20", True),
-        ("TRAORI", True),
-        ("G43.4 H1", True),
-        ("PLANE SPATIAL SPA+0 SPB+0 SPC+0 STAY", True),
-        ("(A5 B6)", False),
-        ("G1 X1. ,C0.5", False),
-        ("CC X+10 Y+5", False),
-        ("C X+10 Y+5 DR-", False),
-        ("CYCLE82(5,0,1,-5)", False),
-        ('MSG("A5 C20")', False),
-        ("X=AC(5)", False),
-        ("0 BEGIN PGM A1 MM", False),
-        ("#<_a5>=3", False),
-        ("G2 X1. I0.5 J0.", False),
-    ],
-)
-def test_words_of_rotary_axes_and_vectors_are_seen(line: str, turns: bool) -> None:
-    assert names_rotary_axes(f"G0 X1.\n{line}\nM30\n".encode()) is turns
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import pytest
 
 from cornersmooth.kinematics import load_machine
 from cornersmooth.kinematics.machine_tables import machine_names
-from cornersmooth.nc_reader.rotary import Rotary
+from cornersmooth.nc_reader.rotary import Rotary, tool_vectors
 
 
 @pytest.mark.parametrize("name", machine_names())
@@ -22,7 +22,7 @@ def test_no_block_bends_more_than_its_bound_and_most_come_near_it(name: str, tip
     turn = random.normal(size=(count, 2)) * random.choice([0.1, 5.0, 90.0], size=(count, 1))
     bounds = rotary._second_derivatives(start, end, angles, np.radians(np.abs(turn)))
     words = [(start + share * (end - start), angles + share * turn) for share in steps]
-    motions = [rotary.tips(*at) for at in words], [rotary.directions(at[1]) for at in words]
+    motions = [rotary.tips(*at) for at in words], [tool_vectors(rotary.machine, at[1]) for at in words]
     for points, bound in zip(motions, bounds, strict=True):
         second = np.diff(np.stack(points), 2, axis=0) / steps[1] ** 2
         largest = np.linalg.norm(second, axis=2).max(axis=0)

@@ -74,9 +74,7 @@ def control_problems(
             yield from wrong
 
 
-def axis_problems(
-    table: Table, run: Elements, machine: Machine, way: str, state: ModalState, step: float
-) -> Iterator[Problem]:
+def axis_problems(table: Table, machine: Machine, way: str, state: ModalState, step: float) -> Iterator[Problem]:
     """What is wrong with the rotary words of a run: beyond the limits of their axes, or words of modulo axes.
 
     Those are from 0 to 360 degrees, and go the shorter way by a word. `step` is the last printed digit, degrees.

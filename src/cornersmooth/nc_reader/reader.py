@@ -179,7 +179,7 @@ class Reader:
                 if machine.names and len(run.curves):
                     line = int(run.line[run.curves.element[0]])
                     raise InputError("CS503", "a curve in rotary words", "write it as lines", file=self.name, line=line)
-                self.problems += axis_problems(table, run, machine, way, self.state, rotary.angle_step)
+                self.problems += axis_problems(table, machine, way, self.state, rotary.angle_step)
                 if self.dialect.switches:
                     tip_control = rotary.tip_control
                     self._tell_once(kinematics_problems(run, machine, self.state, tip_control=tip_control))

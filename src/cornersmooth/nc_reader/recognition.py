@@ -35,12 +35,7 @@ def is_cl_file(head: bytes) -> bool:
     return _OTHER.search(head) is not None
 
 
-#: words of rotary axes and tool vectors, and those that only programs with them have
-_TURNS: Final = re.compile(
-    rb"(?i)(?<![A-Z_,#<])[ABC]\d?[ \t]*(?:=[ \t]*(?:[AID]C|AC[PN])\b|=?[ \t]*[-+]?[ \t]*[\d.#\[])"
-    rb"|(?<![A-Z])T[XYZ][-+]?[\d.]|\b(?:TRAORI|FUNCTION TCPM|M128|M428|G43\.[45]|G234|PLANE|CYCLE800|G68\.[234])"
-)
-#: of these, vectors and tip control: what a machine of three axes does not explain
+#: tool vectors and tip control: what a machine of three axes does not explain
 _TIP: Final = re.compile(
     rb"(?i)(?<![A-Z_,#<])[ABC]3[ \t]*=|(?<![A-Z])T[XYZ][-+]?[\d.]"
     rb"|\b(?:TRAORI|FUNCTION TCPM|M128|M428|G43\.[45]|G234)"
@@ -52,21 +47,12 @@ _BRACKETS: Final = re.compile(rb"\([^()\n]*\)")
 _SEMICOLON: Final = re.compile(rb";[ \t]*[^\s]")
 
 
-def names_rotary_axes(data: bytes) -> bool:
-    """Whether an NC program has words of rotary axes, of tool vectors, or of tilted planes."""
-    return _has(_TURNS, data)
-
-
 def names_tip_control(data: bytes) -> bool:
     """Whether an NC program has tool vectors, or words of tool tip control."""
-    return _has(_TIP, data)
-
-
-def _has(words: re.Pattern[bytes], data: bytes) -> bool:
-    for match in words.finditer(data):
+    for match in _TIP.finditer(data):
         start = data.rfind(b"\n", 0, match.start()) + 1
         end = data.find(b"\n", start)
-        if words.search(_ASIDE.sub(b"", data[start : len(data) if end < 0 else end])):
+        if _TIP.search(_ASIDE.sub(b"", data[start : len(data) if end < 0 else end])):
             return True
     return False
 

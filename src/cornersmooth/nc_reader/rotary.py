@@ -68,10 +68,6 @@ class Rotary:
         """Addresses, nearest to the part first."""
         return "".join(self.machine.names)
 
-    def directions(self, angles: Floats) -> Floats:
-        """(n, 3) unit tool vectors in the part, for (n, 2) degrees."""
-        return tool_vectors(self.machine, angles)
-
     def carried(self, vectors: Floats, angles: Floats) -> Floats:
         """(n, 3) vectors of the machine in a part that tables have turned by (n, 2) degrees."""
         for axis, column in self._carrying("table"):
@@ -161,7 +157,7 @@ class Rotary:
         """
         position = np.vstack((before.tip, run.tip))
         angles = np.nan_to_num(np.vstack((before.second, run.second))[:, :2])
-        tip, vector = self.tips(position, angles), self.directions(angles)
+        tip, vector = self.tips(position, angles), tool_vectors(self.machine, angles)
         curves, arcs = run.curves, run.arcs
         if len(curves):  # of a machine without rotary axes: in rotary words they are refused
             along = np.broadcast_to(self.machine.tool, (len(curves.point), 3))
@@ -184,7 +180,7 @@ class Rotary:
         at = (1.0 - left[inner] / count[own])[:, None]
         fine_tip, fine_vector = tip[1:][owner], vector[1:][owner]
         words = [start[own] + at * (start[own + 1] - start[own]) for start in (position, angles)]
-        fine_tip[inner], fine_vector[inner] = self.tips(*words), self.directions(words[1])
+        fine_tip[inner], fine_vector[inner] = self.tips(*words), tool_vectors(self.machine, words[1])
         return replace(replace(run, curves=curves).divided(owner, last), tip=fine_tip, second=fine_vector)
 
     def swung(self, run: Elements, before: Modal) -> Ints:
@@ -198,17 +194,12 @@ class Rotary:
         rows = np.flatnonzero((run.kind == Element.RAPID) & known & (turn > LONGEST_DETOUR / 2))
         if not len(rows):
             return rows
-        begin, end = self.directions(angles[rows]), self.directions(angles[rows + 1])
+        begin, end = (tool_vectors(self.machine, angles[rows + step]) for step in (0, 1))
         longest = np.zeros(len(rows))
         for share in np.linspace(0.0, 1.0, 16)[1:-1].tolist():
-            between = self.directions(angles[rows] + share * (angles[rows + 1] - angles[rows]))
+            between = tool_vectors(self.machine, angles[rows] + share * (angles[rows + 1] - angles[rows]))
             longest = np.maximum(longest, _apart(begin, between) + _apart(between, end))
         return rows[longest - _apart(begin, end) > LONGEST_DETOUR]
-
-    @property
-    def sagitta(self) -> float:
-        """The same for its tolerance."""
-        return sagitta(self.tolerance)
 
     def _counts(self, run: Elements, position: Floats, angles: Floats) -> Ints:
         """Number of lines that each element becomes.
@@ -222,7 +213,7 @@ class Rotary:
         )
         turn = np.radians(np.abs(angles[turned + 1] - angles[turned]))
         tip, axis = self._second_derivatives(position[turned], position[turned + 1], angles[turned], turn)
-        lines = np.ceil(np.sqrt((tip + self.axis_length * axis) / (8.0 * self.sagitta)))
+        lines = np.ceil(np.sqrt((tip + self.axis_length * axis) / (8.0 * sagitta(self.tolerance))))
         count[turned] = np.clip(lines, 1, MOST_LINES)
         return count
 

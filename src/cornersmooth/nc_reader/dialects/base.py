@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Set
-from typing import Any
+from typing import Any, Final
 
 from cornersmooth.errors import InputError
 from cornersmooth.nc_reader.acts import Acts, Beside, Modes
 from cornersmooth.nc_reader.lexer import Lexer
 from cornersmooth.nc_reader.modal_state import ModalState
-from cornersmooth.nc_reader.word_tables import means_of, word_table
+from cornersmooth.nc_reader.word_tables import effects_of, means_of, word_table
 from cornersmooth.nc_reader.words import Columns, Line, refused
 
 #: how the values of a table `[grammar]` are read, where not as they are
 _READ: Mapping[str, Callable[[Any], Any]] = {
     "tip_control": lambda table: {float(code): name for code, name in table.items()},
     **dict.fromkeys(("controls", "unsure"), lambda table: {kind: tuple(names) for kind, names in table.items()}),
-    "silent": lambda codes: frozenset(map(float, codes)),
 }
+
+#: effects of words that change nothing measured
+_SILENT: Final = frozenset("nothing distance=absolute offset=. path=. smoothing=. smoothing=off cycles=off".split())
 
 
 class Dialect:
@@ -49,11 +51,6 @@ class Dialect:
     curves_need: str = ""
     #: whether tip control is switched by blocks that the machine's file names
     switches: bool = False
-    #: G words of inches and of millimetres, and those that change nothing measured: of all its controls, of this one
-    inches: frozenset[float] = frozenset()
-    millimetres: frozenset[float] = frozenset()
-    always_silent: frozenset[float] = frozenset()
-    silent: frozenset[float] = frozenset()
     #: the first letter, or letters, of tip and second triple in the lexer, with their decimals
     digits: re.Pattern[bytes] = re.compile(rb"(?:([XYZ])|([IJUVW]))[-+]?\d*\.(\d*)")
 
@@ -62,6 +59,7 @@ class Dialect:
         for key, value in table["grammar"].items():
             setattr(self, key, _READ[key](value) if key in _READ else value)
         self.switches, self.means, self.rotary = table.get("switches", False), means_of(control), rotary
+        self.control = control
         if rotary:
             self.digits = re.compile(
                 rb"(?<!K\d)(?:([XYZ])|(?<![A-Z0-9])([%b])(?:=DC\()?)[-+]?\d*\.(\d*)" % rotary.encode()
@@ -88,18 +86,25 @@ class Dialect:
         raise NotImplementedError
 
     def mode(self, code: float, line: Line, state: ModalState) -> Acts:
-        """Take a G word outside group 01 that changes what holds from block to block."""
-        if code in (17.0, 18.0, 19.0):
-            yield Modes({"plane": int(code)})
-        elif code in self.inches | self.millimetres:
-            yield Modes({"inch": code in self.inches})
-        elif code in (93.0, 94.0, 95.0):
-            yield Modes({"per_revolution": code == 95.0, "inverse_time": code == 93.0})
-        elif code in (40.0, 41.0, 42.0):
-            yield Beside("G", code, f"G{code:g}")
-        elif code not in self.always_silent | self.silent:
-            hint = "only absolute milling with tool vectors, axis points or rotary words is read"
-            raise refused(line, f"G{code:g} is not understood", hint)
+        """Take a G word outside group 01 that changes what holds from block to block, by its row in the table."""
+        for effect in effects_of(self.control, f"G{code:g}") or ("unknown",):
+            group, _, value = effect.partition("=")
+            if group == "plane":
+                yield Modes({"plane": int(code)})
+            elif group == "units":
+                yield Modes({"inch": value == "inch"})
+            elif group == "feed":
+                yield Modes({"per_revolution": value == "revolution", "inverse_time": value == "inverse"})
+            elif group == "compensation" and value != "?":
+                yield Beside("G", code, f"G{code:g}")
+            elif effect not in _SILENT:
+                hint = "only absolute milling with tool vectors, axis points or rotary words is read"
+                raise refused(line, f"G{code:g} is not understood", hint)
+
+    def is_silent(self, name: str) -> bool:
+        """Whether a word changes nothing measured."""
+        effects = effects_of(self.control, name)
+        return bool(effects) and _SILENT.issuperset(effects)
 
     def machine_axes(self, line: Line, beside: Set[tuple[str, float]]) -> str:
         """Axes that a block sends to positions of the machine; refuses words beside them but for some."""

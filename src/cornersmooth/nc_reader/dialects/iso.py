@@ -45,9 +45,6 @@ class Iso(Dialect):
     lexer: _IsoLexer
     #: name of what a G word switches on, which takes a length register H with it; ``""`` switches off
     tip_control: Mapping[float, str]
-    inches, millimetres = frozenset((20.0,)), frozenset((21.0,))
-    #: cancellations, work offsets
-    always_silent = frozenset((80.0, *map(float, range(54, 60))))
     #: milliseconds that ``G4 P`` counts in
     dwell: float = 1.0
     #: letters that say nothing here

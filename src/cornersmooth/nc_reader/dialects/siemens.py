@@ -34,10 +34,6 @@ _NAMES: Final = {
 _POLYNOMIALS: Final = {"X": "X", "Y": "Y", "Z": "Z", "XH": "U", "YH": "V", "ZH": "W"}
 _NUMBER_ONLY: Final = re.compile(NUMBER)
 
-#: words and calls that change nothing measured here
-_SILENT_CALLS = frozenset(("CYCLE832", "FFWON", "FFWOF", "SOFT", "BRISK", "STOPRE", "MSG", "CFTCP"))
-_SILENT_CODES = frozenset((9.0, 53.0, *map(float, range(54, 60)), 60.0, 64.0, 90.0, *map(float, range(500, 600))))
-_SILENT_CODES |= frozenset(map(float, (153, 601, 602, 641, 642, 643, 644, 645)))
 _AXIS_FRAMES = ("ORIWKS", "ORIMKS")
 _ORIENTATIONS = ("ORIVECT", "ORIPLANE", "ORICURVE", "ORIAXES")
 _CODES = (0.0, 1.0, 2.0, 3.0)
@@ -67,8 +63,6 @@ class Siemens(Dialect):
     Parameters are those of `Dialect`.
     """
 
-    inches, millimetres = frozenset((70.0, 700.0)), frozenset((71.0, 710.0))
-    always_silent = _SILENT_CODES
     digits = re.compile(rb"(?:([XYZ])|([ABC]3=|[XYZ]H=))[-+]?\d*\.(\d*)")
 
     def __init__(self, control: str, rotary: str = "") -> None:
@@ -106,7 +100,7 @@ class Siemens(Dialect):
                 motion[name] = value
             elif name in ("TRAORI", "TRAFOOF", *_AXIS_FRAMES, *_ORIENTATIONS):
                 self._transform(name, state)
-            elif name not in ("D", "N", "%") and name not in _SILENT_CALLS:
+            elif name not in ("D", "N", "%") and not self.is_silent(name):
                 raise self.not_understood(line, name, text)
         yield Move(motion)
 
