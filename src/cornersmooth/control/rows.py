@@ -9,7 +9,8 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.control.state import MOTIONS, VECTOR, State
-from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.model import Bools, Floats
+from cornersmooth.nc_reader.words import filled
 
 #: what stands for motions in a column; NaN stands for all others
 _CODES: Final = {"rapid": 0.0, "line": 1.0, "arc": 2.0}
@@ -82,9 +83,3 @@ def _places(words: Floats, state: State, letter: str, lost: Bools) -> Floats:
     value, last = filled(np.where(lost, np.nan, words), state.place[letter])
     gone = np.maximum.accumulate(np.where(lost, np.arange(len(words)), -1))
     return np.where((gone >= 0) & (gone >= last), np.nan, value)
-
-
-def filled(values: Floats, before: float) -> tuple[Floats, Ints]:
-    """Give what was written last in each row, and in which row, -1 for before."""
-    last = np.maximum.accumulate(np.where(np.isnan(values), -1, np.arange(len(values))))
-    return np.where(last < 0, before, values[last]), last

@@ -8,11 +8,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.model import MM_PER_UNIT, Bools, Floats, Ints
 from cornersmooth.nc_reader.arcs import circles
 from cornersmooth.nc_reader.elements import Curves, Element, Elements, NcArcs, Problem
 from cornersmooth.nc_reader.splines import curves_of, cut_long
-from cornersmooth.nc_reader.words import NURBS, Table
+from cornersmooth.nc_reader.words import NURBS, Table, filled
 
 _TIP, _VECTOR, _POINT = "XYZ", "IJK", "UVW"
 
@@ -64,12 +64,11 @@ def execute(table: Table, modal: Modal, problems: list[Problem]) -> tuple[Elemen
         After the last block.
     """
     points = modal.points or any(letter in table.columns for letter in _POINT)
-    kept = _Held()
-    code = kept.fill(table.column("G"), modal.code)
+    code, _ = filled(table.column("G"), modal.code)
     # tip and second triple side by side: curves take both at once
     six = np.empty((len(table), 6))
     tip, second = six[:, :3], six[:, 3:]
-    placed = kept.columns(table, _TIP, modal.tip, tip)
+    placed = _kept(table, _TIP, modal.tip, tip)
     straight = (code <= 1) | np.isnan(code)
     is_arc = np.zeros(len(table), np.bool_) if straight.all() else (code == 2) | (code == 3)
     if is_arc.any():  # a full circle need not say where it ends
@@ -78,7 +77,7 @@ def execute(table: Table, modal: Modal, problems: list[Problem]) -> tuple[Elemen
     vector_length = modal.vector_length
     if modal.rotary or points:
         known = modal.rotary or modal.points  # else there has been a vector, which is no point
-        placed |= kept.columns(table, letters, modal.second if known else (np.nan,) * 3, second)
+        placed |= _kept(table, letters, modal.second if known else (np.nan,) * 3, second)
     else:
         given = _vectors(table, modal, straight, second, problems)
         vector_length = min(vector_length, _to_unit_length(second, given))
@@ -96,7 +95,7 @@ def execute(table: Table, modal: Modal, problems: list[Problem]) -> tuple[Elemen
         ends = rows.copy()
         curved = np.searchsorted(rows, curves.element)
         ends[curved] = curves.end
-    feed = kept.fill(table.column("F"), modal.feed)
+    feed, _ = filled(table.column("F"), modal.feed)
     end = six if ends is rows and len(rows) == len(six) else six.take(ends, axis=0)
     if len(curves) and cut.any():  # between its knots a curve does not end in a control point
         end[curved[cut]] = curves.point[(curves.first_point + curves.points)[cut] - 1]
@@ -141,6 +140,24 @@ def execute(table: Table, modal: Modal, problems: list[Problem]) -> tuple[Elemen
     return run, after
 
 
+def in_mm(run: Elements, before: Modal, *, points: bool, inch_feed: float, feed_step: float) -> Elements:
+    """Return a run in millimetres, with `feed_step` as the room of feeds; feeds of a text in inches are `inch_feed`."""
+    factor = MM_PER_UNIT["inch" if before.inch else "mm"]
+    unit = factor * (inch_feed if before.inch and not before.per_revolution else 1.0)
+    unit = 1.0 if before.inverse_time else unit
+    if factor != 1.0:  # a factor of one leaves the numbers untouched
+        run.curves.point[:, : 6 if points else 3] *= factor
+        run = replace(
+            run,
+            tip=run.tip * factor,
+            second=run.second * factor if points else run.second,
+            feed=run.feed * unit,
+            arcs=replace(run.arcs, centre=run.arcs.centre * factor),
+        )
+    run.feed_room[:] += feed_step / 2 * unit
+    return run
+
+
 def _arcs(run: Elements, modal: Modal, table: Table, rows: Ints, code: Floats, problems: list[Problem]) -> NcArcs:
     """Circles of the arcs of a run; `rows` are the blocks of its elements, `code` the G word of each block."""
     element = np.flatnonzero(run.kind == Element.ARC)
@@ -150,43 +167,15 @@ def _arcs(run: Elements, modal: Modal, table: Table, rows: Ints, code: Floats, p
     return NcArcs(element, *circles(part, start, end, code[own] == 3, modal.plane, problems))
 
 
-class _Held:
-    """Fills what is missing in columns with the last value given; most columns of a run miss the same blocks."""
-
-    def __init__(self) -> None:
-        self._missing = np.zeros(0, np.bool_)
-        self._last = np.zeros(0, np.int64)
-
-    def fill(self, column: Floats, before: float, missing: Bools | None = None) -> Floats:
-        """Fill a column; `before` is what was in force in front of it."""
-        if missing is None:
-            missing = np.isnan(column)
-        if not missing.any():
-            return column
-        if missing.all():
-            return np.full(len(column), before)
-        if not np.array_equal(missing, self._missing):
-            given = np.flatnonzero(~missing)
-            count = np.diff(given, append=len(column))
-            self._missing, self._last = missing, np.repeat(given, count)
-        rest = len(column) - len(self._last)
-        filled = column.take(self._last)
-        return np.concatenate((np.full(rest, before), filled)) if rest else filled
-
-    def columns(self, table: Table, letters: str, before: tuple[float, ...], values: Floats) -> Bools:
-        """Put three words kept from block to block into `values`; say which blocks have any of them."""
-        given = np.zeros(len(table), np.bool_)
-        for k, letter in enumerate(letters):
-            column = table.columns.get(letter)
-            if column is None:
-                values[:, k] = before[k]
-            else:
-                missing = np.isnan(column)
-                given |= ~missing
-                values[:, k] = self.fill(column, before[k], missing)
-        if len(letters) < values.shape[1]:
-            values[:, len(letters) :] = 0.0
-        return given
+def _kept(table: Table, letters: str, before: tuple[float, ...], values: Floats) -> Bools:
+    """Put three words kept from block to block into `values`; say which blocks have any of them."""
+    given = np.zeros(len(table), np.bool_)
+    values[:, len(letters) :] = 0.0
+    for k, letter in enumerate(letters):
+        column = table.column(letter)
+        given |= ~np.isnan(column)
+        values[:, k], _ = filled(column, before[k])
+    return given
 
 
 def _vectors(table: Table, modal: Modal, straight: Bools, values: Floats, problems: list[Problem]) -> Bools:
@@ -196,16 +185,11 @@ def _vectors(table: Table, modal: Modal, straight: Bools, values: Floats, proble
     Siemens).
     """
     before = modal.second if not np.isnan(modal.second[0]) else (0.0, 0.0, 1.0)
-    given = np.zeros(len(table), np.bool_)
-    missing = []
-    for letter in _VECTOR:
-        # K is a knot in a curve; I J K are no vector on an arc
-        missing.append(np.isnan(table.column(letter)) | ~straight)
-        given |= ~missing[-1]
-    kept = _Held()
-    for k, letter in enumerate(_VECTOR):
-        column = np.where(missing[k], 0.0, table.column(letter)) if missing[k].any() else table.column(letter)
-        values[:, k] = kept.fill(column, before[k], ~given)
+    # K is a knot in a curve; I J K are no vector on an arc
+    words = [np.where(straight, table.column(letter), np.nan) for letter in _VECTOR]
+    given: Bools = np.logical_not(np.isnan(words).all(axis=0))
+    for k, column in enumerate(words):
+        values[:, k], _ = filled(np.where(given, np.nan_to_num(column), np.nan), before[k])
     bare = values[:, 2] == 0
     if bare.any():  # seldom: only then the others are looked at
         bare &= given & (values[:, 0] == 0) & (values[:, 1] == 0)

@@ -11,6 +11,7 @@ import numpy as np
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.dialects.base import Dialect
 from cornersmooth.nc_reader.elements import Element, Elements, Problem
+from cornersmooth.nc_reader.execution import Modal
 from cornersmooth.nc_reader.modal_state import ModalState
 from cornersmooth.nc_reader.rotary import tool_vectors
 from cornersmooth.nc_reader.words import BY_WORD, NURBS, Table
@@ -109,6 +110,20 @@ def turn_problems(run: Elements, before: Sequence[float], machine: Machine) -> I
         for degrees in turn[turn > MOST_TURN][:1].tolist():
             text = f"{axis.name} turns by {degrees:.0f} deg in one feed move"
             yield from first_wrong("CS526", turn > MOST_TURN, run.line, text)
+
+
+def late_turns(run: Elements, before: Modal, machine: Machine, *, left_turned: bool) -> Iterator[Problem]:
+    """What is wrong with motion where no word says how the rotary axes stand: behind a plane, or where it comes late.
+
+    Before their first words they count as at zero; the first may not turn a tool that has come down.
+    """
+    unknown = np.isnan(np.vstack((before.second, run.second))[:, : len(machine.names)])
+    if left_turned:
+        text = "motion after a tilted plane, and no word says where the rotary axes are"
+        yield from first_wrong("CS506", unknown[1:].any(axis=1), run.line, text)
+    down = ~np.isnan(np.vstack((before.tip, run.tip))[:-1]).any(axis=1)
+    text = "a rotary axis is sent to where it belongs after the tool has come down"
+    yield from first_wrong("CS531", down & (unknown[:-1] & ~unknown[1:]).any(axis=1), run.line, text)
 
 
 def idle_turns(

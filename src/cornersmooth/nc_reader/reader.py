@@ -15,15 +15,15 @@ from cornersmooth.model import MM_PER_UNIT, Floats, Units
 from cornersmooth.nc_reader.acts import Act, Beside, Modes, Move, Tilt, ToMachine, TurnToPlane, Unknown, Wrong
 from cornersmooth.nc_reader.block_tables import Readable, read_lines
 from cornersmooth.nc_reader.elements import RETRACT, Element, Elements, Event, Problem, Second, settle
-from cornersmooth.nc_reader.execution import Modal, execute
+from cornersmooth.nc_reader.execution import Modal, execute, in_mm
 from cornersmooth.nc_reader.modal_state import ModalState
 from cornersmooth.nc_reader.needed_states import (
     axis_problems,
     clamp_problems,
     control_problems,
-    first_wrong,
     idle_turns,
     kinematics_problems,
+    late_turns,
     take_clamp,
     turn_problems,
 )
@@ -171,7 +171,7 @@ class Reader:
             self._tell_once(control_problems(table, self.state, self.dialect, before.code, approach, self.unlooked))
             if self.state.modal.points and not before.points:
                 self._know_points(run)
-            run = self._in_mm(run, factor, before)
+            run = self._in_mm(run, before)
             if self.state.rotary is not None:
                 start = before.but(tip=tuple(factor * value for value in before.tip))
                 rotary = replace(self.state.rotary, tip_step=factor * self.state.rotary.tip_step)
@@ -187,7 +187,8 @@ class Reader:
                 self.problems += turn_problems(run, before.second, machine)
                 if machine.names:
                     self.unlooked += idle_turns(run, before.second, machine, rotary.angle_step, self._idle)
-                self._check_turned(run, before)
+                self.problems += late_turns(run, before, machine, left_turned=self._left_turned)
+                self._left_turned = False
                 if self.dialect.retracts:
                     text = "rotary axes swing the tilted tool in a rapid that is not above a retract"
                     lines = run.line[rotary.swung(run, start)]
@@ -205,28 +206,15 @@ class Reader:
             self._add(run)
         self.waiting = []
 
-    def _in_mm(self, run: Elements, factor: float, before: Modal) -> Elements:
-        """Return a run in millimetres."""
-        unit = factor * (self.dialect.inch_feed if before.inch and not before.per_revolution else 1.0)
-        unit = 1.0 if before.inverse_time else unit
-        points = self.state.modal.points
-        if factor != 1.0:  # a factor of one leaves the numbers untouched
-            run.curves.point[:, : 6 if points else 3] *= factor
-            run = replace(
-                run,
-                tip=run.tip * factor,
-                second=run.second * factor if points else run.second,
-                feed=run.feed * unit,
-                arcs=replace(run.arcs, centre=run.arcs.centre * factor),
-            )
-        run.feed_room[:] += self.dialect.feed_step / 2 * unit
-        return run
-
     def _in_plane(self, table: Table, run: Elements, plane: TiltedPlane, factor: float, before: Modal) -> None:
         """Take over a run in a tilted plane."""
         axis_words = self.state.rotary.names if self.state.rotary is not None else "IJKUVW"
         self._tell_once(plane.problems(table, run, self.state.tip_control, axis_words))
-        self._add(plane.in_part(self._in_mm(run, factor, before), factor), plane)
+        self._add(plane.in_part(self._in_mm(run, before), factor), plane)
+
+    def _in_mm(self, run: Elements, before: Modal) -> Elements:
+        inch_feed, step = self.dialect.inch_feed, self.dialect.feed_step
+        return in_mm(run, before, points=self.state.modal.points, inch_feed=inch_feed, feed_step=step)
 
     def _tilt(self, line: Line, plane: TiltedPlane) -> None:
         """Switch a tilted plane on."""
@@ -237,9 +225,7 @@ class Reader:
         self._above(line, "a tilted plane where the tool is not retracted")
         self.plane, self._told, self._left_turned = plane, set(), False
         self.retracts.end(turned=True)
-        self.retracts.leave(self.elements, self._words(self.state.modal))
-        self.events.append(Event(self.elements, line.number, RETRACT, 0.0))
-        self.state.modal = self.state.modal.but(tip=(math.nan,) * 3)
+        self._leave(line, "XYZ")
         if plane.turned:
             self._turn(line)
 
@@ -262,22 +248,6 @@ class Reader:
         self.retracts.end(turned=True)
         self.state.modal, self.plane = self.plane.left(self.state.modal, rotary=self.state.rotary is not None), None
         self._left_turned = True
-
-    def _check_turned(self, run: Elements, before: Modal) -> None:
-        """Complain of motion where no word says how the rotary axes stand: behind a plane, or where it comes late.
-
-        Before their first words they count as at zero; the first may not turn a tool that has come down.
-        """
-        assert self.state.rotary is not None
-        unsaid = np.isnan(np.vstack((before.second, run.second))[:, : len(self.state.rotary.names)])
-        if self._left_turned:
-            self._left_turned = False
-            text = "motion after a tilted plane, and no word says where the rotary axes are"
-            self.problems += first_wrong("CS506", unsaid[1:].any(axis=1), run.line, text)
-        down = ~np.isnan(np.vstack((before.tip, run.tip))[:-1]).any(axis=1)
-        late = down & (unsaid[:-1] & ~unsaid[1:]).any(axis=1)
-        text = "a rotary axis is sent to where it belongs after the tool has come down"
-        self.problems += first_wrong("CS531", late, run.line, text)
 
     def _above(self, line: Line, text: str) -> None:
         """Complain where the tool is not above a retract."""

@@ -100,10 +100,17 @@ class Table:
     def rows_with(self, letters: Iterable[str], code: float) -> Ints:
         """Rows with any of some words, but for arcs, whose I J K are no vector; `code` is the G word before the run."""
         given = np.any([~np.isnan(self.column(letter)) for letter in letters], axis=0)
-        own = self.column("G")
-        last = np.maximum.accumulate(np.where(np.isnan(own), -1, np.arange(len(own))))
-        own = np.where(last < 0, code, own[last])
+        own, _ = filled(self.column("G"), code)
         return np.flatnonzero(given & (own != 2) & (own != 3))
+
+
+def filled(values: Floats, before: float) -> tuple[Floats, Ints]:
+    """Give what was written last in each row, and in which row, -1 for before."""
+    missing, row = np.isnan(values), np.arange(len(values))
+    if not missing.any():
+        return values, row
+    last = np.maximum.accumulate(np.where(missing, -1, row))
+    return np.where(last < 0, before, values[last]), last
 
 
 @dataclass(frozen=True)
