@@ -68,17 +68,23 @@ def _some_curves(curves: Curves, first: int, stop: int) -> Curves:
     return replace(own, pose=own.pose - first, runs=runs)
 
 
-def some_runs(runs: Runs, kept: Bools) -> Runs:
-    """The runs (r,) that are kept, at the poses they have."""
-    poses, knots = np.repeat(kept, runs.count), np.repeat(kept, runs.knot_count)
+def some_runs(runs: Runs, which: Bools | Ints) -> Runs:
+    """Some runs, or all in another order, at the poses they have."""
+    own = np.arange(len(runs))[which]
+
+    def of(counts: Ints) -> Ints:
+        size, first = counts[own], np.cumsum(counts) - counts
+        return np.repeat(first[own] - np.cumsum(size) + size, size) + np.arange(size.sum())
+
+    poses, knots = of(runs.count), of(runs.knot_count)
     return replace(
         runs,
         pose=runs.pose[poses],
-        count=runs.count[kept],
+        count=runs.count[own],
         s=runs.s[poses],
         knot=runs.knot[knots],
-        knot_count=runs.knot_count[kept],
-        control=runs.control[np.repeat(kept, runs.knot_count + 2)],
-        tip_bound=runs.tip_bound[kept],
-        axis_bound=runs.axis_bound[kept],
+        knot_count=runs.knot_count[own],
+        control=runs.control[of(runs.knot_count + 2)],
+        tip_bound=runs.tip_bound[own],
+        axis_bound=runs.axis_bound[own],
     )

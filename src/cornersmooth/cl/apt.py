@@ -35,11 +35,6 @@ from cornersmooth.model import MM_PER_UNIT, Floats, Ints, Keep, Move, Program, S
 from cornersmooth.nc_reader.recognition import first_block
 from cornersmooth.provenance import HEAD
 
-#: what stands between plain GOTO lines is often the same (RAPID; PAINT/COLOR,31): gaps of up to so many lines are
-#: taken apart once, and no more than so many different ones remembered
-LONGEST_GAP: Final = 3
-REMEMBERED: Final = 4096
-
 HANDLERS: Final = motion_statements.HANDLERS | state_statements.FED | state_statements.KEPT
 
 #: words that may stand between an arc and the GOTO that ends it
@@ -75,15 +70,13 @@ def read_apt(
     units: Units | None = None,
     arc_rule: ArcRule | None = None,
     lenient: bool = False,
-    fast: bool = True,
     cycle_order: tuple[str, ...] = (),
 ) -> Program:
     """Read an APT / CL text; parameters are those of `cornersmooth.cl.read`.
 
-    The text has LF line ends (`cornersmooth.cl.source.clean` makes it so). With `fast` plain GOTO lines are converted
-    in bulk; the result is the same, bit for bit. Memory while reading: 5 bytes for a byte of a tool path of plain GOTO
-    lines, at most 130 for any statements; the lines of a NURBS record may be `nurbs.MOST_LINES` poses for each control
-    point. Raises InputError CS101-CS128 and CS181-CS193, with the line.
+    The text has LF line ends (`cornersmooth.cl.source.clean` makes it so). Memory while reading: 5 bytes for a byte of
+    a tool path of plain GOTO lines, at most 130 for any statements; the lines of a NURBS record may be
+    `nurbs.MOST_LINES` poses for each control point. Raises InputError CS101-CS128 and CS181-CS193, with the line.
     """
     refuse_program(data, name)
     data, cut = without_card_columns(data, name)
@@ -101,32 +94,22 @@ def read_apt(
     )
     if cut:
         state.note(cut, 0)
-    _run(data, state, decode, fast)
+    _run(data, state, decode)
     _end(state)
     if not state.n:
         raise error("CS101", name, 1)
     return _program(state)
 
 
-def _run(data: bytes, state: ReaderState, decode: Decode, fast: bool) -> None:
+def _run(data: bytes, state: ReaderState, decode: Decode) -> None:
     """Carry out all statements: plain GOTO lines by whole runs, the lines between them one after the other."""
-    remembered: dict[tuple[bytes, ...], list[Record]] = {}
     done = 0
 
     def take(lines: list[bytes], first: int, follows: str) -> None:
-        key = tuple(lines) if len(lines) <= LONGEST_GAP else ()
-        if key in remembered:
-            for record in remembered[key]:
-                _obey(state, record.moved(first - 1))
-            return
-        records = []
         for record in read_records(lines, first, decode, state.file, follows):
             _obey(state, record)
-            records.append(record.moved(1 - first) if key else record)
-        if key and len(remembered) < REMEMBERED:
-            remembered[key] = records
 
-    for chunk in chunks(data, fast=fast):
+    for chunk in chunks(data):
         state.enter(chunk)
         done += chunk.size
         begin = 0

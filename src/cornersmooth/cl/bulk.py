@@ -48,16 +48,13 @@ class Chunk:
     poses: Floats  #: (m, 7): tip and axis as written, with NaN where a pose has no axis, and line
 
 
-def chunks(data: bytes, *, fast: bool = True) -> Iterator[Chunk]:
-    """Cut a text, whose last line has an end, too, into chunks that end before a GOTO line; find the plain GOTOs.
-
-    Without `fast` everything is left to the careful reader.
-    """
+def chunks(data: bytes) -> Iterator[Chunk]:
+    """Cut a text, whose last line has an end, too, into chunks that end before a GOTO line; find the plain GOTOs."""
     start, first = 0, 1
     while start < len(data):
         stop = _chunk_end(data, start)
         text = data[start:stop]
-        chunk = (_find_plain(text, first) if fast else None) or _all_careful(text, first)
+        chunk = find_plain(text, first) or _all_careful(text, first)
         yield chunk
         start = stop
         first += chunk.count
@@ -96,7 +93,7 @@ def _line_starts(text: bytes) -> Ints:
     return np.concatenate(([0], ends + 1))
 
 
-def _find_plain(text: bytes, first: int) -> Chunk | None:
+def find_plain(text: bytes, first: int) -> Chunk | None:
     """Find and convert the plain GOTO statements; None if there are none or any of them needs care."""
     starts = _line_starts(text)
     taken, pair = _classify(text, starts[:-1])

@@ -75,11 +75,6 @@ class Record:
         """The other arguments."""
         return [value for value in self.args if isinstance(value, str)]
 
-    def moved(self, lines: int) -> Record:
-        """Return the same statement so many lines further down."""
-        points = tuple((line + lines, args) for line, args in self.points)
-        return Record(self.line + lines, self.word, self.args, self.text, self.rest, points, self.cut_short)
-
 
 @dataclass
 class _Lines:

@@ -12,7 +12,7 @@ import numpy as np
 from cornersmooth.arrays import joined_rows, some_runs
 from cornersmooth.arrays.vectors import angle_between, norm, unit
 from cornersmooth.geometry.bsplines import Splines
-from cornersmooth.geometry.ragged import ranges, spread, starts
+from cornersmooth.geometry.ragged import spread, starts
 from cornersmooth.model import Bools, Floats, Ints, Keep, LimitedBy, Program, Runs, SmoothProgram, Status
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.construction import RUN_CURVATURE, STRAIGHT_ON, find_neighbours
@@ -144,27 +144,10 @@ def with_runs(smoothed: SmoothProgram, program: Program, runs: Runs) -> SmoothPr
         lines = polylines_of(runs, program, settings.axis_length)
         bends = largest_curvature(lines, Splines(runs.knot, runs.knot_count), runs.control)
         corners.extra[RUN_CURVATURE][rows] = bends[inner]
-    return replace(smoothed, program=program, runs=runs if smoothed.runs is None else _in_order(smoothed.runs, runs))
-
-
-def _in_order(one: Runs, other: Runs) -> Runs:
-    """Runs of both, in path order."""
-    runs = joined_rows((one, other))
-    order = np.argsort(runs.pose[starts(runs.count)[:-1]], kind="stable")
-    pose, knot, control = (
-        ranges(starts(count)[:-1][order], count[order]) for count in (runs.count, runs.knot_count, runs.knot_count + 2)
-    )
-    return replace(
-        runs,
-        pose=runs.pose[pose],
-        count=runs.count[order],
-        s=runs.s[pose],
-        knot=runs.knot[knot],
-        knot_count=runs.knot_count[order],
-        control=runs.control[control],
-        tip_bound=runs.tip_bound[order],
-        axis_bound=runs.axis_bound[order],
-    )
+    if smoothed.runs is not None:
+        runs = joined_rows((smoothed.runs, runs))
+        runs = some_runs(runs, np.argsort(runs.pose[starts(runs.count)[:-1]], kind="stable"))
+    return replace(smoothed, program=program, runs=runs)
 
 
 def _at_height(points: Floats, height: float) -> Floats:
