@@ -19,6 +19,7 @@ import numpy as np
 from cornersmooth.nc_reader.ahead import Ahead
 from cornersmooth.nc_reader.elements import Element, Event
 from cornersmooth.nc_reader.tool import directions
+from cornersmooth.verify.acts import Acts
 
 #: how far, mm and rad, a way along the tool may be off it: printed digits
 _ASIDE, _TURN = 1e-3, 1e-3
@@ -42,12 +43,9 @@ class AlongTool:
         Elements before which the tool is retracted, ascending; it grows as the program is read, as `events` do.
     """
 
-    def __init__(self, ahead: Ahead, retracts: Sequence[int], events: Sequence[Event]) -> None:
-        self._ahead, self._retracts, self._events = ahead, retracts, events
+    def __init__(self, ahead: Ahead, retracts: Sequence[int], events: Sequence[Event], acts: Acts) -> None:
+        self._ahead, self._retracts, self._events, self._acts = ahead, retracts, events, acts
         self._left, self._lift = -1, 0.0  # the first element after a retract for which a cut has been left; how far, mm
-        #: NC lines where cuts are left, and where they go on
-        self.rewinds: list[tuple[int, int]] = []
-        self.still: set[int] = set()  #: elements that lead nowhere, as such a rapid is put elsewhere
 
     def next_retract(self, element: int) -> float:
         """The first element from one on that the tool is retracted before, as far as that has been read."""
@@ -74,7 +72,7 @@ class AlongTool:
         if place == element:
             return False
         ahead.put(element, place)
-        self.still.add(max(element, place))
+        self._acts.still.add(max(element, place))
         return True
 
     def _left_at(self, element: int) -> int:
@@ -94,7 +92,7 @@ class AlongTool:
         if not goes_on or min(height, self._lift) < _LEAST_LIFT:
             return element
         first, last = self._ahead.nc.line[[element - 1 - self._ahead.base, after - self._ahead.base]].tolist()
-        self.rewinds.append((first, last))
+        self._acts.rewinds.append((first, last))
         self._left = -1
         return element - 1
 

@@ -7,7 +7,6 @@ can be run beside each other through all guessed places, they can be. Where not,
 
 from __future__ import annotations
 
-from array import array
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Final, TypeAlias
 
@@ -17,12 +16,13 @@ from cornersmooth.model import Floats, Move
 from cornersmooth.nc_reader.ahead import Ahead
 from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem
 from cornersmooth.nc_reader.tool import directions
+from cornersmooth.verify.acts import Acts
 from cornersmooth.verify.along_tool import AlongTool
 from cornersmooth.verify.decision import Batch
 from cornersmooth.verify.feeds import feed_at, out_of_hole
 from cornersmooth.verify.motions import written_motion
 from cornersmooth.verify.nearest import COLUMNS, largest_square, nearest_places
-from cornersmooth.verify.parse import BEFORE, Hole, Parse, Part
+from cornersmooth.verify.parse import BEFORE, Parse, Part
 from cornersmooth.verify.passage import AROUND, LONGER
 from cornersmooth.verify.task import ARITHMETIC, Task
 
@@ -46,17 +46,7 @@ class Batches:
 
     def __init__(self, task: Task, events: Sequence[Event], retracts: Sequence[int]) -> None:
         self.task, self._events, self.retracts = task, events, retracts
-        self.problems: list[Problem] = []
-        #: as of `Parse`
-        self.acts = array("q")
-        self.holes: list[Hole] = []
-        self.left_out: list[Problem] = []
-        self.moves_left_out: set[int] = set()
-        self.ways_up: dict[int, range] = {}
-        self.cuts, self.runs = array("q"), array("q")
-        #: as of `AlongTool`
-        self.rewinds: list[tuple[int, int]] = []
-        self.still: set[int] = set()
+        self.acts = Acts()
         self.elements = 0
         # the stretch that has no end yet: where it begins, as a move and in the text, and (3,) on the CL path, perhaps
         # guessed; and the last move that it may have
@@ -71,25 +61,20 @@ class Batches:
         original = self.task.original
         ahead = self._ahead = Ahead(nc for nc in chunks if len(nc))
         if ahead.has(0) and len(original.pose):
-            along = AlongTool(ahead, self.retracts, self._events)
-            stops = Parse(self.task, ahead, self._events, along)
-            self.rewinds, self.still = along.rewinds, along.still
-            self.acts, self.holes, self.left_out = stops.acts, stops.holes, stops.left_out
-            self.moves_left_out, self.ways_up = stops.moves_left_out, stops.ways_up
-            self.cuts, self.runs = stops.cuts, stops.runs
-            for part in stops.parts():
+            along = AlongTool(ahead, self.retracts, self._events, self.acts)
+            parse = Parse(self.task, ahead, self._events, along, self.acts)
+            for part in parse.parts():
                 yield from self._take(part)
             yield from self._close(len(original.pose) - 1, ahead.count - 1)
             yield from self._flush()
-            self.problems += stops.problems
         elif ahead.count:
             text = "motion that the CL file does not have"
-            self.problems.append(Problem("CS534", 0, int(ahead.nc.line[0]), text))
+            self.acts.problems.append(Problem("CS534", 0, int(ahead.nc.line[0]), text))
             while ahead.has(ahead.count):
                 ahead.forget(ahead.count - 1)
         elif len(original.pose):
             line = int(original.program.line[original.pose[0]])
-            self.problems.append(Problem("CS534", line, 0, "the program lacks motion of the CL file"))
+            self.acts.problems.append(Problem("CS534", line, 0, "the program lacks motion of the CL file"))
         self.elements = ahead.count
 
     def _take(self, part: Part) -> Iterator[Batch]:
@@ -116,7 +101,7 @@ class Batches:
             text = "the first rapid is written as a feed move"
             line = int(original.program.line[original.pose[move]])
             rapid = Problem("CS532", line, int(nc.line[at]), text)
-            self.problems += [rapid] if kind == Move.RAPID else feed_at(task, nc, at, move, 0.0)
+            self.acts.problems += [rapid] if kind == Move.RAPID else feed_at(task, nc, at, move, 0.0)
         # out of a hole the way begins anywhere
         place = out_of_hole(task, nc, at, move) if kind == Move.HOLE else float(original.trail.last[move])
         self._move, self._element, self._place = move, element, np.full(3, place)
@@ -223,4 +208,4 @@ class Batches:
             move = min(self._move + 1, len(original.pose) - 1)
             element = min(self._element + 1 - base, len(nc) - 1)
             line = int(original.program.line[original.pose[move]])
-            self.problems.append(Problem(code, line, int(nc.line[element]), text, amount))
+            self.acts.problems.append(Problem(code, line, int(nc.line[element]), text, amount))

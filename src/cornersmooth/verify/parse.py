@@ -11,19 +11,18 @@ decides what is named, and never whether a program passes.
 from __future__ import annotations
 
 import math
-from array import array
 from bisect import bisect_left, bisect_right
 from collections.abc import Generator, Iterator, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from cornersmooth.model import Bools, Ints, Move
+from cornersmooth.model import Bools, Move
 from cornersmooth.nc_reader.ahead import Ahead
 from cornersmooth.nc_reader.elements import Event, Problem
 from cornersmooth.nc_reader.tool import beyond_digits, directions, moving_rapids
-from cornersmooth.statements.cycles import Drilling, drillings
 from cornersmooth.statements.tool_changes import ToolChanges
+from cornersmooth.verify.acts import Acts, Hole, Step, Stops
 from cornersmooth.verify.along_tool import AlongTool
 from cornersmooth.verify.feeds import feed_at, out_of_hole
 from cornersmooth.verify.holes import HoleLines
@@ -42,25 +41,6 @@ _IN_HOLES: Final = (("G", 4.0), ("G", 84.0))
 BEFORE: Final = 16
 
 
-class Step(NamedTuple):
-    """A stop that is reached."""
-
-    move: int  #: the move that ends there
-    element: int  #: the element that ends there; the first one of a hole; the first feed move out of a hole
-    opens: bool  #: whether feed moves may follow, rather than a hole
-    last: int  #: last move before the next stop
-    within: bool = False  #: whether both motions pass a pose of a run there, where both files have words
-
-
-class Hole(NamedTuple):
-    """A hole that is drilled."""
-
-    move: int
-    first: int  #: the first element that belongs to it
-    leaves: int  #: the element with which the tool leaves it
-    cycle: Drilling
-
-
 class Part(NamedTuple):
     """Elements that are certain: up to `stop`, that excluded."""
 
@@ -71,55 +51,19 @@ class Part(NamedTuple):
 class Parse:
     """Goes through the acts of the CL file and the elements of a program, at least one, side by side."""
 
-    def __init__(self, task: Task, ahead: Ahead, events: Sequence[Event], along: AlongTool) -> None:
-        self._task, self._ahead, self._events, self._along = task, ahead, events, along
+    def __init__(self, task: Task, ahead: Ahead, events: Sequence[Event], along: AlongTool, acts: Acts) -> None:
+        self._task, self._ahead, self._events, self._along, self.acts = task, ahead, events, along, acts
         self._changes = ToolChanges(task.original.program, events)
         self.lines = HoleLines(task.original, ahead, task.axis_length, task.tolerance)
-        #: rapids, holes and feeds out of holes, two numbers for each: the move and the element that begin it
-        self.acts = array("q")
-        self.holes: list[Hole] = []
-        #: runs of feed moves, four numbers for each: the move and the element that they begin with, and those behind
-        self.runs = array("q")
-        #: poses within runs where both files have words: moves that statements are before, and elements behind
-        self.cuts = array("q")
-        #: CS561 for holes that the program leaves out and may leave out if requested
-        self.left_out: list[Problem] = []
-        self.moves_left_out: set[int] = set()
-        #: holes that an element may be the way up from, by the element: it also ends at the rapid behind them
-        self.ways_up: dict[int, range] = {}
-        #: CS531 a rapid goes elsewhere, CS532 one is missing, CS533 one too many; CS536 a feed move too many; of holes
-        self.problems: list[Problem] = []
+        stops = Stops.of(task.original, self.lines)
+        self.moves, self._move, self._hole, self._holes = stops.moves, stops.move, stops.hole, stops.holes
+        self._fed, self._cycles, self._stated = stops.fed, stops.cycles, stops.stated
         self._steps: list[Step] = []
         self._given = 0  #: elements given out so far
         self._begun = -1  #: the element with which the run begins that goes on; -1 within a hole and in front of all
-        original = task.original
-        poses = [one.pose for one in original.program.statements]
-        #: moves that statements are before
-        self._stated: list[int] = np.unique(np.searchsorted(original.pose, poses)).tolist()
         self._from: tuple[int, ...] = ()  # the move and the element that a run of feed moves begins with
         # where a run may be divided next: first element and move, and how far the tool has gone, mm
         self._looked, self._cut_at, self._gone = 0, 0, 0.0
-        self._find_stops()
-
-    def _find_stops(self) -> None:
-        """Find holes, and rapids that move the tool by more than digits show or come out of a hole, from anywhere."""
-        lines, original = self.lines, self._task.original
-        hole, rapid = lines.kind == Move.HOLE, np.flatnonzero(lines.kind == Move.RAPID)
-        before = np.maximum(rapid - 1, 0)
-        turned = np.linalg.norm(lines.axis[rapid] - lines.axis[before], axis=1) * lines.axis_length > lines.room
-        moved = turned | hole[before] | beyond_digits(self._ahead.nc, lines.tip[rapid] - lines.tip[before])
-        chosen = hole.copy()
-        chosen[rapid[moved]] = chosen[:1] = True
-        fed = ~chosen
-        fed[rapid] = False
-        self.moves: Ints = np.flatnonzero(chosen)
-        self._move: list[int] = [*self.moves.tolist(), len(chosen)]
-        self._hole: list[bool] = [*hole[self.moves].tolist(), False]
-        self._holes = np.flatnonzero(hole[self.moves])  # among the stops
-        #: whether feed moves follow each stop
-        self._fed: list[bool] = np.logical_or.reduceat(fed, self.moves).tolist()
-        cycles = drillings(original.program, original.pose[hole].tolist())
-        self._cycles: dict[int, Drilling] = dict(zip(np.flatnonzero(hole).tolist(), cycles, strict=True))
 
     # ------------------------------------------------------------------ acts
 
@@ -212,7 +156,7 @@ class Parse:
             if there:
                 way = gone[max(one - 1 - first, 0)] + length[last[self._move[stop]]]
                 move = min(there, key=lambda move: abs(length[last[move - 1]] - way))  # of those that are there again
-                self.cuts.extend((move, one))
+                self.acts.cuts.extend((move, one))
                 self._cut_at = move + 1
                 if move - 1 > self._move[stop] and one - 1 > self._begun:
                     self._steps.append(Step(move - 1, one - 1, True, self._move[stop + 1] - 1, within=True))
@@ -287,7 +231,7 @@ class Parse:
                     break
                 if self._over(stop, one):
                     text = "motion that the CL file does not have"
-                    self.problems.append(lines.problem("CS534", move, element, text))
+                    self.acts.problems.append(lines.problem("CS534", move, element, text))
                     return stop - 1, one
         return self._leave(stop, element, best)
 
@@ -331,7 +275,7 @@ class Parse:
         if self._along.next_retract(begin) != begin and (slant := lines.slant(move, begin)):
             text = f"a rapid goes aslant to a hole, {slant:.4f} mm: across at the higher level, then down"
             found.append(lines.problem("CS563", move, begin, text, slant))
-        self.problems += found
+        self.acts.problems += found
         self._drilled(stop, begin, behind, left=left)
         ahead, out = self._ahead, end
         has = ahead.has(end)
@@ -342,14 +286,16 @@ class Parse:
             out = end - 1 if lines.at(move + 1, end - 1) else block.stop - 1
             if out >= end and not lines.is_straight(block):
                 text = "feed moves that the CL file does not have"
-                self.problems.append(lines.problem("CS536", move, end, text))
+                self.acts.problems.append(lines.problem("CS536", move, end, text))
             if out == end:
                 nc, own = ahead.nc, end - ahead.base
-                self.problems += feed_at(self._task, nc, own, move + 1, out_of_hole(self._task, nc, own, move))
+                self.acts.problems += feed_at(self._task, nc, own, move + 1, out_of_hole(self._task, nc, own, move))
             self._open(stop, out)
             return stop, max(out, end - 1) + 1
         if not self._done(stop, end):
-            self.problems.append(lines.problem("CS535", move + 1, end - 1, "feed moves of the CL file are missing"))
+            self.acts.problems.append(
+                lines.problem("CS535", move + 1, end - 1, "feed moves of the CL file are missing")
+            )
         if following < len(self.moves) and not self._hole[following]:
             if self._reaches(following, end):
                 self._open(following, end)
@@ -391,7 +337,7 @@ class Parse:
         )
         if not surplus and first < len(self.moves) and (not feeds or first == 0):
             amount = float(lines.missed(self.moves[first : first + 1], np.array([element]))[1][0])
-            self.problems.append(
+            self.acts.problems.append(
                 lines.problem("CS531", self._move[first], element, "a rapid does not end at its pose", amount)
             )
             return self._reach(first, element)
@@ -402,7 +348,7 @@ class Parse:
         """An element before a stop is one too many."""
         surplus = ("CS533", "a rapid that the CL file does not have, or a feed move written as one")
         code, text = ("CS536", "feed moves that the CL file does not have") if self.lines.feeds(element) else surplus
-        self.problems.append(self.lines.problem(code, self._move[stop], element, text))
+        self.acts.problems.append(self.lines.problem(code, self._move[stop], element, text))
 
     def _lack(self, stop: int, element: int) -> int:
         """A stop is missing before an element."""
@@ -414,7 +360,7 @@ class Parse:
         away = ahead.nc.tip[first - ahead.base : max(element, first + 1) - ahead.base] - lines.tip[move]
         near = first + int(np.argmin(np.linalg.norm(away, axis=1)))
         text = "a rapid of the CL file is missing, or is written as a feed move"
-        self.problems.append(lines.problem("CS532", move, near, text))
+        self.acts.problems.append(lines.problem("CS532", move, near, text))
         return stop
 
     def _comes_down_first(self, stop: int, element: int) -> bool:
@@ -435,7 +381,7 @@ class Parse:
         if not lines.goes_to(element - 1, rapid=rapid):
             at_feed = "the tool goes on at feed with a cut that it has left, and does not come from above"
             text = "the tool comes back in rapid to where it has left a cut" if rapid else at_feed
-            self.problems.append(Problem("CS582", 0, lines.nc_line(element), text))
+            self.acts.problems.append(Problem("CS582", 0, lines.nc_line(element), text))
 
     # ------------------------------------------------------------------ what an element may be
 
@@ -479,7 +425,7 @@ class Parse:
             leads = (one for one in range(move + 1, last) if not self.lines.at(one, element - 1))
             first = next(leads, last)
         if self._hole[stop] or not self._is_way_out(element):
-            self.acts.extend((first, element))
+            self.acts.begins.extend((first, element))
         self._end_run(move, element)
         self._steps.append(Step(move, element, True, last))
         self._from = (first, element) if self._fed[stop] else ()
@@ -487,7 +433,7 @@ class Parse:
 
     def _end_run(self, move: int, element: int) -> None:
         """Take down a run of feed moves that ends before a move and an element."""
-        self.runs.extend((*self._from, move, element) if self._from else ())
+        self.acts.runs.extend((*self._from, move, element) if self._from else ())
         self._from, self._begun = (), -1
 
     def _note_way_up(self, stop: int, begin: int, element: int) -> None:
@@ -501,18 +447,18 @@ class Parse:
         while goes_up and first and self._hole[first - 1] and self._over(first - 1, element):
             move = self._move[first - 1]
             highest = max(self._cycles[move].level, float((came_from - lines.tip[move]) @ lines.axis[move]))
-            left = first == stop or (move in self.moves_left_out and element == begin)
+            left = first == stop or (move in self.acts.moves_left_out and element == begin)
             if not left or lines.height(move, element) > highest + lines.tolerance:
                 break
             first -= 1
         if first < stop:
-            self.ways_up[element] = range(self._move[first], self._move[stop])
+            self.acts.ways_up[element] = range(self._move[first], self._move[stop])
 
     def _is_way_out(self, element: int) -> bool:
         """Whether an element belongs to the block with which the tool leaves the last hole."""
-        if not self.holes:
+        if not self.acts.holes:
             return False
-        leaves, lines = self.holes[-1].leaves, self.lines
+        leaves, lines = self.acts.holes[-1].leaves, self.lines
         return element <= leaves or (leaves >= self._ahead.base and lines.nc_line(element) == lines.nc_line(leaves))
 
     def _drilled(self, stop: int, begin: int, end: int, *, left: bool) -> None:
@@ -521,10 +467,10 @@ class Parse:
         cycle, group = self._cycles[move], [one for one in range(begin, end) if lines.over(move, one)]
         if left:
             text = f"a hole of the CL file is not {'tapped' if cycle.tap else 'drilled'}"
-            self.left_out.append(lines.problem("CS561", move, group[0] if group else -1, text))
-            self.moves_left_out.add(move)
+            self.acts.left_out.append(lines.problem("CS561", move, group[0] if group else -1, text))
+            self.acts.moves_left_out.add(move)
         elif group:
             fed = [one for one in group if lines.feeds(one)]
             inside = [one + 1 for one in group if lines.height(move, one) < -lines.room] or fed[-1:] or group[:1]
-            self.holes.append(Hole(move, group[0], min(inside[-1], end), cycle))
-            self.acts.extend((move, group[0]))
+            self.acts.holes.append(Hole(move, group[0], min(inside[-1], end), cycle))
+            self.acts.begins.extend((move, group[0]))

@@ -275,10 +275,10 @@ class Verifier:
         # where the motion leaves the CL path, no place tells which feed is right
         off = {violation.nc_line for violation in findings.violations}
         feeds = [problem for problem in findings.feeds.problems if problem.nc_line not in off]
-        problems += batches.problems + feeds + problems_of(findings.violations)
+        problems += batches.acts.problems + feeds + problems_of(findings.violations)
         problems += half_turns(program)
         if not self._skip_cycles:
-            problems += batches.left_out
+            problems += batches.acts.left_out
         if self._words and batches.elements:  # without any motion nothing has a place
             up = self._options.dialect.retracts and FRAME not in self._trusted
             of_statements, at_home, unsaid = places.problems(
@@ -299,8 +299,8 @@ class Verifier:
             blocks=nc.blocks,
             elements=batches.elements,
             curves=curves,
-            left_out=len(batches.left_out) if self._skip_cycles else 0,
-            rewinds=tuple(batches.rewinds),
+            left_out=len(batches.acts.left_out) if self._skip_cycles else 0,
+            rewinds=tuple(batches.acts.rewinds),
         ).not_verified(not_understood_text(program), unsaid)
 
     @property

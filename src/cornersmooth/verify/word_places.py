@@ -72,11 +72,11 @@ class WordPlaces:
         """
         batches, original = self._batches, self._task.original
         program, moves = original.program, len(original.pose)
-        self._still |= batches.still
+        self._still |= batches.acts.still
         # statements by the first move behind them that leads anywhere, words and retracts by the first such element
         places = np.searchsorted(original.pose, [one.pose for one in program.statements]).tolist()
         unique = np.unique(np.array(places, np.int64))
-        leading, beyond = self._leading(unique, set()), self._leading(unique, batches.moves_left_out)
+        leading, beyond = self._leading(unique, set()), self._leading(unique, batches.acts.moves_left_out)
         requested = [
             one
             for one in asked(program, places, moves, means)
@@ -89,17 +89,17 @@ class WordPlaces:
         # that of those no element names is written
         missed = {int(original.trail.owner[int(one.place)]) for one in found.violations if one.code == "CS524"}
 
-        begins = [(self._moving(one.first), one) for one in batches.holes]
+        begins = [(self._moving(one.first), one) for one in batches.acts.holes]
         holes = {first: (one, _within(nc_tokens, first, one.leaves)) for first, one in begins}
         inside = {id(one) for _, some in holes.values() for one in some if one.kind in ("dwell", "tap")}
         comparison = Comparison(cl_tokens, [one for one in nc_tokens if id(one) not in inside], means, own)
-        acts = np.frombuffer(batches.acts, np.int64).reshape(-1, 2)
+        acts = np.frombuffer(batches.acts.begins, np.int64).reshape(-1, 2)
         # what leads nowhere in the program is no act: a rapid to where the tool is, or the same element again
         rapid = program.kind[original.pose[acts[:, 0]]] == Move.RAPID
         first = np.array([self._moving(one) for one in acts[:, 1].tolist()], np.int64)
         kept = (~rapid | (first == acts[:, 1])) & (np.diff(first, prepend=-1) > 0)
         acts = np.column_stack((acts[:, 0], first))[kept]
-        pairs = zip(batches.cuts[::2], batches.cuts[1::2], strict=True)
+        pairs = zip(batches.acts.cuts[::2], batches.acts.cuts[1::2], strict=True)
         cuts = [(leading[move], self._moving(one)) for move, one in pairs]
         rows = [*acts.tolist(), *(one for one in cuts if one[1] not in first), (moves, batches.elements)]
         acts = np.maximum.accumulate(np.array(sorted(rows, key=lambda row: row[1]), np.int64))
@@ -107,7 +107,7 @@ class WordPlaces:
         nc_places = np.array(sorted({one.place for one in nc_tokens}), np.int64)
         cl_act, nc_act = np.searchsorted(acts[:, 0], cl_places), np.searchsorted(acts[:, 1], nc_places)
         # words in runs for which the other file has none at that pose
-        runs = np.frombuffer(batches.runs, np.int64).reshape(-1, 4)
+        runs = np.frombuffer(batches.acts.runs, np.int64).reshape(-1, 4)
         cl_in, nc_in = (
             _within_runs(some, runs[:, k], runs[:, 2 + k]) & (some < acts[act_of, k])
             for k, (some, act_of) in enumerate(((cl_places, cl_act), (nc_places, nc_act)))
@@ -115,7 +115,7 @@ class WordPlaces:
         cl_alone, cl_at, nc_alone, nc_at = cl_places[cl_in], cl_act[cl_in], nc_places[nc_in], nc_act[nc_in]
         of_cycles = [first for first, (one, some) in holes.items() if some or one.cycle.dwell or one.cycle.tap]
         wanted = {*cl_act.tolist(), *nc_act.tolist(), *np.searchsorted(acts[:, 1], of_cycles).tolist()}
-        wanted |= {act + 1 for act in wanted if act < len(acts) and int(acts[act, 1]) in batches.ways_up}
+        wanted |= {act + 1 for act in wanted if act < len(acts) and int(acts[act, 1]) in batches.acts.ways_up}
         at_home: set[int] = set()
         before, behind_way = (-1, -1), None
         for act in sorted(one for one in wanted if one < len(acts)):
@@ -126,7 +126,7 @@ class WordPlaces:
                 meetings.insert(0, behind_way)
             behind_way = None
             for move, element in [*(one for one in meetings if one[0] < end[0] and one[1] < end[1]), end]:
-                ways_up = batches.ways_up.get(element, ()) if (move, element) == end else ()
+                ways_up = batches.acts.ways_up.get(element, ()) if (move, element) == end else ()
                 if ways_up and not comparison.agrees(*end):
                     # a rapid that ends where the tool goes up from a hole is that way, or leads nowhere behind it
                     readings = ((one, element) for one in reversed(ways_up))
@@ -142,7 +142,7 @@ class WordPlaces:
                 hole, some = holes[end[1]]
                 line = int(program.line[original.pose[hole.move]])
                 comparison.in_hole(line, some, hole.cycle.dwell, tap=hole.cycle.tap)
-        hidden = changed_unseen(requested, leading, beyond) if batches.moves_left_out else ""
+        hidden = changed_unseen(requested, leading, beyond) if batches.acts.moves_left_out else ""
         unsaid = "; ".join(filter(None, (without_word(cl_tokens, nc_tokens, means, own), hidden)))
         return comparison.problems, at_home, unsaid
 

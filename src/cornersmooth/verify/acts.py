@@ -1,0 +1,94 @@
+"""Acts of the CL file, and what of a program does them."""
+
+from __future__ import annotations
+
+from array import array
+from dataclasses import dataclass, field
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from cornersmooth.model import Ints, Move
+from cornersmooth.nc_reader.elements import Problem
+from cornersmooth.nc_reader.tool import beyond_digits
+from cornersmooth.statements.cycles import Drilling, drillings
+from cornersmooth.verify.cl_motion import Original
+from cornersmooth.verify.holes import HoleLines
+
+
+class Step(NamedTuple):
+    """A stop that is reached."""
+
+    move: int  #: the move that ends there
+    element: int  #: the element that ends there; the first one of a hole; the first feed move out of a hole
+    opens: bool  #: whether feed moves may follow, rather than a hole
+    last: int  #: last move before the next stop
+    within: bool = False  #: whether both motions pass a pose of a run there, where both files have words
+
+
+class Hole(NamedTuple):
+    """A hole that is drilled."""
+
+    move: int
+    first: int  #: the first element that belongs to it
+    leaves: int  #: the element with which the tool leaves it
+    cycle: Drilling
+
+
+@dataclass
+class Acts:
+    """What a program does, as it is read: moves and elements that belong together."""
+
+    #: rapids, holes and feeds out of holes, two numbers for each: the move and the element that begin it
+    begins: array[int] = field(default_factory=lambda: array("q"))
+    #: runs of feed moves, four numbers for each: the move and the element that they begin with, and those behind
+    runs: array[int] = field(default_factory=lambda: array("q"))
+    #: poses within runs where both files have words: moves that statements are before, and elements behind
+    cuts: array[int] = field(default_factory=lambda: array("q"))
+    holes: list[Hole] = field(default_factory=list)
+    #: CS561 for holes that the program leaves out and may leave out if requested
+    left_out: list[Problem] = field(default_factory=list)
+    moves_left_out: set[int] = field(default_factory=set)
+    #: holes that an element may be the way up from, by the element: it also ends at the rapid behind them
+    ways_up: dict[int, range] = field(default_factory=dict)
+    rewinds: list[tuple[int, int]] = field(default_factory=list)  #: NC lines where cuts are left, and where they go on
+    still: set[int] = field(default_factory=set)  #: elements that lead nowhere, as a rapid is put elsewhere
+    #: CS531 a rapid goes elsewhere, CS532 one is missing, CS533 one too many; CS536 a feed move too many; of holes
+    problems: list[Problem] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Stops:
+    """Poses of the CL file where acts begin, k of them: holes, rapids that lead anywhere, the very first pose."""
+
+    moves: Ints  #: (k,) the moves that end there
+    move: list[int]  #: the same, and one behind all
+    hole: list[bool]  #: which are holes, and one behind all
+    holes: Ints  #: (h,) which are holes
+    fed: list[bool]  #: whether feed moves follow each
+    cycles: dict[int, Drilling]  #: by the moves of the holes
+    stated: list[int]  #: moves that statements are before, ascending
+
+    @classmethod
+    def of(cls, original: Original, lines: HoleLines) -> Self:
+        """Find them: rapids that move the tool by more than digits show or come out of a hole, from anywhere."""
+        hole, rapid = lines.kind == Move.HOLE, np.flatnonzero(lines.kind == Move.RAPID)
+        before = np.maximum(rapid - 1, 0)
+        turned = np.linalg.norm(lines.axis[rapid] - lines.axis[before], axis=1) * lines.axis_length > lines.room
+        moved = turned | hole[before] | beyond_digits(lines.ahead.nc, lines.tip[rapid] - lines.tip[before])
+        chosen = hole.copy()
+        chosen[rapid[moved]] = chosen[:1] = True
+        fed = ~chosen
+        fed[rapid] = False
+        moves = np.flatnonzero(chosen)
+        cycles = drillings(original.program, original.pose[hole].tolist())
+        stated = np.searchsorted(original.pose, [one.pose for one in original.program.statements])
+        return cls(
+            moves,
+            [*moves.tolist(), len(chosen)],
+            [*hole[moves].tolist(), False],
+            np.flatnonzero(hole[moves]),
+            np.logical_or.reduceat(fed, moves).tolist(),
+            dict(zip(np.flatnonzero(hole).tolist(), cycles, strict=True)),
+            np.unique(stated).tolist(),
+        )
