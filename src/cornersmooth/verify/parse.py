@@ -65,17 +65,16 @@ class Parse:
         # where a run may be divided next: first element and move, and how far the tool has gone, mm
         self._looked, self._cut_at, self._gone = 0, 0, 0.0
 
-    # ------------------------------------------------------------------ acts
-
     def parts(self) -> Iterator[Part]:
         """Give out what is certain as it is read; all but the last `BEFORE` of that may be forgotten then."""
         stop, element, last = -1, 0, len(self.moves) - 1
         while True:
             stop, element = yield from self._run(stop, element)
-            if stop < last and self._hole[stop + 1]:
+            if self._hole[stop + 1] and (self._over(stop + 1, element) or self._may_be_left_out(stop + 1)):
                 stop, element = self._drill(stop + 1, element)
-            elif stop < last and self._reaches(stop + 1, element):
-                stop, element = self._reach(stop + 1, element)
+            elif self._reaches(stop + 1, element):
+                self._open(stop + 1, element)
+                stop, element = stop + 1, element + 1
             elif self._ahead.has(element):
                 stop, element = self._fault(stop, element)
             elif stop < last:
@@ -188,12 +187,7 @@ class Parse:
             return False
         there = self._ahead.has(element) and (stop == 0 or not lines.feeds(element))
         there = there and lines.at(self._move[stop], element)
-        return there and not (lines.stands(element) and self._has_tool(stop, element - 1))
-
-    def _reach(self, stop: int, element: int) -> tuple[int, int]:
-        """Take a rapid."""
-        self._open(stop, element)
-        return stop, element + 1
+        return there and not (lines.stands(element) and self._has_tool(self._move[stop], element - 1))
 
     # ------------------------------------------------------------------ holes
 
@@ -225,14 +219,6 @@ class Parse:
             rank = left, lacks, one == element or not self._has_words(one)
             if not problems and (found is None or rank < found or (late and rank == found)):
                 best, found = one, rank
-        if found is None and end == element and ahead.has(element) and not self._may_be_left_out(stop):
-            for one in range(element, element + _AFTER_FAULT):
-                if not ahead.has(one) or self._fitting(stop + 1, one).any():
-                    break
-                if self._over(stop, one):
-                    text = "motion that the CL file does not have"
-                    self.acts.problems.append(lines.problem("CS534", move, element, text))
-                    return stop - 1, one
         return self._leave(stop, element, best)
 
     def _end_of(self, stop: int, element: int, end: int) -> int:
@@ -277,9 +263,8 @@ class Parse:
             found.append(lines.problem("CS563", move, begin, text, slant))
         self.acts.problems += found
         self._drilled(stop, begin, behind, left=left)
-        ahead, out = self._ahead, end
-        has = ahead.has(end)
-        if self._fed[stop] and has and lines.feeds(end):
+        ahead = self._ahead
+        if self._fed[stop] and ahead.has(end) and lines.feeds(end):
             while ahead.has(end + 1) and lines.stands(end):
                 end += 1
             block = lines.block(end)
@@ -293,19 +278,18 @@ class Parse:
             self._open(stop, out)
             return stop, max(out, end - 1) + 1
         if not self._done(stop, end):
-            self.acts.problems.append(
-                lines.problem("CS535", move + 1, end - 1, "feed moves of the CL file are missing")
-            )
+            text = "feed moves of the CL file are missing"
+            self.acts.problems.append(lines.problem("CS535", move + 1, end - 1, text))
         if following < len(self.moves) and not self._hole[following]:
             if self._reaches(following, end):
                 self._open(following, end)
                 self._note_way_up(following, begin, end)
                 return following, end + 1
-            above = lines.fed_above(move, end - 1, self._cycles[move])
-            if lines.at(self._move[following], end - 1) and self._has_tool(following, end - 1) and not above:
-                there = next(one for one in range(end - 1, -1, -1) if not lines.stands(one))
-                self._open(following, there)
-                self._note_way_up(following, begin, there)
+            there = lines.at(self._move[following], end - 1) and self._has_tool(self._move[following], end - 1)
+            if there and not lines.fed_above(move, end - 1, self._cycles[move]):
+                reached = next(one for one in range(end - 1, -1, -1) if not lines.stands(one))
+                self._open(following, reached)
+                self._note_way_up(following, begin, reached)
                 return following, end
         return stop, end
 
@@ -324,23 +308,19 @@ class Parse:
         """What an element is that begins no act: one too many, one that ends elsewhere, or one behind a lack."""
         lines, first, feeds = self.lines, stop + 1, self.lines.feeds(element)
         fits = np.flatnonzero(self._fitting(first, element))
-        if len(fits):
+        if len(fits) and fits[0] > 0:  # else it is no act for another reason
             for one in range(first, first + int(fits[0])):
                 self._lack(one, element)
             return first + int(fits[0]) - 1, element
-        ahead = self._ahead
-        following = next(
-            (k for k in range(element + 1, element + _AFTER_FAULT) if not ahead.has(k) or not lines.feeds(k)), -1
-        )
-        surplus = (
-            first < len(self.moves) and following >= 0 and ahead.has(following) and self._reaches(first, following)
-        )
-        if not surplus and first < len(self.moves) and (not feeds or first == 0):
+        after = range(element + 1, element + _AFTER_FAULT)  # if the next one goes to where it should, this is too many
+        following = next((k for k in after if not self._ahead.has(k) or not lines.feeds(k)), element)
+        rapid = first < len(self.moves) and not self._hole[first] and (not feeds or first == 0)
+        if rapid and not self._reaches(first, following):
             amount = float(lines.missed(self.moves[first : first + 1], np.array([element]))[1][0])
-            self.acts.problems.append(
-                lines.problem("CS531", self._move[first], element, "a rapid does not end at its pose", amount)
-            )
-            return self._reach(first, element)
+            text = "a rapid does not end at its pose"
+            self.acts.problems.append(lines.problem("CS531", self._move[first], element, text, amount))
+            self._open(first, element)
+            return first, element + 1
         self._surplus(first, element)
         return stop, element + 1
 
@@ -372,8 +352,7 @@ class Parse:
             return False
         move = self._move[stop + 1] - 1
         there = move > self._move[stop] and self.lines.kind[move] == Move.RAPID
-        first, behind = self._changes.elements_of(int(self._task.original.pose[move]))
-        return not (there and first <= element < behind)
+        return not (there and self._has_tool(move, element))
 
     def _check_return(self, element: int) -> None:
         """Complain of an element that goes on with a cut, but if the CL file has a pose where that was left."""
@@ -387,12 +366,12 @@ class Parse:
 
     def _over(self, stop: int, element: int) -> bool:
         """Whether an element ends in the line of a hole, and no tool change parts it from that."""
-        has = self._ahead.has(element) and self._has_tool(stop, element)
+        has = self._ahead.has(element) and self._has_tool(self._move[stop], element)
         return has and self.lines.over(self._move[stop], element)
 
-    def _has_tool(self, stop: int, element: int) -> bool:
-        """Whether no tool change parts an element from a stop."""
-        first, behind = self._changes.elements_of(int(self._task.original.pose[self._move[stop]]))
+    def _has_tool(self, move: int, element: int) -> bool:
+        """Whether no tool change parts an element from a move."""
+        first, behind = self._changes.elements_of(int(self._task.original.pose[move]))
         return first <= element < behind
 
     def _has_words(self, element: int) -> bool:

@@ -101,7 +101,8 @@ class WordPlaces:
         acts = np.column_stack((acts[:, 0], first))[kept]
         pairs = zip(batches.acts.cuts[::2], batches.acts.cuts[1::2], strict=True)
         cuts = [(leading[move], self._moving(one)) for move, one in pairs]
-        rows = [*acts.tolist(), *(one for one in cuts if one[1] not in first), (moves, batches.elements)]
+        begun = {*first.tolist()}
+        rows = [*acts.tolist(), *(one for one in cuts if one[1] not in begun), (moves, batches.elements)]
         acts = np.maximum.accumulate(np.array(sorted(rows, key=lambda row: row[1]), np.int64))
         cl_places = np.array(sorted({one.place for one in cl_tokens} | homes), np.int64)
         nc_places = np.array(sorted({one.place for one in nc_tokens}), np.int64)
