@@ -20,8 +20,7 @@ from cornersmooth.filter.spelling import numbered, numbers_of
 from cornersmooth.kinematics import tip_position, tool_axis
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc.control import Mode
-from cornersmooth.nc.long_rows import line_limits
-from cornersmooth.nc.rotary_rows import LARGEST_TURN
+from cornersmooth.nc.rotary_rows import LARGEST_TURN, line_limits
 from cornersmooth.nc_reader.block_tables import CHUNK
 from cornersmooth.smoothing.fewest_pieces import PieceLimits, Pieces, Polyline, fewest_pieces
 from cornersmooth.smoothing.long_lines import Vertices, fewest_lines

@@ -2,13 +2,15 @@
 
 from cornersmooth.kinematics.machine import Dynamics, Machine, RotaryAxis, Travel, endless, with_dynamics
 from cornersmooth.kinematics.machine_tables import load_machine, machine_names, machine_table, parse_machine
-from cornersmooth.kinematics.poses import Solutions, solutions, tool_axis
-from cornersmooth.kinematics.position import (
+from cornersmooth.kinematics.poses import (
+    Solutions,
     check_travel,
     inverse_time,
     machine_position,
     nose_position,
+    solutions,
     tip_position,
+    tool_axis,
 )
 
 __all__ = [

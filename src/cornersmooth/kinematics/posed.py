@@ -12,8 +12,7 @@ import numpy as np
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.kinematics.machine import LINEAR, Machine
-from cornersmooth.kinematics.poses import Solutions, solutions, tool_axis, wrap
-from cornersmooth.kinematics.position import machine_position, nose_position
+from cornersmooth.kinematics.poses import Solutions, machine_position, nose_position, solutions, tool_axis, wrap
 from cornersmooth.model import Floats
 
 _WORD = re.compile(r"([A-Za-z])\s*=?\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)")

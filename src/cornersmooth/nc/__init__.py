@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cornersmooth.errors import Finding, SettingsError
-from cornersmooth.model import Bools, Ints, SmoothProgram, Units
+from cornersmooth.methods import CURVES_METHOD, DEFAULT_METHOD
+from cornersmooth.model import Bools, FeedMode, Ints, Move, SmoothProgram, Units
 from cornersmooth.nc.blocks import Blocks
 from cornersmooth.nc.circles import Circles, plan_circles, with_arcs
 from cornersmooth.nc.control import Control
@@ -27,18 +28,17 @@ from cornersmooth.nc.curves import SplineCount
 from cornersmooth.nc.form import Form, check_program, choose_form
 from cornersmooth.nc.hole_cycles import upright_poses
 from cornersmooth.nc.holes import Holes
-from cornersmooth.nc.long_rows import coarse_rows, long_rows
 from cornersmooth.nc.messages import Findings
 from cornersmooth.nc.modals import Modals
 from cornersmooth.nc.motion import Motion
 from cornersmooth.nc.planes import Planes, check_travel_of_words, plan_planes
 from cornersmooth.nc.program_frame import BLEND_STEP, POINT_APPROACH, Frame, Stream
-from cornersmooth.nc.rotary_rows import arc_angles, rotary_rows
+from cornersmooth.nc.rotary_rows import arc_angles, coarse_rows, long_rows, rotary_rows
 from cornersmooth.nc.rotary_words import rotary_way, within_reach
 from cornersmooth.nc.script import Script
 from cornersmooth.nc.statement_writer import StatementWriter
-from cornersmooth.nc.warnings import add_warnings
-from cornersmooth.settings import Settings
+from cornersmooth.rotary import rapid_moves
+from cornersmooth.settings import FLIP_ANGLE, Settings
 from cornersmooth.smoothing.sampling import Rows, all_dense_rows, curve_rows, dense_rows
 
 __all__ = [
@@ -189,7 +189,7 @@ def write(
     check_travel_of_words(planes, program, chosen, findings)
     of_rows = Findings()  # rows are made in a thread of their own: their findings come last
     rows, circles = _rows(smoothed, chosen, planes, upright, of_rows)
-    add_warnings(chosen, smoothed, circles, upright, findings)
+    _add_warnings(chosen, smoothed, circles, upright, findings)
     stretch = chosen.stretch(smoothed.settings.axis_length)
     tilting = Coordinates(chosen, program.units, stretch, modal=frame.modal)
     counted = SplineCount(program.line, findings) if chosen.curve == "bspline" else None
@@ -210,6 +210,39 @@ def write(
         script.hand_on(text)
     findings.add_all(of_rows.all())
     return Written(blocks.written, findings.all())
+
+
+def _add_warnings(form: Form, smoothed: SmoothProgram, circles: Circles, upright: Bools, findings: Findings) -> None:
+    """Note what a user of the form should know of the program; `upright` (n,) are tools without words of the axis."""
+    program, style = smoothed.program, form.table.lines
+    lines = program.line[program.arcs.pose]
+    findings.note_each("CS313", lines[(circles.blocks > 0) & ~circles.curved])
+    findings.note_each("CS313b", lines[circles.curved])
+    findings.note_each("CS314", lines[circles.blocks == 0])
+    rapid = rapid_moves(program.kind)
+    if not form.rotary:  # rotary words say which way to turn; feed moves that turn so far are refused before
+        poses, _ = program.axis_steps(rapid, FLIP_ANGLE)
+        findings.note_each("CS326", program.line[poses], angle=FLIP_ANGLE)
+    largest = form.mode.motion.largest_feed
+    beyond = ~rapid & (program.feed_mode == FeedMode.PER_MINUTE) & (program.feed > (largest or np.inf))
+    findings.note_each("CS388", program.line[beyond], largest=largest)
+    if form.orientation == "machine":
+        findings.note_each("CS323", program.line[~rapid & (program.feed_mode == FeedMode.PER_REVOLUTION)])
+    if "{kinematics_on}" in form.mode.within_on and form.machine is not None and form.machine.tip_control is None:
+        findings.note("CS393", 0)
+    if style.lag and smoothed.settings.lines == "long" and smoothed.settings.method == CURVES_METHOD:
+        findings.note("CS394", 0, control=form.control, method=CURVES_METHOD, default=DEFAULT_METHOD)
+    if form.curve == "g6.2" and form.orientation == "point" and not (upright | (program.kind == Move.FROM)).all():
+        findings.note("CS395", 0)
+    rounded = bool(smoothed.corners.smoothed.any()) or smoothed.runs is not None
+    if rounded and not form.curves and smoothed.settings.lines == "dense" and not form.extras:
+        for name, extra in form.table.extras.items():
+            if not extra.forms or form.name in extra.forms:
+                findings.note("CS396", 0, name=name)
+                break
+    for extra in form.extras:
+        if extra.warning:
+            findings.note("CS339", 0, name=extra.name, warning=extra.warning)
 
 
 def _rows(

@@ -68,7 +68,7 @@ class Holes:
             self._cycles(cycle, kind, poses, travel, clearance, came)
             return
         motion.findings.note_each("CS316", program.line[poses])
-        motion.warnings.of_holes(poses, -1 if motion.modals.comes_first else int(poses[0]) - 1, travel, clearance)
+        motion.note_holes(poses, -1 if motion.modals.comes_first else int(poses[0]) - 1, travel, clearance)
         enter, leave = crossings(program, poses, travel, came)
         if travel[0] > came and motion.position is not None:
             up = motion.at.lifted(motion.position, float(travel[0]) - came)
@@ -101,7 +101,9 @@ class Holes:
         kind = kind_of(cycle, motion.at.form, motion.program, poses)
         if not kind:
             return "", "a tap, and the control has no such cycle for it"
-        if cycle.tap and not (self.statements.clockwise and motion.modals.speed and motion.modals.turning):
+        if cycle.tap and not (
+            self.statements.direction == "clockwise" and motion.modals.speed and motion.modals.turning
+        ):
             return "", "a tap takes a spindle that turns clockwise at a known speed"
         if motion.at.tip_control:
             where = "the tool does not stay along Z between its changes, or nothing says that the rotary axes do"
@@ -120,7 +122,7 @@ class Holes:
         motion.findings.note_each("CS347", lines)
         if kind == "tap":
             motion.findings.note_each("CS348", lines)
-        motion.warnings.of_cut(int(poses[0]), turning=motion.modals.turning)
+        motion.note_cut(int(poses[0]), turning=motion.modals.turning)
         mode = int(hole_feeds(cycle, program, poses[:1])[1][0])
         motion.say(motion.modals.set(plane=FIRST_PLANE))  # a cycle drills across the plane
         made = cycle_blocks(cycle, kind, motion.at, program, poses, (travel, clearance), motion.modals.speed or 0.0)

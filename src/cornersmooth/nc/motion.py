@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cornersmooth.arrays import some_rows
-from cornersmooth.kinematics.poses import continued
-from cornersmooth.kinematics.position import nose_position
+from cornersmooth.arrays.vectors import dot
+from cornersmooth.kinematics.poses import continued, nose_position
 from cornersmooth.model import Bools, Floats, Ints, Move, Program
 from cornersmooth.nc.blocks import Blocks
 from cornersmooth.nc.control import INVERSE_TIME
@@ -21,10 +21,11 @@ from cornersmooth.nc.curves import bezier_points
 from cornersmooth.nc.messages import Findings, refused
 from cornersmooth.nc.modals import Modals
 from cornersmooth.nc.rotary_words import UPRIGHT, check_first_block, retracts_before
-from cornersmooth.nc.warnings import MotionWarnings
 from cornersmooth.smoothing.sampling import Rows
 
 NOWHERE = 1 << 62  #: a pose that no program has
+#: cosine of the angle from hole to hole beyond which the tool turns between them
+_TURNED = float(np.cos(np.radians(1.0)))
 
 
 @dataclass
@@ -43,15 +44,16 @@ class Motion:
     position: Ints | None = None  #: where the tool is, in ticks; None where it may be elsewhere
     last: Ints | None = None  #: what was written last, before a tool change too
     last_at: Coordinates | None = None  #: and in which coordinates
-    warnings: MotionWarnings = field(init=False)
     text: list[bytes] = field(default_factory=list)  #: that is not handed on yet
     repeated: int = 0  #: rows that move nothing
     return_to: int = NOWHERE  #: first pose after a tool change, until it is reached
     _begun: int = -1  #: last move after a hole or a FROM that has been begun
+    _noted: set[str] = field(default_factory=set)  #: codes of what is noted once, or once for each tool
+    _tilted: bool = False  #: whether a tool has been tilted, as far as was looked
+    _looked_until: int = 0
 
     def __post_init__(self) -> None:
         self.at = self.tilting
-        self.warnings = MotionWarnings(self.program, self.findings)
 
     def say(self, blocks: Sequence[str]) -> None:
         """Write blocks that are no rows; G06.2 takes none before a G1."""
@@ -72,7 +74,7 @@ class Motion:
         """Take note that the machine is elsewhere, and that another tool may begin at a pose."""
         self.return_to = pose
         self.stand(None)
-        self.warnings.another_tool()
+        self._noted.discard("CS335b")  # noted for each tool
 
     # ------------------------------------------------------------------------------------------------ rows
 
@@ -191,10 +193,10 @@ class Motion:
             return
         first, pose, at, modals = rows.ticks[0], int(rows.move[0]), self.at, self.modals
         if modals.comes_first and not above:
-            self.warnings.of_first(pose, at.form, rapid=bool(rows.rapid[0]))
+            self._note_first(pose, rapid=bool(rows.rapid[0]))
         if not modals.begun:
             if at is self.tilting:
-                self.warnings.of_tip_control(pose, at.form)
+                self._note_tip_control(pose)
             self.say(modals.begin(self.rotary_blocks(first)))
         self.say(modals.go_on())
         if modals["high"]:
@@ -203,11 +205,11 @@ class Motion:
             self._look_at_first(at.lifted(first, height), pose)
             self._approach_first(first, height)
             rows = rows if above else rows.with_programmed_feed(self.program)
-        self.warnings.of_tool(pose, modals.tool)
+        self._note_tool(pose, modals.tool)
         if not rows.rapid.all():
-            self.warnings.of_cut(int(rows.move[np.argmin(rows.rapid)]), turning=bool(modals["spindle"]))
+            self.note_cut(int(rows.move[np.argmin(rows.rapid)]), turning=bool(modals["spindle"]))
         if at.form.rotary:
-            self.warnings.of_turns(rows, at.form, at.angles)
+            self._note_turns(rows)
         self.stand(rows.ticks[-1])
         self.last_at, modals.halted = at, False
         words, modals.waiting = modals.waiting, ""
@@ -285,3 +287,69 @@ class Motion:
         if at is None or self.last is None or not at.form.rotary or {"X", "Y"} & change.keys():
             return None
         return nose_position(machine, at.tip(self.last)[None], at.angles(self.last[None]))[0, :2]
+
+    # ------------------------------------------------------------------------------------------------ warnings
+
+    def _once(self, code: str, pose: int, **values: object) -> None:
+        if code not in self._noted:
+            self._noted.add(code)
+            self.findings.note(code, int(self.program.line[pose]), 1, **values)
+
+    def _note_first(self, pose: int, *, rapid: bool) -> None:
+        """Say that the control turns the tool on its own before its first position, or feeds to it."""
+        form, line = self.at.form, int(self.program.line[pose])
+        if form.orientation in ("vector", "point") and self.program.axis[pose][2] < UPRIGHT:
+            self.findings.note("CS337", line)
+        if not rapid:
+            where = "down from the height of the retract" if form.table.program.retract else "from where the machine is"
+            self.findings.note("CS333", line, where=where)
+
+    def note_holes(self, poses: Ints, before: int, travel: Floats, clearance: Floats) -> None:
+        """Say that the tool turns on its way to holes right above them: what lies there, the CL file does not say.
+
+        It comes from a pose, -1 for none. Heights (h,) over the holes, mm: to which it comes, and from which it feeds.
+        """
+        axis = self.program.axis[poses]
+        come = self.program.axis[np.concatenate(([max(before, 0)], poses[:-1]))]
+        turned = dot(axis, come) < _TURNED
+        turned[0] &= before >= 0
+        low = travel <= clearance
+        turned &= low | np.concatenate(([False], low[:-1]))
+        self.findings.note_each("CS384", self.program.line[poses[turned]])
+
+    def _note_tip_control(self, pose: int) -> None:
+        """Say that a tilted tool has left the rotary axes anywhere, and no words bring them back.
+
+        An upright tool may stand at any angle of the table, too, once a tool has been tilted.
+        """
+        if self.at.form.rotary or "{rotary_zero}" not in self.at.form.table.program.begin:
+            return
+        since = slice(self._looked_until, pose)
+        moved = self.program.kind[since] != Move.FROM
+        self._tilted |= bool((moved & (self.program.axis[since, 2] < UPRIGHT)).any())
+        self._looked_until = pose
+        if self._tilted:
+            self.findings.note("CS358", int(self.program.line[pose]))
+
+    def _note_tool(self, pose: int, tool: int | None) -> None:
+        """Say that a tool moves that was not loaded, or that is none."""
+        if not tool:
+            self._once("CS334" if tool is None else "CS382", pose)
+
+    def note_cut(self, pose: int, *, turning: bool) -> None:
+        """Say that a tool cuts while the spindle stands."""
+        if not turning:
+            self._once("CS335b", pose)
+
+    def _note_turns(self, rows: BlockRows) -> None:
+        """Say that an endless axis gets words that some machines of the control refuse."""
+        form = self.at.form
+        if "CS346" in self._noted or form.mode.motion.endless_words or form.machine is None:
+            return
+        axes = form.machine.axes[: len(form.machine.names)]
+        endless = np.array([axis.limits is None and not axis.modulo for axis in axes])
+        angles = self.at.angles(rows.ticks)[:, : len(axes)]
+        beyond = np.flatnonzero(((angles[:, endless] < 0.0) | (angles[:, endless] >= 360.0)).any(axis=1))
+        if len(beyond):
+            names = " and ".join(form.machine.names[axis] for axis in np.flatnonzero(endless).tolist())
+            self._once("CS346", int(rows.move[beyond[0]]), names=names)

@@ -1,28 +1,31 @@
-"""Rows of lines in rotary words: points where angles need them, inverse time where the control counts so."""
+"""Rows of lines as a form needs them: as few as ε allows, points for rotary words, inverse time where it counts so."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cornersmooth.arrays import some_rows
-from cornersmooth.arrays.vectors import norm
+from cornersmooth.arrays.vectors import norm, unit
 from cornersmooth.geometry.ragged import spread
-from cornersmooth.kinematics import Machine, inverse_time, machine_position, tool_axis
+from cornersmooth.kinematics import inverse_time, machine_position, tip_position, tool_axis
+from cornersmooth.kinematics.machine import LINEAR
 from cornersmooth.methods import METHODS
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program, SmoothProgram
 from cornersmooth.nc.circles import ArcAngles
 from cornersmooth.nc.form import TIP_SHARE, Form
-from cornersmooth.nc.long_rows import LONG_CHUNK, has_law, line_limits, rounded_lines
 from cornersmooth.nc.messages import Findings
 from cornersmooth.nc.rotary_words import RotaryWay, machine_of
 from cornersmooth.nc.statement_args import check_tool_travel
 from cornersmooth.rotary import FilledPath, fill, insertions, rapid_moves
 from cornersmooth.settings import TIMED_POSES, Settings
+from cornersmooth.smoothing.blending import largest_blends
 from cornersmooth.smoothing.long_lines import LineLimits, Vertices, fewest_lines, segments_of_rows, vertices
-from cornersmooth.smoothing.sampling import Rows
+from cornersmooth.smoothing.outside_lines import faster_lines
+from cornersmooth.smoothing.sampling import ArcBlocks, Rows, all_dense_rows
 from cornersmooth.text import to_ticks
 
 _CHUNK = 1 << 15  #: dense rows handed on at a time
@@ -67,15 +70,14 @@ def rotary_rows(
     size = LONG_CHUNK if long else _CHUNK
     for begin in range(0, max(len(way.move) - 1, 1), size):
         here = slice(begin, begin + size + 1)  # the last row of a chunk is the start of the next
-        move, left = way.move[here], way.left[here]
+        part = some_rows(way, here)
+        move, path = part.move, (part.tip, part.axis, part.angles)
         line = program.line[move]
         more = insertions(
             machine,
-            way.tip[here],
-            way.axis[here],
-            way.angles[here],
+            *path,
             tolerance=way.tolerance,
-            rapid=way.free[here],
+            rapid=part.free,
             tip_tolerance=TIP_SHARE * settings.tolerance if form.orientation == "machine" else None,
             max_step=max_step,
             line=line,
@@ -83,22 +85,22 @@ def rotary_rows(
         )
         findings.note_each("CS369", line[more.unsolved + 1])
         findings.note_each("CS367", line[more.segment + 1], names=" and ".join(machine.names))
-        filled = fill(way.tip[here], way.axis[here], way.angles[here], more)
-        start, at_pose = segments_of_rows(way.move, here.start, here.stop)
-        stays = left | np.append(left[1:], False)  # both rows of a place where a cut is left
-        chunk = _Chunk(move, start, at_pose, stays, left, None if timed is None else timed[here])
+        filled = fill(*path, more)
+        segments = segments_of_rows(way.move, here.start, here.stop)
+        chunk = _Chunk(part, smoothed, form, limits, *segments, None if timed is None else timed[here])
         blend = None
         if long:
             if placed:
-                cut = (program.kind[move] == Move.LINEAR) & ~way.free[here]
+                cut = (program.kind[move] == Move.LINEAR) & ~part.free
                 filled = _with_stations(filled, cut[filled.pose], limits)
-            usual = (way.free[here] | _beside_arcs(move, program))[filled.pose]
-            feed = np.where(way.free[here] | ~_cuts(move, program), np.inf, program.feed[move] / 60.0)[filled.pose]
-            found = chunk.vertices(filled, smoothed)
+            bent = program.kind[move] == Move.ARC  # how far rows may be rounded is measured on lines alone
+            usual = (part.free | bent | np.append(bent[1:], False))[filled.pose]
+            feed = np.where(part.free | ~_cuts(move, program), np.inf, program.feed[move] / 60.0)[filled.pose]
+            found = chunk.vertices(filled)
             found, kept, blend = rounded_lines(found, usual, feed, limits, settings, form, placed=placed)
             filled = some_rows(replace(filled, tip=found.tip, angles=found.words), kept)
         own = slice(1 if begin else 0, None)
-        filled, rate = _timed(filled, chunk, own, smoothed, form, limits, findings)
+        filled, rate = chunk.in_time(filled, own, findings)
         pose, inserted = filled.pose[own], filled.inserted[own]
         tip, angles = filled.tip[own], filled.angles[own]
         seen = slice(None) if in_planes is None else ~in_planes[move[pose]]
@@ -111,7 +113,7 @@ def rotary_rows(
             joined=np.zeros(len(pose), np.bool_),
             rate=None if rate is None else rate[own],
             blend=None if blend is None else blend[own],
-            left=left[pose] & ~inserted if way.left.any() else None,
+            left=part.left[pose] & ~inserted if way.left.any() else None,
         )
 
 
@@ -138,24 +140,90 @@ def largest_turn(settings: Settings) -> float:
 
 @dataclass(frozen=True)
 class _Chunk:
-    """Rows of a way, n of them."""
+    """Rows of a way, n of them, and what they are written for."""
 
-    #: move, start: (n,); move of each, and the pose that its segment starts from
-    move: Ints
-    start: Ints
-    #: at_pose, held, left: (n,); whether it is the last of its move, stays whatever ε allows, and comes back into a cut
-    #: that was left
-    at_pose: Bools
-    held: Bools
-    left: Bools
+    way: RotaryWay
+    smoothed: SmoothProgram
+    form: Form
+    limits: LineLimits
+    start: Ints  #: (n,) the pose that the segment of each starts from
+    at_pose: Bools  #: (n,) whether it is the last of its move
     timed: Bools | None  #: (n,) whether it is timed by us; None where only turns are that
 
-    def vertices(self, filled: FilledPath, smoothed: SmoothProgram) -> Vertices:
+    def vertices(self, filled: FilledPath) -> Vertices:
         """Where the original motion is at the rows of a path that was made of these."""
-        row, own = filled.pose, ~filled.inserted
-        at_pose = self.at_pose[row] & own
-        found = vertices(smoothed, filled.tip, filled.axis, filled.angles, self.move[row], self.start[row], at_pose)
-        return replace(found, fixed=found.fixed | (self.held[row] & own))
+        row, own, left = filled.pose, ~filled.inserted, self.way.left
+        held = left | np.append(left[1:], False)  # both rows of a place where a cut is left
+        words, move = (filled.tip, filled.axis, filled.angles), self.way.move[row]
+        found = vertices(self.smoothed, *words, move, self.start[row], self.at_pose[row] & own)
+        return replace(found, fixed=found.fixed | (held[row] & own))
+
+    def in_time(self, filled: FilledPath, own: slice, findings: Findings) -> tuple[FilledPath, Floats | None]:
+        """The path without rows that are too short to be timed by us, and moves per minute; those of `own` count."""
+        rate, fastest = self._rates(filled), self.form.mode.motion.fastest
+        if rate is None:
+            return filled, None
+        if fastest:
+            if self.form.orientation == "machine" and (rate > fastest).any():
+                before = len(filled.pose)
+                filled = self._merged(filled, rate, fastest)
+                if len(filled.pose) < before:
+                    findings.note("CS372", 0, before - len(filled.pose))
+                rate = self._rates(filled)
+            assert rate is not None
+            beyond = filled.pose[own][rate[own] > fastest]
+            findings.note_each("CS371", self.smoothed.program.line[self.way.move[beyond]], fastest=fastest)
+            rate = np.minimum(rate, fastest)
+        return filled, np.round(rate, INVERSE_TIME_DECIMALS)
+
+    def _merged(self, filled: FilledPath, rate: Floats, fastest: float) -> FilledPath:
+        """The path without rows between blocks that are too short to be timed (m,), 1/min, as far as ε allows."""
+        found, limits = self.vertices(filled), self.limits
+        fixed = found.fixed
+        quick = rate > fastest
+        minutes = np.where(np.isfinite(rate), 1.0 / np.where(rate > 0.0, rate, 1.0), 0.0)
+        # a row stays where it ends a part of the time that is long enough
+        part = np.floor(np.cumsum(minutes) * fastest / _SHORTEST_TIMES)
+        ends = np.append(part[1:] != part[:-1], True)
+        between = quick | np.append(quick[1:], False)
+        position = machine_position(machine_of(self.form).with_longest_tool(), filled.tip, filled.angles)
+        # the way between two rows bends, too: what turns little bends little
+        tip, axis_point = _MERGED_SHARE * limits.tip, _MERGED_SHARE * limits.axis_point
+        limits = replace(limits, tip=tip, axis_point=axis_point, turn=min(limits.turn, _MERGED_TURN))
+        if not METHODS[self.smoothed.settings.method].one_parameter:
+            fixed = fixed | _beside_far_corners(found, self.at_pose[filled.pose] & ~filled.inserted, limits)
+        kept = fewest_lines(replace(found, fixed=fixed | ends | ~between, position=position), limits)
+        return some_rows(filled, kept)
+
+    def _rates(self, path: FilledPath) -> Floats | None:
+        """(m,) moves per minute where blocks are timed by us, NaN elsewhere; None where none is.
+
+        Where the tip stands still, the axis point runs with the feed: so it does where the tip stays within ε and the
+        axis point does not.
+        """
+        timed, form, program, settings = self.timed, self.form, self.smoothed.program, self.smoothed.settings
+        if timed is None and not form.mode.timed_turns:
+            return None
+        own = self.way.move[path.pose]
+        step = np.diff(path.tip, axis=0, prepend=path.tip[:1])
+        axis = tool_axis(machine_of(form), path.angles)  # near the pole not that of the row
+        swing = step + settings.axis_scale * np.diff(axis, axis=0, prepend=axis[:1])
+        length = norm(step)
+        digits = form.rounding(program.units)
+        still = (length < digits) | ((length < settings.tolerance) & (norm(swing) > settings.tolerance))
+        turn = np.abs(np.diff(path.angles, axis=0, prepend=path.angles[:1])).max(axis=1)
+        chosen = _cuts(own, program) & still & (turn > _NO_TURN) if timed is None else timed[path.pose]
+        if not chosen.any():
+            return None
+        way = np.maximum(np.where(still, norm(swing), length), digits)  # what is written at all moves by a digit
+        rate = np.full(len(own), np.nan)
+        rate[chosen] = inverse_time(way[chosen], program.feed[own[chosen]], turn[chosen], _FASTEST_TURN)
+        rate[~np.isfinite(rate)] = np.nan
+        back = self.way.left[path.pose] & ~path.inserted
+        if back.any():
+            rate[back] = program.feed[own[back]] / form.rewind if timed is not None else np.nan
+            rate[back & ~chosen] = np.nan
+        return rate
 
 
 def _with_stations(filled: FilledPath, cut: Bools, limits: LineLimits) -> FilledPath:
@@ -178,71 +246,6 @@ def _with_stations(filled: FilledPath, cut: Bools, limits: LineLimits) -> Filled
     )
 
 
-def _timed(
-    filled: FilledPath,
-    chunk: _Chunk,
-    own: slice,
-    smoothed: SmoothProgram,
-    form: Form,
-    limits: LineLimits,
-    findings: Findings,
-) -> tuple[FilledPath, Floats | None]:
-    """The path without rows that are too short to be timed by us, and moves per minute; those of `own` count."""
-    program, settings, fastest = smoothed.program, smoothed.settings, form.mode.motion.fastest
-    rate = _rates(filled, chunk, program, settings, form)
-    if rate is None:
-        return filled, None
-    if fastest:
-        if form.orientation == "machine" and (rate > fastest).any():
-            before = len(filled.pose)
-            filled = _merged(smoothed, machine_of(form).with_longest_tool(), filled, chunk, rate, limits, fastest)
-            if len(filled.pose) < before:
-                findings.note("CS372", 0, before - len(filled.pose))
-            rate = _rates(filled, chunk, program, settings, form)
-        assert rate is not None
-        beyond = filled.pose[own][rate[own] > fastest]
-        findings.note_each("CS371", program.line[chunk.move[beyond]], fastest=fastest)
-        rate = np.minimum(rate, fastest)
-    return filled, np.round(rate, INVERSE_TIME_DECIMALS)
-
-
-def _merged(
-    smoothed: SmoothProgram,
-    machine: Machine,
-    filled: FilledPath,
-    chunk: _Chunk,
-    rate: Floats,
-    limits: LineLimits,
-    fastest: float,
-) -> FilledPath:
-    """The path without rows between blocks that are too short to be timed, as far as ε allows.
-
-    Parameters
-    ----------
-    rate : (m,) float64, 1/min
-    """
-    found = chunk.vertices(filled, smoothed)
-    fixed = found.fixed
-    quick = rate > fastest
-    minutes = np.where(np.isfinite(rate), 1.0 / np.where(rate > 0.0, rate, 1.0), 0.0)
-    # a row stays where it ends a part of the time that is long enough
-    part = np.floor(np.cumsum(minutes) * fastest / _SHORTEST_TIMES)
-    ends = np.append(part[1:] != part[:-1], True)
-    between = quick | np.append(quick[1:], False)
-    position = machine_position(machine, filled.tip, filled.angles)
-    # the way between two rows bends, too: what turns little bends little
-    limits = replace(
-        limits,
-        tip=_MERGED_SHARE * limits.tip,
-        axis_point=_MERGED_SHARE * limits.axis_point,
-        turn=min(limits.turn, _MERGED_TURN),
-    )
-    if not METHODS[smoothed.settings.method].one_parameter:
-        fixed = fixed | _beside_far_corners(found, chunk.at_pose[filled.pose] & ~filled.inserted, limits)
-    kept = fewest_lines(replace(found, fixed=fixed | ends | ~between, position=position), limits)
-    return some_rows(filled, kept)
-
-
 def _beside_far_corners(rows: Vertices, at_pose: Bools, limits: LineLimits) -> Bools:
     """(m,) bool: rows of the two moves at poses that the motion is far from at their own parameter.
 
@@ -253,12 +256,6 @@ def _beside_far_corners(rows: Vertices, at_pose: Bools, limits: LineLimits) -> B
     far = at_pose & ((off_tip > limits.tip) | (off_axis_point > limits.axis_point))
     move = np.concatenate(([0], np.cumsum(at_pose)[:-1]))
     return np.isin(move, move[far]) | np.isin(move, move[far] + 1)
-
-
-def _beside_arcs(move: Ints, program: Program) -> Bools:
-    """(n,) rows on arcs, and those after which one begins: how far they may be rounded is measured on lines alone."""
-    bent: Bools = program.kind[move] == Move.ARC
-    return bent | np.append(bent[1:], False)
 
 
 def _cuts(move: Ints, program: Program) -> Bools:
@@ -277,32 +274,96 @@ def _timed_cuts(angles: Floats, move: Ints, program: Program) -> Bools:
     return cut & turning[np.maximum(run, 0)]
 
 
-def _rates(path: FilledPath, chunk: _Chunk, program: Program, settings: Settings, form: Form) -> Floats | None:
-    """(m,) moves per minute where blocks are timed by us, NaN elsewhere; None where none is.
+LONG_CHUNK = 1 << 17  #: rows handed on at a time: many long lines are tested at once
+_COARSE = 1.0  #: chord tolerance that leaves transitions with as few lines as their change of axis allows, mm
+#: longest change of a tool vector in one line: controls that turn it evenly in angle and those that turn it evenly in
+#: its words are less than 1e-5 rad apart then (θ³/54)
+_LARGEST_STEP = 0.08
 
-    Where the tip stands still, the axis point runs with the feed: so it does where the tip stays within ε and the axis
-    point does not.
+
+def coarse_rows(smoothed: SmoothProgram, arcs: ArcBlocks | None = None) -> Rows:
+    """Dense rows without those that only the chord tolerance asks for.
+
+    Chords from the joints of a transition to its middle keep ε where one parameter drives both curves; else all stay.
     """
-    timed = chunk.timed
-    if timed is None and not form.mode.timed_turns:
-        return None
-    own = chunk.move[path.pose]
-    step = np.diff(path.tip, axis=0, prepend=path.tip[:1])
-    axis = tool_axis(machine_of(form), path.angles)  # near the pole not that of the row
-    swing = step + settings.axis_scale * np.diff(axis, axis=0, prepend=axis[:1])
-    length = norm(step)
-    digits = form.rounding(program.units)
-    still = (length < digits) | ((length < settings.tolerance) & (norm(swing) > settings.tolerance))
-    turn = np.abs(np.diff(path.angles, axis=0, prepend=path.angles[:1])).max(axis=1)
-    chosen = _cuts(own, program) & still & (turn > _NO_TURN) if timed is None else timed[path.pose]
-    if not chosen.any():
-        return None
-    way = np.maximum(np.where(still, norm(swing), length), digits)  # what is written at all moves by a digit
-    rate = np.full(len(own), np.nan)
-    rate[chosen] = inverse_time(way[chosen], program.feed[own[chosen]], turn[chosen], _FASTEST_TURN)
-    rate[~np.isfinite(rate)] = np.nan
-    back = chunk.left[path.pose] & ~path.inserted
-    if back.any():
-        rate[back] = program.feed[own[back]] / form.rewind if timed is not None else np.nan
-        rate[back & ~chosen] = np.nan
-    return rate
+    settings = smoothed.settings
+    if METHODS[settings.method].one_parameter:
+        settings = settings.but(chord_tolerance=_COARSE)
+    return all_dense_rows(replace(smoothed, settings=settings), arcs)
+
+
+def line_limits(settings: Settings, form: Form, largest_turn: float = 0.0) -> LineLimits:
+    """What lines with tool vectors, or with rotary words of a machine (at most `largest_turn` degrees), must keep."""
+    machine = form.machine if form.rotary else None
+    lag = form.table.lines.lag
+    step = _LARGEST_STEP if machine is None else largest_turn
+    if settings.axis_step is not None:
+        step = min(step, math.radians(settings.axis_step) if machine is None else settings.axis_step)
+    return LineLimits(
+        *settings.line_tolerances,
+        step,
+        settings.axis_length,
+        unit if machine is None else lambda words: tool_axis(machine, words),
+        settings.blend_share * settings.tolerance,
+        lag * settings.tolerance if lag else math.inf,
+        (lambda position, words: tip_position(machine, position, words))
+        if machine is not None and form.orientation == "machine"
+        else None,
+        rotary=machine is not None,
+    )
+
+
+def has_law(form: Form) -> bool:
+    """Whether it is known when the control, which rounds corners of lines by itself, reaches the end of each."""
+    machine, style = form.machine, form.table.lines
+    known = set() if machine is None else {axis.name for axis in machine.dynamics}
+    return (
+        machine is not None and bool(style.rounding and style.planner) and known.issuperset((*LINEAR, *machine.names))
+    )
+
+
+def rounded_lines(
+    rows: Vertices, usual: Bools, feed: Floats, limits: LineLimits, settings: Settings, form: Form, *, placed: bool
+) -> tuple[Vertices, Ints, Floats | None]:
+    """Rows, those (k,) at which lines end, and how far the control may round corners there.
+
+    That is in mm, None where one value holds for all; at rows (r,) that are `usual` it is that of the settings. Rows
+    that are `placed` are moved off the path where lines are faster so, with `feed` (r,) in mm/s, inf for none.
+    """
+    style = form.table.lines
+
+    def blends(rows: Vertices, kept: Ints) -> Floats:
+        found = largest_blends(rows, kept, limits, settings.tolerance, style.executed_share * settings.tolerance)
+        return np.where(usual[kept], limits.blend, found)
+
+    def ends_reached(rows: Vertices, kept: Ints) -> Floats:
+        from cornersmooth.feedrate.linuxcnc import Lines, axis_limits, line_times  # with all of feedrate
+
+        assert form.machine is not None
+        place = np.zeros((len(kept), 6))
+        place[:, [*range(3), *map("XYZABC".index, form.machine.names)]] = np.hstack((rows.tip, rows.words))[kept]
+        moves = np.flatnonzero((np.diff(place, axis=0) != 0.0).any(axis=1))
+        lines = Lines(place[moves], place[moves + 1], feed[kept[moves + 1]], blends(rows, kept)[moves + 1])
+        time = np.zeros(len(kept))
+        time[moves + 1] = line_times(lines, axis_limits(form.machine))[1]
+        return np.maximum.accumulate(time)
+
+    if placed:
+        rows, kept = faster_lines(rows, limits, ends_reached)
+    else:
+        kept = fewest_lines(rows, limits)
+    return rows, kept, blends(rows, kept) if style.rounding else None
+
+
+def long_rows(rows: Rows, smoothed: SmoothProgram, form: Form) -> Iterator[Rows]:
+    """Rows with tool vectors at which long lines end; arcs stay as they are."""
+    tip, axis, move = rows.tip, rows.other, rows.move
+    if not len(move):
+        return
+    limits = line_limits(smoothed.settings, form)
+    for begin in range(0, max(len(move) - 1, 1), LONG_CHUNK):
+        here = slice(begin, begin + LONG_CHUNK + 1)  # the last row of a chunk is the start of the next
+        start, at_pose = segments_of_rows(move, here.start, here.stop)
+        part = vertices(smoothed, tip[here], axis[here], axis[here], move[here], start, at_pose)
+        kept = begin + fewest_lines(part, limits)[1 if begin else 0 :]
+        yield Rows(tip[kept], axis[kept], move[kept], np.zeros(len(kept), np.int8), np.zeros(len(kept), np.bool_))

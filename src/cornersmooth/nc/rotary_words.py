@@ -21,7 +21,7 @@ from cornersmooth.arrays.vectors import dot
 from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.geometry.ragged import starts
 from cornersmooth.kinematics import Machine, check_travel, solutions, tool_axis
-from cornersmooth.kinematics.position import nose_position
+from cornersmooth.kinematics.poses import nose_position
 from cornersmooth.model import Bools, Floats, Ints, Move, Program, SmoothProgram
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.messages import Findings, refused

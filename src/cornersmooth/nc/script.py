@@ -30,7 +30,7 @@ class Script:
     statements: StatementWriter
     motion: Motion
     holes: Holes
-    upright: Bools  #: (n,) `cycle_blocks.upright_poses`
+    upright: Bools  #: (n,) `hole_cycles.upright_poses`
     planes: Planes
     _coordinates: dict[tuple[str, int | None], Coordinates] = field(
         default_factory=dict
@@ -51,7 +51,8 @@ class Script:
         """Write a block of rows, with their numbers in ticks, and the statements before and between them."""
         moves, start = rows.move, 0
         for statement in self._statements_until(int(moves[-1])) if len(moves) else []:
-            if self.statements.only_counted(statement):  # thousands of them must not cut the rows to pieces
+            if statement.word == "PAINT":  # thousands of them must not cut the rows to pieces
+                self.statements.blocks(statement)
                 continue
             stop = int(np.searchsorted(moves, statement.pose))
             self._between(rows, ticks, start, stop)

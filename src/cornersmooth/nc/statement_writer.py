@@ -7,11 +7,12 @@ is not understood becomes a comment and a counted warning, never an NC word by g
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from cornersmooth.model import FeedMode, Move, Program, Statement
-from cornersmooth.nc.compensation import begin_compensation
+from cornersmooth.nc.circles import FIRST_PLANE
 from cornersmooth.nc.control import Blocks, Words
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.hole_cycles import HoleCycles
@@ -38,7 +39,8 @@ from cornersmooth.text import format_number
 
 #: words whose text is for the machinist: comments without the word
 _TEXT_WORDS = frozenset("$$ PPRINT REMARK TPRINT LETTER DISPLY".split())
-_SILENT = frozenset({"END-OF-PATH", "FINI", "REWIND"})  #: words that say nothing beside what the NC text shows anyway
+_PLANES = {"XYPLAN": 17, "ZXPLAN": 18, "YZPLAN": 19}  #: words for planes, with the G code of each
+_SILENT = frozenset({"END-OF-PATH", "FINI", "REWIND"})  #: words that say nothing beside what the text shows anyway
 
 
 @dataclass
@@ -52,7 +54,7 @@ class StatementWriter:
     comments: bool = True  #: whether comments are written
     skip_cycles: bool = False  #: whether hole cycles that cannot be written are left out with a warning
     changed: bool = False  #: a tool change, or the way home, left the machine elsewhere
-    _direction: str = "clockwise"
+    direction: str = "clockwise"  #: field of the words for the way in which the spindle turns, as it was named last
     _diameter: float = 0.0
     cycles: HoleCycles = field(init=False)
     words: Words = field(init=False)
@@ -74,17 +76,16 @@ class StatementWriter:
         handler = _HANDLERS.get(word)
         if handler is not None:
             written = handler(self, statement)
-            if written is None and statement.word == "CUTCOM" and id(statement) not in self._unknown:
+            if written is None and word == "CUTCOM" and id(statement) not in self._unknown:
                 written = []  # ON before the side
             if written is not None:
                 return [*written, *(self.comment(statement.text) if self._has_other_words(statement) else ())]
-            self._not_understood(statement)
         elif word in _TEXT_WORDS:
             return self.comment(spoken_text(statement))
         elif word in _SILENT:
             return []
-        elif id(statement) in self._unknown:
-            self._not_understood(statement)
+        if handler is not None or id(statement) in self._unknown:
+            self.findings.note("CS310", statement.line, word=word)
         return self.comment(statement.text or word)
 
     @staticmethod
@@ -96,18 +97,6 @@ class StatementWriter:
         loads = statement.word in TOOL_WORDS and any(isinstance(value, str) for value in statement.args[1:])
         return loads and not words <= {"TOOL", "ADJUST", "OSETNO"}
 
-    def only_counted(self, statement: Statement) -> bool:
-        """Whether a statement says nothing to the control; it has been counted then."""
-        if statement.word != "PAINT":
-            return False
-        self.paint(statement)
-        return True
-
-    @property
-    def clockwise(self) -> bool:
-        """Whether the spindle was last named to turn clockwise, or nothing."""
-        return self._direction == "clockwise"
-
     def comment(self, text: str) -> list[str]:
         """Comments that hold a text."""
         return self.warning_comment(text) if self.comments else []
@@ -116,9 +105,6 @@ class StatementWriter:
         """Comments that are written in any case."""
         layout = self.form.table.layout
         return comment_lines(text, layout.comment, layout.comment_orders)
-
-    def _not_understood(self, statement: Statement) -> None:
-        self.findings.note("CS310", statement.line, word=statement.word)
 
     def load(self, statement: Statement) -> list[str] | None:
         """LOADTL/n, LOAD/TOOL,n[,ADJUST,m], TURRET/n[,OSETNO,m]."""
@@ -182,10 +168,6 @@ class StatementWriter:
         self.findings.note("CS332b" if self.modals.can_rewind else "CS332", statement.line)
         return [*self.comment(statement.text), *blocks]
 
-    def toolno(self, statement: Statement) -> list[str] | None:
-        """TOOLNO/n,...: describes the tool that LOADTL loads; without any such statement it loads itself."""
-        return self.load(statement) if self.toolno_loads else self.comment(statement.text)
-
     def select(self, statement: Statement) -> list[str] | None:
         """SELECT/TOOL,n: brings the next tool near."""
         number = whole_number(numbers_of(statement))
@@ -228,8 +210,8 @@ class StatementWriter:
         if numbers and (cutting := cutting_unit(words)):
             self.findings.note("CS322", statement.line, unit=cutting)
         if "CLW" in words or "CCLW" in words:
-            self._direction = "counterclockwise" if "CCLW" in words else "clockwise"
-        direction = getattr(self.words, self._direction)
+            self.direction = "counterclockwise" if "CCLW" in words else "clockwise"
+        direction = getattr(self.words, self.direction)
         if speed is None and self.modals.speed is None:
             self.findings.note("CS335", statement.line)
             self.modals.switch("spindle", (direction,))
@@ -241,13 +223,11 @@ class StatementWriter:
         if not self.modals["spindle"] and id(statement) in self._ahead_of_tools:
             return self.modals.later("spindle", turning)
         self.modals.switch("spindle", turning)
-        return [direction] if speed is None else [*self._outside_tip_control(), *turning]
-
-    def _outside_tip_control(self) -> list[str]:
-        """Blocks before a new speed, where the control takes none under tool tip control."""
-        blocks = self.modals.pause() if self.words.speed_without_tip_control else []
-        self.changed |= bool(blocks) and self.modals["high"]
-        return blocks
+        if speed is None:
+            return [direction]
+        before = self.modals.pause() if self.words.speed_without_tip_control else []
+        self.changed |= bool(before) and self.modals["high"]
+        return [*before, *turning]
 
     def coolant(self, statement: Statement) -> list[str] | None:
         """COOLNT/ON, OFF, FLOOD, MIST and what else the control has; a bare COOLNT means ON."""
@@ -295,17 +275,33 @@ class StatementWriter:
         return [block.format(milliseconds=time, seconds=seconds) for block in self.words.dwell] if time else []
 
     def compensation(self, statement: Statement) -> list[str] | None:
-        """CUTCOM/LEFT|RIGHT[,plane][,n] and CUTCOM/OFF."""
+        """CUTCOM/LEFT|RIGHT[,plane][,n] and CUTCOM/OFF; CS336 for a control that is given none."""
         if words_of(statement)[:1] in (["OFF"], ["NOMORE"]):
             return (self.modals.set(compensation=()) or list(self.words.compensation_off)) or None
-        begun = begin_compensation(
-            statement, self.form, self.program, self.modals, self.findings, diameter=self._diameter
-        )
-        if begun is None:
+        names, numbers, words = words_of(statement), numbers_of(statement), self.words
+        if not words.compensation_left and names[:1] in (["LEFT"], ["RIGHT"]):
+            raise refused("CS336", self.program, statement.line, control=self.form.control)
+        side = {"LEFT": words.compensation_left, "RIGHT": words.compensation_right}.get((names or [""])[0])
+        register = whole_number(numbers or [float(self.modals.offset)])
+        if not side or len(names) > 2 or not set(names[1:]) <= _PLANES.keys() or register is None:
             return None
-        change = self.modals.set(plane=begun[0])
-        self.modals.now["compensation"] = begun[1]
-        return [*change, *begun[1]]
+        if words.compensation_entry:
+            self._check_entry(statement)
+        tip = self.modals.mode is not self.form.upright and self.form.orientation not in ("fixed", "machine")
+        also = "it may be used with tool tip control (--cycles native does without, along Z), and that " if tip else ""
+        self.findings.note("CS319", statement.line, also=also)
+        change = self.modals.set(plane=_PLANES[names[1]] if len(names) > 1 else FIRST_PLANE)
+        begun = self.modals.now["compensation"] = tuple(block.format(register=register) for block in side)
+        return [*change, *begun]
+
+    def _check_entry(self, statement: Statement) -> None:
+        """Refuse a first move that is too short for cutter compensation to begin on, where the control does."""
+        pose, tip = statement.pose, self.program.tip
+        length = math.hypot(*(tip[pose] - tip[pose - 1])[:2]) if 0 < pose < len(tip) else math.inf
+        if not length > 0.0:
+            raise refused("CS344", self.program, statement.line)
+        if length <= self._diameter / 2.0:
+            self.findings.note("CS345", statement.line, length=length)
 
     def hole_cycle(self, statement: Statement) -> list[str]:
         """CYCLE: kept for the holes that follow."""
@@ -362,10 +358,9 @@ class StatementWriter:
 
 Handler = Callable[[StatementWriter, Statement], list[str] | None]
 _HANDLERS: dict[str, Handler] = {
-    "LOADTL": StatementWriter.load,
-    "LOAD": StatementWriter.load,
-    "TURRET": StatementWriter.load,
-    "TOOLNO": StatementWriter.toolno,
+    **dict.fromkeys(TOOL_WORDS, StatementWriter.load),
+    # describes the tool that LOADTL loads; without any such statement it loads itself
+    "TOOLNO": lambda writer, one: writer.load(one) if writer.toolno_loads else writer.comment(one.text),
     "SELECT": StatementWriter.select,
     "CUTTER": StatementWriter.cutter,
     "TLDATA": StatementWriter.cutter,

@@ -23,7 +23,7 @@ from cornersmooth.errors import InputError
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.lexer import Lexer
 from cornersmooth.nc_reader.words import Word
-from cornersmooth.text.eight_digits import DIGITS, LAST_DIGITS, Bytes, Words, join_digits, words_of
+from cornersmooth.text.parse import DIGITS, LAST_DIGITS, Bytes, Words, join_digits, words_of
 
 #: line ends that must stand before a chunk, so that words beyond its begin can be fetched
 MARGIN: Final = 24

@@ -21,8 +21,15 @@ from cornersmooth.arrays import joined_rows, some_rows
 from cornersmooth.arrays.vectors import dot, norm, unit
 from cornersmooth.geometry.ragged import spread
 from cornersmooth.kinematics.machine import Machine
-from cornersmooth.kinematics.poses import angle_between, continued, solutions, tool_axis, wrap
-from cornersmooth.kinematics.position import machine_position, tip_position
+from cornersmooth.kinematics.poses import (
+    angle_between,
+    continued,
+    machine_position,
+    solutions,
+    tip_position,
+    tool_axis,
+    wrap,
+)
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.rotary.axis_findings import limit_error
 
@@ -348,7 +355,9 @@ def tip_bend(machine: Machine, start: Floats, end: Floats, turn: Floats) -> Floa
     `start` and `end` (n, 3), mm, are words of the linear axes (`machine_position`); turns (n, 2) are in rad.
     """
     turn = np.abs(turn)
-    size, speed, bend = np.zeros((3, len(turn)))  # of the way of the tip and its derivatives, as `position._swing` goes
+    size, speed, bend = np.zeros(
+        (3, len(turn))
+    )  # of the way of the tip and its derivatives, as `kinematics.poses._swing`
     for index in (1, 0):
         axis = machine.axes[index]
         if axis.carrier == "head":

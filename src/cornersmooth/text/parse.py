@@ -4,6 +4,9 @@ The bytes of a block that are not digits (separators, points, signs) cut it into
 a point are fetched as eight-byte words and turned into integers by three multiplications, all fields at once.
 Mantissa and power of ten are exact in float64, so their quotient is the correctly rounded value: what `float` gives.
 Fields that do not fit (exponents, more digits than float64 holds) go to `float` itself, one by one.
+
+A byte string read as a little-endian word has its last character on top. Once the values of eight digits stand in the
+bytes of a word, three multiplications join them to pairs, to fours, to all.
 """
 
 from __future__ import annotations
@@ -12,9 +15,9 @@ import math
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.text.eight_digits import DIGITS, LAST_DIGITS, Bytes, Words, join_digits, words_of
 
 BLOCK: Final = 1 << 16  #: bytes taken at a time: the block and the arrays made from it stay in the second-level cache
 _LOOK_BACK: Final = 256  #: bytes searched at a time for the separator that a block ends with
@@ -172,3 +175,30 @@ def _careful(field: bytes, offset: int) -> float:
     if not math.isfinite(number):
         raise NumberError(f"{shown!r} is too large", offset)
     return number
+
+
+Bytes = NDArray[np.uint8]
+Words = NDArray[np.uint64]
+DIGITS: Final = 8  #: digits that one word holds
+_NIBBLES: Final = 0x0F0F0F0F0F0F0F0F  #: the value of an ASCII digit in each byte
+#: keeps the values of the last k digits of a word, k from 0 to 8
+LAST_DIGITS: Final = np.array([(((1 << (8 * k)) - 1) << (64 - 8 * k)) & _NIBBLES for k in range(9)], np.uint64)
+_PAIRS, _FOURS = np.uint64(0x00FF00FF00FF00FF), np.uint64(0x0000FFFF0000FFFF)  #: what to keep of pairs and of fours
+
+
+def words_of(text: Bytes) -> NDArray[np.void]:
+    """(n - 7,) view of a text, the eight bytes from every place on; take some and view them as ``<u8``."""
+    return np.ndarray((len(text) - DIGITS + 1,), f"V{DIGITS}", buffer=text.data, strides=(1,))
+
+
+def join_digits(words: Words) -> Words:
+    """Turn words of eight digit values, masked by `LAST_DIGITS`, into integers, in place."""
+    words *= np.uint64((10 << 8) + 1)
+    words >>= np.uint64(8)
+    words &= _PAIRS
+    words *= np.uint64((10**2 << 16) + 1)
+    words >>= np.uint64(16)
+    words &= _FOURS
+    words *= np.uint64((10**4 << 32) + 1)
+    words >>= np.uint64(32)
+    return words
