@@ -357,7 +357,7 @@ def tip_bend(machine: Machine, start: Floats, end: Floats, turn: Floats) -> Floa
     turn = np.abs(turn)
     size, speed, bend = np.zeros(
         (3, len(turn))
-    )  # of the way of the tip and its derivatives, as `kinematics.poses._swing`
+    )  # of the way of the tip and its derivatives, as `poses._swing` goes
     for index in (1, 0):
         axis = machine.axes[index]
         if axis.carrier == "head":
