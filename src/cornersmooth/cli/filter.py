@@ -253,7 +253,7 @@ def _measured(found: Filtered, tolerance: float) -> str:
     point = f", axis point {axis_point:.4g} mm" if axis_point == axis_point else ""
     more = f"; {tolerance + found.rounding:g} mm with the tolerance of the program itself" * bool(found.rounding)
     short, blocks, least = found.checked.short, found.checked.blocks, 1000.0 * found.block_time
-    more += f"; CHECK: {short:,} of {blocks:,} blocks take less than {least:g} ms, as the control does" * bool(short)
+    more += f"; CHECK: {short:,} of {blocks:,} blocks come faster than one in {least:g} ms" * bool(short)
     return f"within {tolerance:g} mm: tip {tip:.4g} mm{point}{more}"
 
 

@@ -58,7 +58,8 @@ def execute_rows(state: State, first: int, columns: Mapping[str, Floats], *, wea
     odd = np.zeros(count, np.bool_)
     for name in columns.keys() - {"G", "F", *state.axes}:
         odd |= ~np.isnan(columns[name])
-    lost = (odd & ~arc) | ~(arc | (code == 0.0) | (code == 1.0))
+    named = [~np.isnan(columns.get(letter, blank)) for letter in state.axes]
+    lost = (odd & ~arc) | (~(arc | (code == 0.0) | (code == 1.0)) & np.any(named, axis=0))
     if {*state.axes} >= VECTOR:  # what missing words of a vector are is not known
         given = np.sum([~np.isnan(columns.get(letter, blank)) for letter in sorted(VECTOR)], axis=0)
         lost |= ~arc & (given > 0) & (given < len(VECTOR))

@@ -31,6 +31,9 @@ _SAME, _SAME_DIRECTION = 1e-9, 2e-6
 #: and after; `verify` takes off that of the new program
 _SHARE: Final = (1.0 - 2.0 * LINE_SHARE) / (1.0 - LINE_SHARE)
 
+#: blocks that a control has read ahead, at least: so many have to come in time
+_BUFFER: Final = 20
+
 #: a block by which LinuxCNC rounds corners within a distance, which the verdict adds to ε
 _BOUNDED: Final = re.compile(rb"(?i)\s*(?:N\d+\s*)?G64\s*P\s*\d*\.?\d+(?:\s*Q\s*\d*\.?\d+)?\s*")
 
@@ -54,7 +57,7 @@ class Checked:
     wrong: tuple[Problem, ...]
     tip: float = 0.0  #: tip, axis_point: largest deviation, mm
     axis_point: float = 0.0  #: NaN where the tool axis has a tolerance of its own
-    blocks: int = 0  #: new blocks, and those of them that the control gets later than it has passed the one before
+    blocks: int = 0  #: new blocks, and those of them before which so many come too fast for the control
     short: int = 0
 
 
@@ -175,11 +178,12 @@ def block_time(job: Job) -> float:
 
 
 def _counts(job: Job, nc: NcProgram) -> tuple[int, int]:
-    """Blocks of a motion that cut, and those of them that take less than the time of a block."""
+    """Blocks of a motion that cut, and those of them behind which the control's buffer runs empty."""
     cut = np.flatnonzero((nc.line[1:] > 0) & (nc.kind[1:] != Element.RAPID)) + 1
     seconds = 60.0 * norm(nc.tip[cut] - nc.tip[cut - 1]) / nc.feed[cut]
     taken = np.bincount(np.unique(nc.line[cut], return_inverse=True)[1], seconds)
-    return len(taken), int((taken < block_time(job)).sum())
+    ends = np.concatenate(([0.0], np.cumsum(taken)))
+    return len(taken), int((ends[_BUFFER:] - ends[:-_BUFFER] < _BUFFER * block_time(job)).sum())
 
 
 def shared(old: Reading, new: Reading, where: Sequence[Place]) -> list[list[Place]]:

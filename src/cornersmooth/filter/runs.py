@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.control.program import Act, Stream, Text
+from cornersmooth.control.program import Stream, Text
 from cornersmooth.control.rows import Rows
 from cornersmooth.control.state import PRESET, State
 from cornersmooth.control.table import FRAME, table_of
@@ -59,8 +59,6 @@ _NAMED: Final = {axis: re.compile(rb"(?i)(?<![A-Z])%b" % axis.encode()) for axis
 #: a word that may turn an axis that a program of three axes has not, and what a cut that has it is left for
 TURNS: Final = re.compile(rb"(?i)(?<![A-Z])[ABC][ \t]*=?[ \t]*[-+]?[\d.]")
 _TURNS: Final = "an axis turns in it: name the machine"
-
-_FEED_ALONE: Final = re.compile(rb"(?i)\s*(?:N\s*\d+)?\s*F\s*[\d.]+\s*")
 
 #: what `Reading.why` says of lines that are no cuts, and of plain cuts
 NO_CUT, PLAIN_CUT = 0, 1
@@ -173,6 +171,7 @@ class ProgramReader:
         self.lexer = dialect_of(control, "" if machine is None else "".join(turning)).lexer
         self._weak_feed = "F" in self.lexer.points  # in inches a feed without a point may count otherwise
         self.lexer.points = self.lexer.points - {"F"}
+        self.lexer.places = self.lexer.places | {"F"}  # a feed in a line of its own ends no run
         self._first = State(table_of(control), ("X", "Y", "Z", *turning))
         self._first.groups |= {"units": "inch"} if inch else {}
         self._first.groups |= {"tip": self.wanted} if tip_from_start else {}
@@ -193,7 +192,7 @@ class ProgramReader:
         still: dict[str, float] = dict.fromkeys(found.absent if self.wanted == ANY else (), 0.0)
         stream, stops_left, last, cause = self.stream(found), sorted(set(stops), reverse=True), self._first, ""
         corners = _near([number for number, line in stream.others if _CORNER_WORDS.search(line)], len(found))
-        for item in _over_feeds(stream):
+        for item in stream:
             first, count = (item.first, len(item)) if isinstance(item, Rows) else (item.line, 1)
             if isinstance(item, Rows):
                 self._take_rows(found, _with_places(item, still) if still else item, corners, cause)
@@ -292,57 +291,11 @@ class ProgramReader:
         return "feed per revolution (G95)" if groups["feed"] == "revolution" else ""
 
 
-def _over_feeds(stream: Iterable[Rows | Act]) -> Iterator[Rows | Act]:
-    """Items of a stream; motion blocks with nothing but feeds in lines of their own between them are one item."""
-    kept: list[Rows | Act] = []
-    for item in stream:
-        quiet = isinstance(item, Act) and _FEED_ALONE.fullmatch(item.text) is not None
-        if not (quiet or isinstance(item, Rows)) or (kept and _stop(kept[-1]) != _first(item)):
-            yield from _one_item(kept)
-            kept = []
-        kept.append(item)
-        if not (quiet or isinstance(item, Rows)):
-            yield kept.pop()
-    yield from _one_item(kept)
-
-
-def _one_item(items: Sequence[Rows | Act]) -> Iterator[Rows | Act]:
-    """Items that follow one another as one; feeds before the first motion block and behind the last on their own."""
-    at = [k for k, item in enumerate(items) if isinstance(item, Rows)]
-    if len(at) < 2:
-        yield from items
-        return
-    yield from items[: at[0]]
-    parts = [item if isinstance(item, Rows) else _feed_row(item) for item in items[at[0] : at[-1] + 1]]
-    code, feed, moves, odd, lost = (
-        np.concatenate([getattr(part, name) for part in parts]) for name in ("code", "feed", "moves", "odd", "lost")
-    )
-    place = np.concatenate([parts[0].place, *(part.place[1:] for part in parts[1:])])
-    yield Rows(parts[0].first, parts[0].before, code, place, feed, moves, odd, lost)
-    yield from items[at[-1] + 1 :]
-
-
-def _feed_row(item: Act) -> Rows:
-    """A feed in a line of its own as a motion block that names no axis."""
-    code = {"rapid": 0.0, "line": 1.0, "arc": 2.0}.get(item.before.groups["motion"] or "", np.nan)
-    place = np.tile([item.after.place[letter] for letter in item.after.axes], (2, 1))
-    no = np.zeros(1, np.bool_)
-    return Rows(item.line, item.before, np.array([code]), place, np.array([item.after.feed]), no, no, no)
-
-
 def _with_places(rows: Rows, still: dict[str, float]) -> Rows:
     """Motion blocks under which some axes stand still."""
     place = rows.place.copy()
     place[:, [rows.before.axes.index(letter) for letter in still]] = list(still.values())
     return replace(rows, before=replace(rows.before, place=rows.before.place | still), place=place)
-
-
-def _first(item: Rows | Act) -> int:
-    return item.first if isinstance(item, Rows) else item.line
-
-
-def _stop(item: Rows | Act) -> int:
-    return item.first + len(item) if isinstance(item, Rows) else item.line + 1
 
 
 def _bridged(plain: Bools, quiet: Bools) -> Bools:
