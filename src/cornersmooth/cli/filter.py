@@ -354,10 +354,10 @@ def time_of_program(data: bytes, name: str, given: Options) -> int:
     form, settings, axes = filter_form_of(given), given.settings(), axes_of(given)
     how = {**how_read(given), "axes": axes, "processes": useful_processes()}
     with told_of(name):
-        new = (
-            read_input(given.text)[0] if given.text else filter_program(data, form, settings, verify=False, **how).data
-        )
-        found = verify_programs(data, new, form, settings, **how)
+        if given.text:
+            found = verify_programs(data, read_input(given.text)[0], form, settings, **how)
+        else:
+            found = filter_program(data, form, settings, verify=False, **how)
         if found.seconds is None and not (found.checked and found.checked.wrong):  # nothing differs
             alone = time_as_it_is(*read_program(data, form, settings, **how_read(given)), axes)
             found = replace(found, seconds=(alone, alone))

@@ -112,8 +112,7 @@ def filter_program(
     verify : bool
         Whether both programs are read and compared. Runs that do not pass stay as they are.
     axes : Machine, optional
-        Take what is fastest under the limits of the axes of this machine, and say its time, both by
-        `feedrate.even_ramps`; `verify_programs` plans more closely, which takes a hundred times the work.
+        Take what is fastest under the limits of the axes of this machine, and say its time.
     most : int, optional
         Only whole runs from the middle are smoothed, of no more cuts than this.
     paths : bool
@@ -149,7 +148,7 @@ def filter_program(
         if len(known) == len(way.where):
             seconds = sum(before for before, _ in known), sum(after for _, after in known)
         else:
-            seconds = planned_times(job, old, way.after, way.where, axes, closely=False)
+            seconds = planned_times(job, old, way.after, way.where, axes)
     return _result(job, old, way, seconds, paths=paths)
 
 
@@ -248,7 +247,7 @@ def verify_programs(
     way = _Way(after, where, {}, checked)
     seconds = None
     if axes is not None and where and not wrong:
-        seconds = planned_times(job, before, after, where, axes, closely=True)
+        seconds = planned_times(job, before, after, where, axes)
     found = _result(job, before, way, seconds, paths=paths and not wrong)
     return replace(found, compared=True)
 
@@ -379,10 +378,9 @@ def compare_filtered(
         row = Row.of(candidate)
         try:
             found = filter_program(data, candidate.form, candidate.settings, **how, axes=axes, most=most)
-            times = verify_programs(data, found.data, candidate.form, candidate.settings, **how, axes=axes).seconds
         except CornersmoothError as failure:
             return replace(row, verdict=getattr(failure, "what", str(failure)))
-        saved = 0.0 if times is None else times[0] - times[1]
+        saved = 0.0 if found.seconds is None else found.seconds[0] - found.seconds[1]
         assert found.checked is not None
         point = found.checked.axis_point
         return replace(

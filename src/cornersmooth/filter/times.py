@@ -8,12 +8,12 @@ import numpy as np
 
 from cornersmooth.arrays.vectors import norm
 from cornersmooth.errors import SettingsError
-from cornersmooth.feedrate import Limits, plan_text
+from cornersmooth.feedrate import Limits
 from cornersmooth.feedrate.even_ramps import ramp_times
 from cornersmooth.feedrate.linuxcnc import axis_limits, line_times, program_lines
 from cornersmooth.feedrate.written import text_path
 from cornersmooth.filter.checking import Place, pair, shared
-from cornersmooth.filter.motion import Job, motion_of_runs
+from cornersmooth.filter.motion import Job
 from cornersmooth.filter.runs import NONE, Reading, Run
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import Floats
@@ -21,45 +21,39 @@ from cornersmooth.nc_reader import NcProgram
 from cornersmooth.times.saving import LINUXCNC
 
 
-def planned_times(
-    job: Job, old: Reading, new: Reading, where: Sequence[Place], axes: Machine, *, closely: bool
-) -> tuple[float, float]:
-    """Time of what has changed, before and after, s, under the limits of the axes of a machine.
+def planned_times(job: Job, old: Reading, new: Reading, where: Sequence[Place], axes: Machine) -> tuple[float, float]:
+    """Time of what has changed, before and after, s, under the limits of the axes of a machine (`ramp_times`).
 
-    It is planned `closely`, or in even ramps, with a hundredth of the work. On LinuxCNC it is that of the whole
-    program, by the law of its planner. Errors: a pose out of reach; CS264: a program for LinuxCNC has motion of a kind
-    whose law is not known; CS263: the machine does not say how fast its axes may go.
+    On LinuxCNC it is that of the whole program, by the law of its planner. Errors: a pose out of reach; CS264: a
+    program for LinuxCNC has motion of a kind whose law is not known; CS263: the machine does not say how fast its axes
+    may go.
     """
     if by_own_law(job):
         return float(_on_linuxcnc(old, axes)[-1]), float(_on_linuxcnc(new, axes)[-1])
-    before, after = run_times(job, old, new, where, axes, closely=closely).sum(axis=0).tolist()
+    before, after = run_times(job, old, new, where, axes).sum(axis=0).tolist()
     return before, after
 
 
-def run_times(
-    job: Job, old: Reading, new: Reading, where: Sequence[Place], axes: Machine, *, closely: bool = False
-) -> Floats:
-    """(p, 2) time of each place before and after, s: planned `closely`, or in even ramps; errors as `planned_times`."""
+def run_times(job: Job, old: Reading, new: Reading, where: Sequence[Place], axes: Machine) -> Floats:
+    """(p, 2) time of each place before and after, s; errors as of `planned_times`."""
     if by_own_law(job):
         lines = [(place.run.first, place.run.stop) for place in where], [(place.first, place.stop) for place in where]
         ends = [np.concatenate(([0.0], _on_linuxcnc(reading, axes))) for reading in (old, new)]
         return np.column_stack([[end[b] - end[a] for a, b in own] for end, own in zip(ends, lines, strict=True)])
-    found = {}
+    found: dict[int, Floats] = {}
     for some in shared(old, new, where):
-        for place, own in zip(some, _pair_times(job, old, new, some, axes, closely=closely), strict=True):
-            found[place.run.first] = own
+        firsts = [place.run.first for place in some], [place.first for place in some]
+        times = [_times(job, nc, own, axes) for nc, own in zip(pair(job, old, new, some), firsts, strict=True)]
+        found |= dict(zip(firsts[0], np.column_stack(times), strict=True))
     return np.array([found[place.run.first] for place in where]).reshape(-1, 2)
 
 
-def _pair_times(
-    job: Job, old: Reading, new: Reading, where: Sequence[Place], axes: Machine, *, closely: bool
-) -> Floats:
-    """(p, 2) times of places: all at once where a rapid leads to each."""
-    times = [_stretch_times(job, nc, axes, closely=closely) for nc in pair(job, old, new, where)]
-    if all(len(own) == len(where) for own in times):
-        return np.column_stack(times)
-    each = (pair(job, old, new, [place]) for place in where)
-    return np.array([[_stretch_times(job, nc, axes, closely=closely).sum() for nc in both] for both in each])
+def _times(job: Job, nc: NcProgram, firsts: Sequence[int], axes: Machine) -> Floats:
+    """Time of the stretches of a motion that begin in some lines, without the rapids to them, s."""
+    path = text_path(nc, Limits(), settings=job.settings)
+    taken = np.where(path.rapid, 0.0, ramp_times(path, Limits(), axes))
+    which = np.searchsorted(firsts, np.abs(path.program.line[path.move]) - 1, side="right") - 1
+    return np.bincount(which, taken, len(firsts)).astype(np.float64)
 
 
 def least_time(job: Job, run: Run) -> float:
@@ -77,9 +71,8 @@ def time_as_it_is(job: Job, reading: Reading, axes: Machine) -> float:
         return float(_on_linuxcnc(reading, axes)[-1])
     if not reading.runs:
         raise no_runs()
-    groups = shared(reading, reading, [Place(run, run.first, run.stop) for run in reading.runs])
-    parts = (motion_of_runs(job, reading, [place.run for place in own]) for own in groups)
-    return float(sum(_stretch_times(job, nc, axes).sum() for nc in parts))
+    where = [Place(run, run.first, run.stop) for run in reading.runs]
+    return planned_times(job, reading, reading, where, axes)[0]
 
 
 def no_runs() -> SettingsError:
@@ -91,18 +84,6 @@ def no_runs() -> SettingsError:
 def by_own_law(job: Job) -> bool:
     """Whether the control has a planner whose law is known: times are those of whole programs then."""
     return job.form.table.lines.planner == LINUXCNC
-
-
-def _stretch_times(job: Job, nc: NcProgram, axes: Machine, *, closely: bool = True) -> Floats:
-    """Time between rapids, s."""
-    if closely:
-        law = plan_text(nc, settings=job.settings, machine=axes)
-        rapid, taken = law.path.rapid, np.diff(law.times_at(law.edge))
-    else:
-        path = text_path(nc, Limits(), settings=job.settings)
-        rapid, taken = path.rapid, ramp_times(path, Limits(), axes)
-    total: Floats = np.bincount(np.cumsum(rapid), np.where(rapid, 0.0, taken)).astype(np.float64)
-    return total
 
 
 def _on_linuxcnc(reading: Reading, axes: Machine) -> Floats:
