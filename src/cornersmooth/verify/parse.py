@@ -186,8 +186,10 @@ class Parse:
         if stop == len(self.moves) or self._hole[stop]:
             return False
         there = self._ahead.has(element) and (stop == 0 or not lines.feeds(element))
-        there = there and lines.at(self._move[stop], element)
-        return there and not (lines.stands(element) and self._has_tool(self._move[stop], element - 1))
+        if not (there and lines.at(self._move[stop], element)):
+            return False
+        changed = stop > 0 and self._hole[stop - 1] and not self._has_tool(self._move[stop], element - 1)
+        return changed or not lines.stands(element)
 
     # ------------------------------------------------------------------ holes
 
@@ -264,9 +266,9 @@ class Parse:
         self.acts.problems += found
         self._drilled(stop, begin, behind, left=left)
         ahead = self._ahead
+        while self._fed[stop] and ahead.has(end) and lines.feeds(end) and lines.stands(end):
+            end += 1
         if self._fed[stop] and ahead.has(end) and lines.feeds(end):
-            while ahead.has(end + 1) and lines.stands(end):
-                end += 1
             block = lines.block(end)
             out = end - 1 if lines.at(move + 1, end - 1) else block.stop - 1
             if out >= end and not lines.is_straight(block):
