@@ -58,21 +58,16 @@ class Holes:
         kind, why = self._cycle_of_control(cycle, poses)
         if cycle is None or (cycle.tap and not kind):
             self.statements.cycles.leave_out(why, int(program.line[poses[0]]), len(poses))
-            self._over_holes(rows, heights)
+            self._over_holes(rows, *self._crossings(poses, heights))
             return
         travel = np.maximum(heights, max(cycle.retract, cycle.clearance or 0.0))
         clearance = travel if cycle.clearance is None else np.full(len(poses), cycle.clearance)
-        came = self._come_from(int(poses[0]))
-        self._left = int(poses[-1]), program.tip[poses[-1]] + travel[-1] * program.axis[poses[-1]]
         if kind:
-            self._cycles(cycle, kind, poses, travel, clearance, came)
+            self._cycles(cycle, kind, poses, travel, clearance)
             return
         motion.findings.note_each("CS316", program.line[poses])
         motion.note_holes(poses, -1 if motion.modals.comes_first else int(poses[0]) - 1, travel, clearance)
-        enter, leave = crossings(program, poses, travel, came)
-        if travel[0] > came and motion.position is not None:
-            up = motion.at.lifted(motion.position, float(travel[0]) - came)
-            motion.emit(motion.moving(BlockRows.straight(program, up[None], poses[:1], rapid=True)))
+        enter, leave = self._crossings(poses, travel)
         hole, tip, rapid, dwell = hole_moves(cycle, program, poses, (enter, clearance, leave))
         feed, mode = hole_feeds(cycle, program, poses[hole])
         plain = BlockRows.straight(program, motion.ticks_at(rows, tip, hole), poses[hole])
@@ -82,9 +77,21 @@ class Holes:
         line = self.statements.cycles.line
         motion.emit_above(plain, self.statements.dwell(cycle.dwell, line, per_turn=per_turn) if waits else ())
 
-    def _come_from(self, pose: int) -> float:
-        """Height over a hole, along its axis, at which the tool is over the one right before it, mm; NaN elsewhere."""
+    def _crossings(self, poses: Ints, travel: Floats) -> tuple[Floats, Floats]:
+        """Go up over the hole before, if there is one, where these are higher; heights as of `crossings`."""
+        motion, program, came = self.motion, self.motion.program, self._come_from(int(poses[0]), poses[-1], travel[-1])
+        if travel[0] > came and motion.position is not None:
+            up = motion.at.lifted(motion.position, float(travel[0]) - came)
+            motion.emit(motion.moving(BlockRows.straight(program, up[None], poses[:1], rapid=True)))
+        return crossings(program, poses, travel, came)
+
+    def _come_from(self, pose: int, next_last: int, above: float) -> float:
+        """Height over a hole, along its axis, at which the tool is over the one right before it, mm; NaN elsewhere.
+
+        The tool will leave another hole at a height `above` it then.
+        """
         motion, program, (last, place) = self.motion, self.motion.program, self._left
+        self._left = int(next_last), program.tip[next_last] + above * program.axis[next_last]
         away = motion.position is None or motion.modals["high"] or last != pose - 1
         if away or dot(program.axis[last], program.axis[pose]) <= 1.0 - _SAME_AXIS:
             return np.nan
@@ -112,13 +119,10 @@ class Holes:
             return "", f"a tap, and {where}"
         return kind if self.native or cycle.tap else "", ""
 
-    def _cycles(self, cycle: Cycle, kind: str, poses: Ints, travel: Floats, clearance: Floats, came: float) -> None:
-        """Write holes as cycles of the control, each from the height at which the tool goes from hole to hole.
-
-        The tool may have come from a hole, at a height over the first of these.
-        """
+    def _cycles(self, cycle: Cycle, kind: str, poses: Ints, travel: Floats, clearance: Floats) -> None:
+        """Write holes as cycles of the control, each from the height at which the tool goes from hole to hole."""
         motion, program = self.motion, self.motion.program
-        lines = program.line[poses]
+        lines, came = program.line[poses], self._come_from(int(poses[0]), poses[-1], travel[-1])
         motion.findings.note_each("CS347", lines)
         if kind == "tap":
             motion.findings.note_each("CS348", lines)
@@ -140,18 +144,19 @@ class Holes:
         motion.say(motion.at.form.table.cycles.off)
         motion.modals.now["feed"] = -1
 
-    def _over_holes(self, rows: Rows, height: Floats) -> None:
+    def _over_holes(self, rows: Rows, enter: Floats, leave: Floats) -> None:
         """Go over holes that are left out, and say so."""
         motion, program, poses = self.motion, self.motion.program, rows.move
-        tips = program.tip[poses] + height[:, None] * program.axis[poses]
-        ticks = motion.ticks_at(rows, tips, np.arange(len(poses)))
+        own = np.repeat(np.arange(len(poses)), 2)
+        height = np.column_stack((enter, leave)).reshape(-1, 1)
+        ticks = motion.ticks_at(rows, program.tip[poses[own]] + height * program.axis[poses[own]], own)
         for k, pose in enumerate(poses.tolist()):
             numbers = (
                 format_number(x, motion.at.decimals[0]) for x in (program.tip[pose] / program.mm_per_unit).tolist()
             )
             place = " ".join(map("".join, zip("XYZ", numbers, strict=True)))
             motion.say(self.statements.warning_comment(f"NOT DRILLED: HOLE AT {place}"))
-            one = BlockRows.straight(program, ticks[k : k + 1], poses[k : k + 1], rapid=True)
+            one = BlockRows.straight(program, ticks[2 * k : 2 * k + 2], poses[[k, k]], rapid=True)
             motion.emit_above(motion.moving(one))
 
 
