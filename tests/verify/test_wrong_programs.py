@@ -334,3 +334,76 @@ def test_a_vector_before_tip_control_on_the_way_back(control: str) -> None:
     over = next(k for k in range(on, len(lines)) if re.search(r"^(\d+ )?(G0|LN) X", lines[k]))
     moved = (*lines[:on], lines[over], *lines[on:over], *lines[over + 1 :])
     assert not passes(TWO_TOOLS, control, moved)
+
+
+# programs without a head of ours, around their retracts
+
+
+def another_post(lines: tuple[str, ...]) -> tuple[str, ...]:
+    """A program without any comment."""
+    return tuple(line for line in lines if not re.match(r"\(|;|\d+ ;", line))
+
+
+@pytest.mark.parametrize("control", ["siemens", "heidenhain"])
+def test_tip_control_that_holds_at_the_retract_is_not_verified(control: str) -> None:
+    lines = another_post(right(TWO_TOOLS, control))
+    off = where(lines, "TRAFOOF|FUNCTION RESET TCPM", -2)
+    assert passes(TWO_TOOLS, control, lines)
+    found = judged(TWO_TOOLS, control, (*lines[:off], lines[off + 1], lines[off], *lines[off + 2 :]))
+    assert found.verdict is Verdict.NOT_VERIFIED
+    assert " under " in found.unverified
+
+
+@pytest.mark.parametrize("control", ["fanuc", "haas", "mitsubishi"])
+def test_a_length_that_ends_before_the_retract_is_not_verified(control: str) -> None:
+    lines = another_post(right(TWO_TOOLS, control))
+    up = where(lines, r"G91 G28 Z0\.|G53 G0 Z0", 1)
+    found = judged(TWO_TOOLS, control, put(lines, up, "G49", control))
+    assert found.verdict is Verdict.NOT_VERIFIED
+    assert "G49 before the retract" in found.unverified
+
+
+@pytest.mark.parametrize("control", CONTROLS)
+def test_one_block_from_the_retract_to_the_first_pose_is_to_check(control: str) -> None:
+    lines = another_post(right(TWO_TOOLS, control))
+    if not any(re.search(r"G28|G53|SUPA|M91", line) for line in lines):
+        pytest.skip("it has no retracts")
+    over = where(lines, r"^(\d+ )?(G0|LN?) X")
+    assert not judged(TWO_TOOLS, control, lines).trusted
+    found = judged(TWO_TOOLS, control, (*lines[:over], *lines[over + 1 :]))
+    assert [text for _, text in found.trusted] == ["the tool comes down from a retract before it is over its place"]
+
+
+def test_the_length_of_a_tool_that_a_position_of_the_machine_drops() -> None:
+    lines = right(TWO_TOOLS, "siemens")
+    changed = put(lines, where(lines, "^D1$") + 1, "SUPA G0 X0 Y0 D0", "siemens")
+    assert not passes(TWO_TOOLS, "siemens", changed)
+
+
+@pytest.mark.parametrize("control", CONTROLS)
+def test_a_program_of_a_version_without_digests_is_not_verified(control: str) -> None:
+    lines = right(TWO_TOOLS, control)
+    old = tuple(re.sub(r"(CORNERSMOOTH) \S+:", r"\1 0.2.0:", line) for line in lines)
+    assert old != lines
+    assert judged(TWO_TOOLS, control, old).verdict is Verdict.NOT_VERIFIED
+
+
+@pytest.mark.parametrize("control", ["siemens", "linuxcnc", "mitsubishi", "heidenhain"])
+def test_two_m_words_in_a_block(control: str) -> None:
+    """Where the control takes several: FANUC takes them by a parameter, Haas never."""
+    lines = right(TWO_TOOLS, control)
+    start = where(lines, r"\bM3$")
+    number = "" if control != "heidenhain" else "99 "
+    both = number + re.sub(r"^\d+ ", "", lines[start]) + " M8"
+    assert re.search("M8", lines[start + 1])
+    assert passes(TWO_TOOLS, control, (*lines[:start], both, *lines[start + 2 :]))
+    assert not passes(TWO_TOOLS, control, (*lines[:start], both.replace("M8", "M5"), *lines[start + 1 :]))
+
+
+@pytest.mark.parametrize("control", CONTROLS)
+def test_m2_ends_a_program(control: str) -> None:
+    lines = right(TWO_TOOLS, control)
+    end = where(lines, r"\bM(30|2)$")
+    text = re.sub("M(30|2)$", "M02" if control != "heidenhain" else "M2", lines[end])
+    assert passes(TWO_TOOLS, control, (*lines[:end], text, *lines[end + 1 :]))
+    assert not passes(TWO_TOOLS, control, (*lines[: end - 5], text, *lines[end - 5 : end], *lines[end + 1 :]))

@@ -35,6 +35,8 @@ class WordRules:
         ε in units of the text.
     axis_tolerance : float
         That of the tool axis, degrees.
+    m_words : int
+        How many M words of spindle and coolant a block may have.
     """
 
     def __init__(
@@ -44,8 +46,10 @@ class WordRules:
         lexer: Lexer,
         tolerance: float,
         axis_tolerance: float = 0.0,
+        m_words: int = 1,
     ) -> None:
         self._words, self._blocks = table.listed, (*table.blocks, *positions)
+        self._m_words = m_words
         self._lexer, self._rooms = lexer, {"length": tolerance, "angle": axis_tolerance}
         # most blocks beside the motion are alike; those of cycles are not, but most of their words are
         self._find = lru_cache(_REMEMBERED)(self._look_up)
@@ -92,7 +96,8 @@ class WordRules:
         names += [word for word in words if word[0] in "GM"]
         for name in sorted({name for name in names if names.count(name) > 1}):
             yield wrong(f"{name} is twice in one block")
-        if sum(word.name == "M" for word in line.words) > 1:
+        functions = [row.group for word, row in ruled if word[:1] == "M"]
+        if len(functions) > (self._m_words if set(functions) <= {"spindle", "coolant"} else 1):
             yield wrong("two M words in one block")
         if sum(word in _MOTION for word in words) > 1:
             yield wrong("two motions in one block")

@@ -35,6 +35,9 @@ _CONTROL_CHARACTERS: Final = re.compile(r"[\x00-\x08\x0a-\x1f\x7f]")
 #: mark of the transfer, which a control that shows a program has taken off
 _TAPE: Final = "%"
 
+#: versions whose programs have no digests in their head
+_NO_DIGESTS: Final = re.compile(r"0\.[0-2]\b")
+
 #: stands for any number in a block of the user's
 _ANY: Final = "9075301"
 
@@ -66,7 +69,7 @@ class WordCheck:
     ) -> None:
         self._positions = MachinePositions(None, 1.0) if positions is None else positions
         table, keys = self._positions.table(table_of(control)), word_table(control)
-        self._rules = WordRules(table, self._positions.rules, lexer, tolerance, axis_tolerance)
+        self._rules = WordRules(table, self._positions.rules, lexer, tolerance, axis_tolerance, keys.get("m_words", 1))
         self.lexer = lexer
         trusted = set(trusted)
         own = set(map(self._text, trusted))
@@ -109,6 +112,8 @@ class WordCheck:
         told = [f"{block}, NC line {line}" for line, block in self.unsure[:_UNSURE_TOLD]]
         if more := len(self.unsure) - len(told):
             told.append(f"{more} more blocks of your own")
+        old = "blocks around the motion: the version that wrote them put no digests into the head, write it anew"
+        told += [old] * bool(_NO_DIGESTS.match(self._states.made.get("VERSION", "")))
         return "; ".join(filter(None, (*told, *self._moving, self.parts.changed())))
 
     @property

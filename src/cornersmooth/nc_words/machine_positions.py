@@ -65,7 +65,14 @@ class MachinePositions:
         if home or change:
             says = "position of the machine, as its file has it"
             self.rules = tuple(
-                Row(pattern=re.compile(pattern), says=says, block=True, alone=True, retract=retract)
+                Row(
+                    pattern=re.compile(pattern),
+                    says=says,
+                    block=True,
+                    alone=True,
+                    retract=retract,
+                    drops="edge" * block.endswith("D0"),
+                )
                 for block in _BLOCKS
                 for retract, pattern in ((True, f"(?=.* Z[-+.\\d]){block}"), (False, block))
             )

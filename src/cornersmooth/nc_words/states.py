@@ -57,7 +57,7 @@ _TITLES: Final[Mapping[str, str]] = {
 }
 
 #: comments that say how a program was made, and the words in them
-_MADE: Final = re.compile(r"CORNERSMOOTH \S+: \w+=", re.IGNORECASE)
+_MADE: Final = re.compile(r"CORNERSMOOTH (\S+): \w+=", re.IGNORECASE)
 _MADE_WORDS: Final = re.compile(r"\b(\w+)=([\w.]*)")
 
 #: words of axes
@@ -116,9 +116,12 @@ class StateRules:
         else:
             self.wrong(code, line, *texts)
 
-    def _around_retracts(self, line: int, *texts: str) -> None:
-        """Complain of what a program of ours never does around a retract; other posts may."""
-        self.unframed(NOT_LISTED, line, *(texts if self._made else ()))
+    def _around_retracts(self, line: int, *texts: str, others: list[tuple[int, str]] | None = None) -> None:
+        """Complain of what a program of ours never does around a retract; of another post it is put to `others`."""
+        if self._made:
+            self.unframed(NOT_LISTED, line, *texts)
+        elif others is not None:
+            others += [(line, text) for text in texts]
 
     # what holds
 
@@ -166,8 +169,8 @@ class StateRules:
 
     def comment(self, text: str) -> None:
         """Take note of how the program was made, if a comment says so."""
-        if self._first is None and _MADE.match(text):
-            self._made = dict(_MADE_WORDS.findall(text.upper())) | self._made
+        if self._first is None and (match := _MADE.match(text)):
+            self._made = {"VERSION": match[1]} | dict(_MADE_WORDS.findall(text.upper())) | self._made
 
     def take(self, line: int, words: Sequence[str], ruled: Ruled, after: State) -> None:
         """Go on to the state after a block, and complain of what in it is not in its place."""
@@ -203,7 +206,8 @@ class StateRules:
         if row.retract:
             # of FANUC the length of the tool holds in the retract, with its tip control
             own = [last.text for group, last in self._followed.items() if last.row.tip_on and group != "tool_length"]
-            self._around_retracts(line, *(f"{word} under {tip}" for tip in own if "Z" in word))
+            under = (f"{word} under {tip}" for tip in own if "Z" in word)
+            self._around_retracts(line, *under, others=self.unsure)
             self._retract, self._high, self.above = line, True, True
         if row.changes_tool or row.outside:
             self._retract = 0
@@ -222,7 +226,8 @@ class StateRules:
         self._ended.pop(row.group, None)
         off = row.off and row.pattern.fullmatch(word) is not None
         if off and row.group == "tool_length" and self._first is not None and self._retracts and not self.above:
-            self._around_retracts(line, f"{word} before the retract: it may move the tool by its length")
+            text = f"{word} before the retract: it may move the tool by its length"
+            self._around_retracts(line, text, others=self.unsure)
         if not row.off and row.group in self._approach:  # GOHOME: the same tool comes back as a new one does
             self._retract = 0
 
@@ -240,7 +245,8 @@ class StateRules:
     def turn(self, line: int, words: Mapping[str, float]) -> None:
         """Look at rotary words: they may not turn the axes alone where a retract has left the tool."""
         if self.above and ROTARY & words.keys() and not LINEAR & words.keys():
-            self._around_retracts(line, *(f"the rotary axes turn under {word}" for word in self._tip_control))
+            turns = (f"the rotary axes turn under {word}" for word in self._tip_control)
+            self._around_retracts(line, *turns, others=self.trusted)
 
     def motion(self, line: int, words: Mapping[str, float], *, drills: bool) -> None:
         """Look at what holds where the tool moves by the words of a block.
@@ -248,7 +254,7 @@ class StateRules:
         `drills`: in a cycle of the control, so it does not go there at once.
         """
         if self._high and not drills:
-            self._around_retracts(line, *self._comes_down(words))
+            self._around_retracts(line, *self._comes_down(words), others=self.trusted)
         for group, word in self._ended.items():
             if not self._is_left(group):
                 text = f"{_TITLES[group]}: it must come after {word}, which deselects it"
