@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cornersmooth.feedrate.linuxcnc import AxisLimits, Lines, line_times
+from cornersmooth.feedrate.linuxcnc import AxisLimits, Lines, line_times, program_lines
 from cornersmooth.model import Floats
 
 LIMITS = AxisLimits(
@@ -101,3 +101,13 @@ def main() -> None:
 
 if __name__ == "__main__":
     main()
+
+
+def test_a_program_begins_in_g64() -> None:
+    """On the whole controller a relief in short lines took 3.52 s with and without the word."""
+    cuts = "G21 G90 G94\nG0 X0 Y0 Z0\nG1 F1500\n" + "".join(
+        f"X{0.1 * k:.1f} Z{0.02 * (k % 2):.2f}\n" for k in range(1, 99)
+    )
+    times = {word: line_times(program_lines(word + cuts), LIMITS)[1][-1] for word in ("", "G64\n", "G61\n")}
+    assert times[""] == times["G64\n"]
+    assert times["G61\n"] > 1.5 * times[""]

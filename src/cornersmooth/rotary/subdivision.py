@@ -355,9 +355,7 @@ def tip_bend(machine: Machine, start: Floats, end: Floats, turn: Floats) -> Floa
     `start` and `end` (n, 3), mm, are words of the linear axes (`machine_position`); turns (n, 2) are in rad.
     """
     turn = np.abs(turn)
-    size, speed, bend = np.zeros(
-        (3, len(turn))
-    )  # of the way of the tip and its derivatives, as `poses._swing` goes
+    size, speed, bend = np.zeros((3, len(turn)))  # of the way of the tip and its derivatives, as `poses._swing` goes
     for index in (1, 0):
         axis = machine.axes[index]
         if axis.carrier == "head":
