@@ -18,9 +18,3 @@ from cornersmooth.errors import Verdict
 )
 def test_the_worst_that_applies_is_the_verdict(how: dict[str, int], word: str) -> None:
     assert Verdict.of(**how) == word
-
-
-def test_worst_of_several() -> None:
-    assert Verdict.worst([]) is Verdict.PASSED
-    assert Verdict.worst([Verdict.INCOMPLETE, Verdict.PASSED]) is Verdict.INCOMPLETE
-    assert Verdict.worst([Verdict.NOT_VERIFIED, Verdict.FAILED, Verdict.INCOMPLETE]) is Verdict.FAILED

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 import shlex
-from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import partial
@@ -190,15 +189,3 @@ class Verdict(StrEnum):
         if unverified:
             return cls.NOT_VERIFIED
         return cls.INCOMPLETE if left_out else cls.PASSED
-
-    @classmethod
-    def worst(cls, verdicts: Iterable[Verdict]) -> Verdict:
-        """Give the worst of several; PASSED of none.
-
-        Returns
-        -------
-        Verdict
-            The one that counts for all.
-        """
-        order = list(cls)
-        return max(verdicts, key=order.index, default=cls.PASSED)
