@@ -17,10 +17,11 @@ import warnings
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 
-from cornersmooth.cl import DIALECTS, read
+from cornersmooth.cl import DIALECTS, bulk, read
 from cornersmooth.cl.apt import read_apt
 from cornersmooth.cl.source import clean
 from cornersmooth.errors import CornersmoothError, SettingsError
@@ -194,8 +195,10 @@ def run_one(data: bytes, options: dict[str, object], *, compare: bool) -> str:
 
 
 def _apt(data: bytes, *, fast: bool) -> object:
+    find_plain = bulk.find_plain if fast else lambda text, first: None
     try:
-        program = read_apt(clean(data, "fuzz"), name="fuzz", fast=fast)
+        with patch.object(bulk, "find_plain", find_plain):
+            program = read_apt(clean(data, "fuzz"), name="fuzz")
     except CornersmoothError as error:
         return str(error)
     arrays = (program.tip, program.axis, program.kind, program.feed, program.line, program.keep, program.arcs.sweep)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from unittest.mock import patch
 
 import pytest
 
-from cornersmooth.cl import messages, read
+from cornersmooth.cl import bulk, messages, read
 from cornersmooth.cl.apt import read_apt
 from cornersmooth.cl.source import clean
 from cornersmooth.errors import InputError
@@ -35,9 +36,9 @@ def test_message(path: Path) -> None:
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_careful_reader_says_the_same(path: Path) -> None:
     said = []
-    for fast in (True, False):
-        with pytest.raises(InputError) as caught:
-            read_apt(clean(path.read_bytes(), "x"), name="x", fast=fast)
+    for find_plain in (bulk.find_plain, lambda text, first: None):
+        with pytest.raises(InputError) as caught, patch.object(bulk, "find_plain", find_plain):
+            read_apt(clean(path.read_bytes(), "x"), name="x")
         said.append(str(caught.value))
     assert said[0] == said[1]
 
