@@ -16,7 +16,6 @@ from cornersmooth.arrays.vectors import square, unit
 from cornersmooth.control.state import State
 from cornersmooth.filter.motion import Job, plane_of, says_motion
 from cornersmooth.filter.runs import ANGLES, ANY, NONE, TURNS, VECTOR, Reading, Run
-from cornersmooth.filter.spelling import numbered, numbers_of
 from cornersmooth.kinematics import tip_position, tool_axis
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc.control import Mode
@@ -284,12 +283,6 @@ def _shared_out(
         incremental = run.state.groups["distance"] == "incremental"
         lines = [*([b"G90"] if incremental else []), *lines, *([" ".join(back).encode()] if back else [])]
         lines += [b"G91"] if incremental else []
-        old = reading.lines(run.first, run.stop)
-        if len(lines) >= run.lines:
-            texts.append(None)
-            continue
-        if job.spelling.numbered:
-            lines = numbered(lines, numbers_of(old.splitlines()))
-        text = b"".join(line + job.spelling.end for line in lines)
-        texts.append(text if old.endswith(b"\n") else text.removesuffix(job.spelling.end))
+        fewer = len(lines) < run.lines
+        texts.append(job.spelling.text(reading.lines(run.first, run.stop), lines) if fewer else None)
     return texts

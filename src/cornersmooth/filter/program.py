@@ -41,12 +41,9 @@ _BY_LAW: Final = 10
 _EQUAL: Final = 1e-3
 _FASTER: Final = 1e-2
 
-#: words that let LinuxCNC blend
-_BLENDING: Final = re.compile(rb"(?i)G64[ \t]*P[ \t]*(\d*\.?\d+)(?:[ \t]*Q[ \t]*(\d*\.?\d+))?")
-
-#: words of a program by which a control rounds its motion within a tolerance: of Siemens, Klartext and Haas
-_SETTINGS: Final = re.compile(
-    rb"(?i)CYCLE832[ \t]*\([ \t]*(\d*\.?\d+)|CYCL DEF 32\.1[ \t]*T[ \t]*(\d*\.?\d+)|G187[^\n(]*E[ \t]*(\d*\.?\d+)"
+#: words by which a program lets its control round within a tolerance
+_OWN: Final = re.compile(
+    rb"(G64[ \t]*P|CYCLE832[ \t]*\(|CYCL DEF 32\.1[ \t]*T|G187[^\n(]*E)[ \t]*(\d*\.?\d+)(?:[ \t]*Q[ \t]*(\d*\.?\d+))?"
 )
 
 
@@ -137,19 +134,9 @@ def filter_program(
     if most is not None:
         left_all_but(old, most)
     texts, why = (fewest if settings.lines is None else smoothed)(job, old, old.runs)
-    times: dict[tuple[int, bytes], tuple[float, float]] = {}
     if settings.lines is None and axes is not None and old.runs and not old.absent:
-        texts, why, times = _fastest(job, old, texts, why, axes)
-    way = _way(job, old, texts, why, verify=verify)
-    seconds = None
-    if axes is not None and way.where:
-        texts_of = [] if by_own_law(job) else [(place.run.first, way.text(place)) for place in way.where]
-        known = [times[text] for text in texts_of if text in times]
-        if len(known) == len(way.where):
-            seconds = sum(before for before, _ in known), sum(after for _, after in known)
-        else:
-            seconds = planned_times(job, old, way.after, way.where, axes)
-    return _result(job, old, way, seconds, paths=paths)
+        texts, why = _fastest(job, old, texts, why, axes)
+    return _result(job, old, _way(job, old, texts, why, verify=verify), axes, paths=paths)
 
 
 @dataclass(frozen=True)
@@ -192,38 +179,33 @@ def _way(job: Job, old: Reading, texts: dict[int, bytes], why: dict[int, str], *
 
 def _fastest(
     job: Job, old: Reading, texts: dict[int, bytes], why: dict[int, str], axes: Machine
-) -> tuple[dict[int, bytes], dict[int, str], dict[tuple[int, bytes], tuple[float, float]]]:
-    """Of each run the text with the fewest blocks that is fast, and no slower than the run; times of texts.
+) -> tuple[dict[int, bytes], dict[int, str]]:
+    """Of each run the text with the fewest blocks that is fast, and no slower than the run.
 
     Corners are smoothed in runs that take longer than their feeds ask for.
     """
-    rows = replace(job, spelling=_fine(job.spelling, job.form, job.settings, inch=old.runs[0].state.unit != 1.0))
     found: dict[int, list[tuple[float, int, bytes | None]]] = {}
-    left, why = why, dict(why)
-    for which, some in ((job, (texts, left)), (rows, None)):
-        slow = [
-            run
-            for run in old.runs
-            if min((seconds for seconds, *_ in found.get(run.first, [])), default=math.inf)
-            > (1.0 + _FASTER) * least_time(job, run)
-        ]
-        way = _way(which, old, *(some or smoothed(rows, old, slow)), verify=False)
-        for place, (before, after) in zip(
-            way.where, run_times(job, old, way.after, way.where, axes).tolist(), strict=True
-        ):
+
+    def try_(job: Job, texts: dict[int, bytes]) -> None:
+        way = _way(job, old, texts, {}, verify=False)
+        times = run_times(job, old, way.after, way.where, axes).tolist()
+        for place, (before, after) in zip(way.where, times, strict=True):
             own = found.setdefault(place.run.first, [(before, place.run.lines, None)])
             own.append((after, place.stop - place.first, way.text(place)))
+
+    try_(job, texts)
+    best = {first: min(seconds for seconds, *_ in own) for first, own in found.items()}
+    slow = [run for run in old.runs if best.get(run.first, math.inf) > (1.0 + _FASTER) * least_time(job, run)]
+    rows = replace(job, spelling=_fine(job.spelling, job.form, job.settings, inch=old.runs[0].state.unit != 1.0))
+    try_(rows, smoothed(rows, old, slow)[0])
     chosen: dict[int, bytes] = {}
-    times: dict[tuple[int, bytes], tuple[float, float]] = {}
     for first, own in found.items():
         fast = min((1.0 + _FASTER) * min(seconds for seconds, *_ in own), (1.0 + _EQUAL) * own[0][0])
-        seconds, _, text = min((one for one in own if one[0] <= fast), key=lambda one: one[1])
-        if text is None:
-            why[first] = "nothing makes it faster"
-        else:
-            chosen[first], times[first, text] = text, (own[0][0], seconds)
-            why.pop(first, None)
-    return chosen, why, times
+        text = min((one for one in own if one[0] <= fast), key=lambda one: one[1])[2]
+        if text is not None:
+            chosen[first] = text
+    slower = dict.fromkeys(found.keys() - chosen.keys(), "nothing makes it faster")
+    return chosen, {first: text for first, text in why.items() if first not in chosen} | slower
 
 
 def verify_programs(
@@ -245,10 +227,7 @@ def verify_programs(
     after = job.reader.read(new, [place.stop for place in where])
     checked = Checked(tuple(wrong)) if wrong else check(job, before, after, where)
     way = _Way(after, where, {}, checked)
-    seconds = None
-    if axes is not None and where and not wrong:
-        seconds = planned_times(job, before, after, where, axes)
-    found = _result(job, before, way, seconds, paths=paths and not wrong)
+    found = _result(job, before, way, None if wrong else axes, paths=paths and not wrong)
     return replace(found, compared=True)
 
 
@@ -314,8 +293,8 @@ def left_all_but(reading: Reading, most: int) -> None:
     reading.runs[:] = reading.runs[first:stop]
 
 
-def _result(job: Job, old: Reading, way: _Way, seconds: tuple[float, float] | None, *, paths: bool) -> Filtered:
-    """What became of a program, and what the control does in its runs where that is wanted."""
+def _result(job: Job, old: Reading, way: _Way, axes: Machine | None, *, paths: bool) -> Filtered:
+    """What became of a program; how long its runs take, and what the control does in them, as far as needed."""
     new, where, why = way.after, way.where, way.why
     for run in old.runs:
         if run.first in why:
@@ -331,20 +310,19 @@ def _result(job: Job, old: Reading, way: _Way, seconds: tuple[float, float] | No
         left=old.left(),
         checked=way.checked,
         units_said="units" in old.said,
-        seconds=seconds,
+        seconds=planned_times(job, old, new, where, axes) if axes is not None and where else None,
         motions=pair(job, old, new, drawn) if paths and where else None,
         changed=tuple((place.run.first + 1, place.run.stop, place.first + 1, place.stop) for place in drawn),
-        rounding=max((place.run.state.unit * _rounding(new, place) for place in where), default=0.0),
+        rounding=where[0].run.state.unit * _rounding(new.data) if where else 0.0,
         block_time=block_time(job),
     )
 
 
-def _rounding(new: Reading, place: Place) -> float:
-    """By how much the program lets the control round the blocks of a place, in its units; 0.0 for unknown."""
-    blends = _BLENDING.findall(f"{place.run.state.rounding}\n".encode() + new.lines(place.first, place.stop))
-    # without Q lines are merged within P, too
-    largest = max((float(p) + float(q or p) for p, q in blends), default=0.0)
-    return max([largest, *(float(next(filter(None, found))) for found in _SETTINGS.findall(new.data))])
+def _rounding(data: bytes) -> float:
+    """By how much a program lets the control round it, in its units; 0.0 for unknown."""
+    # LinuxCNC without Q merges lines within P, too
+    found = ((float(p), float(q or p) if word[:3] == b"G64" else 0.0) for word, p, q in _OWN.findall(data.upper()))
+    return max(map(sum, found), default=0.0)
 
 
 def compare_filtered(

@@ -118,6 +118,11 @@ class Spelling:
         zero = self.line[1:-1]
         return replace(own, line=self.line, clockwise=f"G{zero}2", counterclockwise=f"G{zero}3")
 
+    def text(self, old: bytes, blocks: list[bytes]) -> bytes:
+        """Text that takes the place of an old one, with its numbers and line ends."""
+        text = b"".join(line + self.end for line in (_numbered(blocks, old) if self.numbered else blocks))
+        return text if old.endswith(b"\n") else text.removesuffix(self.end)
+
     def feed_text(self, feed: float) -> str:
         """Number of a feed in the digits of the program, or in as many as it has."""
         digits = next((k for k in range(self.feed, _FEED_DIGITS) if float(f"{feed:.{k}f}") == feed), _FEED_DIGITS)
@@ -129,16 +134,12 @@ def _decimals(number: bytes) -> int:
     return len(number.partition(b".")[2])
 
 
-def numbers_of(lines: Iterable[bytes]) -> list[bytes]:
-    """Block numbers of lines that have one, as they are written, with what stands behind them."""
-    return [match[0] for match in map(_LINE_NUMBER.match, lines) if match]
-
-
-def numbered(lines: list[bytes], numbers: list[bytes]) -> list[bytes]:
-    """Give lines the numbers that others had, in order and evenly; lines between have none.
+def _numbered(lines: list[bytes], old: bytes) -> list[bytes]:
+    """Give lines the block numbers that old lines have, in order and evenly; lines between have none.
 
     No number occurs twice, and the first line has the first: who starts in the middle of the program finds it.
     """
+    numbers = [match[0] for match in map(_LINE_NUMBER.match, old.splitlines()) if match]
     count, have = len(lines), len(numbers)
     places = [k * have // count for k in range(count)]
     new = [k == 0 or places[k] != places[k - 1] for k in range(count)]

@@ -14,7 +14,6 @@ import numpy as np
 from cornersmooth.errors import CornersmoothError
 from cornersmooth.filter.motion import Job, motion_of_runs, program_of
 from cornersmooth.filter.runs import Reading, Run
-from cornersmooth.filter.spelling import numbered, numbers_of
 from cornersmooth.kinematics import Machine, solutions, tool_axis
 from cornersmooth.model import Floats
 from cornersmooth.nc import Frame, write
@@ -74,7 +73,7 @@ def _attempt(job: Job, reading: Reading, runs: Sequence[Run], made: dict[int, by
         return
     for run, blocks in zip(runs, found, strict=True):
         if blocks is not None:
-            made[run.first] = _text(job, reading.lines(run.first, run.stop), blocks)
+            made[run.first] = job.spelling.text(reading.lines(run.first, run.stop), blocks)
         elif len(runs) == 1:
             why[run.first] = "the rotary axes would come out in another turn or solution"
         else:
@@ -172,11 +171,3 @@ def _turned(angles: Mapping[str, float], lines: Sequence[bytes]) -> dict[str, fl
         if not left:
             break
     return found
-
-
-def _text(job: Job, old: bytes, blocks: list[bytes]) -> bytes:
-    """Text that takes the place of a run, with the numbers and line ends of the program."""
-    if job.spelling.numbered:
-        blocks = numbered(blocks, numbers_of(old.splitlines()))
-    text = b"".join(line + job.spelling.end for line in blocks)
-    return text if old.endswith(b"\n") else text.removesuffix(job.spelling.end)
