@@ -82,18 +82,6 @@ class Path:
         start = self.length.take(k)
         return start + (place - k) * (self.length.take(k + 1) - start)
 
-    def way_apart(self, here: float, there: float) -> float:
-        """How far the path goes away from one place on its way to another, mm; places are path lengths.
-
-        Less than the length of the way where it goes to and fro.
-        """
-        length = self.length
-        low, high = np.searchsorted(length, sorted((here, there)))
-        if min(here, there) < 0 or high == len(length):
-            return abs(there - here)
-        ends = points_at(self.points, np.interp((here, there), length, np.arange(len(length)))).T
-        return float(np.linalg.norm(np.vstack((self.points[low:high], ends[1])) - ends[0], axis=1).max())
-
 
 @dataclass(frozen=True)
 class Window:
