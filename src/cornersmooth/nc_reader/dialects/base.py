@@ -15,12 +15,11 @@ from cornersmooth.nc_reader.words import Columns, Line, refused
 
 #: how the values of a table `[grammar]` are read, where not as they are
 _READ: Mapping[str, Callable[[Any], Any]] = {
-    "tip_control": lambda table: {float(code): name for code, name in table.items()},
     **dict.fromkeys(("controls", "unsure"), lambda table: {kind: tuple(names) for kind, names in table.items()}),
 }
 
 #: effects of words that change nothing measured
-_SILENT: Final = frozenset("nothing distance=absolute offset=. path=. smoothing=. smoothing=off cycles=off".split())
+SILENT: Final = frozenset("nothing distance=absolute offset=. path=. smoothing=. smoothing=off cycles=off".split())
 
 
 class Dialect:
@@ -87,24 +86,26 @@ class Dialect:
 
     def mode(self, code: float, line: Line, state: ModalState) -> Acts:
         """Take a G word outside group 01 that changes what holds from block to block, by its row in the table."""
-        for effect in effects_of(self.control, f"G{code:g}") or ("unknown",):
-            group, _, value = effect.partition("=")
-            if group == "plane":
-                yield Modes({"plane": int(code)})
-            elif group == "units":
-                yield Modes({"inch": value == "inch"})
-            elif group == "feed":
-                yield Modes({"per_revolution": value == "revolution", "inverse_time": value == "inverse"})
-            elif group == "compensation" and value != "?":
-                yield Beside("G", code, f"G{code:g}")
-            elif effect not in _SILENT:
-                hint = "only absolute milling with tool vectors, axis points or rotary words is read"
-                raise refused(line, f"G{code:g} is not understood", hint)
+        effect = self.effect(f"G{code:g}")
+        group, _, value = effect.partition("=")
+        if group == "plane":
+            yield Modes({"plane": int(code)})
+        elif group == "units":
+            yield Modes({"inch": value == "inch"})
+        elif group == "feed":
+            yield Modes({"per_revolution": value == "revolution", "inverse_time": value == "inverse"})
+        elif group == "tool_length" and value != "?":
+            state.tip_control = "" if value == "off" else f"G{code:g}"
+            yield Beside("G", code, f"G{code:g}")
+        elif group == "compensation" and value != "?":
+            yield Beside("G", code, f"G{code:g}")
+        elif effect not in SILENT:
+            hint = "only absolute milling with tool vectors, axis points or rotary words is read"
+            raise refused(line, f"G{code:g} is not understood", hint)
 
-    def is_silent(self, name: str) -> bool:
-        """Whether a word changes nothing measured."""
-        effects = effects_of(self.control, name)
-        return bool(effects) and _SILENT.issuperset(effects)
+    def effect(self, name: str) -> str:
+        """What a word does in the first place; what is beside it in its row follows from that."""
+        return next(iter(effects_of(self.control, name)), "unknown")
 
     def machine_axes(self, line: Line, beside: Set[tuple[str, float]]) -> str:
         """Axes that a block sends to positions of the machine; refuses words beside them but for some."""

@@ -43,8 +43,6 @@ class Iso(Dialect):
     """
 
     lexer: _IsoLexer
-    #: name of what a G word switches on, which takes a length register H with it; ``""`` switches off
-    tip_control: Mapping[float, str]
     #: milliseconds that ``G4 P`` counts in
     dwell: float = 1.0
     #: letters that say nothing here
@@ -109,7 +107,8 @@ class Iso(Dialect):
                 raise self.not_understood(line, letter, text)
         if self.lexer.odd_vector(motion.keys(), motion.get("G")):
             raise refused(line, "I J K beside rotary words", "leave out --machine for a text with tool vectors")
-        yield Move(motion, later=bool(codes & self.tip_control.keys()) and not late)
+        of_length = any(self.effect(f"G{code:g}").startswith("tool_length") for code in codes)
+        yield Move(motion, later=of_length and not late)
 
     def _switched(self, line: Line, state: ModalState) -> bool:
         """Take a block that switches tip control of the kinematics; return whether it is one."""
@@ -201,13 +200,8 @@ class Iso(Dialect):
 
     def mode(self, code: float, line: Line, state: ModalState) -> Acts:
         """Take a G word outside group 01 that changes what holds from block to block."""
-        if code == 90.0:
-            state.incremental = False
-        elif code in self.tip_control:
-            state.tip_control = self.tip_control[code]
-            yield Beside("G", code, f"G{code:g}")
-        else:
-            yield from super().mode(code, line, state)
+        state.incremental = state.incremental and code != 90.0
+        yield from super().mode(code, line, state)
 
 
 class _IsoLexer(Lexer):

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.nc_reader.acts import Acts, Beside, Move, Tilt, ToMachine, Unknown, Wrong
-from cornersmooth.nc_reader.dialects.base import Dialect
+from cornersmooth.nc_reader.dialects.base import SILENT, Dialect
 from cornersmooth.nc_reader.hole_cycles import HoleCycle, drill, numbers
 from cornersmooth.nc_reader.lexer import NUMBER, Lexer, fixed, number_of
 from cornersmooth.nc_reader.modal_state import ModalState
@@ -100,7 +100,7 @@ class Siemens(Dialect):
                 motion[name] = value
             elif name in ("TRAORI", "TRAFOOF", *_AXIS_FRAMES, *_ORIENTATIONS):
                 self._transform(name, state)
-            elif name not in ("D", "N", "%") and not self.is_silent(name):
+            elif name not in ("D", "N", "%") and self.effect(name) not in SILENT:
                 raise self.not_understood(line, name, text)
         yield Move(motion)
 
