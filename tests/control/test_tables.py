@@ -16,8 +16,9 @@ from cornersmooth.control.rows import Rows
 from cornersmooth.control.state import State
 from cornersmooth.control.table import UNKNOWN, UNLISTED, Row, table_of
 from cornersmooth.control.unread import execute
+from cornersmooth.errors import InputError
 from cornersmooth.filter.runs import ProgramReader
-from cornersmooth.nc_reader import word_tables
+from cornersmooth.nc_reader import read_nc, word_tables
 from cornersmooth.nc_reader.dialects import dialect_of
 from cornersmooth.nc_reader.word_tables import CONTROLS
 from cornersmooth.nc_words.blocks import WordRules
@@ -227,3 +228,26 @@ def test_a_listing_shows_what_is_not_known() -> None:
     shown = list(listing(reader.stream(Text.of(b"G21 G90\nG0 X1. Y2.\nG777\n"))))
     assert shown[1].endswith("rapid X1 Y2 Z? I? J? K?")
     assert shown[2].endswith("all unknown")
+
+
+@pytest.mark.parametrize(
+    ("control", "blocks", "group", "word"),
+    [
+        ("siemens", ["D1", "SUPA G0 Z0 D0"], "edge", "D1"),  # D0 suppresses for a block, and is not an edge
+        ("siemens", ["D1", "WHO KNOWS"], "edge", "D1"),
+        ("fanuc", ["G54.1 P2"], "offset", "G54.1 P2"),
+        ("fanuc", ["G43.4 H5"], "tool_length", "G43.4"),  # H is compared with the CL file
+        ("linuxcnc", ["G64 P0.01 Q0"], "path", "G64 Q0"),  # P may change from block to block
+        ("heidenhain", ["L X+1 RL"], "compensation", "RL"),
+    ],
+)
+def test_the_last_word_of_a_group_is_remembered_whatever_becomes_of_it(
+    control: str, blocks: list[str], group: str, word: str
+) -> None:
+    assert after(control, *blocks).last_words[group].text == word
+
+
+@pytest.mark.parametrize("block", ["G44 H1", "G43.1 H1", "G99.5", "G52 X1."])
+def test_a_word_whose_row_says_no_more_than_that_it_loses_something_is_not_read(block: str) -> None:
+    with pytest.raises(InputError, match="not understood"):
+        read_nc(f"G21 G90\nG0 X0. Y0. Z5.\n{block}\nG1 X1. F100.\n".encode())
