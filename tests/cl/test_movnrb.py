@@ -140,6 +140,14 @@ def test_it_is_written_within_the_tolerance_of_the_curve(control: str, form: str
     assert written(text(form not in ("spl",)), control, form, tolerance)
 
 
+@pytest.mark.parametrize("form", ["g1", "g6.2"])
+def test_a_long_tool_takes_no_more_of_the_tolerance(form: str) -> None:
+    settings = Settings(tolerance=0.01, axis_length=300.0)
+    found = postprocess(text(True), io.BytesIO(), settings, form=choose_form("fanuc", form))
+    assert found.verdict is Verdict.PASSED
+    assert found.smoothed.settings.pose_shift < 0.005
+
+
 def test_a_corner_at_its_end_is_rounded() -> None:
     found = postprocess(text(True), io.BytesIO(), Settings(tolerance=0.02), form=choose_form("fanuc", "g6.2"))
     assert len(sharp_rows(found.smoothed)) == 0

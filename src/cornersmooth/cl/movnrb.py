@@ -30,6 +30,9 @@ from cornersmooth.model import Floats
 NEAR: Final = 1e-3
 AT_START: Final = 1e-5
 
+#: where chords are as near as at the tip: LENGTH may be less than any tool, units of the file
+REACH: Final = 100.0
+
 #: statements of control points, and what they are of
 TIP, SECOND = 2, 3
 
@@ -74,8 +77,11 @@ class Spline:
             return None
         kinds = (TIP, SECOND) if self.five else (TIP,)
         control = np.hstack([np.array(self.rows[kind]).reshape(-1, 3) for kind in kinds])
-        if self.five and not (control[:, :3] != control[:, 3:]).any(axis=1).all():
-            return None
+        if self.five:
+            up = control[:, 3:] - control[:, :3]
+            if not up.any(axis=1).all():
+                return None
+            control[:, 3:] = control[:, :3] + REACH * up / np.linalg.norm(up[0])
         if knots[0] == knots[DEGREE] and np.abs(control[0, :3] - start[:3]).max() <= AT_START:
             control[0] += np.tile(start[:3] - control[0, :3], len(kinds))
         found = cubic(knots, control, tolerance)

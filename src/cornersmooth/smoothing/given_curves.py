@@ -42,42 +42,44 @@ def beside_chords(program: Program, settings: Settings) -> tuple[Program, Settin
 def given_runs(program: Program, settings: Settings) -> tuple[Program, Settings, Runs | None]:
     """The curves of the file as runs, at the axis length; those that end at corners are shorter by two lines there.
 
-    The pose between these lines goes to where the tangent of the curve leads, and counts as moved.
+    Where ε has room, the pose between these lines goes to where the tangent of the curve leads, and counts as moved.
     """
     runs = None if program.curves is None else program.curves.runs
     if runs is None:
         return program, settings, None
     assert program.moved is not None
     runs = replace(runs, control=_at_height(runs.control, settings.axis_length))
-    pose, off = starts(runs.count), program.moved[runs.pose]
-    begins, ends = _bends(program, settings, runs)
-    for turns, at in ((begins, pose[:-1, None] + np.arange(3)), (ends, pose[1:, None] - 1 - np.arange(3))):
-        room = _MOVED * off[np.minimum(at, len(off) - 1)].max(axis=1) <= settings.common_tolerance / 2.0
-        turns *= np.where(room, _LINES, 0)
+    begins, ends = (_LINES * turns for turns in _bends(program, settings, runs))
     left = runs.count - begins - ends >= _FEWEST
     if not left.any():
         return program, settings, None
     runs = _shorter(some_runs(runs, left), begins[left], ends[left])
-    program = _towards(program, runs, begins[left] > 0, 1)
-    program = _towards(program, runs, ends[left] > 0, -1)
+    for turns, ahead in ((begins[left], 1), (ends[left], -1)):
+        program = _towards(program, runs, turns > 0, ahead, settings.common_tolerance / 2.0)
     assert program.moved is not None
     return program, settings.but(pose_shift=float(program.moved.max())), runs
 
 
-def _towards(program: Program, runs: Runs, which: Bools, ahead: int) -> Program:
-    """Move the poses beside the begins (ahead 1) or ends (-1) of some runs to where their tangents lead."""
+def _towards(program: Program, runs: Runs, which: Bools, ahead: int, most: float) -> Program:
+    """Move the poses beside the begins (ahead 1) or ends (-1) of some runs to where their tangents lead.
+
+    Those that would be off by more than `most` stay, mm.
+    """
     assert program.moved is not None
     place, control = starts(runs.count), starts(runs.knot_count + 2)
     at, own = (place[:-1], control[:-1]) if ahead > 0 else (place[1:] - 1, control[1:] - 1)
-    end, own = runs.pose[at[which]], own[which]
-    beside, way = end - ahead, runs.control[own] - runs.control[own + ahead]
+    around = runs.pose[at] - ahead * np.arange(3)[:, None]
+    off = _MOVED * program.moved[np.clip(around, 0, len(program) - 1)].max(axis=0)
+    which = which & (off <= most)
+    (end, beside, _), own, off = around[:, which], own[which], off[which]
+    way = runs.control[own] - runs.control[own + ahead]
     size = norm(program.tip[beside] - program.tip[end]) + norm(program.axis[beside] - program.axis[end])
     unit_size = norm(way[:, :3]) + norm(way[:, 3:] - way[:, :3]) / norm(runs.control[own, 3:] - runs.control[own, :3])
     point = runs.control[own] + (_ALONG * size / unit_size)[:, None] * way
     tip, axis, moved = program.tip.copy(), program.axis.copy(), program.moved.copy()
     tip[beside], axis[beside] = point[:, :3], unit(point[:, 3:] - point[:, :3])
-    for pose in (end, beside, beside - ahead):
-        moved[pose] = np.maximum(moved[pose], _MOVED * program.moved[[end, beside, beside - ahead]].max(axis=0))
+    for pose in around[:, which]:
+        moved[pose] = np.maximum(moved[pose], off)
     return replace(program, tip=tip, axis=axis, moved=moved)
 
 
