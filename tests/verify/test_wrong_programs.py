@@ -407,3 +407,49 @@ def test_m2_ends_a_program(control: str) -> None:
     text = re.sub("M(30|2)$", "M02" if control != "heidenhain" else "M2", lines[end])
     assert passes(TWO_TOOLS, control, (*lines[:end], text, *lines[end + 1 :]))
     assert not passes(TWO_TOOLS, control, (*lines[: end - 5], text, *lines[end - 5 : end], *lines[end + 1 :]))
+
+
+# what holds beside tip control
+
+
+TURNED = """LOADTL/1
+SPINDL/RPM,3000,CLW
+RAPID
+GOTO/0,0,50,0,0,1
+FEDRAT/MMPM,500
+GOTO/0,0,0,0,0,1
+GOTO/10,3,0,0.1,0,0.9949874
+RAPID
+GOTO/10,3,50,0.1,0,0.9949874
+LOADTL/2
+SPINDL/RPM,1500,CLW
+RAPID
+GOTO/5,5,30,0,0,1
+CYCLE/DRILL,RAPTO,3,FEDTO,12,RTRCTO,5,MMPM,200
+GOTO/5,5,0
+CYCLE/OFF
+RAPID
+GOTO/5,5,60
+SPINDL/OFF
+FINI
+"""
+
+
+@pytest.mark.parametrize("control", ["fanuc", "siemens", "heidenhain", "mitsubishi"])
+def test_rotary_axes_stay_turned_where_nothing_keeps_the_tip(control: str) -> None:
+    """Holes drilled beside their places: the table has not been turned back."""
+    form, stream = choose_form(control, "g1", machine=load_machine("table-ac")), io.BytesIO()
+    frame, how = Frame(cycles="native"), {"tolerance": 0.02, "control": control, "machine": form.machine}
+    postprocess(program(TURNED), stream, Settings(tolerance=0.02), form=form, frame=frame, verify=False)
+    lines = another_post(tuple(stream.getvalue().decode().splitlines()))
+    turns = where(lines, r"^(\d+ )?(G0|L) A\S+ C\S+( FMAX)?$", -2)
+    assert verify(program(TURNED), "\n".join(lines).encode(), **how).verdict is Verdict.PASSED
+    found = verify(program(TURNED), "\n".join((*lines[:turns], *lines[turns + 1 :])).encode(), **how)
+    assert "no tool tip control where rotary axes are away from zero" in [one.text for one in found.problems]
+
+
+def test_the_length_of_the_first_tool_needs_its_word() -> None:
+    cl = TWO_TOOLS.replace("LOADTL/3", "LOADTL/1")
+    lines = another_post(right(cl, "linuxcnc"))
+    at = where(lines, r"^G43 H1$")
+    assert not passes(cl, "linuxcnc", (*lines[:at], *lines[at + 1 :]))

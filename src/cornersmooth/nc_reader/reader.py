@@ -18,6 +18,7 @@ from cornersmooth.nc_reader.elements import RETRACT, Element, Elements, Event, P
 from cornersmooth.nc_reader.execution import Modal, execute, in_mm
 from cornersmooth.nc_reader.modal_state import ModalState
 from cornersmooth.nc_reader.needed_states import (
+    away_problems,
     axis_problems,
     clamp_problems,
     control_problems,
@@ -180,6 +181,9 @@ class Reader:
                     line = int(run.line[run.curves.element[0]])
                     raise InputError("CS503", "a curve in rotary words", "write it as lines", file=self.name, line=line)
                 self.problems += axis_problems(table, machine, way, self.state, rotary.angle_step)
+                bare = rotary.tip_control and self.state.tip_control in self.dialect.controls.get("machine", ())
+                if bare and machine.names and not self.dialect.switches:
+                    self._tell_once(away_problems(run, machine, rotary.angle_step))
                 if self.dialect.switches:
                     tip_control = rotary.tip_control
                     self._tell_once(kinematics_problems(run, machine, self.state, tip_control=tip_control))

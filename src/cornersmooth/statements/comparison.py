@@ -168,6 +168,8 @@ class Comparison:
             if kind == "speed" and not {self.cl.value("spindle"), self.nc.value("spindle")}.isdisjoint(ENDINGS):
                 continue
             wanted, value = self.cl.value(kind), self.nc.value(kind)
+            if kind == "offset" and self.cl.held[kind].line and not self.nc.held[kind].line:
+                value = None  # the length of tool 1 needs its word, too
             if wanted == value and kind in self.nc.held:
                 self._agreed[kind] = self.nc.held[kind]
             elif wanted != value and (moves or (kind in _ENDED and wanted == "OFF")):
