@@ -99,6 +99,13 @@ def test_a_tool_without_a_length_is_refused(lengths: str) -> None:
     assert refused.value.line == 2 + CL[: CL.index("LOADTL/7")].count("\n") - 1
 
 
+def test_a_tool_that_toolno_loads_needs_its_length_too() -> None:
+    with pytest.raises(SettingsError) as refused:
+        lines_of(form_of("fanuc", machine("1 = 120\n")), CL.replace("LOADTL", "TOOLNO"))
+    assert refused.value.code == "CS219"
+    assert refused.value.line == 2 + CL[: CL.index("LOADTL/7")].count("\n") - 1
+
+
 def test_what_is_no_table_of_lengths_is_refused() -> None:
     for text in ("x = 3", "1 = -3", '1 = "a"'):
         with pytest.raises(SettingsError):
