@@ -187,8 +187,7 @@ class Mode:
     off: Blocks = ()
     motion: Motion = Motion()
     circles: bool = False  #: whether arcs may be written as circular blocks, without the words of the orientation
-    #: whether only those of G17 may: the length of the tool acts across the plane
-    circles_in_xy: bool = False
+    circles_in_xy: bool = False  #: whether only those of G17 may: the length of the tool acts across the plane
     #: whether tables that would tilt their plane must stand at zero, where tip control began
     circles_at_zero: bool = False
     #: whether blocks in which only rotary axes turn are written with inverse time: F would be degrees per minute
