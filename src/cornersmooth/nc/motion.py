@@ -205,7 +205,8 @@ class Motion:
             self._look_at_first(at.lifted(first, height), pose)
             self._approach_first(first, height)
             rows = rows if above else rows.with_programmed_feed(self.program)
-        self._note_tool(pose, modals.tool)
+        if not modals.tool:
+            self._once("CS334" if modals.tool is None else "CS382", pose)
         if not rows.rapid.all():
             self.note_cut(int(rows.move[np.argmin(rows.rapid)]), turning=bool(modals["spindle"]))
         if at.form.rotary:
@@ -330,11 +331,6 @@ class Motion:
         self._looked_until = pose
         if self._tilted:
             self.findings.note("CS358", int(self.program.line[pose]))
-
-    def _note_tool(self, pose: int, tool: int | None) -> None:
-        """Say that a tool moves that was not loaded, or that is none."""
-        if not tool:
-            self._once("CS334" if tool is None else "CS382", pose)
 
     def note_cut(self, pose: int, *, turning: bool) -> None:
         """Say that a tool cuts while the spindle stands."""

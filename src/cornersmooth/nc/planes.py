@@ -199,7 +199,7 @@ def check_travel_of_words(planes: Planes, program: Program, form: Form, findings
     with travel nothing is known.
     """
     machine = form.machine
-    if machine is None or not machine.travel:
+    if machine is None or not machine.travel or (form.rotary and not planes.planes):
         return
     pose, tip, _ = poses_and_arcs(program, _ARC_STEP)
     moving = program.kind[pose] != Move.FROM
