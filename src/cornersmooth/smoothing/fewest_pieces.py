@@ -47,6 +47,9 @@ _LARGEST: Final = math.radians(75.0)
 #: vertices before the farthest that are tried where the piece to it turns too much at its end
 _BACK: Final = 6
 
+#: steps of the radius that the chord of an arc is long, at least
+_SHORTEST: Final = 20.0
+
 #: share of a tangent's room that is planned with: the rest is for the rounding of the radius
 _PLANNED: Final = 0.98
 
@@ -227,110 +230,147 @@ class _Search:
         return starts_well & ends_well
 
     def _arcs(self, at: Ints, end: Ints, enters: Floats) -> _Found:
-        limits, count = self.limits, len(at)
-        a, b = self.point[at], self.point[end]
-        middle = self.point[(at + end) // 2]
-        normal = np.abs(np.cross(middle - a, b - middle))
-        closed = [axis for axis, plane in ((2, 17), (1, 18), (0, 19)) if plane not in limits.planes]
-        normal[:, closed] = -1.0
-        plane = 2 - np.argmax(normal, axis=1)
-        first, second, third = AXES[plane].T
-        own = np.arange(count)
-
-        def local(vectors: Floats, which: Ints) -> tuple[Floats, Floats, Floats]:
-            rows = np.arange(len(vectors))
-            return vectors[rows, first[which]], vectors[rows, second[which]], vectors[rows, third[which]]
-
-        across, up, rise = local(b - a, own)
-        length = np.hypot(across, up)
-        fit = (length > 20.0 * limits.step) & (end - at > 1)
+        limits = self.limits
+        plane = self._planes(at, end)
+        chords = _Chords(self.point, at, end, plane, _SHORTEST * limits.step)
+        fit = chords.long & (end - at > 1)
         if limits.flat:
-            fit &= rise == 0.0
-        safe = np.where(fit, length, 1.0)
-        cosine, sine = across / safe, up / safe
-        line, place = spread(end - at)  # edges, and vertices at their ends
-
-        def seen(values: Floats) -> tuple[Floats, Floats, Floats]:
-            u, v, w = local(values - a[line], line)
-            return u * cosine[line] + v * sine[line], v * cosine[line] - u * sine[line], w
-
-        row = at[line] + place
-        x, y, w = (np.column_stack(pair) for pair in zip(seen(self.point[row]), seen(self.point[row + 1]), strict=True))
-        begin = starts(end - at)[:-1]
-        edges = [np.concatenate((values[:, 1], values.mean(axis=1))) for values in (x, y)]
-        sees, per = _seen(edges[0], edges[1], np.tile(safe[line], 2))
-        weight, sees = (per**2).reshape(2, -1).sum(axis=0), (sees * per**2).reshape(2, -1).sum(axis=0)
-        mean = np.add.reduceat(sees, begin) / np.maximum(np.add.reduceat(weight, begin), 1e-300)
+            fit &= chords.rise == 0.0
+        mean = chords.mean()
         fit &= np.abs(mean) <= _LARGEST
         mean = np.where(fit, mean, 0.0)
-        dx, dy = np.diff(x)[:, 0], np.diff(y)[:, 0]
-        squared = np.where(dx**2 + dy**2 > 0.0, dx**2 + dy**2, 1.0)
-
-        def nearest(beta: Floats) -> Floats:
-            """Parts of the edges where they are nearest to the centre."""
-            centre = (safe / (2.0 * np.tan(np.where(beta == 0.0, 1e-9, beta))))[line]
-            return np.clip(((safe[line] / 2.0 - x[:, 0]) * dx + (centre - y[:, 0]) * dy) / squared, 0.0, 1.0)
-
-        # in order: x never falls, and stays between the ends
-        wrong = (dx < 0.0) | (x[:, 0] < 0.0) | (x[:, 1] > safe[line] * (1.0 + 1e-12))
-        lowest, highest = np.full(count, -_LARGEST), np.full(count, _LARGEST)
-
-        def points(beta: Floats) -> Iterator[tuple[Floats, Floats, Floats]]:
-            """Vertices, and where edges are nearest to the centre: along the chord, off it, and height off the arc."""
-            for part in (np.ones_like(dx), nearest(beta)):
-                here, off, high = (values[:, 0] + part * np.diff(values)[:, 0] for values in (x, y, w))
-                yield here, off, high - rise[line] * _share(here / safe[line], beta[line])
-
-        for here, off, high in points(mean):
-            sees, per = _seen(here, off, safe[line])
-            left = limits.tolerance**2 - high**2
-            wrong |= left <= 0.0
-            with np.errstate(divide="ignore"):
-                width = np.sqrt(np.maximum(left, 1e-300)) / per
-            lowest = np.maximum(lowest, np.maximum.reduceat(sees - width, begin))
-            highest = np.minimum(highest, np.minimum.reduceat(sees + width, begin))
-        fit &= np.bincount(line[wrong], minlength=count) == 0
-        fit &= lowest <= highest
-        slope = np.arctan2(rise, safe * mean / np.where(mean == 0.0, 1.0, np.sin(mean)) + (mean == 0.0) * safe)
-        fit &= np.abs(slope) <= limits.slope
-
-        def window(direction: Floats, room: Floats) -> tuple[Floats, Floats]:
-            """Angle from the chord to a direction in the plane, and how far a tangent may be off it."""
-            du, dv, dw = local(direction, own)
-            turned = np.arctan2(dv * cosine - du * sine, du * cosine + dv * sine)
-            off = np.abs(np.arcsin(np.clip(dw, -1.0, 1.0)) - slope)
-            half = np.sqrt(np.maximum((_PLANNED * room) ** 2 - off**2, 0.0)) / np.cos(slope)
-            free = np.isnan(du) | (room > _WIDE)
-            return np.where(free, 0.0, turned), np.where(free, np.inf, np.where(off > room, -1.0, half))
-
-        turned, half = window(enters, self.room[at])
+        lowest, highest = chords.room(mean, limits.tolerance)
+        slope = chords.slope(mean)
+        fit &= (lowest <= highest) & (np.abs(slope) <= limits.slope)
+        # tangents at both ends, where they have to be met
+        turned, half = chords.window(enters, self.room[at], slope)
         low_in, high_in = np.maximum(lowest, -turned - half), np.minimum(highest, -turned + half)
         near = fit & (low_in <= high_in)
-        turned, half = window(self.ahead[end], self.room[end])
+        turned, half = chords.window(self.ahead[end], self.room[end], slope)
         low_out, high_out = np.maximum(low_in, turned - half), np.minimum(high_in, turned + half)
         whole = low_out <= high_out
         beta = np.clip(mean, np.where(whole, low_out, low_in), np.where(whole, high_out, high_in))
-        size = safe / (2.0 * np.maximum(np.abs(np.sin(beta)), 1e-12))
+        # what is written is measured once more
+        size = chords.safe / (2.0 * np.maximum(np.abs(np.sin(beta)), 1e-12))
         ticks = np.rint(np.minimum(size, 2.0 * limits.largest) / limits.step)
         size = ticks * limits.step
-        reachable = near & (size <= limits.largest) & (2.0 * size > safe)
-        beta = np.sign(beta) * np.arcsin(np.where(reachable, safe / (2.0 * np.where(reachable, size, 1.0)), 0.0))
-        written = reachable & (np.abs(beta) <= _LARGEST + 1e-3)
-        across = (safe / (2.0 * np.tan(np.where(written, beta, 1.0))))[line]
-        for here, off, high in points(beta):
-            round_ = np.hypot(here - safe[line] / 2.0, off - across) - size[line]
-            far = round_**2 + high**2 > limits.tolerance**2
-            written &= np.bincount(line[far], minlength=count) == 0
-        tangents = []
-        for angle in (-beta, beta):
-            flat = np.zeros((count, 3))
-            flat[own, first] = np.cos(angle) * cosine - np.sin(angle) * sine
-            flat[own, second] = np.cos(angle) * sine + np.sin(angle) * cosine
-            flat[own, third] = np.tan(slope)
-            tangents.append(unit(flat))
-        good = written & whole & self._meets(at, end, enters, *tangents)
+        written = near & (size <= limits.largest) & (2.0 * size > chords.safe)
+        beta = np.sign(beta) * np.arcsin(np.where(written, chords.safe / (2.0 * np.where(written, size, 1.0)), 0.0))
+        written &= np.abs(beta) <= _LARGEST + 1e-3
+        written &= chords.keeps(np.where(written, beta, 1.0), beta, size, limits.tolerance)
+        first, last = chords.tangents(beta, slope)
+        good = written & whole & self._meets(at, end, enters, first, last)
         radius = np.where(good, np.sign(beta) * ticks, 0.0).astype(np.int64)
-        return _Found(near, good, plane + FIRST, radius, tangents[1])
+        return _Found(near, good, plane + FIRST, radius, last)
+
+    def _planes(self, at: Ints, end: Ints) -> Ints:
+        """Of each part the plane, less 17, that it lies in most nearly of those that are allowed."""
+        a, b, middle = self.point[at], self.point[end], self.point[(at + end) // 2]
+        normal = np.abs(np.cross(middle - a, b - middle))
+        normal[:, [axis for axis, plane in ((2, 17), (1, 18), (0, 19)) if plane not in self.limits.planes]] = -1.0
+        return 2 - np.argmax(normal, axis=1)
+
+
+class _Chords:
+    """c parts of a polyline beside their chords: x along it, y across it in the plane of an arc, w off the plane."""
+
+    def __init__(self, point: Floats, at: Ints, end: Ints, plane: Ints, shortest: float) -> None:
+        self.axes, self.own = AXES[plane], np.arange(len(at))
+        across, up, self.rise = self._local(point[end] - point[at], self.own)
+        length = np.hypot(across, up)
+        self.long = length > shortest
+        #: (c,) length of the chord in the plane, where it is long enough; else 1
+        self.safe = np.where(self.long, length, 1.0)
+        self.cosine, self.sine = across / self.safe, up / self.safe
+        self.line, place = spread(end - at)  # part of each edge
+        self.begin = starts(end - at)[:-1]
+        row = at[self.line] + place
+        ends = (self._seen(point[row + k] - point[at][self.line]) for k in (0, 1))
+        #: (e, 2) both ends of each edge
+        self.x, self.y, self.w = (np.column_stack(pair) for pair in zip(*ends, strict=True))
+        self.dx, self.dy = np.diff(self.x)[:, 0], np.diff(self.y)[:, 0]
+
+    def _local(self, vectors: Floats, which: Ints) -> tuple[Floats, Floats, Floats]:
+        """Vectors along the axes of the plane of some parts."""
+        first, second, third = np.take_along_axis(vectors, self.axes[which], axis=1).T
+        return first, second, third
+
+    def _seen(self, gone: Floats) -> tuple[Floats, Floats, Floats]:
+        u, v, w = self._local(gone, self.line)
+        cosine, sine = self.cosine[self.line], self.sine[self.line]
+        return u * cosine + v * sine, v * cosine - u * sine, w
+
+    def mean(self) -> Floats:
+        """(c,) β of the arcs that lie in the middle of the edges, all in all."""
+        ends = [np.concatenate((values[:, 1], values.mean(axis=1))) for values in (self.x, self.y)]
+        sees, per = _seen(ends[0], ends[1], np.tile(self.safe[self.line], 2))
+        weight, sees = (per**2).reshape(2, -1).sum(axis=0), (sees * per**2).reshape(2, -1).sum(axis=0)
+        found: Floats = np.add.reduceat(sees, self.begin) / np.maximum(np.add.reduceat(weight, self.begin), 1e-300)
+        return found
+
+    def _points(self, beta: Floats) -> Iterator[tuple[Floats, Floats, Floats]]:
+        """Vertices, and where edges are nearest to the centre: along the chord, off it, and height off the arc."""
+        safe, squared = self.safe[self.line], self.dx**2 + self.dy**2
+        centre = (self.safe / (2.0 * np.tan(np.where(beta == 0.0, 1e-9, beta))))[self.line]
+        to_centre = (safe / 2.0 - self.x[:, 0]) * self.dx + (centre - self.y[:, 0]) * self.dy
+        nearest = np.clip(to_centre / np.where(squared > 0.0, squared, 1.0), 0.0, 1.0)
+        for part in (np.ones_like(nearest), nearest):
+            here, off, high = (values[:, 0] + part * np.diff(values)[:, 0] for values in (self.x, self.y, self.w))
+            yield here, off, high - self.rise[self.line] * _share(here / safe, beta[self.line])
+
+    def room(self, beta: Floats, tolerance: float) -> tuple[Floats, Floats]:
+        """(c,) least and largest β within a tolerance, at the heights of one; none where edges go back."""
+        count, safe = len(self.own), self.safe[self.line]
+        lowest, highest = np.full(count, -_LARGEST), np.full(count, _LARGEST)
+        # in order: x never falls, and stays between the ends
+        wrong = (self.dx < 0.0) | (self.x[:, 0] < 0.0) | (self.x[:, 1] > safe * (1.0 + 1e-12))
+        for here, off, high in self._points(beta):
+            sees, per = _seen(here, off, safe)
+            left = tolerance**2 - high**2
+            wrong |= left <= 0.0
+            with np.errstate(divide="ignore"):
+                width = np.sqrt(np.maximum(left, 1e-300)) / per
+            lowest = np.maximum(lowest, np.maximum.reduceat(sees - width, self.begin))
+            highest = np.minimum(highest, np.minimum.reduceat(sees + width, self.begin))
+        return np.where(np.bincount(self.line[wrong], minlength=count) == 0, lowest, np.inf), highest
+
+    def slope(self, beta: Floats) -> Floats:
+        """(c,) rad; how steeply arcs rise."""
+        arc = self.safe * beta / np.where(beta == 0.0, 1.0, np.sin(beta)) + (beta == 0.0) * self.safe
+        found: Floats = np.arctan2(self.rise, arc)
+        return found
+
+    def window(self, direction: Floats, room: Floats, slope: Floats) -> tuple[Floats, Floats]:
+        """Angle from the chord to a direction in the plane, and how far a tangent may be off it."""
+        du, dv, dw = self._local(direction, self.own)
+        turned = np.arctan2(dv * self.cosine - du * self.sine, du * self.cosine + dv * self.sine)
+        off = np.abs(np.arcsin(np.clip(dw, -1.0, 1.0)) - slope)
+        half = np.sqrt(np.maximum((_PLANNED * room) ** 2 - off**2, 0.0)) / np.cos(slope)
+        free = np.isnan(du) | (room > _WIDE)
+        return np.where(free, 0.0, turned), np.where(free, np.inf, np.where(off > room, -1.0, half))
+
+    def keeps(self, safe_beta: Floats, beta: Floats, size: Floats, tolerance: float) -> Bools:
+        """(c,) whether arcs of a size are within a tolerance; of no use where they are none."""
+        across = (self.safe / (2.0 * np.tan(safe_beta)))[self.line]
+        far = np.zeros(len(self.line), np.bool_)
+        for here, off, high in self._points(beta):
+            round_ = np.hypot(here - self.safe[self.line] / 2.0, off - across) - size[self.line]
+            far |= round_**2 + high**2 > tolerance**2
+        return np.bincount(self.line[far], minlength=len(self.own)) == 0
+
+    def tangents(self, beta: Floats, slope: Floats) -> Iterator[Floats]:
+        """Directions (c, 3) at the start and at the end of arcs."""
+        for angle in (-beta, beta):
+            found = np.zeros((len(beta), 3))
+            along = np.column_stack(
+                (
+                    np.cos(angle) * self.cosine - np.sin(angle) * self.sine,
+                    np.cos(angle) * self.sine + np.sin(angle) * self.cosine,
+                    np.tan(slope),
+                )
+            )
+            np.put_along_axis(found, self.axes, along, axis=1)
+            yield unit(found)
 
 
 def _seen(x: Floats, y: Floats, length: Floats) -> tuple[Floats, Floats]:
