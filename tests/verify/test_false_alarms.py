@@ -5,12 +5,16 @@ The numbers come from random programs, cut down to the moves that matter.
 
 from __future__ import annotations
 
+import io
 from dataclasses import dataclass, replace
 
 import pytest
 
 from cornersmooth.cl import read
+from cornersmooth.kinematics import load_machine
 from cornersmooth.model import Program
+from cornersmooth.nc import choose_form
+from cornersmooth.pipeline import postprocess
 from cornersmooth.settings import Settings
 from cornersmooth.verify import Verification, verify
 from nc.cases import Case
@@ -756,3 +760,16 @@ def test_cycles_of_one_hole_are_told_apart() -> None:
     assert [problem.code for problem in found] == ["CS556"]
     moved = [*lines[:dwell], *lines[dwell + 1 : second + 1], lines[dwell], *lines[second + 1 :]]
     assert "CS556" in [problem.code for problem in TWO_CYCLES_IN_A_HOLE.verified("\n".join(moved)).problems]
+
+
+def test_holes_in_one_line_to_the_digits_of_the_cl_file() -> None:
+    """From one hole, without a retract, up along the tool to the next, which lies in its line but for the last digit of the CL file."""
+    cl = (
+        "UNITS/MM\nLOADTL/1\nSPINDL/2000,RPM,CLW\nCYCLE/DRILL,FEDTO,4.0,MMPM,100,RAPTO,3,RTRCTO,20\n"
+        "GOTO/37.4690,21.4146,-13.0597,0.0506639,-0.0575490,0.9970563\nLOADTL/3\n"
+        "GOTO/38.0770,20.7240,-1.0950,0.0506639,-0.0575490,0.9970563\nSPINDL/OFF\nFINI\n"
+    )
+    form, stream = choose_form("generic", machine=load_machine("head-table-bc")), io.BytesIO()
+    postprocess(cl.encode(), stream, Settings(tolerance=0.00214, axis_length=20.0), form=form, verify=False)
+    how = {"control": "generic", "machine": form.machine, "tolerance": 0.00214, "axis_length": 20.0}
+    assert not verify(read(cl.encode()), stream.getvalue(), **how).problems
