@@ -14,7 +14,9 @@ from cornersmooth.kinematics import load_machine
 from cornersmooth.kinematics.machine import Dynamics
 from cornersmooth.model import Move, Program, Statement
 from cornersmooth.nc import choose_form, fit_settings
-from cornersmooth.times.saving import planned_saving
+from cornersmooth.settings import Settings
+from cornersmooth.times import saving
+from cornersmooth.times.saving import Timing, faster_method, planned_saving, written_text
 
 
 def winding(count: int) -> Program:
@@ -118,3 +120,30 @@ def test_holes_count_on_neither_side(program, whole):
     drilled = Program.from_poses(tip, axis, kind=kind, feed=1500.0, statements=(*program.statements, *words))
     found = planned_saving(drilled, settings, form, Limits())
     assert found.direct - found.written == pytest.approx(whole.direct - whole.written, abs=0.1)
+
+
+def row_of_bends(poses: int) -> Program:
+    """Dense poses along a wave whose axis sways: curves of whole runs are faster there."""
+    at = np.linspace(0.0, 1.0, poses)
+    tip = np.stack((60.0 * at, 3.0 * np.sin(9.0 * at), np.cos(13.0 * at)), axis=1)
+    axis = np.stack((0.4 * np.sin(5.0 * at) + 0.3, 0.5 * np.cos(7.0 * at), np.ones(poses)), axis=1)
+    return Program.from_poses(np.round(tip, 3), axis, feed=1800.0)
+
+
+def test_lines_have_the_method_whose_program_is_faster(monkeypatch: pytest.MonkeyPatch) -> None:
+    program, form, axes = row_of_bends(120), choose_form("fanuc", "g1"), load_machine("table-ac")
+    times = {}
+    for method in ("proportional", "global"):
+        settings = fit_settings(Settings(method=method), form, program.units)
+        timing = Timing.of(form, settings, axes=axes)
+        assert timing is not None
+        times[method] = timing.written(written_text(program, settings, form), program)[0]
+    assert times["global"] < 0.98 * times["proportional"]
+    assert faster_method(program, Settings(), form, axes).method == "global"
+    # a method that is named stays, and so does one whose program nobody times
+    assert faster_method(program, Settings(method="zhang2016"), form, axes).method == "zhang2016"
+    assert faster_method(row_of_bends(4001), Settings(), form, axes).method == "auto"
+    of_linuxcnc = choose_form("linuxcnc", machine=load_machine("xyzac-trt"))
+    assert faster_method(program, Settings(), of_linuxcnc, axes).method == "auto"
+    monkeypatch.setattr(saving, "_FASTER", 0.5)
+    assert faster_method(program, Settings(), form, axes).method == "auto"

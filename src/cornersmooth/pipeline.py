@@ -167,7 +167,7 @@ def read_back(text: bytes | str, form: Form, settings: Settings, name: str | Non
 def postprocess(
     source: Program | bytes | str | os.PathLike[str],
     target: Target,
-    settings: Settings | None = None,
+    settings: Settings | Callable[[Program], Settings] | None = None,
     *,
     form: Form | None = None,
     frame: Frame | None = None,
@@ -189,7 +189,7 @@ def postprocess(
     ----------
     source : Program, path or bytes
     target : path or binary stream
-    settings : Settings, optional
+    settings : Settings, or function of a Program that gives them, optional
         ε 0.01 mm, H 10 mm, the method that suits the form; fitted here to its digits.
     form : Form, optional
         What `choose_form` gives; fanuc g1 by default.
@@ -229,7 +229,7 @@ def postprocess(
         As `read`, `choose_form`, `write` and `open_output` say it.
     """
     form = nc.choose_form() if form is None else form
-    if plan_feeds is not None:
+    if plan_feeds is not None and not callable(settings):
         settings = _for_planned_feeds(Settings() if settings is None else settings, form)
     processes = useful_processes() if processes is None else processes
     may_replace = check_output(target, [] if isinstance(source, (Program, bytes)) else [source], force=force)
@@ -242,7 +242,7 @@ def postprocess(
     with _timed(seconds, "read"):
         program = (source if isinstance(source, Program) else read(source, **(reading or {}))).with_feed(feed)
     with _timed(seconds, "smooth"):
-        step = stage_of(progress, "smoothing")
+        step, settings = stage_of(progress, "smoothing"), settings(program) if callable(settings) else settings
         smoothed = smooth(program, settings, form=form, progress=step, processes=processes)
     return_free_memory()  # before processes share what there is
     frame = (frame or Frame()).with_offset_of(program, form)

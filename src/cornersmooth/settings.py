@@ -81,7 +81,8 @@ class Settings:
     #: is given is against it, else proportional.
     method: str = option(
         AUTO,
-        "How the curves are made. With auto: global in curves (g6.2, bspline, poly, spl), proportional in lines. "
+        "How the curves are made. With auto: global in curves (g6.2, bspline, poly, spl); in lines proportional, or "
+        "global where its program is faster under --limits. "
         + " ".join(f"With {item.name}: {item.summary}." for item in METHODS.values())
         + " Global takes less time on the machine and about a block a pose in curves; on LinuxCNC it takes more time.",
     )

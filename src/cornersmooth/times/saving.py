@@ -15,9 +15,10 @@ from cornersmooth.feedrate.linuxcnc import axis_limits, line_times, program_line
 from cornersmooth.feedrate.machine_axes import follow
 from cornersmooth.feedrate.parts import time_of_parts
 from cornersmooth.feedrate.path import Path, build_path
-from cornersmooth.feedrate.resolution import Resolution
+from cornersmooth.feedrate.resolution import ROUGHLY, Resolution
 from cornersmooth.feedrate.written import text_path
 from cornersmooth.kinematics import Machine, endless, tool_axis, with_dynamics
+from cornersmooth.methods import AUTO, CURVES_METHOD, DEFAULT_METHOD
 from cornersmooth.model import Floats, Ints, Move, Program
 from cornersmooth.nc import Form
 from cornersmooth.pipeline import Progress, read_back, stage_of
@@ -30,6 +31,9 @@ LINUXCNC = "linuxcnc-2.9"
 
 #: poses up to which motions are planned whole
 _WHOLE = 4_000
+
+#: time over that of the usual method from which on another is taken: rough plans tell no less apart
+_FASTER = 0.99
 
 #: of the digits of a program, mm and radians: a pose of it is the same as one of the CL file
 _SAME = 1e-3
@@ -171,6 +175,27 @@ def planned_saving(
         return Saving(before, written, limited, against)
     except CornersmoothError:
         return None
+
+
+def faster_method(program: Program, settings: Settings, form: Form, axes: Machine) -> Settings:
+    """Settings with a method in the place of "auto" where lines are written: that of the program that takes less time.
+
+    Rough plans under the limits of `axes` are compared; the usual method stays where they cannot tell, where the
+    program is long, and where the control has a law of its own.
+    """
+    own = without_holes(program)
+    timing = Timing.of(form, settings, axes=axes)
+    if settings.method != AUTO or form.curves or timing is None or len(program) > _WHOLE or form.table.lines.planner:
+        return settings
+    times = []
+    for method in (DEFAULT_METHOD, CURVES_METHOD):
+        try:
+            some = nc.fit_settings(settings.but(method=method), form, program.units)
+            text = written_text(own, some, form)
+            times.append(replace(timing, settings=some).written(text, own, resolution=ROUGHLY)[0])
+        except CornersmoothError:  # nobody runs it, or its time is not known
+            return settings
+    return settings.but(method=CURVES_METHOD) if times[1] < _FASTER * times[0] else settings
 
 
 def _in_parts(timing: Timing, text: bytes, program: Program, progress: Progress | None) -> Saving:
