@@ -127,10 +127,7 @@ FINDINGS: Final[dict[str, tuple[Severity, str]]] = {
         "{word} changes the coordinates of what follows: ignored; see that the path is in one coordinate system",
     ),
     "CS144": ("warning", "{what}: ignored"),
-    "CS145": (
-        "note",
-        "NURBS curves become lines within {tolerance:g} mm where the program cannot have them as they are",
-    ),
+    "CS145": ("note", "NURBS curves become lines within {tolerance:g} mm where the program has no curves"),
     "CS146": ("note", "{word} changes: positions and axes are read into {into}"),
     "CS147": ("warning", "the tool axis turns along an arc, and how it turns is not defined"),
     "CS148": ("warning", "FEDRAT without a unit is read in the unit of the file"),
@@ -156,10 +153,7 @@ FINDINGS: Final[dict[str, tuple[Severity, str]]] = {
         "warning",
         "{what} before this line, and the tool feeds straight on; see that it may, or say --between-passes",
     ),
-    "CS209": (
-        "warning",
-        "the whole path is {size:.3g} {units} long: are the numbers metres?; then --scale 1000",
-    ),
+    "CS209": ("warning", "the whole path is {size:.3g} {units} long: are the numbers metres?; then --scale 1000"),
     "CS176": ("note", "the file states no units: mm assumed"),
 }
 

@@ -156,21 +156,19 @@ def curves_of(
         elsewhere = kind[pose[0]] in (Move.FROM, Move.HOLE)  # the tool does not come from that pose
         if fixed or elsewhere or exact[pose].any() or (kind[pose[1:]] != Move.LINEAR).any():
             continue
-        if one.control.shape[1] == 3:
-            up = axis[pose[1]] / scale
-            control, bezier = (np.concatenate((p, p + up), axis=-1) for p in (one.control, one.bezier))
-        else:
-            lever = scale * np.linalg.norm(one.control[0, 3:] - one.control[0, :3])
-            control, bezier = (
-                np.concatenate((p[..., :3], p[..., :3] + (p[..., 3:] - p[..., :3]) / lever), axis=-1)
-                for p in (one.control, one.bezier)
-            )
+        control, bezier = (_raised(scale * points, axis[pose[1]]) for points in (one.control, one.bezier))
         poses.append(pose[1:])
-        pieces.append(scale * bezier)
-        runs += _as_run(one, pose, scale * control)
+        pieces.append(bezier)
+        runs += _as_run(one, pose, control)
     if not poses:
         return None
     return Curves(np.concatenate(poses), np.concatenate(pieces), joined_rows(runs) if runs else None)
+
+
+def _raised(points: Floats, axis: Floats) -> Floats:
+    """Points (..., 3 or 6) of tip, with second points about 1 mm up the tool axis."""
+    tip, way = points[..., :3], points[..., 3:] - points[..., :3] if points.shape[-1] == 6 else axis
+    return np.concatenate((tip, tip + way / np.linalg.norm(way.reshape(-1, 3)[0])), axis=-1)
 
 
 def _as_run(one: Cubic, pose: Ints, control: Floats) -> list[Runs]:

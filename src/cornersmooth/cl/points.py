@@ -76,12 +76,7 @@ def looks_like_points(data: bytes) -> bool:
 
 
 def read_points(
-    data: bytes,
-    *,
-    name: str,
-    units: Units | None = None,
-    lenient: bool = False,
-    rules: TableRules = TableRules(),
+    data: bytes, *, name: str, units: Units | None = None, lenient: bool = False, rules: TableRules = TableRules()
 ) -> Program:
     """Read a CSV or column file: every row is a linear move to its pose, at feed or rapid (InputError CS150-CS166).
 
