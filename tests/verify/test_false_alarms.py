@@ -763,7 +763,7 @@ def test_cycles_of_one_hole_are_told_apart() -> None:
 
 
 def test_holes_in_one_line_to_the_digits_of_the_cl_file() -> None:
-    """From one hole, without a retract, up along the tool to the next, which lies in its line but for the last digit of the CL file."""
+    """Up along the tool, without a retract, to a hole that is in the line of the one before but for the last digit."""
     cl = (
         "UNITS/MM\nLOADTL/1\nSPINDL/2000,RPM,CLW\nCYCLE/DRILL,FEDTO,4.0,MMPM,100,RAPTO,3,RTRCTO,20\n"
         "GOTO/37.4690,21.4146,-13.0597,0.0506639,-0.0575490,0.9970563\nLOADTL/3\n"
