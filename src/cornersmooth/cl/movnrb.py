@@ -31,7 +31,7 @@ NEAR: Final = 1e-3
 AT_START: Final = 1e-5
 
 #: where chords are as near as at the tip: LENGTH may be less than any tool, units of the file
-REACH: Final = 100.0
+REACH: Final = 40.0
 
 #: statements of control points, and what they are of
 TIP, SECOND = 2, 3
