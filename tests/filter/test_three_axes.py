@@ -172,3 +172,12 @@ def test_what_is_not_known_is_said_with_the_line_since_which(tmp_path: Path) -> 
     (tmp_path / "part.nc").write_text(FANUC.format("M98 P1000\nG1 " + CUTS))
     made = run("filter", "part.nc", "-o", "new.nc", cwd=tmp_path)
     assert b"not said again since 'M98 P1000': compensation of the cutter (G40), G90 or G91, units" in made.stderr
+
+
+@pytest.mark.parametrize("corner", [",C1.", ",R0.5"])
+def test_a_chamfer_leaves_the_rest_known(corner: str, tmp_path: Path) -> None:
+    text = FANUC.format(f"X-9. {corner}\nY9.\nX0.\n" + CUTS)
+    told, new = filtered(tmp_path, text)
+    assert told.startswith("PASSED")
+    assert f"G1 Z-1. F350.\nX-9. {corner}\nY9.\n".encode() in new
+    assert int(re.search(r"(\d+) of \d+ cuts smoothed", told)[1]) >= len(PASS)  # type: ignore[index]

@@ -22,6 +22,8 @@ _WORKED_OUT: Final = re.compile(
     r"([A-Z]+\d*)\s*=?\s*[-+]?(?:#(?:<[^>]*>|\d+|\[[^]]*\])|\[[^]]*\]|Q[LRS]?\d+|"
     r"(?<==)\"[^\"]*\"|(?<==)(?:AC|IC|DC|ACP|ACN)\([^()]*\)|(?<==)[A-Z_$][^\s]*)"
 )
+#: a chamfer or a round corner at the end of a block: it changes neither groups nor the end of the next block
+_CORNER: Final = re.compile(r",\s*[RC]\s*[\d.]+")
 #: words that change no group, whatever their number
 _NUMBERS: Final = frozenset("XYZABCFSQRP")
 #: jumps, loops and labels, which are no words
@@ -48,7 +50,8 @@ def _execute(state: State, plain: str, lexer: Lexer) -> str:
         return ""
     lost = {match[1] for match in _WORKED_OUT.finditer(plain)}
     try:
-        line = lexer.line(_WORKED_OUT.sub(" ", plain).encode("latin-1"), 0, None) if lost else None
+        bare = _CORNER.sub(" ", _WORKED_OUT.sub(" ", plain))
+        line = lexer.line(bare.encode("latin-1"), 0, None) if bare != plain else None
     except InputError:
         line = None
     if line is None and state.table.row(plain) is not UNKNOWN:

@@ -57,7 +57,7 @@ _SHOWN: Final = 40
 _NAMED: Final = {axis: re.compile(rb"(?i)(?<![A-Z])%b" % axis.encode()) for axis in "XYZ"}
 
 #: a word that may turn an axis that a program of three axes has not, and what a cut that has it is left for
-TURNS: Final = re.compile(rb"(?i)(?<![A-Z])[ABC][ \t]*=?[ \t]*[-+]?[\d.]")
+TURNS: Final = re.compile(rb"(?i)(?<![A-Z,])[ABC][ \t]*=?[ \t]*[-+]?[\d.]")
 _TURNS: Final = "an axis turns in it: name the machine"
 
 #: what `Reading.why` says of lines that are no cuts, and of plain cuts
