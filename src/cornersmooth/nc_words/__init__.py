@@ -5,9 +5,9 @@ Nothing in it measures motion, and nothing in it knows the CL file: what that as
 =================== ===================================================================================================
 what is decided     where
 =================== ===================================================================================================
-the closed list     `rules`, of the control's table in `nc_reader/word_lists`
-one block           `blocks`: which rule each word falls under, and what may not be together
-states              `states`: what holds where the tool moves, is changed, or the program ends
+one block           `blocks`: which row of `control.table` each word falls under, and what may not be together
+states              `states`: what must hold of the groups of `control.state` where the tool moves, or is changed
+parts               `parts`: digests of what is not of the motion
 positions           `machine_positions`: those of the machine's file
 all blocks in order `check`: the walk, how a program begins and ends, and what is taken on trust
 =================== ===================================================================================================
