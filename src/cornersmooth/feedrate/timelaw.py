@@ -12,6 +12,7 @@ from cornersmooth.feedrate.path import Path
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.settings import Limits
 
+#: rounds of halving: the time is exact in its last digit
 _HALVINGS = 60
 
 

@@ -23,6 +23,7 @@ TOGETHER: Final = 1.8
 #: for what lies between two samples
 _BETWEEN: Final = 0.98
 
+#: nothing is divided by less
 _LEAST: Final = 1e-30
 
 
