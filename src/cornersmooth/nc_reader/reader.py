@@ -148,10 +148,8 @@ class Reader:
         for table in joined_tables(self.waiting, sys.maxsize if self.retracts.open else FEW_ROWS):
             before = self.state.modal
             if self.state.incremental:
-                hint = "write G90 after a position of the machine"
-                raise InputError(
-                    "CS503", "motion in incremental words (G91)", hint, file=self.name, line=int(table.line[0])
-                )
+                what, hint = "motion in incremental words (G91)", "write G90 after a position of the machine"
+                raise InputError("CS503", what, hint, file=self.name, line=int(table.line[0]))
             run, self.state.modal = execute(table, before, self.problems)
             if self.state.rotary is not None:
                 self.problems += clamp_problems(run, before.second, self.state.rotary.machine, self.state)
