@@ -444,8 +444,11 @@ def test_rotary_axes_stay_turned_where_nothing_keeps_the_tip(control: str) -> No
     lines = another_post(tuple(stream.getvalue().decode().splitlines()))
     turns = where(lines, r"^(\d+ )?(G0|L) A\S+ C\S+( FMAX)?$", -2)
     assert verify(program(TURNED), "\n".join(lines).encode(), **how).verdict is Verdict.PASSED
-    found = verify(program(TURNED), "\n".join((*lines[:turns], *lines[turns + 1 :])).encode(), **how)
-    assert "no tool tip control where rotary axes are away from zero" in [one.text for one in found.problems]
+    half = re.sub(r"(C[-+]?)0\.0", r"\g<1>0.5", lines[turns])
+    assert half != lines[turns]
+    for block in ((), (half,)):
+        found = verify(program(TURNED), "\n".join((*lines[:turns], *block, *lines[turns + 1 :])).encode(), **how)
+        assert "no tool tip control where rotary axes are away from zero" in [one.text for one in found.problems]
 
 
 def test_the_length_of_the_first_tool_needs_its_word() -> None:

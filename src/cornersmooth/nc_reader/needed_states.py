@@ -79,9 +79,9 @@ def away_problems(run: Elements, machine: Machine, step: float) -> Iterator[Prob
     """Where X Y Z are those of the tip, although nothing keeps it and rotary axes have been sent away from zero."""
     angles = run.second[:, : len(machine.names)]
     full = np.array([np.inf if axis.limits is not None else 360.0 for axis in machine.axes])
-    zero = np.array([0.0 if axis.limits is None else min(max(0.0, axis.low), axis.high) for axis in machine.axes])
+    zero = np.array([min(max(0.0, np.ceil(axis.low)), np.floor(axis.high)) for axis in machine.axes])  # or as near
     off = np.abs(angles - zero) % full
-    away = (np.minimum(off, full - off) > np.ceil(step)).any(axis=1)
+    away = (np.minimum(off, full - off) > step).any(axis=1)
     yield from first_wrong(CONTROL_WORDS, away, run.line, "no tool tip control where rotary axes are away from zero")
 
 
