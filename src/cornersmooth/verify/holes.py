@@ -157,7 +157,7 @@ class HoleLines:
         turned = np.linalg.norm(np.diff(directions(nc, nc.tip[own], nc.second[own]), axis=0)) * self.axis_length
         rises = along > 0.0 and self.kind[max(move - 1, 0)] != Move.HOLE
         none = rises or turned > 2 * self.room or np.linalg.norm(way - along * axis) <= self.tolerance
-        return 0.0 if none else max(abs(along) - 2 * self.room - float(nc.tip_room[own].sum()), 0.0)
+        return 0.0 if none else max(abs(along) - self.tolerance - float(nc.tip_room[own].sum()), 0.0)
 
     def _carries(self, element: int, feed: float, *, per_revolution: bool) -> bool:
         """Whether an element has a feed."""
