@@ -70,6 +70,8 @@ REFUSED_ONCE = {
     1507023: "a rapid that leads nowhere at the pose that a later rapid goes to before a hole",
     1508921: "two rapids to a pose, as far as the digits of turned axes show, and coolant off between them and a hole",
     1502841: "a feed move that leads nowhere over a hole, and later a rapid to the height above it",
+    1501051: "a tap that is left out, and another above it where the tool is behind GOHOME",
+    1510120: "a feed move to where a hole has been left, with words before it, and nothing behind it",
     1005030: "the CL file's own rapid into a hole that is drilled behind it",
 }
 

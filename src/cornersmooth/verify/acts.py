@@ -11,6 +11,7 @@ import numpy as np
 from cornersmooth.model import Ints, Move
 from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.nc_reader.tool import beyond_digits
+from cornersmooth.statements.asked import NOTHING
 from cornersmooth.statements.cycles import Drilling, drillings
 from cornersmooth.verify.cl_motion import Original
 from cornersmooth.verify.holes import HoleLines
@@ -67,7 +68,7 @@ class Stops:
     holes: Ints  #: (h,) which are holes
     fed: list[bool]  #: whether feed moves follow each
     cycles: dict[int, Drilling]  #: by the moves of the holes
-    stated: list[int]  #: moves that statements are before, ascending
+    stated: list[int]  #: moves that statements which ask for something are before, ascending
 
     @classmethod
     def of(cls, original: Original, lines: HoleLines) -> Self:
@@ -82,7 +83,8 @@ class Stops:
         fed[rapid] = False
         moves = np.flatnonzero(chosen)
         cycles = drillings(original.program, original.pose[hole].tolist())
-        stated = np.searchsorted(original.pose, [one.pose for one in original.program.statements])
+        asks = [one.pose for one in original.program.statements if one.word == "GOHOME" or one.word not in NOTHING]
+        stated = np.searchsorted(original.pose, asks)
         return cls(
             moves,
             [*moves.tolist(), len(chosen)],

@@ -145,7 +145,8 @@ class Parse:
             return
         lines, nc, base = self.lines, self._ahead.nc, self._ahead.base
         first = max(element - 1, base)
-        ways = np.linalg.norm(np.diff(nc.tip[first - base : end - base], axis=0), axis=1)
+        tip, second = (values[first - base : end - base] for values in (nc.tip, nc.second))
+        ways = np.linalg.norm(np.diff(self._task.six(tip, directions(nc, tip, second)), axis=0), axis=1)
         gone = self._gone + np.append(0.0, np.cumsum(ways))
         self._gone = float(gone[-1])
         length, last = self._task.path.length, self._task.original.trail.last
@@ -191,18 +192,14 @@ class Parse:
         changed = stop > 0 and self._hole[stop - 1] and not self._has_tool(self._move[stop], element - 1)
         return changed or not lines.stands(element)
 
-    # ------------------------------------------------------------------ holes
-
     def _drill(self, stop: int, element: int) -> tuple[int, int]:
         """Take a hole: it ends where it is done as its cycle says, and where what follows can begin."""
         ahead, lines, move = self._ahead, self.lines, self._move[stop]
-        cycle = self._cycles[move]
-        end = element
+        cycle, end = self._cycles[move], element
         while ahead.has(end):
             if not (self._over(stop, end) or (end > element and lines.stands(end))):
-                if end == element or not self._over(stop, end + 1) or self._begins(stop, end) is not None:
-                    break
-                if self._fitting(stop + 1, end).any():
+                goes_on = end > element and self._over(stop, end + 1) and self._begins(stop, end) is None
+                if not goes_on or self._fitting(stop + 1, end).any():
                     break
                 self._surplus(stop + 1, end)
             end += 1
@@ -244,7 +241,8 @@ class Parse:
         if following == len(self.moves):
             return None if has else lacks
         if self._hole[following]:
-            if not inside and self._over(following, element):
+            below = lines.height(self._move[following], element - 1) < -lines.room  # from there no hole is fed
+            if not inside and self._over(following, element) and not (below and lines.feeds(element)):
                 return lacks
             behind = self._begins(following, element) if self._may_be_left_out(following) else None
             return None if behind is None else behind + 1 + lacks
@@ -294,8 +292,6 @@ class Parse:
                 self._note_way_up(following, begin, reached)
                 return following, end
         return stop, end
-
-    # ------------------------------------------------------------------ faults
 
     def _fitting(self, first: int, element: int) -> Bools:
         """Which stops from one on an element may reach."""
@@ -364,8 +360,6 @@ class Parse:
             text = "the tool comes back in rapid to where it has left a cut" if rapid else at_feed
             self.acts.problems.append(Problem("CS582", 0, lines.nc_line(element), text))
 
-    # ------------------------------------------------------------------ what an element may be
-
     def _over(self, stop: int, element: int) -> bool:
         """Whether an element ends in the line of a hole, and no tool change parts it from that."""
         has = self._ahead.has(element) and self._has_tool(self._move[stop], element)
@@ -395,8 +389,6 @@ class Parse:
         both = slice(max(at - 1, 0), at + 1)
         turn = self.lines.axis_length * np.ptp(directions(nc, nc.tip[both], nc.second[both]), axis=0)
         return at > 0 and not beyond_digits(nc, np.diff(nc.tip[both], axis=0))[0] and max(turn) <= self.lines.room
-
-    # ------------------------------------------------------------------ what is taken down
 
     def _open(self, stop: int, element: int) -> None:
         """Take down the begin of a run: a rapid, or the way out of a hole."""
