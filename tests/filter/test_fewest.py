@@ -13,7 +13,9 @@ import cornersmooth as cs
 from cornersmooth.errors import Verdict
 from cornersmooth.filter import Filtered, filter_program, verify_programs
 from cornersmooth.filter.program import THREE_AXES
-from filter.fine_programs import HEAD, PROGRAMS, program
+from cornersmooth.filter.runs import ProgramReader
+from cornersmooth.nc_reader.block_tables import CHUNK
+from filter.fine_programs import HEAD, PROGRAMS, program, relief
 from filter.foreign import by_rs274, by_words, difference
 from oracle.command import DONE, run
 
@@ -303,3 +305,10 @@ def test_the_first_block_of_a_run_says_that_it_cuts() -> None:
     assert wrong != found.data
     form = cs.choose_form("fanuc", "g1", machine=THREE_AXES)
     assert verify_programs(text.encode(), wrong, form, cs.Settings(tolerance=EPS)).verdict is Verdict.FAILED
+
+
+def test_a_run_goes_on_where_the_text_is_divided() -> None:
+    text = relief(rows=400).encode()
+    assert len(text) > CHUNK
+    (run,) = ProgramReader("linuxcnc", THREE_AXES).read(text).runs
+    assert len(run) == 400 * 120 - 1
