@@ -71,6 +71,10 @@ REFUSED_ONCE = {
     1508921: "two rapids to a pose, as far as the digits of turned axes show, and coolant off between them and a hole",
     1502841: "a feed move that leads nowhere over a hole, and later a rapid to the height above it",
     1501051: "a tap that is left out, and another above it where the tool is behind GOHOME",
+    1502005: "a feed move that leads nowhere behind a tap that is left out, and a bore there",
+    1503370: "a feed between a hole and a rapid above it, behind two holes in one place",
+    1503386: "a bore that is left to where a rapid leads, and holes above each other behind it",
+    1503417: "taps left out, and a rapid along the tool before a retract",
     1510120: "a feed move to where a hole has been left, with words before it, and nothing behind it",
     1005030: "the CL file's own rapid into a hole that is drilled behind it",
 }

@@ -173,7 +173,7 @@ class Parse:
             idle = lines.stands(element) or (rapid and stop >= 0 and self._negligible(element))
             if idle and not (rapid and stop >= 0 and self._comes_down_first(stop, element)):
                 element += 1
-            elif self._hole[following] and self._over(following, element):
+            elif self._hole[following] and (self._over(following, element) or self._may_pass_over(following, element)):
                 break
             elif along.stays(element):
                 lines.forget()
@@ -195,13 +195,13 @@ class Parse:
     def _drill(self, stop: int, element: int) -> tuple[int, int]:
         """Take a hole: it ends where it is done as its cycle says, and where what follows can begin."""
         ahead, lines, move = self._ahead, self.lines, self._move[stop]
-        cycle, end = self._cycles[move], element
+        cycle, end, surplus = self._cycles[move], element, list[int]()
         while ahead.has(end):
             if not (self._over(stop, end) or (end > element and lines.stands(end))):
                 goes_on = end > element and self._over(stop, end + 1) and self._begins(stop, end) is None
                 if not goes_on or self._fitting(stop + 1, end).any():
                     break
-                self._surplus(stop + 1, end)
+                surplus.append(end)
             end += 1
         best, late = end, self._hole[stop + 1] and not self._fed[stop]
         found: tuple[bool, int, bool] | None = None
@@ -218,6 +218,9 @@ class Parse:
             rank = left, lacks, one == element or not self._has_words(one)
             if not problems and (found is None or rank < found or (late and rank == found)):
                 best, found = one, rank
+        for one in surplus:
+            if one < best:
+                self._surplus(stop + 1, one)
         return self._leave(stop, element, best)
 
     def _end_of(self, stop: int, element: int, end: int) -> int:
@@ -234,7 +237,7 @@ class Parse:
         inside = self._hole[stop] and lines.height(self._move[stop], element - 1) < -lines.room
         at_feed = inside and self._cycles[self._move[stop]].feed_out  # the way out is the hole's
         if self._fed[stop] and has and lines.feeds(element) and not at_feed:
-            return 0
+            return 0 if self._feeds_on(stop, element) else 2
         if self._fed[stop] and not self._done(stop, element):
             return None
         lacks = int(self._fed[stop])  # feed moves that lead nowhere
@@ -248,7 +251,16 @@ class Parse:
             return None if behind is None else behind + 1 + lacks
         if self._reaches(following, element):
             return lacks
-        return self._begins(following, element) if element and lines.at(self._move[following], element - 1) else None
+        shared = self._begins(following, element) if element and lines.at(self._move[following], element - 1) else None
+        return None if shared is None else shared + lines.feeds(element - 1)  # a rapid is rather written as one
+
+    def _feeds_on(self, stop: int, element: int) -> bool:
+        """Whether feed moves from an element on may lead to the last pose before the next stop."""
+        move = self._move[stop + 1] - 1
+        for one in range(element, element + _AFTER_FAULT):
+            if not self._ahead.has(one) or not self.lines.feeds(one) or self.lines.at(move, one):
+                return self._ahead.has(one) and self.lines.feeds(one)
+        return True
 
     def _leave(self, stop: int, begin: int, end: int) -> tuple[int, int]:
         """Take down a hole that some elements belong to."""
@@ -378,6 +390,10 @@ class Parse:
     def _may_be_left_out(self, stop: int) -> bool:
         cycle = self._cycles[self._move[stop]]
         return cycle.tap or not cycle.depth > self.lines.room
+
+    def _may_pass_over(self, stop: int, element: int) -> bool:
+        """Whether a hole is left out in front of an element with which what follows begins."""
+        return self._may_be_left_out(stop) and self._begins(stop, element) is not None
 
     def _done(self, stop: int, element: int) -> bool:
         """Whether no move between a hole and the next stop leads away from where the tool is before an element."""
