@@ -78,7 +78,7 @@ def test_motion_is_that_of_the_independent_readers(case: Case) -> None:
         blocks = np.split(np.arange(len(nc)), np.flatnonzero(np.diff(last)) + 1)
     assert len(blocks) == len(pieces)
     # half way the great circle is where the ruled motion is
-    share = np.array([0.5, 1.0]) if form.vectors else np.linspace(0.0, 1.0, 6)[1:]
+    share = np.array([0.5, 1.0]) if form.orientation == "vector" else np.linspace(0.0, 1.0, 6)[1:]
     for piece, block in zip(pieces, blocks, strict=True):
         assert piece.rapid == (nc.kind[block[0]] == Element.RAPID)
         tip, axis = piece.at(share[-1:] if piece.rapid or block[0] == 0 else share)

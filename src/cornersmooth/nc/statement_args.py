@@ -131,6 +131,19 @@ def tool_loads(program: Program) -> list[tuple[Statement, tuple[int, int]]]:
     return [(statement, tool) for statement, tool in loads if tool is not None]
 
 
+def until_next_tool(program: Program) -> dict[int, tuple[slice, int | None]]:
+    """For each load, by identity: the statements behind it up to another tool, and its number if there is one."""
+    loads = {id(statement): tool for statement, tool in tool_loads(program)}
+    places = [(k, id(statement)) for k, statement in enumerate(program.statements) if id(statement) in loads]
+    found: dict[int, tuple[slice, int | None]] = {}
+    end: tuple[int | None, int | None] = None, None
+    for (place, load), (_, following) in zip(reversed(places), [(0, -1), *reversed(places)], strict=False):
+        if following in loads and loads[following] != loads[load]:
+            end = found[following][0].start - 1, loads[following][0]
+        found[load] = slice(place + 1, end[0]), end[1]
+    return found
+
+
 def ahead_of_tools(program: Program) -> frozenset[int]:
     """Last statements of each word ahead of the first tool, if no motion and no wait comes before it; by identity."""
     found: dict[str, int] = {}

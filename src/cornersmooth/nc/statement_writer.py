@@ -30,7 +30,7 @@ from cornersmooth.nc.statement_args import (
     spindle_args,
     spindle_speed,
     spoken_text,
-    tool_loads,
+    until_next_tool,
     whole_number,
     words_of,
 )
@@ -59,6 +59,8 @@ class StatementWriter:
     cycles: HoleCycles = field(init=False)
     words: Words = field(init=False)
     toolno_loads: bool = field(init=False)
+    #: for each load, by identity: the statements up to the next tool, and its number if there is one
+    _until_next_tool: dict[int, tuple[slice, int | None]] = field(init=False)
     _ahead_of_tools: frozenset[int] = field(init=False)
     _unknown: frozenset[int] = field(init=False)  #: statements that are not understood, by identity
 
@@ -67,6 +69,7 @@ class StatementWriter:
         self.cycles = HoleCycles(self.program, self.findings, skip=self.skip_cycles)
         written_words = {statement.word for statement in self.program.statements}
         self.toolno_loads = not TOOL_WORDS & written_words
+        self._until_next_tool = until_next_tool(self.program)
         self._ahead_of_tools = ahead_of_tools(self.program)
         self._unknown = frozenset(map(id, statements_not_understood(self.program)))
 
@@ -127,7 +130,8 @@ class StatementWriter:
 
         Where the table says so, the tool of the next change is brought near, if the CL file selects none.
         """
-        (between, after), staged = self._until_next_tool(statement), self.words.tool_select
+        (gap, after), staged = self._until_next_tool[id(statement)], self.words.tool_select
+        between = self.program.statements[gap]
         if not self.words.stage_tool or after in (None, number) or any(s.word == "SELECT" for s in between):
             staged = ()
         speed = None
@@ -137,16 +141,6 @@ class StatementWriter:
                 raise refused("CS354", self.program, statement.line, tool=number)
         blocks = [block.format(tool=number, speed=self._speed_text(speed or 0.0)) for block in self.words.tool_change]
         return blocks + [block.format(tool=after) for block in staged]
-
-    def _until_next_tool(self, load: Statement) -> tuple[tuple[Statement, ...], int | None]:
-        """Statements between a tool change and the next one, and the tool of that, if there is one."""
-        statements, own = self.program.statements, loaded_tool(load)
-        begin = next(k for k, statement in enumerate(statements) if statement is load) + 1
-        loads = {id(statement): tool for statement, tool in tool_loads(self.program)}
-        for k, statement in enumerate(statements[begin:], begin):
-            if (tool := loads.get(id(statement), own)) not in (None, own):
-                return statements[begin:k], tool[0]
-        return statements[begin:], None
 
     def _first_speed(self, between: tuple[Statement, ...]) -> float | None:
         """First speed that some statements give, rev/min."""

@@ -26,7 +26,7 @@ from cornersmooth.verify.acts import Acts, Hole, Step, Stops
 from cornersmooth.verify.along_tool import AlongTool
 from cornersmooth.verify.feeds import feed_at, out_of_hole
 from cornersmooth.verify.holes import HoleLines
-from cornersmooth.verify.task import Task
+from cornersmooth.verify.task import ARITHMETIC, Task
 
 #: elements that are given out together
 TOGETHER: Final = 1 << 14
@@ -36,6 +36,9 @@ _AFTER_FAULT: Final = 64
 
 #: words that a hole may have: its dwell and its tap
 _IN_HOLES: Final = (("G", 4.0), ("G", 84.0))
+
+#: a direction along which no two poses of a usual part are at the same place
+_ASLANT: Final = np.array([0.48, 0.6, 0.64])
 
 #: elements before those that are certain that are still looked at
 BEFORE: Final = 16
@@ -151,8 +154,9 @@ class Parse:
         self._gone = float(gone[-1])
         length, last = self._task.path.length, self._task.original.trail.last
         words = (bisect_left(self._events, one, key=lambda event: event.element) for one in (element, end))
-        for one in sorted({event.element for event in self._events[slice(*words)]}):
-            there = [move for move in moves if move >= self._cut_at and lines.at(move - 1, one - 1)]
+        elements = sorted({event.element for event in self._events[slice(*words)]})
+        for one, near in zip(elements, self._poses_near(elements, moves), strict=True):
+            there = [move for move in near if move >= self._cut_at and lines.at(move - 1, one - 1)]
             if there:
                 way = gone[max(one - 1 - first, 0)] + length[last[self._move[stop]]]
                 move = min(there, key=lambda move: abs(length[last[move - 1]] - way))  # of those that are there again
@@ -160,6 +164,16 @@ class Parse:
                 self._cut_at = move + 1
                 if move - 1 > self._move[stop] and one - 1 > self._begun:
                     self._steps.append(Step(move - 1, one - 1, True, self._move[stop + 1] - 1, within=True))
+
+    def _poses_near(self, elements: Sequence[int], moves: Sequence[int]) -> Iterator[list[int]]:
+        """For each element, those of moves whose poses are about where the element in front of it ends."""
+        nc, tip = self._ahead.nc, self.lines.tip[np.asarray(moves) - 1] @ _ASLANT
+        order = np.argsort(tip)
+        before = np.array(elements, np.int64) - 1 - self._ahead.base
+        room = 2.0 * (nc.tip_step + nc.tip_room[before]) + ARITHMETIC
+        end = nc.tip[before] @ _ASLANT
+        bounds = (np.searchsorted(tip, end + far, sorter=order).tolist() for far in (-room, room))
+        return (sorted(moves[k] for k in order[first:last]) for first, last in zip(*bounds, strict=True))
 
     def _pass_idle(self, stop: int, element: int) -> int:
         """First element from one on that leads anywhere: posts add others beside retracts."""
