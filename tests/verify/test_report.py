@@ -65,7 +65,8 @@ def test_command(files, tmp_path, capsys):
     source, text = files
     assert run(["verify", source, text, "-e", "0.04"]) == 0
     told = capsys.readouterr()
-    assert told.err == ""
+    (check,) = told.err.splitlines()  # one block leads from the retract to X Y Z
+    assert "CS573" in check
     # corner to chamfer: 0.05/sqrt(2)
     assert told.out.startswith("PASSED")
     assert "tip               0.0353553 mm (limit 0.04) at CL line 6, NC line 11" in told.out
