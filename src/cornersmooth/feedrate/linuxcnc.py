@@ -29,8 +29,8 @@ from cornersmooth.errors import InputError
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import MM_PER_UNIT, Bools, Floats, Ints
 
-#: ``CART_FUZZ`` of posemath, mm or degrees: an axis that moves by less does not move
-_FUZZ = 1e-8
+#: ``CARTFUZZ`` of posemath, mm or degrees: an axis that moves by less does not move
+FUZZ = 1e-8
 #: ``tpSetupTangent``: part of the acceleration that the velocity jump at a tangent corner may take
 _KINK = 0.1
 #: ``tpSetupTangent``: lines that turn by more than 180° less this angle are reversals
@@ -111,7 +111,7 @@ def _moves(lines: Lines, limits: AxisLimits) -> tuple[Floats, Floats, Floats, Fl
     """
     step = lines.end - lines.start
     share = np.abs(step)
-    share[share < _FUZZ] = 0.0
+    share[share < FUZZ] = 0.0
     linear, rotary = np.linalg.norm(share[:, :3], axis=1), np.linalg.norm(share[:, 3:], axis=1)
     moves = linear > 0.0
     length = np.where(moves, linear, rotary)

@@ -337,12 +337,12 @@ def rounded_lines(
         return np.where(usual[kept], limits.blend, found)
 
     def ends_reached(rows: Vertices, kept: Ints) -> Floats:
-        from cornersmooth.feedrate.linuxcnc import Lines, axis_limits, line_times  # with all of feedrate
+        from cornersmooth.feedrate.linuxcnc import FUZZ, Lines, axis_limits, line_times  # with all of feedrate
 
         assert form.machine is not None
         place = np.zeros((len(kept), 6))
         place[:, [*range(3), *map("XYZABC".index, form.machine.names)]] = np.hstack((rows.tip, rows.words))[kept]
-        moves = np.flatnonzero((np.diff(place, axis=0) != 0.0).any(axis=1))
+        moves = np.flatnonzero((np.abs(np.diff(place, axis=0)) >= FUZZ).any(axis=1))
         lines = Lines(place[moves], place[moves + 1], feed[kept[moves + 1]], blends(rows, kept)[moves + 1])
         time = np.zeros(len(kept))
         time[moves + 1] = line_times(lines, axis_limits(form.machine))[1]
