@@ -45,7 +45,7 @@ HEAD = """\
 """
 #: what is changed in the program of the sample, and how
 WRONG = {
-    "X of a pose by 0.5 mm": ("X22.4793", "X22.9793"),
+    "X of a pose by 0.5 mm": ("X22.3621", "X22.8621"),
     "another work offset": ("G54", "G55"),
     "the coolant lost": ("M8\n", ""),
     "the first feed of the cut": ("F800.", "F900."),
