@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from cornersmooth.arrays import joined_rows
 from cornersmooth.control.program import Act, Stream, Text
 from cornersmooth.control.rows import Rows
 from cornersmooth.control.state import PRESET, State
@@ -308,17 +309,8 @@ def _joined(stream: Iterable[Rows | Act]) -> Iterator[Rows | Act]:
 
 def _one(rows: Sequence[Rows]) -> Rows:
     """Motion blocks that follow one another as one item."""
-    if len(rows) == 1:
-        return rows[0]
-    columns = {
-        name: np.concatenate([getattr(one, name) for one in rows]) for name in ("code", "feed", "moves", "odd", "lost")
-    }
-    return Rows(
-        rows[0].first,
-        rows[0].before,
-        place=np.concatenate([rows[0].place[:1], *(one.place[1:] for one in rows)]),
-        **columns,
-    )
+    place = np.concatenate([rows[0].place[:1], *(one.place[1:] for one in rows)])
+    return replace(joined_rows(rows), place=place)
 
 
 def _with_places(rows: Rows, still: dict[str, float]) -> Rows:

@@ -133,14 +133,14 @@ def tool_loads(program: Program) -> list[tuple[Statement, tuple[int, int]]]:
 
 def until_next_tool(program: Program) -> dict[int, tuple[slice, int | None]]:
     """For each load, by identity: the statements behind it up to another tool, and its number if there is one."""
-    loads = {id(statement): tool for statement, tool in tool_loads(program)}
-    places = [(k, id(statement)) for k, statement in enumerate(program.statements) if id(statement) in loads]
+    place = {id(statement): k for k, statement in enumerate(program.statements)}
     found: dict[int, tuple[slice, int | None]] = {}
-    end: tuple[int | None, int | None] = None, None
-    for (place, load), (_, following) in zip(reversed(places), [(0, -1), *reversed(places)], strict=False):
-        if following in loads and loads[following] != loads[load]:
-            end = found[following][0].start - 1, loads[following][0]
-        found[load] = slice(place + 1, end[0]), end[1]
+    end, after, following = None, None, None
+    for load, tool in reversed(tool_loads(program)):
+        if following is not None and following[1] != tool:
+            end, after = place[id(following[0])], following[1][0]
+        found[id(load)] = slice(place[id(load)] + 1, end), after
+        following = load, tool
     return found
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from cornersmooth.model import Bools, Floats, Ints, Move
 from cornersmooth.nc_reader.ahead import Ahead
 from cornersmooth.nc_reader.elements import Element, Problem
-from cornersmooth.nc_reader.tool import directions, leads_somewhere
+from cornersmooth.nc_reader.tool import beyond_digits, directions, leads_somewhere
 from cornersmooth.statements.cycles import Drilling
 from cornersmooth.verify.cl_motion import Original, selecting
 from cornersmooth.verify.motions import digit_errors
@@ -24,6 +25,9 @@ _ABOVE, _LEAST_ABOVE, _REST = 1.0 / 32.0, 0.1, 0.01
 
 #: elements that are compared with a pose together, as the next ones will be wanted, too
 _WINDOW = 16
+
+#: a direction along which no two poses of a usual part are at the same place
+_ASLANT: Final = np.array([0.48, 0.6, 0.64])
 
 
 class HoleLines:
@@ -48,6 +52,29 @@ class HoleLines:
         """(k,) whether elements end exactly at the poses of moves, and by how much, mm, they miss them."""
         own = elements - self.ahead.base
         return digit_errors(self.ahead.nc, own, self.tip[moves], self.axis[moves], self.axis_length)
+
+    def poses_near(self, elements: Sequence[int], moves: Sequence[int]) -> Iterator[list[int]]:
+        """For each element, those of moves that begin about where the element in front of it ends."""
+        nc, tip = self.ahead.nc, self.tip[np.asarray(moves) - 1] @ _ASLANT
+        order = np.argsort(tip)
+        before = np.array(elements, np.int64) - 1 - self.ahead.base
+        room = 2.0 * (nc.tip_step + nc.tip_room[before]) + ARITHMETIC
+        end = nc.tip[before] @ _ASLANT
+        bounds = (np.searchsorted(tip, end + far, sorter=order).tolist() for far in (-room, room))
+        return (sorted(moves[k] for k in order[first:last]) for first, last in zip(*bounds, strict=True))
+
+    def reach(self, moves: Ints, element: int) -> Bools:
+        """Which moves, rapids and holes, an element may lead to."""
+        elements = np.full(len(moves), element)
+        rapid = self.exact(moves, elements) & (not self.feeds(element))
+        return np.where(self.kind[moves] == Move.HOLE, ~np.isnan(self.heights(moves, elements)), rapid)
+
+    def negligible(self, element: int) -> bool:
+        """Whether an element moves the tool by no more than digits show."""
+        nc, at = self.ahead.nc, element - self.ahead.base
+        both = slice(max(at - 1, 0), at + 1)
+        turn = self.axis_length * np.ptp(directions(nc, nc.tip[both], nc.second[both]), axis=0)
+        return at > 0 and not beyond_digits(nc, np.diff(nc.tip[both], axis=0))[0] and max(turn) <= self.room
 
     def heights(self, moves: Ints, elements: Ints) -> Floats:
         """(k,) mm above the poses of holes at the ends of straight elements; NaN beside a hole or with another axis."""

@@ -17,16 +17,16 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from cornersmooth.model import Bools, Move
+from cornersmooth.model import Move
 from cornersmooth.nc_reader.ahead import Ahead
 from cornersmooth.nc_reader.elements import Event, Problem
-from cornersmooth.nc_reader.tool import beyond_digits, directions, moving_rapids
+from cornersmooth.nc_reader.tool import directions, moving_rapids
 from cornersmooth.statements.tool_changes import ToolChanges
 from cornersmooth.verify.acts import Acts, Hole, Step, Stops
 from cornersmooth.verify.along_tool import AlongTool
 from cornersmooth.verify.feeds import feed_at, out_of_hole
 from cornersmooth.verify.holes import HoleLines
-from cornersmooth.verify.task import ARITHMETIC, Task
+from cornersmooth.verify.task import Task
 
 #: elements that are given out together
 TOGETHER: Final = 1 << 14
@@ -36,9 +36,6 @@ _AFTER_FAULT: Final = 64
 
 #: words that a hole may have: its dwell and its tap
 _IN_HOLES: Final = (("G", 4.0), ("G", 84.0))
-
-#: a direction along which no two poses of a usual part are at the same place
-_ASLANT: Final = np.array([0.48, 0.6, 0.64])
 
 #: elements before those that are certain that are still looked at
 BEFORE: Final = 16
@@ -155,7 +152,7 @@ class Parse:
         length, last = self._task.path.length, self._task.original.trail.last
         words = (bisect_left(self._events, one, key=lambda event: event.element) for one in (element, end))
         elements = sorted({event.element for event in self._events[slice(*words)]})
-        for one, near in zip(elements, self._poses_near(elements, moves), strict=True):
+        for one, near in zip(elements, lines.poses_near(elements, moves), strict=True):
             there = [move for move in near if move >= self._cut_at and lines.at(move - 1, one - 1)]
             if there:
                 way = gone[max(one - 1 - first, 0)] + length[last[self._move[stop]]]
@@ -164,16 +161,6 @@ class Parse:
                 self._cut_at = move + 1
                 if move - 1 > self._move[stop] and one - 1 > self._begun:
                     self._steps.append(Step(move - 1, one - 1, True, self._move[stop + 1] - 1, within=True))
-
-    def _poses_near(self, elements: Sequence[int], moves: Sequence[int]) -> Iterator[list[int]]:
-        """For each element, those of moves whose poses are about where the element in front of it ends."""
-        nc, tip = self._ahead.nc, self.lines.tip[np.asarray(moves) - 1] @ _ASLANT
-        order = np.argsort(tip)
-        before = np.array(elements, np.int64) - 1 - self._ahead.base
-        room = 2.0 * (nc.tip_step + nc.tip_room[before]) + ARITHMETIC
-        end = nc.tip[before] @ _ASLANT
-        bounds = (np.searchsorted(tip, end + far, sorter=order).tolist() for far in (-room, room))
-        return (sorted(moves[k] for k in order[first:last]) for first, last in zip(*bounds, strict=True))
 
     def _pass_idle(self, stop: int, element: int) -> int:
         """First element from one on that leads anywhere: posts add others beside retracts."""
@@ -184,7 +171,7 @@ class Parse:
                 self._check_return(element)
             if self._reaches(following, element):
                 break
-            idle = lines.stands(element) or (rapid and stop >= 0 and self._negligible(element))
+            idle = lines.stands(element) or (rapid and stop >= 0 and lines.negligible(element))
             if idle and not (rapid and stop >= 0 and self._comes_down_first(stop, element)):
                 element += 1
             elif self._hole[following] and (self._over(following, element) or self._may_pass_over(following, element)):
@@ -213,7 +200,7 @@ class Parse:
         while ahead.has(end):
             if not (self._over(stop, end) or (end > element and lines.stands(end))):
                 goes_on = end > element and self._over(stop, end + 1) and self._begins(stop, end) is None
-                if not goes_on or self._fitting(stop + 1, end).any():
+                if not goes_on or lines.reach(self.moves[stop + 1 :][:_AFTER_FAULT], end).any():
                     break
                 surplus.append(end)
             end += 1
@@ -319,19 +306,10 @@ class Parse:
                 return following, end
         return stop, end
 
-    def _fitting(self, first: int, element: int) -> Bools:
-        """Which stops from one on an element may reach."""
-        lines = self.lines
-        moves = self.moves[first : first + _AFTER_FAULT]
-        elements = np.full(len(moves), element)
-        hole = lines.kind[moves] == Move.HOLE
-        rapid = lines.exact(moves, elements) & (not lines.feeds(element))
-        return np.where(hole, ~np.isnan(lines.heights(moves, elements)), rapid)
-
     def _fault(self, stop: int, element: int) -> tuple[int, int]:
         """What an element is that begins no act: one too many, one that ends elsewhere, or one behind a lack."""
         lines, first, feeds = self.lines, stop + 1, self.lines.feeds(element)
-        fits = np.flatnonzero(self._fitting(first, element))
+        fits = np.flatnonzero(lines.reach(self.moves[first:][:_AFTER_FAULT], element))
         if len(fits) and fits[0] > 0:  # else it is no act for another reason
             for one in range(first, first + int(fits[0])):
                 self._lack(one, element)
@@ -412,13 +390,6 @@ class Parse:
     def _done(self, stop: int, element: int) -> bool:
         """Whether no move between a hole and the next stop leads away from where the tool is before an element."""
         return all(self.lines.at(move, element - 1) for move in range(self._move[stop] + 1, self._move[stop + 1]))
-
-    def _negligible(self, element: int) -> bool:
-        """Whether an element moves the tool by no more than digits show."""
-        nc, at = self._ahead.nc, element - self._ahead.base
-        both = slice(max(at - 1, 0), at + 1)
-        turn = self.lines.axis_length * np.ptp(directions(nc, nc.tip[both], nc.second[both]), axis=0)
-        return at > 0 and not beyond_digits(nc, np.diff(nc.tip[both], axis=0))[0] and max(turn) <= self.lines.room
 
     def _open(self, stop: int, element: int) -> None:
         """Take down the begin of a run: a rapid, or the way out of a hole."""
