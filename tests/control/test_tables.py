@@ -87,6 +87,13 @@ def test_units_coolant_and_spindle_of_the_writer_are_those_of_the_table(control:
         assert state.groups["motion"] == "line"
 
 
+@pytest.mark.parametrize("control", CONTROLS)
+def test_feeds_of_rising_arcs_are_read_as_they_are_written(control: str) -> None:
+    written = cs.nc.load_control(control).motion.feed_in_plane
+    assert read_nc(b"", control=control).feed_in_plane is written
+    assert written is (control in ("fanuc", "haas", "mitsubishi", "generic"))
+
+
 @pytest.mark.parametrize("path", GOLDEN, ids=[path.stem for path in GOLDEN])
 def test_every_word_that_the_writer_writes_has_a_row(path: Path) -> None:
     """Nothing but the end of a program makes all unknown."""

@@ -259,6 +259,7 @@ class NcProgram(Elements):
     means: Means  #: what words of the control say beside the motion
     retracts: tuple[int, ...] = ()  #: elements before which an axis goes to a position of the machine, ascending
     unlooked: tuple[tuple[int, str], ...] = ()  #: NC lines, and what of the motion was not looked at there
+    feed_in_plane: bool = False  #: whether F of an arc that rises counts in the plane of its circle alone
     coarse: int = 0  #: NC line from which on digits of X Y Z are too few for the tolerance; 0 for none
 
     @property

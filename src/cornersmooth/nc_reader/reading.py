@@ -10,6 +10,7 @@ from cornersmooth.nc_reader.elements import Elements, NcProgram
 from cornersmooth.nc_reader.options import DIGITS_SAMPLE, ReadingOptions
 from cornersmooth.nc_reader.reader import Reader
 from cornersmooth.nc_reader.source import Source, readable_twice
+from cornersmooth.nc_reader.word_tables import word_table
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine
@@ -77,6 +78,7 @@ def program_of(reader: Reader, parts: list[Elements]) -> NcProgram:
         units=reader.units,
         blocks=reader.blocks,
         means=reader.dialect.means,
+        feed_in_plane=word_table(reader.dialect.control).get("feed_in_plane", False),
         retracts=tuple(reader.retracts.places),
         unlooked=tuple(reader.unlooked),
         coarse=reader.coarse,

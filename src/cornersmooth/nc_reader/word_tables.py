@@ -14,6 +14,8 @@ Keys:
     Addresses whose numbers need their decimal point.
 ``whole``
     Those of them that count in full without it, in millimetres per minute.
+``feed_in_plane``
+    Whether F of a circular block that rises counts in the plane of the circle alone, and not along the helix.
 ``switches``
     Whether tip control is switched by blocks that the machine's file names.
 ``spelling``
