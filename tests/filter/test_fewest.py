@@ -14,7 +14,7 @@ from cornersmooth.errors import Verdict
 from cornersmooth.filter import Filtered, filter_program, verify_programs
 from cornersmooth.filter.program import THREE_AXES
 from cornersmooth.filter.runs import ProgramReader
-from cornersmooth.nc_reader.block_tables import CHUNK
+from cornersmooth.nc_reader.source import CHUNK
 from filter.fine_programs import HEAD, PROGRAMS, program, relief
 from filter.foreign import by_rs274, by_words, difference
 from oracle.command import DONE, run

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from cornersmooth.errors import InputError
-from cornersmooth.nc_reader import block_tables, line_patterns
+from cornersmooth.nc_reader import line_patterns, source
 from cornersmooth.nc_reader.dialects import dialect_of
 from cornersmooth.nc_reader.line_patterns import LinePatterns, Lines
 from cornersmooth.nc_reader.words import Table
@@ -72,7 +72,7 @@ def read(call):
 
 def same_alone(data, dialect):
     """How many lines are read in runs; each says what it says alone."""
-    together, _ = read(block_tables.read_lines(data, None, dialect.lexer))
+    together, _ = read(source.read_lines(data, None, dialect.lexer))
     for (number, said), line in zip(together, data.split(b"\n")[:-1], strict=True):
         alone = dialect.lexer.line(line, number, None)
         assert said == (alone if not isinstance(said, dict) else dialect.row(alone))
@@ -84,7 +84,7 @@ def same_alone(data, dialect):
 )
 def test_lines_in_runs_say_what_each_says_alone(control, seed, odd):
     data, dialect = text(control, seed, odd), dialect_of(control)
-    together, wrong = read(block_tables.read_lines(data, None, dialect.lexer))
+    together, wrong = read(source.read_lines(data, None, dialect.lexer))
     for (number, said), line in zip(together, data.split(b"\n"), strict=False):
         alone = dialect.lexer.line(line, number, None)
         assert said == (alone if not isinstance(said, dict) else dialect.row(alone))
@@ -103,7 +103,7 @@ def test_zero_without_a_point_does_not_let_other_numbers_without_one_through():
 
 @pytest.mark.parametrize("control", SHAPES)
 def test_lines_that_each_have_a_shape_of_their_own_are_read_in_runs(control, monkeypatch):
-    monkeypatch.setattr(block_tables, "CHUNK", 4000)
+    monkeypatch.setattr(source, "CHUNK", 4000)
     rng, data = random.Random(5), []
     for number in range(600):
         words = [f"{letter}{rng.uniform(-10, 900):.{rng.randrange(9)}f}".ljust(5, "0") for letter in "XYZ"]
@@ -114,7 +114,7 @@ def test_lines_that_each_have_a_shape_of_their_own_are_read_in_runs(control, mon
 
 def test_lines_without_words_do_not_end_a_run():
     lexer = dialect_of("fanuc").lexer
-    first, *rest = block_tables.read_lines(b"G1 X1.5\n\n \r\nX2.5\n", None, lexer)
+    first, *rest = source.read_lines(b"G1 X1.5\n\n \r\nX2.5\n", None, lexer)
     assert first.line.tolist() == [1, 4]
     assert [line.number for line in rest] == [2, 3]
 

@@ -7,7 +7,7 @@ import pytest
 
 from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.kinematics import load_machine
-from cornersmooth.nc_reader import block_tables, read_nc
+from cornersmooth.nc_reader import read_nc, source
 from cornersmooth.nc_reader.elements import Element
 from cornersmooth.nc_reader.rotary import MOST_LINES
 from cornersmooth.nc_reader.tool import written_at
@@ -210,7 +210,7 @@ def test_chunks_make_no_difference(monkeypatch):
     tip, axis = wavy(60)
     text = simple_text(tip, axis, 0.02, 10.0, "g6.2")
     whole = read_nc(text)
-    monkeypatch.setattr(block_tables, "CHUNK", 500)
+    monkeypatch.setattr(source, "CHUNK", 500)
     pieces = read_nc(text)
     assert np.array_equal(whole.tip, pieces.tip)
     assert np.array_equal(whole.curves.knot, pieces.curves.knot)
@@ -230,7 +230,7 @@ def test_block_numbers_make_no_difference(monkeypatch):
     numbered = b"\n".join(
         b"N%d %b" % (i, line) if line[:1] in b"GK" else line for i, line in enumerate(text.split(b"\n"))
     )
-    monkeypatch.setattr(block_tables, "CHUNK", 500)
+    monkeypatch.setattr(source, "CHUNK", 500)
     plain, other = read_nc(text), read_nc(numbered)
     assert np.array_equal(plain.tip, other.tip)
     assert np.array_equal(plain.curves.point, other.curves.point)

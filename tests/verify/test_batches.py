@@ -16,7 +16,7 @@ import pytest
 from cornersmooth.errors import InputError
 from cornersmooth.model import FeedMode, Move, Program, Statement
 from cornersmooth.nc import Frame, choose_form, fit_settings, write
-from cornersmooth.nc_reader import block_tables, reader
+from cornersmooth.nc_reader import reader, source
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from cornersmooth.verify import Verifier, Where, batches, verifier, verify
@@ -296,7 +296,7 @@ def _moved(line, by):
 
 def test_rapids_that_miss_their_poses_one_after_another_are_those_of_their_poses(used, monkeypatch):
     """What is at hand of the text may be fewer rapids than are looked for: the rest of them is still to come."""
-    monkeypatch.setattr(block_tables, "CHUNK", 4000)
+    monkeypatch.setattr(source, "CHUNK", 4000)
     program = part(count=600, every=5)
     lines = text_of(program).decode().splitlines()
     rapids = [k for k, line in enumerate(lines) if re.match(r"(G0 |)X.*I", line) and "G0" in line][30:70]

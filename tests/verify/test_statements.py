@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from cornersmooth.model import Move, Program, Source, Statement
-from cornersmooth.nc_reader import block_tables, reader
-from cornersmooth.nc_reader.ahead import Ahead
+from cornersmooth.nc_reader import reader, source
+from cornersmooth.nc_reader.elements import Ahead
 from cornersmooth.verify import batches, parse, verify
 
 from .writing import HEAD, TAIL, encode
@@ -213,7 +213,7 @@ def test_holes_are_the_same_however_the_text_is_read(changes, monkeypatch):
     program = said(CYCLE, OFF, kind=KINDS, tip=HOLES)
     whole = verify(program, drilled(**changes), tolerance=0.01)
     monkeypatch.setattr(reader, "GIVEN_OUT", 1)
-    monkeypatch.setattr(block_tables, "CHUNK", 40)
+    monkeypatch.setattr(source, "CHUNK", 40)
     assert repr(verify(program, drilled(**changes), tolerance=0.01)) == repr(whole)
     assert whole.passed == (not changes)
 
@@ -225,7 +225,7 @@ def test_path_before_holes_is_measured_as_it_is_read(monkeypatch):
     program = said(Statement(402, 3, "CYCLE", CYCLE.args), Statement(404, 9, "CYCLE", ("OFF",)), kind=kinds, tip=path)
     lines = [("G0", 0, 0, 20), *(("G1", x, 3, 5) for x in range(400)), *DRILLED]
     monkeypatch.setattr(reader, "GIVEN_OUT", 4)
-    monkeypatch.setattr(block_tables, "CHUNK", 60)
+    monkeypatch.setattr(source, "CHUNK", 60)
     monkeypatch.setattr(parse, "TOGETHER", 4)
     monkeypatch.setattr(batches, "BATCH", 40)
     held = []
@@ -251,7 +251,7 @@ def many_holes(count, dwell=()):
 def test_a_long_run_of_holes_is_measured_as_it_is_read(monkeypatch):
     program, lines = many_holes(200)
     monkeypatch.setattr(reader, "GIVEN_OUT", 4)
-    monkeypatch.setattr(block_tables, "CHUNK", 60)
+    monkeypatch.setattr(source, "CHUNK", 60)
     monkeypatch.setattr(parse, "TOGETHER", 8)
     held = []
     part = Ahead.part

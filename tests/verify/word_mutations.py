@@ -18,9 +18,9 @@ import numpy as np
 
 from cornersmooth.errors import InputError
 from cornersmooth.nc import fit_settings, write
-from cornersmooth.nc_reader.block_tables import read_lines
 from cornersmooth.nc_reader.options import ReadingOptions
 from cornersmooth.nc_reader.reader import Reader
+from cornersmooth.nc_reader.source import read_lines
 from cornersmooth.nc_words.check import WordCheck
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth

@@ -15,9 +15,9 @@ from cornersmooth.control.state import State
 from cornersmooth.control.table import FRAME
 from cornersmooth.control.unread import execute
 from cornersmooth.model import Bools, Ints
-from cornersmooth.nc_reader.block_tables import CHUNK
 from cornersmooth.nc_reader.lexer import Lexer
 from cornersmooth.nc_reader.line_patterns import LinePatterns, Lines
+from cornersmooth.nc_reader.source import CHUNK
 
 #: lines before the first block: they name the program
 _TITLE: Final = re.compile(r"(?i)(%.*|[O:]\s*(\d+|<[^>]*>|[A-Z][^#\[(]*))")

@@ -18,9 +18,9 @@ from cornersmooth.filter.motion import Job, Stretch, motion, motion_of_runs, pla
 from cornersmooth.filter.runs import PLAIN_CUT, ProgramReader, Reading, Run
 from cornersmooth.model import Program
 from cornersmooth.nc_reader import NcProgram, Problem
-from cornersmooth.nc_reader.block_tables import CHUNK
 from cornersmooth.nc_reader.elements import Element
 from cornersmooth.nc_reader.rotary import LINE_SHARE
+from cornersmooth.nc_reader.source import CHUNK
 from cornersmooth.settings import Settings
 from cornersmooth.verify import Verification, verify
 

@@ -20,7 +20,7 @@ from cornersmooth.kinematics import tip_position, tool_axis
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc.control import Mode
 from cornersmooth.nc.rotary_rows import LARGEST_TURN, line_limits
-from cornersmooth.nc_reader.block_tables import CHUNK
+from cornersmooth.nc_reader.source import CHUNK
 from cornersmooth.smoothing.fewest_pieces import PieceLimits, Pieces, Polyline, fewest_pieces
 from cornersmooth.smoothing.long_lines import Vertices, fewest_lines
 from cornersmooth.text import RowFormat, interleave, to_ticks

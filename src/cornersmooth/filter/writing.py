@@ -18,7 +18,7 @@ from cornersmooth.kinematics import Machine, solutions, tool_axis
 from cornersmooth.model import Floats
 from cornersmooth.nc import Frame, write
 from cornersmooth.nc.form import Form
-from cornersmooth.nc_reader.block_tables import CHUNK
+from cornersmooth.nc_reader.source import CHUNK
 from cornersmooth.pipeline import smooth
 from cornersmooth.settings import Settings
 

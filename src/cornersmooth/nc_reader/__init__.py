@@ -16,15 +16,16 @@ event             a word that stands beside the motion
 
 Where is what:
 
-- what a text is: `source` (bytes), `dialects` (grammar), `word_tables` (words and what they mean)
-- bytes to tables: `lexer`, `words`, `block_tables`, `line_patterns`
+- what a text is: `source` (bytes), `dialects` (grammar), `acts` (what it gives), `word_tables` (words, their effects)
+- bytes to tables: `lexer`, `words`, `line_patterns`, `source`
 - tables to elements: `reader` holds the modal state, `execution` executes: `arcs`, `splines`, `rotary`;
   `needed_states` says which words want another state; `retracts` leads back from retracts
-- what comes out: `elements`; `ahead` reads on as far as need be, `curves` evaluates, `reading` puts a
+- what comes out: `elements`; `curves` evaluates; `reader` puts a
   whole text together
 """
 
 from cornersmooth.nc_reader.elements import Event, NcProgram, Problem
-from cornersmooth.nc_reader.reading import CONTROLS, read_nc
+from cornersmooth.nc_reader.reader import read_nc
+from cornersmooth.nc_reader.word_tables import CONTROLS
 
 __all__ = ["CONTROLS", "Event", "NcProgram", "Problem", "read_nc"]

@@ -1,12 +1,69 @@
-"""What a grammar makes of a block that is no plain motion block: acts, which the reader carries out in their order."""
+"""What a grammar makes of a block that is no plain motion block: acts, which the reader carries out in their order.
+
+Hole cycles are acts, too: the moves that they mean. A cycle goes over its place in rapid, at the height where the tool
+is, down in rapid to where feeding begins, at feed to the bottom, and out again. All that is measured of holes is
+measured on these moves.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Final
 
+from cornersmooth.nc_reader.execution import Modal
 from cornersmooth.nc_reader.planes import TiltedPlane
+from cornersmooth.nc_reader.rotary import Rotary
+from cornersmooth.nc_reader.words import Line, refused
+
+#: share of a peck that the tool stays above the last depth when it comes back
+_ABOVE: Final = 0.05
+
+#: by how much the sum of two printed heights may be off, in units of the text
+_ROUNDING: Final = 1e-9
+
+#: more pecks in one hole are not carried out
+_MOST_PECKS: Final = 10_000
+
+
+@dataclass(frozen=True)
+class HoleCycle:
+    """A hole cycle, in units of the text; heights are those of Z."""
+
+    travel: float  #: where the tool goes in the end
+    clearance: float  #: where feeding begins
+    bottom: float
+    feed: float | None = None  #: In units of F; None for the one in force.
+    step: float = 0.0  #: of a peck; 0 for one feed
+    from_clearance: bool = True  #: whether pecks are counted from `clearance`, or from `top`
+    top: float = 0.0
+    chip: bool = False  #: whether a peck only moves up a little
+    dwell: float = 0.0
+    feed_out: bool = False
+    pitch: float | None = None  #: of a tap, per revolution
+
+
+@dataclass
+class ModalState:
+    """What holds between two lines; grammars read it, and set what has no `acts.Act`."""
+
+    modal: Modal
+    rotary: Rotary | None = None  #: with the length of the tool in the spindle
+    tip_control: str = ""  #: name of the tool tip control that is on
+    incremental: bool = False  #: G91 is in force, in which no motion is read
+    high_speed: bool = False  #: look ahead of the kind that some controls ask for with curves is on
+    clamped: dict[str, bool] = field(default_factory=dict)  #: rotary axes with a clamp: kept, or words let them turn
+    keeps_tip: bool | None = None  #: whether the kinematics do, where the machine's file says what switches that
+    shorter_way: bool = False  #: whether rotary axes go it
+    speed: float = math.nan  #: of the spindle
+    rigid: bool = False  #: M29 asks the spindle to turn with the feed
+    height: float | None = None  #: at which a run of modal cycles began (G98), in units of the program
+    cycle: HoleCycle | None = None  #: that a block defines for others to call
+    centre: dict[str, float] = field(default_factory=dict)  #: of circles to come
+    #: how the tool axis is interpolated, and in which coordinates
+    orientation: str = ""
+    axis_frame: str = ""
 
 
 @dataclass(frozen=True)
@@ -69,3 +126,48 @@ class Unknown:
 
 Act = Move | Modes | Beside | Tilt | TurnToPlane | ToMachine | Wrong | Unknown
 Acts = Iterator[Act]
+
+
+def drill(cycle: HoleCycle, x: float, y: float, line: Line, before: Modal, clamped: Mapping[str, bool]) -> Acts:
+    """Give out the moves of a cycle at a place; `before` holds in front of it.
+
+    Raises
+    ------
+    InputError
+        CS503 where the height at which it begins is not known, or its heights make no hole.
+    """
+    if not cycle.bottom <= cycle.clearance <= cycle.travel + _ROUNDING:
+        raise refused(line, "a cycle whose heights are not one below another", "give them in their order")
+    if cycle.step and (cycle.clearance - cycle.bottom) / cycle.step > _MOST_PECKS:
+        raise refused(line, f"more than {_MOST_PECKS:,} pecks in one hole", "give a larger step")
+    free = [axis for axis, kept in clamped.items() if not kept]
+    if free:
+        yield Wrong("CS538", f"a hole cycle while {' and '.join(free)} is not clamped")
+    # all moves up to the next event are carried out together
+    yield Move({"G": 0.0, "X": x, "Y": y}, later=True)
+    yield Move({"G": 0.0, "Z": cycle.clearance}, later=True)
+    if cycle.pitch is not None:
+        yield Beside("G", 84.0)
+        yield Modes({"per_revolution": True})
+        if cycle.dwell:
+            yield Wrong("CS506", "a tap that waits at the bottom of its thread")
+    feed = {} if cycle.feed is None else {"F": cycle.feed}
+    done = cycle.clearance if cycle.from_clearance else cycle.top
+    while cycle.step and done - cycle.step > cycle.bottom + _ROUNDING:
+        done -= cycle.step
+        yield Move({"G": 1.0, "Z": done, **feed}, later=True)
+        above = done + _ABOVE * cycle.step
+        for height in (above,) if cycle.chip else (cycle.clearance, above):
+            yield Move({"G": 0.0, "Z": min(height, cycle.clearance)}, later=True)
+    yield Move({"G": 1.0, "Z": cycle.bottom, **feed}, later=True)
+    if cycle.dwell:
+        yield Beside("G", 4.0, f"{cycle.dwell:.10g}")
+    if cycle.feed_out or cycle.pitch is not None:
+        yield Move({"G": 1.0, "Z": cycle.clearance}, later=True)
+    yield Move({"G": 0.0, "Z": cycle.travel})
+    yield Modes({"code": math.nan, "feed": before.feed, "per_revolution": before.per_revolution})
+
+
+def numbers(text: str) -> list[float | None]:
+    """Arguments of a call, None for those that are left out; raises ValueError for what is no number."""
+    return [float(part) if part.strip() else None for part in text.split(",")]

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.nc_reader.acts import ModalState
 from cornersmooth.nc_reader.dialects.base import Dialect
 from cornersmooth.nc_reader.elements import Element, Elements, Problem
 from cornersmooth.nc_reader.execution import Modal
-from cornersmooth.nc_reader.modal_state import ModalState
 from cornersmooth.nc_reader.rotary import tool_vectors
 from cornersmooth.nc_reader.words import BY_WORD, NURBS, Table
 

@@ -16,8 +16,7 @@ from typing import Final
 
 import numpy as np
 
-from cornersmooth.nc_reader.ahead import Ahead
-from cornersmooth.nc_reader.elements import Element, Event
+from cornersmooth.nc_reader.elements import Ahead, Element, Event
 from cornersmooth.nc_reader.tool import directions
 from cornersmooth.verify.acts import Acts
 

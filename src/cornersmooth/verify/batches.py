@@ -13,8 +13,7 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from cornersmooth.model import Floats, Move
-from cornersmooth.nc_reader.ahead import Ahead
-from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem
+from cornersmooth.nc_reader.elements import Ahead, Element, Elements, Event, Problem
 from cornersmooth.nc_reader.tool import directions
 from cornersmooth.verify.acts import Acts
 from cornersmooth.verify.along_tool import AlongTool

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cornersmooth.model import Bools, Floats, Ints, Move
-from cornersmooth.nc_reader.ahead import Ahead
-from cornersmooth.nc_reader.elements import Element, Problem
+from cornersmooth.nc_reader.elements import Ahead, Element, Problem
 from cornersmooth.nc_reader.tool import beyond_digits, directions, leads_somewhere
 from cornersmooth.statements.cycles import Drilling
 from cornersmooth.verify.cl_motion import Original, selecting

@@ -18,8 +18,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from cornersmooth.model import Move
-from cornersmooth.nc_reader.ahead import Ahead
-from cornersmooth.nc_reader.elements import Event, Problem
+from cornersmooth.nc_reader.elements import Ahead, Event, Problem
 from cornersmooth.nc_reader.tool import directions, moving_rapids
 from cornersmooth.statements.tool_changes import ToolChanges
 from cornersmooth.verify.acts import Acts, Hole, Step, Stops

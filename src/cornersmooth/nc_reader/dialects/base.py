@@ -7,9 +7,8 @@ from collections.abc import Callable, Mapping, Set
 from typing import Any, Final
 
 from cornersmooth.errors import InputError
-from cornersmooth.nc_reader.acts import Acts, Beside, Modes
+from cornersmooth.nc_reader.acts import Acts, Beside, ModalState, Modes
 from cornersmooth.nc_reader.lexer import Lexer
-from cornersmooth.nc_reader.modal_state import ModalState
 from cornersmooth.nc_reader.word_tables import effects_of, means_of, word_table
 from cornersmooth.nc_reader.words import Columns, Line, refused
 

@@ -7,11 +7,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
 
-from cornersmooth.nc_reader.acts import Acts, Beside, Modes, Move, Tilt, ToMachine, Wrong
+from cornersmooth.nc_reader.acts import Acts, Beside, HoleCycle, ModalState, Modes, Move, Tilt, ToMachine, Wrong, drill
 from cornersmooth.nc_reader.dialects.base import Dialect, values
-from cornersmooth.nc_reader.hole_cycles import HoleCycle, drill
 from cornersmooth.nc_reader.lexer import NUMBER, Lexer, fixed, number_of
-from cornersmooth.nc_reader.modal_state import ModalState
 from cornersmooth.nc_reader.planes import TiltedPlane, room_of, rotated_frame
 from cornersmooth.nc_reader.words import SPL, Columns, Line, Word, refused
 

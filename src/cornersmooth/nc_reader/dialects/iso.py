@@ -7,11 +7,20 @@ import re
 from collections.abc import Mapping, Set
 from dataclasses import replace
 
-from cornersmooth.nc_reader.acts import Acts, Beside, Move, Tilt, ToMachine, TurnToPlane, Wrong
+from cornersmooth.nc_reader.acts import (
+    Acts,
+    Beside,
+    HoleCycle,
+    ModalState,
+    Move,
+    Tilt,
+    ToMachine,
+    TurnToPlane,
+    Wrong,
+    drill,
+)
 from cornersmooth.nc_reader.dialects.base import Dialect
-from cornersmooth.nc_reader.hole_cycles import HoleCycle, drill
 from cornersmooth.nc_reader.lexer import NUMBER, Lexer, fixed, number_of
-from cornersmooth.nc_reader.modal_state import ModalState
 from cornersmooth.nc_reader.planes import TiltedPlane, room_of, rotated_frame, turned_frame
 from cornersmooth.nc_reader.word_tables import word_table
 from cornersmooth.nc_reader.words import MOTION_CODES, NURBS, Columns, Line, Word, refused, tools_first

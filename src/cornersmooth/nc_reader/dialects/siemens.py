@@ -9,11 +9,21 @@ from typing import Final
 
 import numpy as np
 
-from cornersmooth.nc_reader.acts import Acts, Beside, Move, Tilt, ToMachine, Unknown, Wrong
+from cornersmooth.nc_reader.acts import (
+    Acts,
+    Beside,
+    HoleCycle,
+    ModalState,
+    Move,
+    Tilt,
+    ToMachine,
+    Unknown,
+    Wrong,
+    drill,
+    numbers,
+)
 from cornersmooth.nc_reader.dialects.base import SILENT, Dialect
-from cornersmooth.nc_reader.hole_cycles import HoleCycle, drill, numbers
 from cornersmooth.nc_reader.lexer import NUMBER, Lexer, fixed, number_of
-from cornersmooth.nc_reader.modal_state import ModalState
 from cornersmooth.nc_reader.planes import TiltedPlane, room_of, rotated_frame
 from cornersmooth.nc_reader.words import BSPLINE, BY_WORD, POLY, Columns, Line, Word, refused, tools_first
 
