@@ -29,8 +29,8 @@ _HAIR: Final = 1e-9
 #: segments on either side of a place among which a nearer one is looked for
 _REACH: Final = 2
 
-#: distances from a place, in steps, through which parabolas are laid, one after the other
-_WIDTHS: Final = (1 / 8, 1 / 64, 1 / 512)
+#: places between two at which a distance is worked out, as often as so many rounds: to a billionth of the way
+_SHARES, _ROUNDS = np.linspace(0.0, 1.0, 17), 10
 
 #: rows for which tip and axis point are looked at each on its own at a time: only the largest are wanted
 _SOME: Final = 16
@@ -74,15 +74,14 @@ def of_written(match: Match) -> Reached:
 
 
 def of_original(match: Match) -> Reached:
-    """Every vertex of the original that is passed, against the written motion."""
+    """Every vertex of the original that is passed, against the step of the written motion on which it is."""
     vertex, row, share = match.passing
-    first, last = match.runs
-    point = match.path.points[vertex]
-    place = nearest_places(point, match.six, row, 1, first[row], last[row] - 1)
+    place, point = row + share, match.path.points[vertex]
     away = _written(match, place) - point
-    far = np.flatnonzero(largest_square(away.T) > match.tolerance**2)
-    if len(far):  # the sum of both squares is least there, but not the larger: the place that is proved
-        place[far] = row[far] + share[far]
+    # the sum of both squares is least there, and where that is not enough the larger of both has to be
+    if len(far := np.flatnonzero(largest_square(away.T) > match.task.radius**2)):
+        low = row[far].astype(np.float64)
+        place[far], _ = _least(lambda where: _written(match, where), point[far], COLUMNS["both"], low, low + 1.0)
         away[far] = _written(match, place[far]) - point[far]
     return Reached(vertex, Gap.of(match.task, away), place, False)
 
@@ -91,43 +90,40 @@ def nearest(match: Match, reached: Reached, rows: Ints, metric: Metric) -> Float
     """(k,) distances of some rows from the nearest place of the other motion: of tips, or of axis points."""
     vertex = reached.vertex[rows]
     if reached.mine:
-        own, other, middle, low, high = match.six, match.path.points, match.segment, match.low, match.high
-        middle, low, high = middle[vertex], low[vertex], high[vertex]
+        own, other, middle = match.six, match.path.points, match.segment[vertex]
+        low, high = match.low[vertex], match.high[vertex]
     else:
         own, other = match.path.points, match.six
         middle = np.minimum(reached.place[rows].astype(np.int64), len(other) - 2)
         first, last = match.runs
         low, high = first[middle], last[middle] - 1
-    point, columns = own[vertex], COLUMNS[metric]
-    best = nearest_places(point, other, middle, _REACH, low, high, metric)
-
-    def square(place: Floats) -> Floats:
-        away = (match.path.at(place) if reached.mine else _written(match, place)) - point
-        return largest_square(away[:, columns].T)
-
-    return np.sqrt(_least(square, best, low.astype(np.float64), (high + 1).astype(np.float64)))
+    best = nearest_places(own[vertex], other, middle, _REACH, low, high, metric)
+    ends = np.maximum(best - 0.5, low), np.minimum(best + 0.5, high + 1.0)
+    at = match.path.at if reached.mine else lambda where: _written(match, where)
+    return _least(at, own[vertex], COLUMNS[metric], *ends)[1]
 
 
-def _least(square: Callable[[Floats], Floats], best: Floats, first: Floats, last: Floats) -> Floats:
-    """(k,) the least squares near places, from the first to the last ones: of a bent motion, by parabolas."""
-    least = square(best)
-    for width in _WIDTHS:
-        centre = np.clip(best, first + width, last - width)  # a bent step may go on in the next one
-        before, here, after = (square(centre + side) for side in (-width, 0.0, width))
-        bend = before - 2.0 * here + after
-        shift = np.divide(width * (before - after), 2.0 * bend, out=np.zeros_like(bend), where=bend > 0.0)
-        best = np.clip(centre + np.clip(shift, -1.0, 1.0), first, last)
-        least = np.minimum.reduce((least, before, here, after))
-    return np.minimum(least, square(best))
+def _least(
+    at: Callable[[Floats], Floats], points: Floats, columns: slice, low: Floats, high: Floats
+) -> tuple[Floats, Floats]:
+    """(k,) places between two nearest to points (k, 6), and distances of the farther triple.
+
+    Exact where a motion is straight: there the distance falls and then rises.
+    """
+    for _ in range(_ROUNDS):
+        place = low + _SHARES[:, None] * (high - low)
+        away = at(place.ravel()).reshape(*place.shape, -1) - points
+        square = largest_square(np.moveaxis(away[..., columns], 2, 0))
+        best, each = square.argmin(axis=0), np.arange(len(low))
+        low, high = (place[np.clip(best + side, 0, len(_SHARES) - 1), each] for side in (-1, 1))
+    return place[best, each], np.sqrt(square[best, each])
 
 
 def _written(match: Match, place: Floats) -> Floats:
     """(k, 6) points of the written motion at places of its polyline."""
-    six, segment = match.six, np.minimum(place.astype(np.int64), len(match.six) - 2)
-    share = place - segment
-    points = six.take(segment, axis=0)
-    points += share[:, None] * (six.take(segment + 1, axis=0) - points)
-    bent = np.flatnonzero((match.motion.bend[segment] > 0.0) & (share > 0.0) & (share < 1.0))
+    points = points_at(match.six, place).T
+    segment = np.minimum(place.astype(np.int64), len(match.six) - 2)
+    bent = np.flatnonzero((match.motion.bend[segment] > 0.0) & (place > segment) & (place < segment + 1))
     if len(bent):
         points[bent] = inner_points(match.nc, match.motion, match.task, place[bent], match.first)
     return points
@@ -223,14 +219,10 @@ class _Around:
         columns, path = COLUMNS[metric], match.path.points
         at, off = _nearest(match.six[self.rows], path, self.segments, columns)
         step, other = _nearest(path[self.vertices], match.six, self.steps, columns)
-        if (off_path := other > match.tolerance).any():  # they are off the chords, but perhaps not the bent steps
-            vertices = self.vertices[off_path]
-            first, last = (np.full(len(vertices), float(at)) for at in (self.steps[0], self.steps[-1] + 1))
-
-            def square(place: Floats) -> Floats:
-                return largest_square((_written(match, place) - path[vertices])[:, columns].T)
-
-            other[off_path] = np.sqrt(_least(square, step[off_path], first, last))
+        if len(far := np.flatnonzero(other > match.tolerance)):  # off the chords, but perhaps not off the bent steps
+            ends = np.maximum(step[far] - 0.5, self.steps[0]), np.minimum(step[far] + 0.5, self.steps[-1] + 1.0)
+            points = path[self.vertices[far]]
+            other[far] = _least(lambda where: _written(match, where), points, columns, *ends)[1]
         return np.append(off, other), np.append(at, self.vertices), np.append(self.rows, step)
 
     def note(self, match: Match, found: Findings, gap: Gap, row: Ints) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final
 
 import numpy as np
 
@@ -14,9 +13,6 @@ from cornersmooth.verify.cl_motion import Original
 from cornersmooth.verify.decision import Batch, Decision, decide
 from cornersmooth.verify.passage import MOST_BREAKS
 from cornersmooth.verify.task import Task
-
-#: vertices on either side of one from whose places it is worked out first where it may be (speed only)
-_FEW: Final = 64
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,11 +45,6 @@ class Match(Batch, Decision):
     def tolerance(self) -> float:
         """ε, mm."""
         return self.task.tolerance
-
-    @cached_property
-    def margin(self) -> float:
-        """Distance that printed digits may account for, mm."""
-        return self.task.margin(self.nc)
 
     @cached_property
     def on(self) -> Bools:

@@ -10,7 +10,6 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints, Keep, Program
-from cornersmooth.nc_reader.elements import Elements
 from cornersmooth.verify.chain import Path
 from cornersmooth.verify.cl_motion import Original, original_motion
 from cornersmooth.verify.nearest import COLUMNS, Metric
@@ -20,12 +19,6 @@ ARITHMETIC: Final = 1e-9
 
 #: how many tolerances tip and axis point may be away from one common pose, though each is near its own path
 APART: Final = 2.0
-
-#: last printed digits by which the next segment must be nearer to be taken
-MARGIN_STEPS = 4.0
-
-#: share of the tolerance that these are at most
-MARGIN_SHARE = 0.5
 
 
 @dataclass(frozen=True)
@@ -115,11 +108,6 @@ class Task:
         begins[moved[1:][other]] = True
         first = np.append(0, np.flatnonzero(begins))
         return np.cumsum(begins), first
-
-    def margin(self, nc: Elements) -> float:
-        """Distance that printed digits may account for, mm: never more than a share of the tolerance."""
-        axis_step = nc.second_step * (self.axis_length if nc.second_is == "vector" else 1.0)
-        return min(MARGIN_STEPS * max(nc.tip_step, axis_step), MARGIN_SHARE * self.tolerance)
 
 
 def length_of(tolerance: float, axis_tolerance: float) -> float:
