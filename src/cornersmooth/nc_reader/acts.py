@@ -10,8 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Final, NamedTuple
 
+import numpy as np
+
+from cornersmooth.model import Floats
+from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.nc_reader.execution import Modal
 from cornersmooth.nc_reader.planes import TiltedPlane
 from cornersmooth.nc_reader.rotary import Rotary
@@ -64,25 +68,21 @@ class ModalState:
     #: how the tool axis is interpolated, and in which coordinates
     orientation: str = ""
     axis_frame: str = ""
+    plane: TiltedPlane | None = None  #: that is on
+    left_turned: bool = False  #: a plane that is off again has left the rotary axes where no word says
+    idle: Floats = field(
+        default_factory=lambda: np.zeros(2)
+    )  #: degrees that axes have turned while the tool axis stands
 
 
-@dataclass(frozen=True)
-class Move:
+class Move(NamedTuple):
     """A motion block; one without position only changes what holds."""
 
     columns: Mapping[str, float]
     later: bool = False  #: whether it is carried out with those behind it
 
 
-@dataclass(frozen=True)
-class Modes:
-    """Fields of `Modal` that change."""
-
-    values: Mapping[str, Any] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Beside:
+class Beside(NamedTuple):
     """A word beside the motion, as `elements.Event` has it."""
 
     letter: str
@@ -90,46 +90,34 @@ class Beside:
     text: str = ""
 
 
-@dataclass(frozen=True)
-class Tilt:
+class Tilt(NamedTuple):
     """A tilted plane is switched on, or off (None)."""
 
     plane: TiltedPlane | None
 
 
-@dataclass(frozen=True)
-class TurnToPlane:
+class TurnToPlane(NamedTuple):
     """The rotary axes turn to the tilted plane that is on."""
 
 
-@dataclass(frozen=True)
-class ToMachine:
+class ToMachine(NamedTuple):
     """Axes go to positions of the machine."""
 
     axes: str
 
 
-@dataclass(frozen=True)
-class Wrong:
-    """Something that breaks the rules of the control."""
-
-    code: str
-    text: str
-
-
-@dataclass(frozen=True)
-class Unknown:
-    """Something that this text does not say, and that bears on the motion."""
-
-    text: str
-
-
-Act = Move | Modes | Beside | Tilt | TurnToPlane | ToMachine | Wrong | Unknown
+#: problems are what breaks the rules of the control, or without a code what is not known and bears on the motion
+Act = Move | Beside | Tilt | TurnToPlane | ToMachine | Problem
 Acts = Iterator[Act]
 
 
-def drill(cycle: HoleCycle, x: float, y: float, line: Line, before: Modal, clamped: Mapping[str, bool]) -> Acts:
-    """Give out the moves of a cycle at a place; `before` holds in front of it.
+def wrong(line: Line, text: str, code: str = "CS506") -> Problem:
+    """What breaks the rules of the control in a line."""
+    return Problem(code, 0, line.number, text)
+
+
+def drill(cycle: HoleCycle, x: float, y: float, line: Line, state: ModalState) -> Acts:
+    """Give out the moves of a cycle at a place.
 
     Raises
     ------
@@ -140,17 +128,17 @@ def drill(cycle: HoleCycle, x: float, y: float, line: Line, before: Modal, clamp
         raise refused(line, "a cycle whose heights are not one below another", "give them in their order")
     if cycle.step and (cycle.clearance - cycle.bottom) / cycle.step > _MOST_PECKS:
         raise refused(line, f"more than {_MOST_PECKS:,} pecks in one hole", "give a larger step")
-    free = [axis for axis, kept in clamped.items() if not kept]
+    before, free = state.modal, [axis for axis, kept in state.clamped.items() if not kept]
     if free:
-        yield Wrong("CS538", f"a hole cycle while {' and '.join(free)} is not clamped")
+        yield wrong(line, f"a hole cycle while {' and '.join(free)} is not clamped", "CS538")
     # all moves up to the next event are carried out together
     yield Move({"G": 0.0, "X": x, "Y": y}, later=True)
     yield Move({"G": 0.0, "Z": cycle.clearance}, later=True)
     if cycle.pitch is not None:
         yield Beside("G", 84.0)
-        yield Modes({"per_revolution": True})
+        state.modal = state.modal.but(per_revolution=True)
         if cycle.dwell:
-            yield Wrong("CS506", "a tap that waits at the bottom of its thread")
+            yield wrong(line, "a tap that waits at the bottom of its thread")
     feed = {} if cycle.feed is None else {"F": cycle.feed}
     done = cycle.clearance if cycle.from_clearance else cycle.top
     while cycle.step and done - cycle.step > cycle.bottom + _ROUNDING:
@@ -165,7 +153,7 @@ def drill(cycle: HoleCycle, x: float, y: float, line: Line, before: Modal, clamp
     if cycle.feed_out or cycle.pitch is not None:
         yield Move({"G": 1.0, "Z": cycle.clearance}, later=True)
     yield Move({"G": 0.0, "Z": cycle.travel})
-    yield Modes({"code": math.nan, "feed": before.feed, "per_revolution": before.per_revolution})
+    state.modal = state.modal.but(code=math.nan, feed=before.feed, per_revolution=before.per_revolution)
 
 
 def numbers(text: str) -> list[float | None]:

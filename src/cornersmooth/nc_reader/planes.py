@@ -14,10 +14,9 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.model import Floats
-from cornersmooth.nc_reader.elements import Elements, Problem
+from cornersmooth.nc_reader.elements import Elements
 from cornersmooth.nc_reader.execution import Modal
 from cornersmooth.nc_reader.rotary import Rotary
-from cornersmooth.nc_reader.words import Table
 
 #: problem of a plane that is switched on or off where the tool is not above the part
 NOT_ABOVE: Final = "CS539"
@@ -56,25 +55,6 @@ class TiltedPlane:
         known = np.array(modal.tip) @ self.frame.T + self.origin  # nothing where any of it is unknown
         second = (math.nan,) * 3 if rotary else tuple(self.tool.tolist())
         return modal.but(tip=tuple(known.tolist()), second=second)
-
-    def problems(self, table: Table, run: Elements, tip_control: str, axis_words: str) -> list[Problem]:
-        """Return what is wrong with a run of motion blocks in it; `axis_words`: addresses of its axis."""
-        if not len(run.kind):
-            return []
-        line, found = int(run.line[0]), []
-        if not self.turned:
-            found.append("motion in a tilted plane before the tool is turned to it")
-        if tip_control != self.needs:
-            found.append(
-                f"motion in a tilted plane under {tip_control or 'no length of the tool'}, where "
-                f"{self.needs or 'no tool tip control'} must be in force"
-            )
-        straight = ~np.isin(table.column("G"), (2.0, 3.0))
-        if any((~np.isnan(table.column(name)) & straight).any() for name in axis_words):
-            found.append("words of the tool axis in a tilted plane")
-        if len(run.curves):
-            found.append("a curve in a tilted plane")
-        return [Problem("CS506", 0, line, text) for text in found]
 
 
 def rotated_frame(turns: Sequence[tuple[str, float]]) -> Floats:

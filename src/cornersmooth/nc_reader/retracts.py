@@ -7,8 +7,7 @@ over the arrival first, with the axis that it has there, and then down. One bloc
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -20,26 +19,6 @@ from cornersmooth.nc_reader.elements import Element, Elements, Problem
 _TURN: Final = 360.0
 
 
-class _Rapid(NamedTuple):
-    """A rapid of a way back: (6,) words before it and behind it, NaN where not known, in the plane that is on."""
-
-    before: Floats
-    behind: Floats
-    line: int
-    free: bool  #: whether rotary axes turn in it without the tip
-
-    def moves(self, letters: str) -> bool:
-        """Whether it moves any of X, Y and Z to where a word says."""
-        at = ["XYZ".index(letter) for letter in letters]
-        return bool((~np.isnan(self.behind[at]) & (self.behind[at] != self.before[at])).any())
-
-    @property
-    def turned(self) -> Bools:
-        """(3,) which words of the axis it changes."""
-        turned: Bools = ~np.isnan(self.behind[3:]) & (self.behind[3:] != self.before[3:])
-        return turned
-
-
 class Retracts:
     """Follows the retracts of a program.
 
@@ -49,20 +28,22 @@ class Retracts:
         Of the program, for messages.
     problems : list of Problem
         Takes ways back that lead elsewhere, or down too early.
-    zero : sequence of float
+    zero : (2,) float64
         Degrees at which each rotary axis is at zero, or as near as its limits let it.
     """
 
-    def __init__(self, name: str | None, problems: list[Problem], zero: Sequence[float] = ()) -> None:
+    def __init__(self, name: str | None, problems: list[Problem], zero: Floats) -> None:
         self._name, self._problems = name, problems
-        self._zero = np.append(zero, np.zeros(3 - len(zero)))
+        self._zero = np.concatenate((np.full(3, np.nan), zero, [0.0]))
         #: whether an axis is at a position of the machine
         self.open = False
         #: whether the program is on a way back
         self.coming = True
         #: elements before which the tool is retracted, ascending
         self.places: list[int] = []
-        self._way: list[_Rapid] = []
+        #: rapids of the way back: (6,) words before and behind, NaN where not known, in the plane that is on; the line;
+        #: whether rotary axes turn in it without the tip
+        self._way: list[tuple[Floats, Floats, int, bool]] = []
         self._left = np.full(6, np.nan)  # where the way back began
 
     def leave(self, elements: int, words: Floats) -> None:
@@ -102,7 +83,7 @@ class Retracts:
         count = int(np.argmin(unknown)) + 1 if arrived else len(unknown)
         words = np.vstack((before, np.hstack((run.tip[:count], run.second[:count]))))
         rapid = run.kind[:count] == Element.RAPID
-        self._way += [_Rapid(words[k], words[k + 1], int(run.line[k]), free) for k in np.flatnonzero(rapid).tolist()]
+        self._way += [(words[k], words[k + 1], int(run.line[k]), free) for k in np.flatnonzero(rapid).tolist()]
         dropped = gone & self.open
         if arrived:
             self._check(words[-1], arrived=bool(rapid[-1]))
@@ -112,28 +93,29 @@ class Retracts:
     def _check(self, arrival: Floats, *, arrived: bool) -> None:
         """Complain of the rapids of a way back to an arrival (6,), NaN where it is open; the last of them `arrived`."""
         aside = False
-        for k, one in enumerate(self._way, 1 - len(self._way)):
-            last = arrived and not k
-            if one.moves("XY") and _elsewhere(one.behind[:2], arrival[:2]):
-                text = "a rapid of the way back from a retract is not over the position that it leads to"
-                self._problems.append(Problem("CS531", 0, one.line, text))
-            if one.turned.any() and not self._may_turn(one, arrival):
-                text = "the tool axis turns elsewhere on the way back from a retract"
-                self._problems.append(Problem("CS531", 0, one.line, text))
-            over = not _elsewhere(one.before[:2], arrival[:2]) and not _elsewhere(one.before[3:], arrival[3:])
-            if one.moves("Z") and not over and (aside or not last):
-                text = "the tool comes down from a retract before it is over its position, with its axis there"
-                self._problems.append(Problem("CS531", 0, one.line, text))
-            aside |= one.moves("XY")
+        for k, (before, behind, line, free) in enumerate(self._way, 1 - len(self._way)):
+            moved = ~np.isnan(behind) & (behind != before)
+            sideways, down = bool(moved[:2].any()), bool(moved[2])
+            # without the tip axes may also turn to zero, or back, by themselves
+            there = (behind == arrival) | np.isnan(arrival)
+            if free and not sideways and not down:
+                there |= (behind == self._left) | (behind % _TURN == 0.0) | (behind == self._zero)
+            early = down and (aside or not arrived or k < 0)
+            for wrong, text in (
+                (
+                    sideways and _elsewhere(behind[:2], arrival[:2]),
+                    "a rapid of the way back from a retract is not over the position that it leads to",
+                ),
+                ((moved & ~there)[3:].any(), "the tool axis turns elsewhere on the way back from a retract"),
+                (
+                    early and (_elsewhere(before[:2], arrival[:2]) or _elsewhere(before[3:], arrival[3:])),
+                    "the tool comes down from a retract before it is over its position, with its axis there",
+                ),
+            ):
+                if wrong:
+                    self._problems.append(Problem("CS531", 0, line, text))
+            aside |= sideways
         self._way = []
-
-    def _may_turn(self, one: _Rapid, arrival: Floats) -> bool:
-        """Whether the axis turns to where it is at the arrival; without the tip also to zero, or back, by itself."""
-        angle, wanted, left = (words[one.turned] for words in (one.behind[3:], arrival[3:], self._left[3:]))
-        there = (angle == wanted) | np.isnan(wanted)
-        if one.free and not (one.moves("XY") or one.moves("Z")):
-            there |= (angle == left) | (angle % _TURN == 0.0) | (angle == self._zero[one.turned])
-        return bool(there.all())
 
 
 def _elsewhere(words: Floats, wanted: Floats) -> bool:

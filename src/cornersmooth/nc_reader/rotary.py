@@ -68,6 +68,11 @@ class Rotary:
         """Addresses, nearest to the part first."""
         return "".join(self.machine.names)
 
+    @property
+    def zero(self) -> Floats:
+        """(2,) degrees at which the axes are at zero, or as near as their limits let them."""
+        return np.array([min(max(0.0, np.ceil(axis.low)), np.floor(axis.high)) for axis in self.machine.axes])
+
     def carried(self, vectors: Floats, angles: Floats) -> Floats:
         """(n, 3) vectors of the machine in a part that tables have turned by (n, 2) degrees."""
         for axis, column in self._carrying("table"):

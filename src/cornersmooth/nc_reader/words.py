@@ -139,24 +139,12 @@ def table_of(rows: list[tuple[int, dict[str, float]]]) -> Table:
     )
 
 
-def joined_tables(waiting: Sequence[Table | tuple[int, dict[str, float]]], few: int) -> list[Table]:
-    """Neighbouring tables and single rows as few tables, in order.
+def joined_tables(tables: Sequence[Table], few: int) -> Sequence[Table]:
+    """Neighbouring tables as few tables, in order.
 
     One, where a curve may go on from one table into the next, or where they have no more than `few` rows each.
     """
-    tables: list[Table] = []
-    rows: list[tuple[int, dict[str, float]]] = []
-    for item in waiting:
-        if isinstance(item, Table):
-            if rows:
-                tables.append(table_of(rows))
-                rows = []
-            tables.append(item)
-        else:
-            rows.append(item)
-    if rows:
-        tables.append(table_of(rows))
-    if all(table.closed for table in tables) and sum(map(len, tables)) > few * len(tables):
+    if len(tables) == 1 or (all(table.closed for table in tables) and sum(map(len, tables)) > few * len(tables)):
         return tables
     letters = sorted({letter for table in tables for letter in table.columns})
     line = np.concatenate([table.line for table in tables])

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Set
 from typing import Any, Final
 
 from cornersmooth.errors import InputError
-from cornersmooth.nc_reader.acts import Acts, Beside, ModalState, Modes
+from cornersmooth.nc_reader.acts import Acts, Beside, ModalState
 from cornersmooth.nc_reader.lexer import Lexer
 from cornersmooth.nc_reader.word_tables import effects_of, means_of, word_table
 from cornersmooth.nc_reader.words import Columns, Line, refused
@@ -88,11 +88,13 @@ class Dialect:
         effect = self.effect(f"G{code:g}")
         group, _, value = effect.partition("=")
         if group == "plane":
-            yield Modes({"plane": int(code)})
+            state.modal = state.modal.but(plane=int(code))
         elif group == "units":
-            yield Modes({"inch": value == "inch"})
+            state.modal = state.modal.but(inch=value == "inch")
         elif group == "feed":
-            yield Modes({"per_revolution": value == "revolution", "inverse_time": value == "inverse"})
+            if value == "inverse" and state.rotary is None:
+                raise refused(line, "inverse time feed (G93) without rotary words", "name the machine with --machine")
+            state.modal = state.modal.but(per_revolution=value == "revolution", inverse_time=value == "inverse")
         elif group == "tool_length" and value != "?":
             state.tip_control = "" if value == "off" else f"G{code:g}"
             yield Beside("G", code, f"G{code:g}")

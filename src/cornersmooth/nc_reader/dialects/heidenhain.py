@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
 
-from cornersmooth.nc_reader.acts import Acts, Beside, HoleCycle, ModalState, Modes, Move, Tilt, ToMachine, Wrong, drill
+from cornersmooth.nc_reader.acts import Acts, Beside, HoleCycle, ModalState, Move, Tilt, ToMachine, drill, wrong
 from cornersmooth.nc_reader.dialects.base import Dialect, values
 from cornersmooth.nc_reader.lexer import NUMBER, Lexer, fixed, number_of
 from cornersmooth.nc_reader.planes import TiltedPlane, room_of, rotated_frame
@@ -100,12 +100,12 @@ class Heidenhain(Dialect):
 
     def _call(self, line: Line, state: ModalState) -> Acts:
         """M99: the hole cycle that was defined last, where the block ends."""
-        defined, modal = state.cycle, state.modal
+        defined = state.cycle
         if defined is None:
             raise refused(line, "M99 without a cycle before it", "define the cycle that it calls")
         if state.tip_control:
-            yield Wrong("CS506", f"a hole cycle under {state.tip_control}")
-        yield from drill(defined, modal.tip[0], modal.tip[1], line, modal, state.clamped)
+            yield wrong(line, f"a hole cycle under {state.tip_control}")
+        yield from drill(defined, state.modal.tip[0], state.modal.tip[1], line, state)
 
     def _define(self, number: int, text: str, line: Line, state: ModalState) -> None:
         """CYCL DEF 200, 201, 207 with their parameters."""
@@ -158,7 +158,7 @@ class Heidenhain(Dialect):
 
     def _miscellaneous(self, value: float, text: str, line: Line, state: ModalState) -> Acts:
         if value in (136.0, 137.0):
-            yield Modes({"per_revolution": value == 136.0})
+            state.modal = state.modal.but(per_revolution=value == 136.0)
         elif value in (128.0, 129.0):
             state.tip_control = "M128" if value == 128.0 else ""
         elif value in (126.0, 127.0):
@@ -175,7 +175,7 @@ class Heidenhain(Dialect):
             if unit not in ("MM", "INCH"):
                 raise refused(line, f"{text}: no units", "name MM or INCH at its end")
             if text.startswith("BEGIN"):
-                yield Modes({"inch": unit == "INCH"})
+                state.modal = state.modal.but(inch=unit == "INCH")
         elif match := _TOOL_CALL.fullmatch(text):
             if match[1] is not None:
                 yield Beside("T", float(match[1]), text)

@@ -16,8 +16,8 @@ from cornersmooth.nc_reader.acts import (
     Tilt,
     ToMachine,
     TurnToPlane,
-    Wrong,
     drill,
+    wrong,
 )
 from cornersmooth.nc_reader.dialects.base import Dialect
 from cornersmooth.nc_reader.lexer import NUMBER, Lexer, fixed, number_of
@@ -141,7 +141,7 @@ class Iso(Dialect):
                 line, f"G{code:g} with words that are missing or not understood", "give X Y Z R and F in its block"
             )
         if state.tip_control != self.cycles_in:
-            yield Wrong("CS506", f"a hole cycle under {state.tip_control or 'no length of the tool'}")
+            yield wrong(line, f"a hole cycle under {state.tip_control or 'no length of the tool'}")
         travel = state.modal.tip[2] if state.height is None else state.height
         state.height = travel
         feed, turning = given.get("F", state.modal.feed), state.modal.per_revolution
@@ -157,15 +157,15 @@ class Iso(Dialect):
             feed_out=code in (85.0, 89.0),
         )
         if state.modal.inverse_time:
-            yield Wrong("CS506", "a hole cycle at inverse time feed (G93)")
+            yield wrong(line, "a hole cycle at inverse time feed (G93)")
         tap = code == 84.0
         if tap:
             if self.rigid and not state.rigid:
-                yield Wrong("CS506", "a tap without M29, which turns the spindle with the feed")
+                yield wrong(line, "a tap without M29, which turns the spindle with the feed")
             pitch = feed if turning else feed / speed
             cycle = replace(cycle, feed=pitch, pitch=pitch)
         state.modal = state.modal.but(feed=feed)  # that of the blocks after it, too
-        yield from drill(cycle, given["X"], given["Y"], line, state.modal, state.clamped)
+        yield from drill(cycle, given["X"], given["Y"], line, state)
 
     def _plane(self, line: Line, codes: set[float], state: ModalState) -> Acts:
         """G68.2, G53.1 and G69, or G254 and G255."""
