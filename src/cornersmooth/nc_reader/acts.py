@@ -111,7 +111,7 @@ Act = Move | Beside | Tilt | TurnToPlane | ToMachine | Problem
 Acts = Iterator[Act]
 
 
-def wrong(line: Line, text: str, code: str = "CS506") -> Problem:
+def wrong(code: str, line: Line, text: str) -> Problem:
     """What breaks the rules of the control in a line."""
     return Problem(code, 0, line.number, text)
 
@@ -130,7 +130,7 @@ def drill(cycle: HoleCycle, x: float, y: float, line: Line, state: ModalState) -
         raise refused(line, f"more than {_MOST_PECKS:,} pecks in one hole", "give a larger step")
     before, free = state.modal, [axis for axis, kept in state.clamped.items() if not kept]
     if free:
-        yield wrong(line, f"a hole cycle while {' and '.join(free)} is not clamped", "CS538")
+        yield wrong("CS538", line, f"a hole cycle while {' and '.join(free)} is not clamped")
     # all moves up to the next event are carried out together
     yield Move({"G": 0.0, "X": x, "Y": y}, later=True)
     yield Move({"G": 0.0, "Z": cycle.clearance}, later=True)
@@ -138,7 +138,7 @@ def drill(cycle: HoleCycle, x: float, y: float, line: Line, state: ModalState) -
         yield Beside("G", 84.0)
         state.modal = state.modal.but(per_revolution=True)
         if cycle.dwell:
-            yield wrong(line, "a tap that waits at the bottom of its thread")
+            yield wrong("CS506", line, "a tap that waits at the bottom of its thread")
     feed = {} if cycle.feed is None else {"F": cycle.feed}
     done = cycle.clearance if cycle.from_clearance else cycle.top
     while cycle.step and done - cycle.step > cycle.bottom + _ROUNDING:

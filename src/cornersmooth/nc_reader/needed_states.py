@@ -111,17 +111,16 @@ def plane_problems(run: Run) -> Iterator[Problem]:
     if plane is None or not len(run.elements):
         return
     here, need = tip_control or "no length of the tool", plane.needs or "no tool tip control"
-    for wrong, text in (
-        (not plane.turned, "motion in a tilted plane before the tool is turned to it"),
-        (tip_control != plane.needs, f"motion in a tilted plane under {here}, where {need} must be in force"),
-        (
-            any((~np.isnan(run.table.column(name)) & straight).any() for name in axis_words),
-            "words of the tool axis in a tilted plane",
-        ),
-        (len(run.elements.curves) > 0, "a curve in a tilted plane"),
-    ):
-        if wrong:
-            yield Problem(CONTROL_WORDS, 0, int(run.elements.line[0]), text)
+    line = int(run.elements.line[0])
+    if not plane.turned:
+        yield Problem("CS506", 0, line, "motion in a tilted plane before the tool is turned to it")
+    if tip_control != plane.needs:
+        text = f"motion in a tilted plane under {here}, where {need} must be in force"
+        yield Problem("CS506", 0, line, text)
+    if any((~np.isnan(run.table.column(name)) & straight).any() for name in axis_words):
+        yield Problem("CS506", 0, line, "words of the tool axis in a tilted plane")
+    if len(run.elements.curves):
+        yield Problem("CS506", 0, line, "a curve in a tilted plane")
 
 
 def clamp_problems(run: Run) -> Iterator[Problem]:
@@ -140,25 +139,27 @@ def axis_problems(run: Run) -> Iterator[Problem]:
     """
     table, way = run.table, run.dialect.shorter_way
 
-    def first(wrong: Bools, text: str, code: str = CONTROL_WORDS) -> list[Problem]:
+    def first(code: str, wrong: Bools, text: str) -> list[Problem]:
         return Problem.at(code, wrong, table.line, text, most=1)
 
     for axis in run.machine.axes:
         name, values = axis.name, table.column(axis.name)
         given, by_words = ~np.isnan(values), ~np.isnan(table.column(f"{BY_WORD} {axis.name}"))
         if axis.modulo:
-            yield from first((values < 0.0) | (values >= 360.0), f"a word of {name} that is not from 0 to 360 degrees")
+            yield from first(
+                "CS506", (values < 0.0) | (values >= 360.0), f"a word of {name} that is not from 0 to 360 degrees"
+            )
         if way == BY_WORD and axis.modulo:
-            yield from first(given & ~by_words, f"{name} without {BY_WORD}(), which sends it the shorter way")
+            yield from first("CS506", given & ~by_words, f"{name} without {BY_WORD}(), which sends it the shorter way")
         elif way == BY_WORD:
-            yield from first(by_words, f"{name} with {BY_WORD}(), which is for modulo axes")
+            yield from first("CS506", by_words, f"{name} with {BY_WORD}(), which is for modulo axes")
         elif way and axis.modulo and not run.state.shorter_way:
-            yield from first(given, f"{name} without {way} in force, which sends it the shorter way")
+            yield from first("CS506", given, f"{name} without {way} in force, which sends it the shorter way")
         half = run.rotary.angle_step / 2
         beyond = (values < axis.low - half) | (values > axis.high + half)
         for angle in values[beyond][:1].tolist():
             text = f"{name} goes to {angle:g} deg, its limits are {axis.low:g} and {axis.high:g}"
-            yield from first(beyond, text, "CS581")
+            yield from first("CS581", beyond, text)
 
 
 def kinematics_problems(run: Run) -> Iterator[Problem]:

@@ -206,7 +206,8 @@ class Reader:
         if plane is not None and before is not None:
             self._wrong("CS506", line, "a tilted plane within another")
         if state.tip_control:
-            self._wrong("CS506", line, f"{'the end of ' * (plane is None)}a tilted plane under {state.tip_control}")
+            under = f"a tilted plane under {state.tip_control}"
+            self._wrong("CS506", line, under if plane is not None else f"the end of {under}")
         ends = "a tilted plane ends where the tool is not retracted"
         self._above(line, ends if plane is None else "a tilted plane where the tool is not retracted")
         self.retracts.end(turned=True)

@@ -101,19 +101,19 @@ class Retracts:
             if free and not sideways and not down:
                 there |= (behind == self._left) | (behind % _TURN == 0.0) | (behind == self._zero)
             early = down and (aside or not arrived or k < 0)
-            for wrong, text in (
+            for wrong, problem in (
                 (
                     sideways and _elsewhere(behind[:2], arrival[:2]),
-                    "a rapid of the way back from a retract is not over the position that it leads to",
+                    ("CS531", "a rapid of the way back from a retract is not over the position that it leads to"),
                 ),
-                ((moved & ~there)[3:].any(), "the tool axis turns elsewhere on the way back from a retract"),
+                ((moved & ~there)[3:].any(), ("CS531", "the tool axis turns elsewhere on the way back from a retract")),
                 (
                     early and (_elsewhere(before[:2], arrival[:2]) or _elsewhere(before[3:], arrival[3:])),
-                    "the tool comes down from a retract before it is over its position, with its axis there",
+                    ("CS531", "the tool comes down from a retract before it is over its position, with its axis there"),
                 ),
             ):
                 if wrong:
-                    self._problems.append(Problem("CS531", 0, line, text))
+                    self._problems.append(Problem(problem[0], 0, line, problem[1]))
             aside |= sideways
         self._way = []
 

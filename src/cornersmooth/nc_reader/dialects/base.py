@@ -93,7 +93,8 @@ class Dialect:
             state.modal = state.modal.but(inch=value == "inch")
         elif group == "feed":
             if value == "inverse" and state.rotary is None:
-                raise refused(line, "inverse time feed (G93) without rotary words", "name the machine with --machine")
+                what = "inverse time feed (G93) without rotary words"
+                raise InputError("CS503", what, "name the machine with --machine", line=line.number)
             state.modal = state.modal.but(per_revolution=value == "revolution", inverse_time=value == "inverse")
         elif group == "tool_length" and value != "?":
             state.tip_control = "" if value == "off" else f"G{code:g}"

@@ -104,7 +104,7 @@ class Heidenhain(Dialect):
         if defined is None:
             raise refused(line, "M99 without a cycle before it", "define the cycle that it calls")
         if state.tip_control:
-            yield wrong(line, f"a hole cycle under {state.tip_control}")
+            yield wrong("CS506", line, f"a hole cycle under {state.tip_control}")
         yield from drill(defined, state.modal.tip[0], state.modal.tip[1], line, state)
 
     def _define(self, number: int, text: str, line: Line, state: ModalState) -> None:

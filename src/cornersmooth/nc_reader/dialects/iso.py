@@ -141,7 +141,7 @@ class Iso(Dialect):
                 line, f"G{code:g} with words that are missing or not understood", "give X Y Z R and F in its block"
             )
         if state.tip_control != self.cycles_in:
-            yield wrong(line, f"a hole cycle under {state.tip_control or 'no length of the tool'}")
+            yield wrong("CS506", line, f"a hole cycle under {state.tip_control or 'no length of the tool'}")
         travel = state.modal.tip[2] if state.height is None else state.height
         state.height = travel
         feed, turning = given.get("F", state.modal.feed), state.modal.per_revolution
@@ -157,11 +157,11 @@ class Iso(Dialect):
             feed_out=code in (85.0, 89.0),
         )
         if state.modal.inverse_time:
-            yield wrong(line, "a hole cycle at inverse time feed (G93)")
+            yield wrong("CS506", line, "a hole cycle at inverse time feed (G93)")
         tap = code == 84.0
         if tap:
             if self.rigid and not state.rigid:
-                yield wrong(line, "a tap without M29, which turns the spindle with the feed")
+                yield wrong("CS506", line, "a tap without M29, which turns the spindle with the feed")
             pitch = feed if turning else feed / speed
             cycle = replace(cycle, feed=pitch, pitch=pitch)
         state.modal = state.modal.but(feed=feed)  # that of the blocks after it, too

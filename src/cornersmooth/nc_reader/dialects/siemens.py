@@ -126,7 +126,7 @@ class Siemens(Dialect):
                 line, f"{words[0].text} is not understood", "give RTP, RFP, SDIS and DP first, in its own block"
             )
         if state.tip_control:
-            yield wrong(line, f"a hole cycle under {state.tip_control}")
+            yield wrong("CS506", line, f"a hole cycle under {state.tip_control}")
         whole = [value if value is not None else 0.0 for value in args] + [0.0] * 12
         travel, top, setup, bottom, _, fifth = whole[:6]
         known = HoleCycle(travel, top + setup, bottom, top=top, from_clearance=False)
@@ -146,7 +146,7 @@ class Siemens(Dialect):
             wanted = "a pitch, SDAC 3, POSS 0, no DTB and one speed"
             known = replace(known, pitch=whole[8], feed=whole[8])
             if state.speed != whole[10]:
-                yield wrong(line, f"CYCLE84 at {whole[10]:g} revolutions, where S says otherwise")
+                yield wrong("CS506", line, f"CYCLE84 at {whole[10]:g} revolutions, where S says otherwise")
         elif name == "CYCLE85":
             right &= whole[6] == whole[7] and whole[6] > 0.0
             wanted = "one feed for both ways"
@@ -198,7 +198,7 @@ class Siemens(Dialect):
         """Take a G word outside group 01 that changes what holds from block to block."""
         if code in _LENGTHS_ALONE:
             what = f"feeds under G{code:g}, whose units the machine's basic system says: G{code:g}0 says them"
-            yield wrong(line, what, "")
+            yield wrong("", line, what)
         yield from super().mode(code, line, state)
 
 
