@@ -11,6 +11,7 @@ from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ from cornersmooth.cli import run
 from cornersmooth.geometry import nurbs
 from cornersmooth.model import LimitedBy, Program, SmoothProgram, Status
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing import smooth, zhang2016
+from cornersmooth.smoothing import self_check, smooth, zhang2016
 from cornersmooth.smoothing.construction import Construction
 from cornersmooth.smoothing.segments import segments_of
 from cornersmooth.smoothing.synchronise import matching_parameters
@@ -359,7 +360,14 @@ def test_bounds_let_nothing_pass_that_is_measured(curves: bool, monkeypatch: pyt
     """Curves are run at common parameters, where Q is off H by more than at v(u)."""
     program, settings = cornersmooth.read(SAMPLE.with_name("impeller.cls")), settings_of(0.01, curves=curves)
     found = CONSTRUCTION.smooth(program, settings).corners
-    monkeypatch.setattr(zhang2016, "_most_share", lambda off, *_others: np.full_like(off, np.inf))
+    exact = self_check.bounded
+
+    def none(*given: Any) -> tuple[Floats, Floats]:
+        own, share = exact(*given)
+        return own, np.full_like(share, np.inf)
+
+    monkeypatch.setattr(self_check, "bounded", none)
+    monkeypatch.setattr(zhang2016, "bounded", none)
     measured = CONSTRUCTION.smooth(program, settings).corners
     assert (found.status == measured.status).all()
     rows = found.smoothed

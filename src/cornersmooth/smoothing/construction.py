@@ -69,6 +69,13 @@ def legs_at(program: Program, axis_length: float, pose: Ints, before: Ints, afte
     )
 
 
+def legs_of(smoothed: SmoothProgram, rows: Ints) -> Legs:
+    """Segments at some corners (g,)."""
+    corners = smoothed.corners
+    where = (column[rows] for column in (corners.pose, corners.before, corners.after))
+    return legs_at(smoothed.program, smoothed.settings.axis_length, *where)
+
+
 def half_cosine(legs: Legs, axis_length: float) -> Floats:
     """(g,) cosine of half the larger of both axis changes, from their chords ``|turn| = 2 H sin(θ/2)``."""
     sine = np.maximum(norm(legs.turn_in), norm(legs.turn_out)) / (2.0 * axis_length)

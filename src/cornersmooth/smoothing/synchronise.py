@@ -13,12 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cornersmooth.arrays.vectors import angle_between
 from cornersmooth.geometry import nurbs
 from cornersmooth.model import Floats, Ints
-
-#: parameters of the tip curve at which residual and jumps are reported
-REPORT_PARAMETERS = np.linspace(0.0, 1.0, 9)
 
 #: what is zero where something is looked for, and its derivative, at parameters of rows
 _Wanted = Callable[[Floats, Ints], tuple[Floats, Floats]]
@@ -43,90 +39,66 @@ _POWERS = np.array([[1.0, 0, 0, 0], [-3, 3, 0, 0], [3, -6, 3, 0], [-1, 3, -3, 1]
 class _Excess:
     """``(|Q(v) − P|² − H²) / 2H`` of g corners and points P in one half of v: zero where ``|Q(v) − P|`` is H.
 
-    With σ and β as in `cornersmooth.geometry.nurbs`, Q(v) is σ·l + β·d from the corner, so this is a form in σ and β.
+    With σ and β as in `cornersmooth.geometry.nurbs`, Q(v) is σ·l + β·d from the corner. Times the squared weight, all
+    are polynomials in s, which runs from the outer end of the half to its middle.
     """
 
-    terms: Floats  # (6, g): of 1, σ, β, σ², σβ and β²
-    powers: Floats  # (3, 4): weight, and σ and β times weight, in powers of s
-    paper: bool  # all weights are 1: then σ is 1 − s, and β is s³/6
-    second: bool  # half, in which s runs from the end of the curve to its middle
+    above: Floats  # (7, g): the excess times the squared weight, by powers of s
+    below: Floats  # (1,) or (7,): the squared weight, which is 1 where all weights are
+    second: bool  # half
     axis_length: float
 
-    def __call__(self, v: Floats, rows: Ints) -> tuple[Floats, Floats]:
-        """Equation (21) as a length, mm, and its derivative, at parameters (k,) of the curves of rows."""
-        return self._derivatives(v, np.take(self.terms, rows, axis=1), bends=False)[:2]
-
-    def bends(self, v: Floats, rows: Ints) -> tuple[Floats, Floats]:
-        """First and second derivative."""
-        return self._derivatives(v, np.take(self.terms, rows, axis=1), bends=True)[1:]
+    def __call__(self, v: Floats, rows: Ints | slice = slice(None)) -> tuple[Floats, Floats, Floats]:
+        """Equation (21) as a length, mm, with two derivatives, at parameters (k,) of the curves of rows."""
+        s, turned = self._place(v), -2.0 if self.second else 2.0
+        value, slope, bend = _polynomial(self.above[:, rows], s)
+        if len(self.below) > 1:
+            weight, rate, change = _polynomial(self.below, s)
+            value = value / weight
+            slope = (slope - value * rate) / weight
+            bend = (bend - 2.0 * slope * rate - value * change) / weight
+        return value, turned * slope, 4.0 * bend
 
     def on(self, grid: Floats) -> Floats:
         """(g, m) the excess at common parameters (m,)."""
-        s = 2.0 * (1.0 - grid if self.second else grid)
-        weight, sigma, beta = self.powers @ s ** np.arange(4)[:, None]
-        sigma, beta = sigma / weight, beta / weight
-        return self.terms.T @ np.stack((sigma**0, sigma, beta, sigma**2, sigma * beta, beta**2))
+        powers = self._place(grid) ** np.arange(7)[:, None]
+        return self.above.T @ powers / (self.below @ powers[: len(self.below)])
 
     def missing(self, v: Floats) -> Floats:
         """``||Q(v) − P| − H|``, mm."""
-        squared = self.axis_length * (self.axis_length + 2.0 * self._derivatives(v, self.terms, bends=False)[0])
+        squared = self.axis_length * (self.axis_length + 2.0 * self(v)[0])
         return np.abs(np.sqrt(np.maximum(squared, 0.0)) - self.axis_length)
 
     def only_roots(self, v: Floats) -> Floats:
-        """(m, g) roots, or the end that comes nearest to one, where the excess surely never turns; NaN elsewhere.
+        """(m, g) roots, or the end nearest to one, where a polynomial surely never turns; NaN elsewhere.
 
-        It is a polynomial p of degree 6 in s then. Newton starts from the parameters (m,).
+        Newton starts from the parameters (m,).
         """
-        if not self.paper:
-            return np.full(self.terms.shape[1:], np.nan)
-        one, c_s, c_b, c_ss, c_sb, c_bb = self.terms
-        of_beta = nurbs.RATIO / 4.0
-        p0, p1, p2 = one + c_s + c_ss, -c_s - 2.0 * c_ss, c_ss
-        p3, p4, p6 = of_beta * (c_b + c_sb), -of_beta * c_sb, of_beta**2 * c_bb
-        least = p1 + np.minimum(3.0 * p3, 0.0) + np.minimum(4.0 * p4, 0.0)
-        most = p1 + 2.0 * p2 + np.maximum(3.0 * p3, 0.0) + np.maximum(4.0 * p4, 0.0) + 6.0 * p6
+        if len(self.below) > 1:
+            return np.full(self.above.shape[1:], np.nan)
+        slopes = self.above[1:] * np.arange(1.0, 7.0)[:, None, None]
+        least = slopes[0] + np.minimum(slopes[1:], 0.0).sum(axis=0)
+        most = slopes[0] + np.maximum(slopes[1:], 0.0).sum(axis=0)
         turns = (least <= 0.0) & (most >= 0.0)
-        here = np.broadcast_to(2.0 * (1.0 - v if self.second else v)[:, None], p0.shape)
+        here = np.broadcast_to(self._place(v)[:, None], turns.shape)
         for _ in range(_NEAR_STEPS):
-            tail = p4 + here * here * p6
-            value = p0 + here * (p1 + here * (p2 + here * (p3 + here * tail)))
-            slope = p1 + here * (2.0 * p2 + here * (3.0 * p3 + here * (4.0 * tail + 2.0 * here * here * p6)))
+            value, slope, _ = _polynomial(self.above, here)
             last, here = here, np.clip(here - value / np.where(turns, 1.0, slope), 0.0, 1.0)
         near = ~turns & (np.abs(here - last) <= _SHORT)
         return np.where(near, 1.0 - here / 2.0 if self.second else here / 2.0, np.nan)
 
-    def _derivatives(self, v: Floats, terms: Floats, *, bends: bool) -> tuple[Floats, Floats, Floats]:
-        one, c_s, c_b, c_ss, c_sb, c_bb = terms
-        s, turned = (2.0 - 2.0 * v, -2.0) if self.second else (2.0 * v, 2.0)
-        (sigma, d_sigma, s2), (beta, d_beta, b2) = self._shares(s)
-        mixed = c_sb * beta
-        by_sigma, by_beta = c_s + mixed + 2.0 * c_ss * sigma, c_b + c_sb * sigma + 2.0 * c_bb * beta
-        value = one + sigma * (c_s + mixed + c_ss * sigma) + beta * (c_b + c_bb * beta)
-        slope = by_sigma * d_sigma + by_beta * d_beta
-        bend = slope
-        if bends:
-            bend = by_sigma * s2 + by_beta * b2
-            bend += 2.0 * (c_ss * d_sigma**2 + c_sb * d_sigma * d_beta + c_bb * d_beta**2)
-        return value, turned * slope, 4.0 * bend
-
-    def _shares(self, s: Floats) -> tuple[tuple[Floats, Floats | float, Floats | float], tuple[Floats, Floats, Floats]]:
-        """Values and first two derivatives by s of σ and β."""
-        if self.paper:
-            of_beta = nurbs.RATIO / 4.0 * s
-            return (1.0 - s, -1.0, 0.0), (of_beta * s * s, 3.0 * of_beta * s, 6.0 * of_beta)
-        (w, w1, w2), *both = (
-            (((p3 * s + p2) * s + p1) * s + p0, (3.0 * p3 * s + 2.0 * p2) * s + p1, 6.0 * p3 * s + 2.0 * p2)
-            for p0, p1, p2, p3 in self.powers
-        )
-        values = [value / w for value, *_ in both]
-        rates = [(rate - value * w1) / w for value, (_, rate, _) in zip(values, both, strict=True)]
-        bends = [(n[2] - value * w2 - 2.0 * rate * w1) / w for value, rate, n in zip(values, rates, both, strict=True)]
-        sigma, beta = zip(values, rates, bends, strict=True)
-        return sigma, beta
+    def _place(self, v: Floats) -> Floats:
+        return 2.0 * (1.0 - v if self.second else v)
 
 
-def _dot(one: Floats, other: Floats) -> Floats:
-    return np.einsum("ck,ck->k", one, other)
+def _polynomial(powers: Floats, s: Floats) -> tuple[Floats, Floats, Floats]:
+    """Value and first two derivatives of polynomials (p, ...): Horner's rule."""
+    value, slope, bend = powers[-1] * s + powers[-2], powers[-1], np.zeros(())
+    for power in powers[-3::-1]:
+        bend = bend * s + slope
+        slope = slope * s + value
+        value = value * s + power
+    return value, slope, 2.0 * bend
 
 
 def matching_parameters(
@@ -137,39 +109,35 @@ def matching_parameters(
     Equations (20) and (21).
     Control points (g, 5, 3) are those of P and Q; weights (2,) are those of all, u (m,) ascends.
     """
+    curves = np.stack((tip_curve, axis_curve), axis=1)
     lever = axis_curve[:, 2] - tip_curve[:, 2]
-    legs = [(curve[:, 2] - curve[:, 0], curve[:, 4] - curve[:, 2]) for curve in (tip_curve, axis_curve)]
-    return synchronised(legs[0], legs[1], lever, weights, u, axis_length)
+    return synchronised(curves[:, :, [2, 4]] - curves[:, :, [0, 2]], lever, weights, u, axis_length)
 
 
-def synchronised(
-    tip_legs: tuple[Floats, Floats],
-    axis_legs: tuple[Floats, Floats],
-    lever: Floats,
-    weights: Floats,
-    u: Floats,
-    axis_length: float,
-) -> tuple[Floats, Floats]:
-    """`matching_parameters` of curves by their legs in and out, and by levers at the corners, (g, 3) each."""
-    lever, *legs = (np.ascontiguousarray(values.T) for values in (lever, *tip_legs, *axis_legs))
-    bend, away, paper = legs[3] - legs[2], (lever, legs[0], legs[1]), bool((weights == 1.0).all())
+def synchronised(legs: Floats, lever: Floats, weights: Floats, u: Floats, axis_length: float) -> tuple[Floats, Floats]:
+    """`matching_parameters` of both curves by their legs in and out (g, 2, 2, 3), and by levers at the corners."""
+    (tip_in, tip_out), (axis_in, axis_out) = np.ascontiguousarray(np.moveaxis(legs, 0, -1))
+    bend, away = axis_out - axis_in, np.stack((np.ascontiguousarray(lever.T), tip_in, tip_out))
     shares = nurbs.leg_coefficients(u, weights) * (1.0, -1.0, -1.0)  # of `away` in P less the corner of Q
     first, other = np.triu_indices(3)
-    pairs = np.stack([_dot(away[i], away[j]) for i, j in zip(first, other, strict=True)])
+    pairs = _dot(away[first], away[other]) * np.where(first == other, 1.0, 2.0)[:, None]
     pairs[0] -= axis_length**2
     powers = (nurbs.full_weights(weights) * _OF_SHARES) @ _POWERS.T
+    # products of weight, σ and β, each times weight: as they go with the terms below
+    products = np.array([np.convolve(powers[i], powers[j]) for i, j in zip(first, other, strict=True)]).T
     halves = []
-    for second, leg in enumerate((-legs[2], legs[3])):
+    for second, leg in enumerate((-axis_in, axis_out)):
         own = shares[(u > 0.5) == second]
-        squares = own[:, first] * own[:, other] * np.where(first == other, 1.0, 2.0) @ pairs
-        terms = (squares, *(2.0 * own @ np.stack([_dot(one, part) for part in away]) for one in (leg, bend)))
-        terms += _dot(leg, leg), 2.0 * _dot(leg, bend), _dot(bend, bend)
-        every = np.stack([np.broadcast_to(term, squares.shape) for term in terms]) / (2.0 * axis_length)
-        halves.append(_Excess(every, powers, paper, bool(second), axis_length))
+        terms = [own[:, first] * own[:, other] @ pairs, *(2.0 * own @ _dot(one, away) for one in (leg, bend))]
+        terms += [_dot(leg, leg), 2.0 * _dot(leg, bend), _dot(bend, bend)]
+        every = np.stack([np.broadcast_to(term, terms[0].shape) for term in terms]) / (2.0 * axis_length)
+        above = (products @ every.reshape(6, -1)).reshape(7, *every.shape[1:])
+        below = products[:, 0] if products[1:, 0].any() else products[:1, 0]
+        halves.append(_Excess(above, below, bool(second), axis_length))
 
     # the paper solves (21) in the knot interval of u, n = 3 or 4: so both are ½ together
-    v, missing = np.empty((2, len(u), lever.shape[1]))
-    last, before = np.zeros(lever.shape[1]), 0.0
+    v, missing = np.empty((2, len(u), len(lever)))
+    last, before = np.zeros(len(lever)), 0.0
     for half in halves:
         own = (u > 0.5) == half.second
         found = half.only_roots(u[own])
@@ -177,11 +145,16 @@ def synchronised(
         found = np.maximum.accumulate(found, axis=0)
         rows = np.flatnonzero(np.isnan(found[-1:]).any(axis=0))
         if len(rows):
-            found[:, rows] = _in_turn(replace(half, terms=half.terms[..., rows]), u[own], last[rows], before)
+            found[:, rows] = _in_turn(replace(half, above=half.above[..., rows]), u[own], last[rows], before)
         v[own], missing[own] = found, half.missing(found)
         if len(found):
             last, before = found[-1], u[own][-1]
     return v.T, missing.T
+
+
+def _dot(one: Floats, other: Floats) -> Floats:
+    """Products of columns (..., 3, g)."""
+    return (one * other).sum(axis=-2)
 
 
 def _in_turn(half: _Excess, u: Floats, last: Floats, before: float) -> Floats:
@@ -191,13 +164,13 @@ def _in_turn(half: _Excess, u: Floats, last: Floats, before: float) -> Floats:
     for j, step in enumerate(np.diff(u, prepend=before)):
         if u[j] != 0.5:
             low_limit, target = np.maximum(last, low), np.clip(last + step, low, high)
-            excess = replace(half, terms=half.terms[:, j])
+            excess = replace(half, above=half.above[:, j])
             v[j] = _near(low_limit, high, target, excess)
             left = np.flatnonzero(np.isnan(v[j]))
             if len(left):
-                excess = replace(excess, terms=excess.terms[:, left])
+                excess = replace(excess, above=excess.above[:, left])
                 own = _GRID[slice(*np.searchsorted(_GRID, (low, high + _NO_STEP)))]
-                v[j, left] = _follow(own, excess.on(own), low_limit[left], target[left], excess)
+                v[j, left] = _follow(own, excess, low_limit[left], target[left])
         last = v[j]
     return v
 
@@ -207,7 +180,7 @@ def _near(low_limit: Floats, high: float, target: Floats, excess: _Excess) -> Fl
     found, rows = np.full(len(target), np.nan), np.arange(len(target))
     here, sign = target, np.zeros(len(target))
     for number in range(_NEAR_STEPS):
-        value, slope = excess(here, rows)
+        value, slope, _ = excess(here, rows)
         sign = np.sign(slope) if number == 0 else sign
         to = here - np.divide(value, slope, out=np.full_like(value, np.inf), where=slope != 0.0)
         none = np.abs(value) <= _NO_EXCESS
@@ -223,15 +196,12 @@ def _near(low_limit: Floats, high: float, target: Floats, excess: _Excess) -> Fl
     return found
 
 
-def _follow(grid: Floats, values: Floats, low_limit: Floats, target: Floats, excess: _Excess) -> Floats:
-    """One step of the branch: the root at or above `low_limit` nearest to `target`, else the smallest excess.
-
-    `values` (g, m) are the excess on the grid (m,).
-    """
-    # the cell that holds the limit counts from the limit on
-    each = np.arange(len(values))
-    at_limit = excess(low_limit, each)[0]
-    values = np.where(low_limit[:, None] > grid, at_limit[:, None], values)
+def _follow(grid: Floats, excess: _Excess, low_limit: Floats, target: Floats) -> Floats:
+    """One step of the branch: the root at or above `low_limit` nearest to `target`, else the smallest excess."""
+    # the cell of the grid that holds the limit counts from the limit on
+    each = np.arange(len(target))
+    at_limit = excess(low_limit)[0]
+    values = np.where(low_limit[:, None] > grid, at_limit[:, None], excess.on(grid))
     parameters = np.maximum(grid, low_limit[:, None])
     crossing = (values[:, :-1] <= 0.0) != (values[:, 1:] <= 0.0)
     distance = np.maximum(parameters[:, :-1] - target[:, None], target[:, None] - parameters[:, 1:])
@@ -246,31 +216,20 @@ def _follow(grid: Floats, values: Floats, low_limit: Floats, target: Floats, exc
 
     def wanted(v: Floats, rows: Ints) -> tuple[Floats, Floats]:
         """What is zero at the place that is looked for, and its derivative; above zero behind it."""
-        root, sign = has_root[rows], side[rows]
-        if root.all():
-            value, slope = excess(v, rows)
-            return -sign * value, -sign * slope
-        value, slope = excess(v, rows)
-        first, bend = excess.bends(v, rows)
-        return np.where(root, -sign * value, sign * first), np.where(root, -sign * slope, sign * bend)
+        (value, slope, bend), root, sign = excess(v, rows), has_root[rows], side[rows]
+        return np.where(root, -sign * value, sign * slope), np.where(root, -sign * slope, sign * bend)
 
     found = _zero(ends, start, wanted)
-    between = np.flatnonzero(~has_root & (side * excess(found, each)[0] < 0.0))  # two roots in a cell of the grid
+    between = np.flatnonzero(~has_root & (side * excess(found)[0] < 0.0))  # two roots in a cell of the grid
     if len(between):
         first, middle = target[between] <= found[between], found[between]
         ends = np.where(first, ends[0][between], middle), np.where(first, middle, ends[1][between])
-        sign = np.where(first, -side[between], side[between])
-
-        def crossed(v: Floats, rows: Ints) -> tuple[Floats, Floats]:
-            value, slope = excess(v, between[rows])
-            return sign[rows] * value, sign[rows] * slope
-
-        found[between] = _zero(ends, target[between], crossed)
+        has_root[between], side[between] = True, np.where(first, side[between], -side[between])
+        found[between] = _zero(ends, target[between], lambda v, rows: wanted(v, between[rows]))
     # an exact root at the limit, as at the two ends of a well synchronised corner, is kept exactly
     kept = has_root & (np.abs(at_limit) <= 1e-12) & (np.abs(target - low_limit) <= np.abs(target - found))
     found = np.where(kept, low_limit, found)
-    missing = np.abs(excess(found, each)[0])
-    worse = ~has_root & (np.abs(values[each, best]) < missing)
+    worse = ~has_root & (np.abs(values[each, best]) < np.abs(excess(found)[0]))
     return np.where(worse, parameters[each, best], found)
 
 
@@ -299,28 +258,3 @@ def _zero(ends: tuple[Floats, Floats], start: Floats, wanted: _Wanted) -> Floats
         if not len(pending):
             break
     return found
-
-
-def synchronisation_report(
-    tip_legs: tuple[Floats, Floats],
-    axis_legs: tuple[Floats, Floats],
-    lever: Floats,
-    weights: Floats,
-    axis_length: float,
-    u: Floats = REPORT_PARAMETERS,
-) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    """How far g corners are from what equations (17), (18) and (20) ask for, (g,) each.
-
-    `tip_legs` and `axis_legs` (g, 3), mm, lead from the first control point to the corner and from there to the last
-    one; `lever` is H times the axis at the corner. Gives v (g, m) at u (m,), ½ in the middle; the largest ``||Q−P|−H|``
-    there, mm; angles, rad, between the axis of the transition and that of the straight motion before it and after it,
-    and between the axis at u = ½ and that at the corner.
-    """
-    v, residual = synchronised(tip_legs, axis_legs, lever, weights, u, axis_length)
-    half = len(u) // 2
-    of_tip, of_axis = (nurbs.leg_coefficients(at, weights)[..., 1:] for at in (u[[0, half, -1]], v[:, [0, half, -1]]))
-    tips, axes = of_tip @ np.stack(tip_legs, axis=1), of_axis @ np.stack(axis_legs, axis=1)
-    levers = lever[:, None] + axes - tips
-    before, after = lever - axis_legs[0] + tip_legs[0], lever + axis_legs[1] - tip_legs[1]
-    jumps = (angle_between(one, levers[:, at]) for one, at in ((before, 0), (after, 2)))
-    return v, residual.max(axis=1), *jumps, angle_between(levers[:, 1], lever)

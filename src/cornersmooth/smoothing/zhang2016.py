@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
 
+from cornersmooth.arrays import some_rows
 from cornersmooth.arrays.vectors import angle_between, dot, norm, unit
 from cornersmooth.geometry import nurbs
 from cornersmooth.model import Corners, Floats, Ints, LimitedBy, Program, SmoothProgram, Status
@@ -20,7 +20,7 @@ from cornersmooth.smoothing.construction import (
     Progress,
     divide,
     half_cosine,
-    legs_at,
+    legs_of,
     put,
     refuse_turns,
 )
@@ -28,23 +28,19 @@ from cornersmooth.smoothing.proportional import EXACT
 from cornersmooth.smoothing.sampling import nodes
 from cornersmooth.smoothing.segments import Segments, lines_of, segments_of
 from cornersmooth.smoothing.self_check import (
-    TOGETHER,
+    ENDS,
     Motion,
     Original,
+    Parameters,
+    Transitions,
     bounded,
-    chord_sag,
     most_taken,
-    motion_of,
-    parts_gone,
-    sums,
     taken,
 )
-from cornersmooth.smoothing.synchronise import (
-    REPORT_PARAMETERS,
-    matching_parameters,
-    synchronisation_report,
-    synchronised,
-)
+from cornersmooth.smoothing.synchronise import matching_parameters
+
+#: parameters of the tip curve at which residual and jumps are reported
+REPORT_PARAMETERS: Final = np.linspace(0.0, 1.0, 9)
 
 #: what `Corners.extra` holds: the largest ``||Q−P|−H|`` that the synchronisation leaves (mm), the jumps of the axis at
 #: both ends of the transition (rad), and the length (15) of a curve whose segments have room for it (mm)
@@ -79,14 +75,11 @@ class Zhang2016(Construction):
 
         def again(rows: Ints, most: Floats) -> None:
             for part in np.split(np.arange(len(rows)), np.arange(BATCH, len(rows), BATCH)):
-                some = rows[part]
-                legs = legs_at(
-                    program, settings.axis_length, corners.pose[some], corners.before[some], corners.after[some]
-                )
+                legs = legs_of(smoothed, rows[part])
                 placed = self.sized(legs, settings, most[part])
                 if np.isfinite(most[part]).all():
                     placed.status[placed.status == Status.TOO_SHORT] = Status.STRAYS
-                put(corners, some, placed, legs.shift)
+                put(corners, rows[part], placed, legs.shift)
 
         rows = np.flatnonzero(corners.status == Status.STRAYS)
         again(rows, np.full(len(rows), np.inf))
@@ -108,29 +101,28 @@ class Zhang2016(Construction):
         (16) and (19) give the curve with the larger sine the tolerance and the other one its share by the ratio of the
         sines; put into (15) that is one and the same length for both: 3(w1+w2)ε/(2·w1·max(sin α/2, sin β/2)).
         """
-        tip, axis = (legs.tip_in, legs.tip_out), (legs.tip_in + legs.turn_in, legs.tip_out + legs.turn_out)
-        (tip_sizes, tip_sine), (axis_sizes, axis_sine) = _turn(*tip), _turn(*axis)
-        g = len(tip_sine)
+        original = Original.of(legs, settings)
+        segments = original.segments
+        sizes, sines = norm(segments), norm(unit(segments[:, :, 1]) - unit(segments[:, :, 0])) / 2.0
+        sines[sizes.min(axis=2) == 0.0] = 0.0  # a leg of no length has no direction
+        g = len(sines)
         factor = 2.0 * float(nurbs.deviation_factor(np.array(settings.weights)))  # 2·w1/(3(w1+w2)) in the paper
-        spare = legs.spare(settings)
-        by_tolerance = np.minimum(
-            divide(settings.common_tolerance + spare, factor * tip_sine),
-            divide(settings.axis_point_tolerance + spare, factor * axis_sine),
-        )
-        halves = np.minimum(*tip_sizes) / 2.0, np.minimum(*axis_sizes) / 2.0
+        allowed = np.array((settings.common_tolerance, settings.axis_point_tolerance)) + original.spare[:, None]
+        by_tolerance = divide(allowed, factor * sines).min(axis=1)
+        halves = sizes.min(axis=2) / 2.0
 
         status = np.full(g, Status.SMOOTHED, np.uint8)
-        status[(tip_sine == 0.0) & (axis_sine == 0.0)] = Status.STRAIGHT
-        sizes = np.hypot(tip_sizes[0], axis_sizes[0]) * np.hypot(tip_sizes[1], axis_sizes[1])
-        cosine = (dot(*tip) + dot(*axis)) / sizes
+        status[(sines == 0.0).all(axis=1)] = Status.STRAIGHT
+        cosine = dot(segments[:, :, 0], segments[:, :, 1]).sum(axis=1) / norm(np.swapaxes(sizes, 1, 2)).prod(axis=1)
         refuse_turns(status, cosine, half_cosine(legs, settings.axis_length), settings)
 
         # the size: the length (15) of both curves where their segments have room for it
-        size = np.minimum(np.minimum(by_tolerance, np.maximum(*halves)), most)
+        size = np.minimum(np.minimum(by_tolerance, halves.max(axis=1)), most)
         rows = np.flatnonzero(status == Status.SMOOTHED)
         found, last, step, power = np.zeros((4, g)), np.ones(g), np.ones(g), np.ones(g)
         for number in range(rounds):
-            found[:, rows], share = _measured(legs, settings, rows, *(np.minimum(half, size)[rows] for half in halves))
+            lengths = np.minimum(halves[rows], size[rows, None])
+            found[:, rows], share = _measured(_trimmed(some_rows(original, rows), sizes[rows], lengths, settings))
             over = share > 1.0 + EXACT
             rows, share = rows[over], share[over]
             if not len(rows):
@@ -141,29 +133,19 @@ class Zhang2016(Construction):
             last[rows], step[rows] = share, np.maximum(keeping ** (1.0 / power[rows]), np.minimum(keeping, 0.5))
             size[rows] *= step[rows] if number < _ROUNDS // 2 else 0.5
         status[rows] = Status.STRAYS
-        tip_length, axis_length = np.minimum(halves[0], size), np.minimum(halves[1], size)
-        short = np.maximum(tip_length, axis_length) <= 4.0 * settings.tip_resolution
-        status[(status == Status.SMOOTHED) & short] = Status.TOO_SHORT
+        lengths = np.minimum(halves, size[:, None])
+        status[(status == Status.SMOOTHED) & (lengths.max(axis=1) <= 4.0 * settings.tip_resolution)] = Status.TOO_SHORT
         smoothed = status == Status.SMOOTHED
-        tip_length, axis_length = np.where(smoothed, tip_length, 0.0), np.where(smoothed, axis_length, 0.0)
-        by_segment = (np.minimum(*halves) < size) | (np.maximum(*halves) <= size)
+        lengths[~smoothed] = 0.0
+        by_segment = (halves.min(axis=1) < size) | (halves.max(axis=1) <= size)
         limited_by = np.where(by_segment, LimitedBy.SEGMENT, LimitedBy.TOLERANCE).astype(np.uint8)
         limited_by[~smoothed] = LimitedBy.NOTHING
-        tip_trims, axis_trims = (
-            [np.divide(length, size, out=np.zeros(g), where=size > 0.0) for size in sizes]
-            for length, sizes in ((tip_length, tip_sizes), (axis_length, axis_sizes))
-        )
-        return Placed(
-            status,
-            limited_by,
-            *(tip_trims[0], tip_trims[1], axis_trims[0], axis_trims[1]),
-            tip_error=factor * tip_length * tip_sine,  # equation (10)
-            axis_error=factor * axis_length * axis_sine,
-            orientation_error=np.where(smoothed, found[3], 0.0),
-            extra={
-                name: np.where(smoothed, values, np.nan) for name, values in zip(EXTRA, (*found[:3], size), strict=True)
-            },
-        )
+        (tip_in, tip_out), (axis_in, axis_out) = np.moveaxis(_trimmed(original, sizes, lengths, settings).trims, 0, -1)
+        tip_error, axis_error = (factor * lengths * sines).T  # equation (10)
+        found[:3, ~smoothed], found[3, ~smoothed], size[~smoothed] = np.nan, 0.0, np.nan
+        extra = dict(zip(EXTRA, (*found[:3], size), strict=True))
+        trims = tip_in, tip_out, axis_in, axis_out
+        return Placed(status, limited_by, *trims, tip_error, axis_error, found[3], extra)
 
     def points(self, smoothed: SmoothProgram, rows: Ints, u: Floats) -> tuple[Floats, Floats]:
         """The axis-point curve at the synchronised parameters: equations (20) to (22) and, at the ends, (26)."""
@@ -236,103 +218,39 @@ class Zhang2016(Construction):
 CONSTRUCTION = Zhang2016()
 
 
-def _turn(leg_in: Floats, leg_out: Floats) -> tuple[tuple[Floats, Floats], Floats]:
-    """Lengths of legs, and the sine of half the angle between them; 0 where a leg has no length (no direction)."""
-    sizes = norm(leg_in), norm(leg_out)
-    return sizes, np.where(np.minimum(*sizes) > 0.0, norm(unit(leg_out) - unit(leg_in)) / 2.0, 0.0)
+def _trimmed(original: Original, sizes: Floats, lengths: Floats, settings: Settings) -> Transitions:
+    """Transitions of lengths (g, 2) on segments of some sizes (g, 2, 2); a segment of no size has none."""
+    trims = np.divide(lengths[..., None], sizes, out=np.zeros_like(sizes), where=sizes > 0.0)
+    return Transitions(trims, original, settings)
 
 
-@dataclass(frozen=True)
-class _Transitions:
-    """Transitions at g corners."""
-
-    tip_legs: tuple[Floats, Floats]
-    axis_legs: tuple[Floats, Floats]
-    trims: tuple[Floats, ...]  # of the tip in and out, of the axis point in and out
-    original: Original
-    spare: Floats
-
-    @classmethod
-    def of(cls, legs: Legs, trims: Sequence[Floats], settings: Settings) -> _Transitions:
-        tips, turns = (legs.tip_in, legs.tip_out), (legs.turn_in, legs.turn_out)
-        cut = [trim[:, None] * leg for trim, leg in zip(trims, (*tips, *sums(tips, turns)), strict=True)]
-        original = Original(tips, turns, settings.axis_length * legs.axis)
-        return cls((cut[0], cut[1]), (cut[2], cut[3]), tuple(trims), original, legs.spare(settings))
-
-    def bounded(
-        self, parameters: tuple[Floats, Floats], missing: Floats, settings: Settings
-    ) -> tuple[Floats, Floats, Ints]:
-        """(g,) mm that the axis point is off its path at most; (g,) the share of ε in use at most; where that is none.
-
-        There is no bound for a tolerance of the axis.
-        """
-        weights = np.array(settings.weights)
-        factor = float(nurbs.deviation_factor(weights))
-        errors = (
-            factor * norm(self.tip_legs[1] - self.tip_legs[0]),
-            factor * norm(self.axis_legs[1] - self.axis_legs[0]),
-        )
-        gone = parts_gone(self.trims, parameters, weights)
-        off, both = bounded(gone, missing, self.original, errors, settings.axis_length)
-        share = _most_share(off, both, self.spare, settings)
-        return off, share, np.flatnonzero(share > 1.0)
-
-    def motion(
-        self, rows: Ints, parameters: tuple[Floats, Floats], settings: Settings
-    ) -> tuple[Motion, Original, Floats]:
-        """Poses of some, the segments that they are measured against, and what is left of the tolerances."""
-        (u, v), weights = parameters, np.array(settings.weights)
-        tip_legs, axis_legs = ((one[0][rows], one[1][rows]) for one in (self.tip_legs, self.axis_legs))
-        at, trims = (u, v if len(v) == 1 else v[rows]), tuple(trim[rows] for trim in self.trims)
-        original = self.original.some(rows)
-        gone = parts_gone(trims, at, weights)
-        return motion_of(tip_legs, axis_legs, gone, original.lever, at, weights), original, self.spare[rows]
-
-    def missing_at(self, u: Floats, weights: Floats, height: float) -> Floats:
-        """(g,) mm: the largest ``||Q(u) − P(u)| − H|`` at common parameters (m,)."""
-        turns = np.stack(self.axis_legs, axis=1) - np.stack(self.tip_legs, axis=1)
-        levers = self.original.lever[:, None] + nurbs.leg_coefficients(u, weights)[:, 1:] @ turns
-        return np.abs(norm(levers) - height).max(axis=1)
-
-    def missing_at_ends(self, height: float) -> Floats:
-        """(g,) mm: the larger ``||Q − P| − H|`` of both ends of the curves."""
-        (tip_in, tip_out), (axis_in, axis_out), lever = self.tip_legs, self.axis_legs, self.original.lever
-        ends = norm(lever + tip_in - axis_in), norm(lever - tip_out + axis_out)
-        return np.maximum(*(np.abs(end - height) for end in ends))
-
-
-def _measured(
-    legs: Legs, settings: Settings, rows: Ints, tip_length: Floats, axis_length: Floats
-) -> tuple[tuple[Floats, ...], Floats]:
-    """Residual, jumps and turn of transitions with these lengths (15), and what of the tolerances they take (g,)."""
-    legs = Legs(*(values[rows] for values in legs))
-    tips = legs.tip_in, legs.tip_out
-    axes = sums(tips, (legs.turn_in, legs.turn_out))
-    trims = [divide(length, norm(leg)) for each, length in ((tips, tip_length), (axes, axis_length)) for leg in each]
-    made = _Transitions.of(legs, [np.where(np.isfinite(trim), trim, 0.0) for trim in trims], settings)
-    weights = np.array(settings.weights)
+def _measured(made: Transitions) -> tuple[tuple[Floats, ...], Floats]:
+    """Residual, jumps and turn of transitions, and what of the tolerances they take (g,)."""
+    settings = made.settings
     u = REPORT_PARAMETERS if settings.weights == (1.0, 1.0) and settings.axis_tolerance is None else _MORE_PARAMETERS
-    both, lever = (made.tip_legs, made.axis_legs), made.original.lever
-    v, *report = synchronisation_report(*both, lever, weights, settings.axis_length, u)
-    lines = settings.round_feed_changes
-    if lines:
-        (u, at), missing = _joined(u, v), np.maximum(report[0], made.missing_at_ends(settings.axis_length))
+    v, residual = made.synchronised(u)
+    most, report = residual.max(axis=1), made.report(u, (u, v))
+    if settings.round_feed_changes:
+        parameters, missing = _joined(u, v), np.maximum(most, made.missing(ENDS))
     else:  # controls run curves at common parameters
-        at, missing = u[None], made.missing_at(u, weights, settings.axis_length)
-    off, share, doubtful = made.bounded((u, at), missing, settings)
-    passing = off + (settings.chord if lines else 0.0)
-    most = *made.motion(doubtful, (u, at), settings), settings, len(u) // 2, passing[doubtful] if lines else None
-    share[doubtful] = most_taken(*most)
-    return tuple(report), share
+        parameters = u, u[None]
+        missing = made.missing(parameters)
+    off, share = made.bounded(parameters, missing)
+    doubtful = np.flatnonzero(share > 1.0)
+    passing = off[doubtful] + settings.chord if settings.round_feed_changes else None
+    some = made.some(doubtful)
+    middle = len(parameters[0]) // 2
+    share[doubtful] = most_taken(some.motion(_of(parameters, doubtful)), some.original, settings, middle, passing)
+    return (most, *report), share
 
 
-def _most_share(off: Floats, both: Floats, spare: Floats, settings: Settings) -> Floats:
-    """(g,) bound of what is taken of the tolerances, from those of `bounded`; none for a tolerance of the axis."""
-    share: Floats = np.maximum(off, both / TOGETHER) / (settings.common_tolerance + spare)
-    return share if settings.axis_tolerance is None else np.full_like(share, np.inf)
+def _of(parameters: Parameters, rows: Ints) -> Parameters:
+    """Those of some corners."""
+    u, v = parameters
+    return u, v if len(v) == 1 else v[rows]
 
 
-def _joined(u: Floats, v: Floats) -> tuple[Floats, Floats]:
+def _joined(u: Floats, v: Floats) -> Parameters:
     """Parameters of lines, which begin and end where straight motion does: equation (26)."""
     return np.concatenate(([0.0], u, [1.0])), np.pad(v, ((0, 0), (1, 1)), constant_values=((0, 0), (0.0, 1.0)))
 
@@ -342,28 +260,25 @@ def straying_lines(smoothed: SmoothProgram, rows: Ints) -> Ints:
 
     One line for each half ends where `_measured` has looked.
     """
-    program, corners, settings = smoothed.program, smoothed.corners, smoothed.settings
+    corners, settings = smoothed.corners, smoothed.settings
     rows = rows[corners.smoothed[rows]]
     if not settings.round_feed_changes or not len(rows):
         return rows[:0]
-    weights, height = np.array(settings.weights), settings.axis_length
     number = lines_of(smoothed, rows)
     rows, number = rows[np.abs(number) > 1], number[np.abs(number) > 1]
     found = [rows[:0]]
     order = np.argsort(number, kind="stable")
     cuts = np.union1d(np.flatnonzero(np.diff(number[order])) + 1, np.arange(BATCH, len(rows), BATCH))
+    columns = corners.trim_in, corners.trim_out, corners.axis_trim_in, corners.axis_trim_out
     for part in np.split(order, cuts) if len(rows) else ():
         some, u = rows[part], nodes(int(number[part[0]]))[:-1]
-        legs = legs_at(program, height, corners.pose[some], corners.before[some], corners.after[some])
-        trims = [
-            column[some] for column in (corners.trim_in, corners.trim_out, corners.axis_trim_in, corners.axis_trim_out)
-        ]
-        made = _Transitions.of(legs, trims, settings)
-        v, missing = synchronised(made.tip_legs, made.axis_legs, made.original.lever, weights, u, height)
-        missing = np.maximum(missing.max(axis=1), made.missing_at_ends(height))
-        parameters = _joined(u, v)
-        doubtful = made.bounded(parameters, missing, settings)[2]
-        share = taken(*made.motion(doubtful, parameters, settings), settings)
+        trims = np.stack([column[some] for column in columns], axis=1).reshape(-1, 2, 2)
+        made = Transitions(trims, Original.of(legs_of(smoothed, some), settings), settings)
+        v, residual = made.synchronised(u)
+        parameters, missing = _joined(u, v), np.maximum(residual.max(axis=1), made.missing(ENDS))
+        doubtful = np.flatnonzero(made.bounded(parameters, missing)[1] > 1.0)
+        made = made.some(doubtful)
+        share = taken(made.motion(_of(parameters, doubtful)), made.original, settings)
         found.append(some[doubtful[share.max(axis=1) > 1.0 + 1e-6]])
     return np.concatenate(found)
 
@@ -380,27 +295,28 @@ def straying_remainders(smoothed: SmoothProgram, rows: Ints | slice = slice(None
     beside[smoothed.corners.pose[rows]] = True
     pose = np.flatnonzero(unlike & segments.has_line & (segments.start >= 0) & (beside | beside[segments.start]))
     found, reserve = [pose[:0]], settings.interpolation_tolerance
-    cuts = (segments.entry, segments.exit), (segments.axis_entry, segments.axis_exit)
+    #: (n, 2) where the rests of the segments of tip and axis point begin, and where they end
+    low = np.column_stack((segments.entry, segments.axis_entry))
+    high = np.column_stack((segments.exit, segments.axis_exit))
     for part in np.split(pose, np.arange(BATCH, len(pose), BATCH)):
         start = segments.start[part]
         step = program.tip[part] - program.tip[start]
         lever = settings.axis_length * program.axis[start]
         turn = settings.axis_length * program.axis[part] - lever
-        ends = [[values[part, None] for values in pair] for pair in cuts]
-        none, original = np.zeros(len(part)), Original((step, step), (turn, turn), lever)
+        none = np.zeros((len(part), 2))
+        original = Original(np.stack((step, step), axis=1), np.stack((turn, turn), axis=1), lever, none[:, 0])
         # at one pose |Q − P| is H but for the chord of the turn; the tip is `apart` from that of the axis point
-        apart = np.maximum(*(np.abs(of_tip - of_axis) for of_tip, of_axis in zip(*ends, strict=True)))
-        missing = chord_sag(original, settings.axis_length) + apart[:, 0] * norm(step)
-        off, both = bounded((apart, 0.0 * apart), missing, original, (none, none + reserve), settings.axis_length)
-        doubtful = np.flatnonzero(_most_share(off, both, none, settings) > 1.0)
+        apart = np.maximum(*(np.abs(ends[part, :1] - ends[part, 1:]) for ends in (low, high)))
+        missing = original.chord_sag(settings.axis_length) + apart[:, 0] * norm(step)
+        _, share = bounded((apart, 0.0 * apart), missing, original, none + np.array((0.0, reserve)), settings)
+        doubtful = np.flatnonzero(share > 1.0)
 
-        tip_at, axis_at = (low[doubtful] + _PARTS * (high - low)[doubtful] for low, high in ends)
-        original = original.some(doubtful)
-        (step, _), (turn, _), lever = original
-        tip = tip_at[..., None] * step[:, None]
-        motion = Motion(tip, lever[:, None] + axis_at[..., None] * (step + turn)[:, None] - tip, tip_at, axis_at)
-        share = taken(motion, original, none[doubtful], settings, reserve=reserve)
-        found.append(part[doubtful[share.max(axis=1) > 1.0]])
+        here, original = part[doubtful], some_rows(original, doubtful)
+        tip_at, axis_at = (low[here, k, None] + _PARTS * (high - low)[here, k, None] for k in range(2))
+        tip = original.at(tip_at)[0]
+        motion = Motion(tip, sum(original.at(axis_at)) - tip, tip_at, axis_at)
+        share = taken(motion, original, settings, reserve=reserve)
+        found.append(here[share.max(axis=1) > 1.0])
     pose = np.concatenate(found)
     rows = np.unique(segments.row[np.concatenate((segments.start[pose], pose))])
     return rows[rows >= 0]
