@@ -6,8 +6,8 @@ import gzip
 import os
 import re
 import socket
-import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -15,7 +15,7 @@ import pytest
 from cornersmooth import read
 from cornersmooth.cl import source
 from cornersmooth.errors import InputError
-from cornersmooth.system.output import _machine
+from cornersmooth.system.output import _ABANDONED
 from oracle.command import SMALL, run
 
 unix = pytest.mark.skipif(sys.platform == "win32", reason="pipes in folders are of Unix")
@@ -38,7 +38,7 @@ def test_pipes_devices_and_sockets_of_a_folder_are_skipped_with_a_reason(tmp_pat
         "socket.cls",
         "zero.cls",
     ]
-    assert [path.name for path in (tmp_path / "out").iterdir()] == ["part.nc"]
+    assert [path.name for path in (tmp_path / "out").glob("[!.]*")] == ["part.nc"]
 
 
 def test_an_input_beyond_the_limit_is_an_error_that_names_the_option(
@@ -66,17 +66,17 @@ def test_a_gzip_file_that_grows_without_measure_is_refused(monkeypatch: pytest.M
 
 
 @unix
-def test_what_a_killed_run_has_left_goes_with_the_next_run(tmp_path: Path) -> None:
+def test_what_a_killed_run_has_left_goes_with_a_run_of_the_next_day(tmp_path: Path) -> None:
     (tmp_path / "part.cls").write_bytes(SMALL)
-    gone = subprocess.run([sys.executable, "-c", "import os; print(os.getpid())"], capture_output=True, check=True)
-    left = tmp_path / f".o.nc.{int(gone.stdout)}-01234567-{_machine()}.part"
+    left = tmp_path / ".o.nc.4711-01234567.part"
     others = (
-        tmp_path / f".o.nc.{os.getpid()}-01234567-{_machine()}.part",  # of a process that is at work
-        tmp_path / f".o.nc.{int(gone.stdout)}-01234567-0badcafe.part",  # of another computer
-        tmp_path / f".other.nc.{int(gone.stdout)}-01234567-{_machine()}.part",
+        tmp_path / ".o.nc.4712-01234567.part",  # somebody may be at it
+        tmp_path / ".other.nc.4711-01234567.part",
     )
     for path in (left, *others):
         path.touch()
+    for path in (left, others[1]):
+        os.utime(path, (time.time() - 2 * _ABANDONED,) * 2)
     assert run("smooth", tmp_path / "part.cls", "-o", tmp_path / "o.nc").returncode == 0
     assert not left.exists()
     assert all(path.exists() for path in others)

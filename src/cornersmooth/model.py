@@ -135,6 +135,7 @@ class Source:
     dialect: str = "plain"
     operation: int = 0  #: Number of the operation that was taken alone; 0 for the whole file
     operation_name: str = ""  #: Empty where the file gives none
+    sha256: str = ""  #: of the file, in hexadecimal digits; empty where there is none
 
 
 @dataclass(frozen=True)

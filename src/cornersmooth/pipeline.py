@@ -27,7 +27,7 @@ from cornersmooth.nc_reader import CONTROLS, NcProgram, read_nc
 from cornersmooth.nc_reader.elements import Element
 from cornersmooth.provenance import HEAD, Provenance, with_parts
 from cornersmooth.report import NcFile, report
-from cornersmooth.report.record import planned_times, sha256_of
+from cornersmooth.report.record import planned_times
 from cornersmooth.report.verdict import Judgement, Saving, judge, trusted_blocks
 from cornersmooth.settings import Settings
 from cornersmooth.system.output import FAILED, Output, Target, check_output, open_output, path_of
@@ -57,9 +57,7 @@ class Result:
     #: Time of the stages ``read``, ``smooth``, ``write`` and ``verify``.
     seconds: Mapping[str, float] = field(default_factory=dict)
     path: str | None = None  #: File that holds the text; None where it went to a stream, or nowhere
-    #: Of the CL file, empty where it is not known, and of the written program.
-    source_sha256: str = ""
-    sha256: str = ""
+    sha256: str = ""  #: of the written program
 
     @property
     def verdict(self) -> Verdict:
@@ -92,7 +90,6 @@ class Result:
             findings=self.findings[own:],
             verification=self.verification,
             unverified=self.unverified,
-            source_sha256=self.source_sha256,
             nc_file=NcFile.of(self.path, self.sha256, form),
             command=command,
             loosened=loosened,
@@ -167,17 +164,14 @@ def read_back(text: bytes | str, form: Form, settings: Settings, name: str | Non
 def postprocess(
     source: Program | bytes | str | os.PathLike[str],
     target: Target,
-    settings: Settings | Callable[[Program], Settings] | None = None,
+    settings: Settings | None = None,
     *,
     form: Form | None = None,
     frame: Frame | None = None,
-    reading: Mapping[str, Any] | None = None,
-    feed: float | None = None,
     plan_feeds: Limits | None = None,
     verify: bool = True,
     strict: bool = False,
     force: bool | None = False,
-    mark: Mapping[str, str] | None = None,
     processes: int | None = None,
     progress: Progress | None = None,
 ) -> Result:
@@ -188,17 +182,14 @@ def postprocess(
     Parameters
     ----------
     source : Program, path or bytes
+        What `read` gives; it is read here where nothing else has to be known of it.
     target : path or binary stream
-    settings : Settings, or function of a Program that gives them, optional
+    settings : Settings, optional
         ε 0.01 mm, H 10 mm, the method that suits the form; fitted here to its digits.
     form : Form, optional
         What `choose_form` gives; fanuc g1 by default.
     frame : Frame, optional
         Program name, block numbers, texts before and behind.
-    reading : mapping, optional
-        Keyword arguments of `read`.
-    feed : float, mm/min, optional
-        For moves that have none.
     plan_feeds : Limits, optional
         Plan the text within these limits, and those of the axes of the form's machine, and give every block the feed
         that it reaches there. The whole text is kept in memory then.
@@ -208,8 +199,6 @@ def postprocess(
         Whether any verdict but PASSED is an error.
     force : bool or None
         Whether an existing file may be replaced; None for not, but it may stay if it is the same.
-    mark : mapping of str to str, optional
-        Kept with the file where the file system can (`cornersmooth.system.output.read_mark`), with the verdict.
     processes : int, optional
         Processes to smooth and to verify with; by default as many as are useful. The result does not depend on it.
     progress : callable, optional
@@ -229,8 +218,9 @@ def postprocess(
         As `read`, `choose_form`, `write` and `open_output` say it.
     """
     form = nc.choose_form() if form is None else form
-    if plan_feeds is not None and not callable(settings):
-        settings = _for_planned_feeds(Settings() if settings is None else settings, form)
+    settings = Settings() if settings is None else settings
+    if plan_feeds is not None:
+        settings = _for_planned_feeds(settings, form)
     processes = useful_processes() if processes is None else processes
     may_replace = check_output(target, [] if isinstance(source, (Program, bytes)) else [source], force=force)
     back = reading_back(form)
@@ -238,16 +228,15 @@ def postprocess(
     if verify and not back["control"]:
         unverified = "nothing was measured: the control is like none whose programs can be read"
     seconds: dict[str, float] = {}
-    _begin(progress, "reading")
-    with _timed(seconds, "read"):
-        program = (source if isinstance(source, Program) else read(source, **(reading or {}))).with_feed(feed)
-    with _timed(seconds, "smooth"):
-        step, settings = stage_of(progress, "smoothing"), settings(program) if callable(settings) else settings
+    with timed(seconds, "read", progress):
+        program = source if isinstance(source, Program) else read(source)
+    with timed(seconds, "smooth"):
+        step = stage_of(progress, "smoothing")
         smoothed = smooth(program, settings, form=form, progress=step, processes=processes)
     return_free_memory()  # before processes share what there is
     frame = (frame or Frame()).with_offset_of(program, form)
     provenance = replace(
-        _provenance(source, program, smoothed.settings, form),
+        _provenance(program, smoothed.settings, form),
         planned_feeds=plan_feeds is not None,
         work_offset=frame.named_offset(form.table),
         parts=not unverified,
@@ -272,7 +261,7 @@ def postprocess(
                 **back | {"trusted": (*back["trusted"], *_users_blocks(frame, form, program, smoothed.settings))},
             )
             stack.enter_context(verifier)
-        with _timed(seconds, "write"):
+        with timed(seconds, "write"):
             step = stage_of(progress, "writing")
             if plan_feeds is None:
                 written = nc.write(smoothed, output.stream, form=form, frame=frame, progress=step)
@@ -284,8 +273,7 @@ def postprocess(
         return_free_memory()
         verification = None
         if verifier is not None:
-            _begin(progress, "verifying")
-            with _timed(seconds, "verify"):
+            with timed(seconds, "verify", progress):
                 verification, unverified = _verified(verifier, form, frame)
                 if verification is not None:
                     _put_parts(output, verification.parts)
@@ -306,13 +294,9 @@ def postprocess(
             findings,
             seconds,
             path,
-            provenance.sha256,
             output.stream.digest,
         )
-        judgement = result.judgement
-        output.failed = judgement.verdict is Verdict.FAILED or (strict and judgement.verdict is not Verdict.PASSED)
-        if mark:
-            output.mark = {**mark, "verdict": judgement.text}
+        output.failed = result.verdict is Verdict.FAILED or (strict and result.verdict is not Verdict.PASSED)
     if output.failed:
         where = "nothing was written" if path is None else f"the program is in {path}{FAILED}"
         failure = VerdictError("CS508", f"the verdict is {result.verdict}; {where}", file=program.source.name)
@@ -362,9 +346,7 @@ def _put_parts(output: Output, digests: str) -> None:
         output.stream.patch(output.path, *found)
 
 
-def _provenance(
-    source: Program | bytes | str | os.PathLike[str], program: Program, settings: Settings, form: Form
-) -> Provenance:
+def _provenance(program: Program, settings: Settings, form: Form) -> Provenance:
     """What the text says of how it was made."""
     return Provenance(
         version=__version__,
@@ -379,7 +361,7 @@ def _provenance(
         source=program.source.name,
         operation=program.source.operation,
         extras="-".join(extra.name for extra in form.extras),
-        sha256="" if isinstance(source, Program) else sha256_of(source),
+        sha256=program.source.sha256,
         weights=(1.0, *settings.weights),
     )
 
@@ -416,19 +398,20 @@ def _verified(verifier: Verifier, form: Form, frame: Frame) -> tuple[Verificatio
     return found, found.unverified
 
 
-def _begin(progress: Progress | None, stage: str) -> None:
-    """Name a stage of which nobody knows how far it is."""
-    if progress is not None:
-        progress(stage, 0, 0)
-
-
 def stage_of(progress: Progress | None, stage: str) -> Callable[[int, int], None] | None:
     """Give what to call of a stage with what is done and all."""
     return None if progress is None else lambda done, total: progress(stage, done, total)
 
 
+#: stages of which nobody knows how far they are, as `Progress` names them
+_UNMEASURED = {"read": "reading", "verify": "verifying"}
+
+
 @contextmanager
-def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
+def timed(seconds: dict[str, float], stage: str, progress: Progress | None = None) -> Iterator[None]:
+    """Note the seconds of a stage; `progress` is called with its name where nobody knows how far it is."""
+    if progress is not None:
+        progress(_UNMEASURED[stage], 0, 0)
     begin = time.perf_counter()
     yield
     seconds[stage] = round(time.perf_counter() - begin, 6)

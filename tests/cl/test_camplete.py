@@ -166,7 +166,7 @@ def test_spellings_that_mean_one_thing(dialect: str, cycle: str, same: str) -> N
     for one in (cycle, same):
         stream = io.BytesIO()
         reading = {"dialect": dialect}
-        result = postprocess(text.format(one).encode(), stream, Settings(tolerance=0.02), reading=reading)
+        result = postprocess(read(text.format(one).encode(), **reading), stream, Settings(tolerance=0.02))
         assert result.verdict is Verdict.PASSED
         found.append([line for line in stream.getvalue().decode().splitlines() if not line.startswith("(")])
     assert found[0] == found[1]
@@ -178,7 +178,7 @@ def test_spellings_that_mean_one_thing(dialect: str, cycle: str, same: str) -> N
 def test_what_means_more_is_not_drilled(cycle: str) -> None:
     text = f"UNITS/MM\nLOADTL/1\nSPINDL/RPM,900,CLW\nRAPID\nGOTO/5,6,40\nCYCLE/{cycle},RAPTO,3,FEDTO,-12,MMPM,80\n"
     with pytest.raises(InputError, match=r"6: error\[CS342\]"):
-        postprocess((text + "GOTO/5,6,0\nCYCLE/OFF\nFINI\n").encode(), io.BytesIO(), reading={"dialect": "nx"})
+        postprocess(read((text + "GOTO/5,6,0\nCYCLE/OFF\nFINI\n").encode(), dialect="nx"), io.BytesIO())
 
 
 CATIA = (
@@ -201,7 +201,7 @@ def test_an_order_names_the_numbers_of_a_cycle(order: str, cycle: str, same: str
     found = []
     for one, reading in ((cycle, {"cycle_order": order}), (same, {})):
         stream = io.BytesIO()
-        result = postprocess(CATIA.format(one).encode(), stream, Settings(tolerance=0.02), reading=reading)
+        result = postprocess(read(CATIA.format(one).encode(), **reading), stream, Settings(tolerance=0.02))
         assert result.verdict is Verdict.PASSED
         found.append([line for line in stream.getvalue().decode().splitlines() if not line.startswith("(")])
     assert found[0] == found[1]
@@ -210,7 +210,7 @@ def test_an_order_names_the_numbers_of_a_cycle(order: str, cycle: str, same: str
 def test_more_numbers_than_the_order_names_are_not_drilled() -> None:
     for reading in ({}, {"cycle_order": "DEPTH,FEED"}):
         with pytest.raises(InputError, match=r"error\[CS342\]"):
-            postprocess(CATIA.format("DRILL,26,85,1,MMPM").encode(), io.BytesIO(), reading=reading)
+            postprocess(read(CATIA.format("DRILL,26,85,1,MMPM").encode(), **reading), io.BytesIO())
     for wrong in ("DEPTH,SPEED", "DEPTH,DEPTH"):
         with pytest.raises(SettingsError, match="CS230"):
             read(CATIA.format("OFF").encode(), cycle_order=wrong)

@@ -204,4 +204,4 @@ def test_operations_are_the_whole_file_and_each_is_right_alone(path: Path) -> No
         alone = read(path, operation=str(one.number))
         np.testing.assert_array_equal(alone.tip, whole.tip[one.first : one.stop])
         np.testing.assert_array_equal(alone.feed, whole.feed[one.first : one.stop])
-        assert postprocess(alone, io.BytesIO(), feed=500.0).verdict == Verdict.PASSED
+        assert postprocess(alone.with_feed(500.0), io.BytesIO()).verdict == Verdict.PASSED

@@ -9,7 +9,6 @@ import re
 import shlex
 import shutil
 import signal
-import socket
 import subprocess
 import time
 from collections.abc import Iterator
@@ -21,7 +20,6 @@ from cornersmooth import Settings, __version__, choose_form
 from cornersmooth.cli.job import Job
 from cornersmooth.cli.options import Options
 from cornersmooth.nc import Frame
-from cornersmooth.system import output
 from interruptions import cl_text
 from oracle.command import DONE, SCRIPT, USAGE, command, environment, run, wait_for
 from oracle.messages import one_line
@@ -74,7 +72,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def files_in(folder: Path) -> dict[str, bytes]:
-    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("[!.]*.nc"))}
 
 
 def test_a_lost_worker_loses_no_file(scheduler: Path, folder: Path, tmp_path: Path) -> None:
@@ -148,21 +146,6 @@ def test_a_scheduler_with_tls_takes_those_with_its_certificate(folder: Path, tmp
                 assert not list(tmp_path.rglob("*.nc"))
     assert said[-1].startswith(f"{FILES} files: {FILES} PASSED")
     assert len(files_in(tmp_path / "nc")) == FILES
-
-
-def test_what_a_killed_run_has_left_goes_with_the_next(tmp_path: Path) -> None:
-    done = subprocess.Popen(["true"])
-    done.wait()
-    name = f"cluster-{socket.gethostname()}"
-    end = f"0badcafe-{output._machine()}.part"
-    for process, host in ((done.pid, name), (os.getpid(), name), (done.pid, "cluster-elsewhere")):
-        (tmp_path / f".{host}.{process}-{end}").touch()
-    target = str(tmp_path / "one.nc")
-    job = Job("one.cls", target, (), "one", Options(directory="out"), Settings(), choose_form(), Frame())
-    with pytest.importorskip("cornersmooth.cli.cluster")._proof_of_sharing([job]) as proof:
-        assert Path(proof).exists()
-        left = {path.name for path in tmp_path.iterdir()} - {Path(proof).name}
-    assert left == {f".{name}.{os.getpid()}-{end}", f".cluster-elsewhere.{done.pid}-{end}"}
 
 
 @pytest.mark.parametrize(

@@ -130,3 +130,11 @@ def test_the_short_help_has_the_options_of_every_day() -> None:
     assert "--help-all" in short
     assert "--method [" in whole
     assert len(re.findall(r"^  (?:-\w, )?--", whole, re.MULTILINE)) <= 55
+
+
+def test_files_in_the_wrong_order_are_named(part: Path) -> None:
+    out = part.with_suffix(".nc")
+    assert run("smooth", part, "-o", out).returncode == DONE
+    refused = run("verify", out, part)
+    assert refused.returncode == USAGE
+    assert f"write: cornersmooth verify {part} {out}" in one_line(refused.stderr)

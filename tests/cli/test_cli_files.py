@@ -339,7 +339,7 @@ def several(tmp_path: Path) -> list[Path]:
 
 
 def _contents(folder: Path) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
+    return {path.name: path.read_bytes() for path in sorted(folder.glob("[!.]*"))}
 
 
 def test_any_number_of_processes_gives_the_same_bytes(several: list[Path], tmp_path: Path) -> None:
@@ -470,7 +470,7 @@ def test_existing_outputs_in_the_folder_are_kept(several: list[Path], tmp_path: 
     out = tmp_path / "out"
     out.mkdir()
     assert run("smooth", *several, "-d", out).returncode == DONE
-    first = next(iter(sorted(out.iterdir())))
+    first = next(iter(sorted(out.glob("[!.]*"))))
     first.write_text("mine")
     result = run("smooth", *several, "-d", out)
     assert result.returncode == BAD_OUTPUT

@@ -9,7 +9,7 @@ import re
 
 import numpy as np
 
-from cornersmooth import Settings
+from cornersmooth import Settings, read
 from cornersmooth.page import smoothed_page
 from cornersmooth.pipeline import Result, postprocess
 from cornersmooth.times.saving import planned_saving
@@ -54,7 +54,7 @@ def smoothed(
     import io
 
     text = path.format(name=name, comment=comment).encode()
-    return postprocess(text, io.BytesIO(), Settings(tolerance=0.02, method=method), form=form, reading={"name": source})
+    return postprocess(read(text, name=source), io.BytesIO(), Settings(tolerance=0.02, method=method), form=form)
 
 
 def page_of(result: Result, **more: object) -> str:

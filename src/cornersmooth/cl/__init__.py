@@ -112,7 +112,7 @@ def read(
         if value is not None and value not in choices:
             raise SettingsError("CS230", f"unknown {what} {value!r}", f"use one of {', '.join(choices)}")
     tables_only = scale != 1.0 or flip_axis or between_passes is not None
-    data, name = load(source, name, size_limit=size_limit)
+    data, name, digest = load(source, name, size_limit=size_limit)
     if format is None:
         refuse_foreign(data, name)
         from cornersmooth.cl.points import begins_with_names, looks_like_points
@@ -138,7 +138,7 @@ def read(
         program = read_apt(
             text, name=name, dialect=dialect, units=units, arc_rule=arc_rule, lenient=lenient, cycle_order=order
         )
-    program = replace(program, source=replace(program.source, name=os.path.basename(name)))
+    program = replace(program, source=replace(program.source, name=os.path.basename(name), sha256=digest))
     if operation is not None or tool_number is not None or spindle is not None:
         from cornersmooth.cl.operations import one_operation, with_tool
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import hashlib
 import io
 import os
 import re
@@ -44,8 +45,13 @@ _IN_FRONT: Final = re.compile(rb"[ \t]*([0-9]{1,9})(?:[ \t]*[:.)]?[ \t]*(?=[A-Za
 _FREE: Final = re.compile(rb"[ \t]*(\$\$|PARTNO|PPRINT|INSERT|REMARK|LETTER|TPRINT|DISPLY)", re.IGNORECASE)
 
 
-def load(source: str | os.PathLike[str] | bytes, name: str | None, *, size_limit: bool = True) -> tuple[bytes, str]:
-    """Return the contents and the name for messages, where none is given the path itself or ``"<memory>"``.
+def load(
+    source: str | os.PathLike[str] | bytes, name: str | None, *, size_limit: bool = True
+) -> tuple[bytes, str, str]:
+    """Return the contents, their name for messages and the SHA-256 of the file.
+
+    Where no name is given it is the path itself, or ``"<memory>"``.
+
 
     Raises InputError CS100: the file cannot be read; CS103: it is no complete gzip file; CS199: with a limit of size it
     is larger than `LARGEST`, or a gzip file that grows 200-fold.
@@ -59,6 +65,7 @@ def load(source: str | os.PathLike[str] | bytes, name: str | None, *, size_limit
                 data = read_bounded(file, name, size_limit=size_limit)
         except OSError as why:
             raise error("CS100", name, None, why=why.strerror or why) from why
+    digest = hashlib.sha256(data).hexdigest()
     if data.startswith(_GZIP):
         most = min(LARGEST, max(_LARGEST_RATIO * len(data), _ALWAYS))
         try:
@@ -66,7 +73,7 @@ def load(source: str | os.PathLike[str] | bytes, name: str | None, *, size_limit
                 data = read_bounded(file, name, size_limit=size_limit, most=most)
         except (OSError, EOFError, zlib.error) as why:
             raise error("CS103", name, None, why=why) from why
-    return data, name
+    return data, name, digest
 
 
 class _Reader(Protocol):

@@ -13,7 +13,6 @@ import signal
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import partial
 from itertools import islice
 from multiprocessing import parent_process
 from typing import TYPE_CHECKING, Any
@@ -91,7 +90,9 @@ class Batch:
         try:
             while True:
                 for place, job in islice(waiting, self._processes - len(running)):
-                    running[Helper(partial(_run_with_parent, job))] = place
+                    helper = Helper(_run_with_parent)
+                    running[helper] = place
+                    helper.start(job)
                 if not running:
                     return
                 for helper in first_ready(running):
@@ -214,14 +215,9 @@ def row_of(outcome: Outcome) -> dict[str, Any]:
         "reason": outcome.message or outcome.skipped,
         "verdict": outcome.verdict,
         "verdict_text": outcome.verdict_text,
-        "to_check": contents.get("to_check"),
-        "left_out": contents.get("left_out"),
-        "not_verified": contents.get("not_verified"),
+        **{name: contents.get(name) for name in ("to_check", "left_out", "not_verified")},
         "poses": contents.get("input", {}).get("poses"),
-        "corners": summary.get("corners"),
-        "smoothed": summary.get("smoothed"),
-        "max_tip_error_mm": summary.get("max_tip_error_mm"),
-        "max_axis_error_mm": summary.get("max_axis_error_mm"),
+        **{name: summary.get(name) for name in ("corners", "smoothed", "max_tip_error_mm", "max_axis_error_mm")},
         "blocks": summary.get("blocks_out"),
         "findings": len(contents["findings"]) if contents else None,
         "warnings": _warnings(contents.get("findings", ())),

@@ -105,6 +105,10 @@ class _Option(click.Option):
         super().__init__(*args, **given)
         self.heading = heading
 
+    def value_is_missing(self, value: Any) -> bool:
+        """Never: the shop settings may have it, which are read behind the command line."""
+        return False
+
 
 class _Setting(_Option):
     """What no command line has: only ``cornersmooth.toml`` and the environment give it."""

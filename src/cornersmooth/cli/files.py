@@ -7,11 +7,11 @@ import os
 import re
 import stat
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatch
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
@@ -23,31 +23,6 @@ if TYPE_CHECKING:
     from cornersmooth.cli.options import Options
 
 STANDARD = "-"
-
-
-#: lines of a text that a terminal is shown without -o
-_SHOWN = 20
-
-
-class Beginning:
-    """A stream that lets the first lines of a text through and counts the others, which it holds back."""
-
-    def __init__(self, stream: BinaryIO) -> None:
-        self._stream, self._left = stream, _SHOWN
-        self.held_back = 0
-
-    def write(self, data: bytes, /) -> int:
-        """Let through what belongs to the first lines."""
-        lines = data.splitlines(keepends=True)
-        shown = lines[: self._left]
-        self._stream.write(b"".join(shown))
-        self._left -= sum(line.endswith(b"\n") for line in shown)
-        self.held_back += sum(line.endswith(b"\n") for line in lines[len(shown) :])
-        return len(data)
-
-    def flush(self) -> None:
-        """Hand everything to the terminal."""
-        self._stream.flush()
 
 
 def read_input(path: str, *, size_limit: bool = True) -> tuple[bytes, str]:
@@ -140,6 +115,25 @@ def write_report(path: str, parts: Iterable[str | bytes], *, replace: bool = Tru
     with output.open_output(target_of(path), replace=replace) as made:
         for part in parts:
             made.stream.write(part if isinstance(part, bytes) else part.encode("utf-8", "backslashreplace"))
+
+
+def write_reports(
+    paths: Mapping[str, bool],
+    contents: Mapping[str, Any],
+    *,
+    csv: Callable[[], Iterable[str]] | None = None,
+    page: Callable[[], str] | None = None,
+) -> None:
+    """Write reports in the forms that their names end in; of each path, whether it may be replaced."""
+    from cornersmooth.report import report_json
+
+    for path, replace in paths.items():
+        form = suffix_of(path)
+        if form == ".csv" and csv is not None:
+            write_report(path, csv(), replace=replace)
+        else:
+            text = page() if form == ".html" and page is not None else report_json(contents)
+            write_report(path, [text], replace=replace)
 
 
 @contextlib.contextmanager
@@ -242,17 +236,16 @@ def _stem(path: str) -> str:
 
 def _check_outputs(inputs: list[Input]) -> None:
     """Refuse two outputs of one name, and outputs of one that are the input of another."""
-    sources = [one.source for one in inputs]
-    names = {name for source in sources for name in _names(source)}
+    sources = {os.path.realpath(one.source) for one in inputs if one.source != STANDARD}
     taken: dict[str, Input] = {}
     for one in inputs:
-        real = [os.path.realpath(path) for path in one.outputs]
-        for path, place in zip(one.outputs, real, strict=True):
-            other = taken.setdefault(place, one)
-            if other is not one or real.count(place) > 1:
-                _refuse_clash(other, one, path)
-            if not names.isdisjoint(_names(path)):
-                check_path(path, sources, force=True)
+        for path in one.outputs:
+            place = os.path.realpath(path)
+            if place in sources:
+                raise SettingsError("CS220", f"{path} is the input", "choose another name for the output")
+            if place in taken:
+                _refuse_clash(taken[place], one, path)
+            taken[place] = one
 
 
 def _refuse_clash(one: Input, other: Input, path: str) -> NoReturn:
@@ -263,14 +256,3 @@ def _refuse_clash(one: Input, other: Input, path: str) -> NoReturn:
     raise click.UsageError(
         f"{one.source} and {other.source} would both be written to {path}; rename one, or give each a -d of its own"
     )
-
-
-def _names(path: str) -> list[object]:
-    """What tells a file from others: its place, and where it exists, its number."""
-    if path == STANDARD:
-        return []
-    try:
-        found = os.stat(path)
-    except OSError:
-        return [os.path.realpath(path)]
-    return [os.path.realpath(path), (found.st_dev, found.st_ino)]

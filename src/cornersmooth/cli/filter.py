@@ -10,35 +10,13 @@ from typing import Any
 
 import click
 
-from cornersmooth.cli.files import (
-    STANDARD,
-    Input,
-    check_endings,
-    check_inputs,
-    check_path,
-    find_inputs,
-    read_head,
-    read_input,
-    suffix_of,
-    target_of,
-    told_of,
-    write_report,
-)
+from cornersmooth.cli import files, show
 from cornersmooth.cli.options import Options
 from cornersmooth.cli.shop import command_line, loosened
-from cornersmooth.cli.show import (
-    more,
-    print_line,
-    print_message,
-    print_verdict,
-    say,
-    say_json,
-    say_line,
-    warn,
-)
+from cornersmooth.cli.show import more
 from cornersmooth.control.listing import listing
 from cornersmooth.control.program import Text
-from cornersmooth.errors import CornersmoothError, SettingsError, Verdict
+from cornersmooth.errors import CornersmoothError, SettingsError, Verdict, command_text
 from cornersmooth.filter import Filtered, filter_program, verify_programs
 from cornersmooth.filter.checking import measure
 from cornersmooth.filter.program import THREE_AXES, read_program, refuse_cl_file
@@ -49,7 +27,7 @@ from cornersmooth.nc import Form
 from cornersmooth.nc_reader import Problem
 from cornersmooth.nc_reader.recognition import is_cl_file, names_tip_control, needs_its_control, recognise_control
 from cornersmooth.provenance import HEAD
-from cornersmooth.report import NcFile, report_json
+from cornersmooth.report import NcFile
 from cornersmooth.report.record import Kind, planned_times, record, sha256_of
 from cornersmooth.report.verdict import Judgement, Saving
 from cornersmooth.settings import Settings
@@ -70,19 +48,19 @@ _SHOWN, _WRONG_SHOWN = 10, 20
 def run_filter(given: Options) -> int:
     """Do the work of the command; return its exit code."""
     settings = given.settings()
-    check_endings("report", given.reports, ".json or .html")
-    jobs = find_inputs(given, PATTERNS)
-    if given.as_json and (len(jobs) != 1 or jobs[0].target == STANDARD):
+    files.check_endings("report", given.reports, ".json or .html")
+    jobs = files.find_inputs(given, PATTERNS)
+    if given.as_json and (len(jobs) != 1 or jobs[0].target == files.STANDARD):
         raise click.UsageError("--json needs one input and -o FILE; --report '{stem}.json' tells of several")
     if len(jobs) == 1:  # what is wrong with the input comes before what is wrong with the output
-        check_inputs(jobs[0].source)
-        with told_of(jobs[0].source):
-            refuse_cl_file(read_head(jobs[0].source))
+        files.check_inputs(jobs[0].source)
+        with files.told_of(jobs[0].source):
+            refuse_cl_file(files.read_head(jobs[0].source))
     for job in jobs:
         if given.directory:
             make_folder(os.path.dirname(job.target) or ".")
         for path in (job.target, *job.reports):
-            check_path(path, [job.source], force=given.force)
+            files.check_path(path, [job.source], force=given.force)
     worst, words = 0, Counter[str]()
     for job in jobs:
         try:
@@ -92,10 +70,10 @@ def run_filter(given: Options) -> int:
             if len(jobs) == 1:
                 raise
             error.file = error.file or job.source
-            print_message(str(error))
+            show.print_message(str(error))
             worst, words = max(worst, error.exit_code), words + Counter(("error",))
     if len(jobs) > 1 and not given.quiet:
-        print_line(f"{len(jobs)} programs: " + ", ".join(f"{count} {word}" for word, count in words.items()))
+        show.print_line(f"{len(jobs)} programs: " + ", ".join(f"{count} {word}" for word, count in words.items()))
     return worst
 
 
@@ -105,15 +83,15 @@ def _bad(verdict: Verdict, given: Options) -> bool:
 
 
 def _pages(reports: Iterable[str]) -> bool:
-    return any(suffix_of(path) == ".html" for path in reports)
+    return any(files.suffix_of(path) == ".html" for path in reports)
 
 
-def _filter(job: Input, settings: Settings, given: Options) -> Verdict:
+def _filter(job: files.Input, settings: Settings, given: Options) -> Verdict:
     """Filter one program; return the verdict."""
-    data, name = read_input(job.source)
+    data, name = files.read_input(job.source)
     given = options_for(data, name, given)
     form, axes = filter_form_of(given), given.load_limits()
-    with told_of(name):
+    with files.told_of(name):
         found = filter_program(
             data,
             form,
@@ -125,10 +103,10 @@ def _filter(job: Input, settings: Settings, given: Options) -> Verdict:
             processes=useful_processes(),
         )
     bad = _bad(found.verdict, given)
-    with open_output(target_of(job.target), hold=bad, replace=given.force) as output:
+    with open_output(files.target_of(job.target), hold=bad, replace=given.force) as output:
         output.failed = bad
         output.stream.write(found.data)
-    path = None if job.target == STANDARD else job.target + FAILED * bad
+    path = None if job.target == files.STANDARD else job.target + FAILED * bad
     saving = None if found.seconds is None else Saving(*found.seconds, against="the program as it was")
     contents = _reported(
         "filter",
@@ -152,17 +130,20 @@ def _filter(job: Input, settings: Settings, given: Options) -> Verdict:
         left_as_it_is=[asdict(left) for left in found.left],
     )
     if given.as_json:
-        say_json(contents)
+        show.say_json(contents)
     elif not given.quiet:
         _show(name, contents, found, given)
     elif loosened(settings.tolerance):
-        print_line(f"{name}: {contents['verdict_text']}")
+        show.print_line(f"{name}: {contents['verdict_text']}")
     return found.verdict
 
 
 def verify_with_program(source: str, old: bytes, given: Options) -> int:
     """Compare an NC program with what was made of it; return the exit code of ``verify``."""
-    new, name = read_input(given.text)
+    new, name = files.read_input(given.text)
+    if is_cl_file(new[:HEAD]):
+        order = command_text(["cornersmooth", "verify", given.text, given.source])
+        raise click.UsageError(f"{name} is a CL file, and the CL file comes first; write: {order}")
     given = options_for(old, source, given)
     settings, form = given.settings(), filter_form_of(given)
     found = verify_programs(
@@ -172,14 +153,14 @@ def verify_with_program(source: str, old: bytes, given: Options) -> int:
     assert checked is not None
     what = _problems(checked.wrong) or _measured(found, settings.tolerance)
     judgement = Judgement(found.verdict, _to_check(found), 0, "", what)
-    path = None if given.text == STANDARD else given.text
+    path = None if given.text == files.STANDARD else given.text
     written = replace(NcFile.of(path, sha256_of(new), form), form=None)
     contents = _reported("verify", found, judgement, (source, old), name, written, form, settings, given.reports)
     show_wrong(name, checked.wrong)
     if given.as_json:
-        say_json(contents)
+        show.say_json(contents)
     elif loosened(settings.tolerance) or not given.quiet:
-        say_line(contents["verdict_text"])
+        show.say_line(contents["verdict_text"])
     return int(found.verdict is not Verdict.PASSED)
 
 
@@ -219,27 +200,30 @@ def _reported(
         "problems": [{"code": one.code, "nc_line": one.nc_line, "text": one.text} for one in checked.wrong],
     }
     contents |= more
+    motions = found.motions
+
+    def page() -> str:
+        assert motions is not None
+        return verified_page(
+            *measure(*motions, settings, os.path.basename(old_name)),
+            name=name,
+            control=form.table.name,
+            form=form.name,
+            source=old,
+            machine=axes or form.machine,
+            planner=form.table.lines.planner,
+            judgement=judgement,
+            origin="old program",
+            runs=found.changed,
+            left=[asdict(one) for one in found.left],
+            saving=saving,
+        )
+
+    written = [path for path in reports if motions is not None or files.suffix_of(path) != ".html"]
     for path in reports:
-        if suffix_of(path) != ".html":
-            write_report(path, [report_json(contents)])
-        elif found.motions is None:
-            warn("no page is written: no run differs", path)
-        else:
-            page = verified_page(
-                *measure(*found.motions, settings, os.path.basename(old_name)),
-                name=name,
-                control=form.table.name,
-                form=form.name,
-                source=old,
-                machine=axes or form.machine,
-                planner=form.table.lines.planner,
-                judgement=judgement,
-                origin="old program",
-                runs=found.changed,
-                left=[asdict(one) for one in found.left],
-                saving=saving,
-            )
-            write_report(path, [page])
+        if path not in written:
+            show.warn("no page is written: no run differs", path)
+    files.write_reports(dict.fromkeys(written, True), contents, page=page)
     return contents
 
 
@@ -263,20 +247,20 @@ def _show(name: str, contents: Mapping[str, Any], found: Filtered, given: Option
     if found.seconds is not None:
         before, after = found.seconds
         counts += f", {after:.1f} s instead of {before:.1f} s ({100.0 * (after / before - 1.0):+.1f} %)"
-    print_verdict(contents, counts, ["all outside of runs is the same byte for byte"])
+    show.print_verdict(contents, counts, ["all outside of runs is the same byte for byte"])
     if found.checked is not None:
         show_wrong(name, found.checked.wrong)
     if not found.units_said and given.units is None:
-        warn("the program does not say its units: millimetres are taken; give --units", name)
+        show.warn("the program does not say its units: millimetres are taken; give --units", name)
     left = found.left if given.verbose else found.left[:_SHOWN]
     if left:
-        print_line(f"{'left as it is':>13}  first line  reason")
+        show.print_line(f"{'left as it is':>13}  first line  reason")
     for cuts in left:
-        print_line(f"{cuts.count:>13}  {cuts.line:>10}  {cuts.reason}")
+        show.print_line(f"{cuts.count:>13}  {cuts.line:>10}  {cuts.reason}")
     if len(left) < len(found.left):
-        print_line(f"... {len(found.left) - len(left)} more reasons; -v shows them")
+        show.print_line(f"... {len(found.left) - len(left)} more reasons; -v shows them")
     if found.cuts and not found.smoothed and any("tool tip control is off" in one.reason for one in found.left):
-        print_line("--tip-control says that tool tip control is on where the program begins")
+        show.print_line("--tip-control says that tool tip control is on where the program begins")
 
 
 def _judgement(found: Filtered, tolerance: float) -> Judgement:
@@ -310,11 +294,11 @@ def options_for(data: bytes, name: str, given: Options) -> Options:
         return given
     if given.control.lower() in ALIKE:
         if given.limits:
-            warn(f"times are those of LinuxCNC's law: that of {given.control} is not known", name)
+            show.warn(f"times are those of LinuxCNC's law: that of {given.control} is not known", name)
         given = replace(given, control="linuxcnc")
     head = recognised(given, data[:HEAD])
     if head.remark:
-        warn(head.remark, name)
+        show.warn(head.remark, name)
     default = click.get_current_context().get_parameter_source("control") == click.core.ParameterSource.DEFAULT
     if default and not recognise_control(data[:HEAD]) and needs_its_control(data[:HEAD]):
         what = f"{name} does not say its control, and has numbers without a point or comments after a semicolon"
@@ -353,9 +337,9 @@ def time_of_program(data: bytes, name: str, given: Options) -> int:
     given = options_for(data, name, given)
     form, settings, axes = filter_form_of(given), given.settings(), axes_of(given)
     how = {**how_read(given), "axes": axes, "processes": useful_processes()}
-    with told_of(name):
+    with files.told_of(name):
         if given.text:
-            found = verify_programs(data, read_input(given.text)[0], form, settings, **how)
+            found = verify_programs(data, files.read_input(given.text)[0], form, settings, **how)
         else:
             found = filter_program(data, form, settings, verify=False, **how)
         if found.seconds is None and not (found.checked and found.checked.wrong):  # nothing differs
@@ -382,19 +366,19 @@ def time_of_program(data: bytes, name: str, given: Options) -> int:
         f"{after:>12.3f} s  {given.text or 'smoothed'}{share}",
         f"of {what}; {found.smoothed:,} of {found.cuts:,} cuts differ",
     )
-    say(given, contents, lines)
+    show.say(given, contents, lines)
     return 0
 
 
 def explain_program(source: str, given: Options) -> int:
     """Show what the control does in each block of a program."""
-    data, name = read_input(source)
-    with told_of(name):
+    data, name = files.read_input(source)
+    with files.told_of(name):
         refuse_cl_file(data[:HEAD])
     control = given.reading_back()["control"]
     reader = ProgramReader(control, given.load_machine(), tcp=not given.no_tcp, **how_read(given))
     lines = list(listing(reader.stream(Text.of(data))))
-    say(given, {"schema": "cornersmooth-stream/1", "name": name, "control": control, "stream": lines}, lines)
+    show.say(given, {"schema": "cornersmooth-stream/1", "name": name, "control": control, "stream": lines}, lines)
     return 0
 
 
@@ -415,6 +399,6 @@ def describe_program(data: bytes, name: str) -> dict[str, Any]:
 def show_wrong(name: str, wrong: Sequence[Problem]) -> None:
     """Print the first problems of a program, and how many more there are."""
     for one in wrong[:_WRONG_SHOWN]:
-        print_message(one.message(f"{name}:{one.nc_line}"))
+        show.print_message(one.message(f"{name}:{one.nc_line}"))
     if len(wrong) > _WRONG_SHOWN:
-        print_line(f"{name}: {more(len(wrong) - _WRONG_SHOWN, 'problem')}")
+        show.print_line(f"{name}: {more(len(wrong) - _WRONG_SHOWN, 'problem')}")

@@ -90,19 +90,12 @@ def run(args: list[str] | None, ending: Shutdown) -> int:
         return result if isinstance(result, int) else 0
     except click.exceptions.Exit as leaving:
         return leaving.exit_code
-    except click.UsageError as wrong:
-        where = f"{wrong.ctx.command_path} --help" if wrong.ctx else "cornersmooth --help"
-        text = wrong.format_message().rstrip(".")
-        hint = "" if "; " in text else f"{where} shows the options"
-        _say(message("error", text, hint=hint))
-        what, _, more = text.partition("; ")
-        return _ended(args, 2, SettingsError("", what, hint or more))
     except click.ClickException as wrong:
-        _say(message("error", wrong.format_message()))
-        return _ended(args, 2, SettingsError("", wrong.format_message()))
+        where = getattr(wrong, "ctx", None) and wrong.ctx.command_path  # type: ignore[attr-defined]
+        what, _, hint = wrong.format_message().rstrip(".").partition("; ")
+        return _failed(args, SettingsError("", what, hint or f"{where or 'cornersmooth'} --help shows the options"))
     except CornersmoothError as failure:
-        _say(str(failure))
-        return _ended(args, failure.exit_code, failure)
+        return _failed(args, failure)
     except (ClosedPipe, BrokenPipeError, SystemExit):  # click and rich leave so where a pipe is closed, and else never
         _close_quietly()
         return EXIT_CLOSED_PIPE
@@ -115,21 +108,13 @@ def run(args: list[str] | None, ending: Shutdown) -> int:
         return EXIT_INTERNAL
 
 
-def _ended(args: list[str] | None, code: int, failure: CornersmoothError) -> int:
-    """Give the error as an object too, where the output was to be one (report/error.schema.json); return the code."""
+def _failed(args: list[str] | None, failure: CornersmoothError) -> int:
+    """Print an error, as an object too where the output was to be one (report/error.schema.json); return its code."""
+    _say(str(failure))
     if "--json" in (sys.argv[1:] if args is None else args) and sys.stdout is not None:
-        say_json(
-            {
-                "schema": "cornersmooth-error/1",
-                "exit_code": code,
-                "code": failure.code or None,
-                "what": failure.what,
-                "hint": failure.hint or None,
-                "file": failure.file,
-                "line": failure.line,
-            }
-        )
-    return code
+        contents = {name: getattr(failure, name) or None for name in ("code", "what", "hint", "file", "line")}
+        say_json({"schema": "cornersmooth-error/1", "exit_code": failure.exit_code, **contents})
+    return failure.exit_code
 
 
 def flushed(code: int) -> int:

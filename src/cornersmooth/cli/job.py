@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, BinaryIO, cast
+from typing import TYPE_CHECKING, Any
 
 from cornersmooth import __version__
+from cornersmooth.cl import read
 from cornersmooth.cl.apt import refuse_program
-from cornersmooth.cli.files import Beginning, Input, check_path, read_input, suffix_of, target_of, write_report
+from cornersmooth.cli.files import Input, check_path, read_input, suffix_of, target_of, write_reports
 from cornersmooth.cli.options import POINTS, Options
 from cornersmooth.cli.show import more
 from cornersmooth.errors import (
@@ -27,11 +29,11 @@ from cornersmooth.kinematics import Machine
 from cornersmooth.methods import AUTO
 from cornersmooth.model import Program
 from cornersmooth.nc import Form, Frame
-from cornersmooth.pipeline import Progress, Result, postprocess
-from cornersmooth.report import corners_csv, report_json
+from cornersmooth.pipeline import Progress, Result, postprocess, timed
+from cornersmooth.report import corners_csv
 from cornersmooth.report.verdict import Saving
 from cornersmooth.settings import TIMED_POSES, Settings
-from cornersmooth.system.output import ClosedPipe, make_folder, read_mark
+from cornersmooth.system.output import ClosedPipe, make_folder, read_mark, write_mark
 from cornersmooth.system.processes import return_large_arrays
 
 if TYPE_CHECKING:
@@ -63,7 +65,7 @@ class Job(Input):
     axes: Machine | None = None  #: whose limits, in place of those of the machine of the form
     #: Within which the feeds of the blocks are planned; None for the programmed ones.
     plan_feeds: Limits | None = None
-    beginning: bool = False  #: whether standard output gets the first lines only
+    in_memory: bool = False  #: whether the program goes to the outcome, in place of the target
     #: name of a run that does a file again where a worker was lost, although that may have written it; empty for none
     run: str = ""
     loosened: str = ""  #: what settings made looser than the default; the line of the verdict says it
@@ -93,8 +95,7 @@ class Outcome:
     saving: Saving | None = None
     #: time of each stage, s
     seconds: Mapping[str, float] = field(default_factory=dict)
-    #: lines that standard output did not get
-    held_back: int = 0
+    text: bytes = b""  #: the program, of a job in memory
 
     @property
     def verdict(self) -> str:
@@ -107,22 +108,6 @@ class Outcome:
         return "not done" if self.unfinished else "skipped" if self.skipped else self.verdict or "error"
 
 
-def _check(job: Job, *, replace_target: bool | None = False) -> dict[str, bool | None]:
-    """Refuse what would fail later or destroy something; say of each output whether it may replace what is there.
-
-    `replace_target` is whether the NC file may be replaced, besides `--force`: as `force` of `output.check_output`.
-    """
-    force = job.given.force
-    may_replace: dict[str, bool | None] = {
-        job.target: check_path(job.target, [job.source], force=force or replace_target)
-    }
-    if not force and replace_target is None:
-        may_replace[job.target] = None
-    for path in job.reports:
-        may_replace[path] = check_path(path, [job.source], force=force, beginning=_OURS[suffix_of(path)])
-    return may_replace
-
-
 def run_job(job: Job, progress: Progress | None = None) -> Outcome:
     """Read, smooth, write, report; errors of the input or output become part of the outcome.
 
@@ -131,7 +116,7 @@ def run_job(job: Job, progress: Progress | None = None) -> Outcome:
     return_large_arrays()
     outcome = Outcome(job)
     try:
-        outcome.contents = _smooth_file(job, outcome, progress)
+        _smooth_file(job, outcome, progress)
     except CornersmoothError as failure:
         outcome.exit_code = failure.exit_code
         outcome.message = str(failure)
@@ -174,97 +159,90 @@ def _plain(value: object) -> str:
     return repr(value)
 
 
-def _may_replace(job: Job, made_of: str, outcome: Outcome) -> bool | None:
-    """Whether the output of an earlier run may be replaced; where nothing has to be done the outcome says so."""
-    if job.given.force or not os.path.exists(job.target):
-        return job.given.force
-    before = read_mark(job.target)
-    if before is None:  # nothing can be known of it: it may stay if it is the same
-        return None
-    if before.get("made_of") != made_of:
-        return False
-    if job.run and before.get("run") == job.run:
-        return True
-    if all(map(os.path.exists, job.reports)):
-        outcome.skipped, outcome.verdict_text = "nothing has changed", before.get("verdict", "")
-    return True
-
-
-def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> dict[str, Any]:
-    """Make text and reports; a verdict that is not good enough goes to the outcome, and why there was nothing to do."""
+def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> None:
+    """Make text and reports; the outcome gets what there is of them, and why there was nothing to do."""
     given = job.given
     source, name = read_input(job.source, size_limit=not given.no_size_limit)
     if given.dialect != POINTS:  # what is wrong with the input comes before what is wrong with the output
         refuse_program(source, name)
-    may_replace = {} if job.batch else _check(job)
+    force: bool | None = given.force
     made_of = ""
     if job.batch:
         made_of = _made_of(job, source)
-        replace_target = _may_replace(job, made_of, outcome)
-        if outcome.skipped:
-            return {}
+        before = None if force else read_mark(job.target)
+        if before is not None:
+            force = before.get("made_of") == made_of
+            again = job.run and before.get("run") == job.run
+            if force and not again and all(map(os.path.exists, job.reports)):
+                outcome.skipped, outcome.verdict_text = "nothing has changed", before.get("verdict", "")
+                return
+        force = force if force or before is not None else None  # a file of which nothing is known may be the same
         for path in job.outputs:
             make_folder(os.path.dirname(path) or ".")
-        may_replace = _check(job, replace_target=replace_target)
-    target = target_of(job.target)
-    beginning = Beginning(cast(BinaryIO, target)) if job.beginning else None
+    check_path(job.target, [job.source], force=force)
+    replace = {
+        path: check_path(path, [job.source], force=given.force, beginning=_OURS[suffix_of(path)])
+        for path in job.reports
+    }
+    reading: dict[str, float] = {}
+    with timed(reading, "read", progress):
+        program = read(source, name=name, **given.reading()).with_feed(given.feed)
+    text = io.BytesIO()
     try:
         result = postprocess(
-            source,
-            cast(BinaryIO, beginning) if beginning is not None else target,
-            _settings_of(job),
+            program,
+            text if job.in_memory else target_of(job.target),
+            _settings_for(job, program),
             form=job.form,
             frame=job.frame,
-            reading={"name": name, **given.reading()},
-            feed=given.feed,
             plan_feeds=job.plan_feeds,
             verify=not given.no_verify,
             strict=given.strict,
-            force=may_replace[job.target],
-            mark={"made_of": made_of, "run": job.run} if made_of else None,
+            force=force,
             processes=None if job.alone else 1,
             progress=progress,
         )
     except VerdictError as failure:
         result = failure.result
         outcome.exit_code = failure.exit_code
-        outcome.message = _say_failed(name, result, failure)
-    if beginning is not None:
-        outcome.held_back = beginning.held_back
-    outcome.seconds = result.seconds
+        outcome.message = _failed(name, result, failure)
+    else:
+        if made_of:
+            mark = {"made_of": made_of, "run": job.run, "verdict": result.judgement.text}
+            write_mark(job.target, result.sha256, mark)
+    outcome.text = text.getvalue()
+    outcome.seconds = {**result.seconds, **reading}
     outcome.verdict_text = "; ".join(filter(None, (result.judgement.text, job.loosened)))
-    pages = [path for path in job.reports if suffix_of(path) == ".html"]
-    timed = given.time or (len(result.program) <= TIMED_POSES and (pages or not (given.quiet or job.batch)))
-    if timed and result.verdict in (Verdict.PASSED, Verdict.INCOMPLETE):
+    with_page = any(suffix_of(path) == ".html" for path in job.reports)
+    timed_too = given.time or (len(program) <= TIMED_POSES and (with_page or not (given.quiet or job.batch)))
+    if timed_too and result.verdict in (Verdict.PASSED, Verdict.INCOMPLETE):
         from cornersmooth.times.saving import planned_saving
 
         settings = result.smoothed.settings
-        outcome.saving = planned_saving(result.program, settings, result.form, axes=job.axes, progress=progress)
-    for path in pages:
+        outcome.saving = planned_saving(program, settings, result.form, axes=job.axes, progress=progress)
+
+    def page() -> str:
         from cornersmooth.page import smoothed_page
 
-        page = smoothed_page(result, source=source, axes=job.axes, saving=outcome.saving, tool=given.tool)
-        write_report(path, [page], replace=bool(may_replace[path]))
+        return smoothed_page(result, source=source, axes=job.axes, saving=outcome.saving, tool=given.tool)
+
     contents = result.report(command=job.command, loosened=job.loosened, saving=outcome.saving, limits=job.axes)
-    for path in job.reports:
-        if path not in pages:
-            table = suffix_of(path) == ".csv"
-            texts = corners_csv(result.smoothed, dense=not result.form.curve) if table else [report_json(contents)]
-            write_report(path, texts, replace=bool(may_replace[path]))
-    return contents
+    outcome.contents = contents
+    table = partial(corners_csv, result.smoothed, dense=not result.form.curve)
+    write_reports(replace, contents, csv=table, page=page)
 
 
-def _settings_of(job: Job) -> Settings | Callable[[Program], Settings]:
+def _settings_for(job: Job, program: Program) -> Settings:
     """Settings of a job; under limits those of the method whose lines are faster."""
     if job.axes is None or job.settings.method != AUTO or job.form.curves or job.plan_feeds is not None:
         return job.settings
     from cornersmooth.times.saving import faster_method
 
-    return partial(faster_method, settings=job.settings, form=job.form, axes=job.axes)
+    return faster_method(program, settings=job.settings, form=job.form, axes=job.axes)
 
 
-def _say_failed(name: str, result: Result, failure: VerdictError) -> str:
-    """Say what verification found, and where the text is now."""
+def _failed(name: str, result: Result, failure: VerdictError) -> str:
+    """What verification found, and where the text is now."""
     found = result.verification
     problems = found.problems[:_PROBLEMS_SHOWN] if found is not None else ()
     lines = [problem.message(f"{name}:{problem.cl_line}", f"NC line {problem.nc_line}") for problem in problems]

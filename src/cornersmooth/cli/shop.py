@@ -1,24 +1,8 @@
 """Shop settings: defaults of a project and of a user, from ``cornersmooth.toml`` and the environment.
 
-A project's file is in the folder of the input or above it, a user's in ``~/.config/cornersmooth`` (Windows:
-``%APPDATA%\\cornersmooth``)::
-
-    [smooth]
-    tolerance = 0.01        # options by their long names
-    control = "shop"
-
-    [smooth.shop]           # only with this control
-    form = "bspline"
-
-    [controls.shop]         # a control of one's own, as docs/controls.md says it
-    like = "siemens"
-
-    [machines.mill]
-    like = "table-ac"
-
-What counts is the option, then the environment (``CORNERSMOOTH_TOLERANCE``), the project, the user, the default. What
-[smooth] says holds for all commands that have the option; [filter], [verify], [compare], [time], [setup], [info] and
-[surface] may say otherwise.
+docs/settings.md describes the file. What counts is the option, then the environment (``CORNERSMOOTH_TOLERANCE``), the
+project, the user, the default. [smooth] holds for all commands that have the option, [smooth.NAME] with the control of
+that name; tables of other commands may have other values.
 """
 
 from __future__ import annotations
@@ -93,29 +77,43 @@ _TYPED = f"{__name__}.typed"
 def parse_args(
     command: click.Command, ctx: click.Context, args: list[str], parse: Callable[[click.Context, list[str]], list[str]]
 ) -> list[str]:
-    """Read the shop settings that go with the input, then the options."""
+    """Read the options, then the shop settings that go with the input, which give what nobody has typed."""
     ctx.meta[_TYPED] = command_text(["cornersmooth", str(command.name), *args])
     if not settable(command):
         return parse(ctx, args)
-    if ctx.resilient_parsing:  # a shell wants to complete what is not whole yet
-        with contextlib.suppress(SettingsError, click.UsageError):
-            ctx.meta[SHOP] = Shop(find_files(_first_look(command, ctx, list(args))[0]))
-        return parse(ctx, args)
-    first, control = _first_look(command, ctx, list(args))
-    _check_environment(command)
-    shop = Shop(find_files(first))
-    for file in shop.files:
-        _name_strangers(file.path)
-    ctx.meta[SHOP] = shop
-    ctx.default_map = _defaults(command, shop, control)
+    if not ctx.resilient_parsing:
+        _check_environment(command)
     rest = parse(ctx, args)
+    if ctx.resilient_parsing:  # a shell wants to complete what is not whole yet
+        with contextlib.suppress(SettingsError):
+            _set_defaults(command, ctx)
+        return rest
+    _set_defaults(command, ctx)
+    for file in ctx.meta[SHOP].files:
+        _name_strangers(file.path)
+    for param in command.params:
+        if param.required and ctx.params[str(param.name)] is None:
+            raise click.MissingParameter(ctx=ctx, param=param)
+    if command.name not in _WITH_VERDICT and (loose := loosened(ctx.params.get("tolerance"))):
+        warn(loose)
+    return rest
+
+
+def _set_defaults(command: click.Command, ctx: click.Context) -> None:
+    """Put what the files have in the place of defaults (SettingsError CS240 to CS242)."""
+    first = next((ctx.params.get(str(one.name)) for one in command.params if isinstance(one, click.Argument)), None)
+    first = first[0] if isinstance(first, tuple) and first else first
+    shop = Shop(find_files(first if isinstance(first, str) and first != "-" else "."))
+    ctx.meta[SHOP] = shop
+    by_default = ctx.get_parameter_source("control") is click.core.ParameterSource.DEFAULT
+    for name, value in _values(command, shop, None if by_default else ctx.params.get("control")).items():
+        if ctx.get_parameter_source(name) is click.core.ParameterSource.DEFAULT:
+            ctx.params[name] = value
+            ctx.set_parameter_source(name, click.core.ParameterSource.DEFAULT_MAP)
     for kind, options in _OWN_TABLES.items():
         for name in options:
             if isinstance(ctx.params.get(name), str):
                 ctx.params[name] = _own(shop, kind, ctx.params[name])
-    if command.name not in _WITH_VERDICT and (loose := loosened(ctx.params.get("tolerance"))):
-        warn(loose)
-    return rest
 
 
 def _name_strangers(path: str) -> None:
@@ -177,18 +175,20 @@ def _config_folder(system: str) -> Path:
     return Path(os.environ.get(variable) or os.path.expanduser(usual))
 
 
-def _defaults(command: click.Command, shop: Shop, control: str | None) -> dict[str, Any]:
-    """Values of options by name, as the files have them (SettingsError CS241, CS242)."""
-    options = {key(str(option.name)): option for option in settable(command)}
+def _values(command: click.Command, shop: Shop, control: str | None) -> dict[str, Any]:
+    """Values of options by name, as the files have them; None for the control that these name."""
+    if not shop.files:
+        return {}
     if control is None:
         named = (
             file.tables.get(table, {}).get("control") for file in shop.files for table in (str(command.name), "smooth")
         )
         control = next((name for name in named if isinstance(name, str)), "fanuc")
-    if shop.files and not any(file.own("controls", control) for file in shop.files):
+    if not any(file.own("controls", control) for file in shop.files):
         from cornersmooth.nc import find_control
 
         control = find_control(control) or control
+    options = {key(str(option.name)): option for option in settable(command)}
     values: dict[str, Any] = {}
     for file in reversed(shop.files):
         for table, word, value in file.options(command.name or "", control):
@@ -200,16 +200,6 @@ def _defaults(command: click.Command, shop: Shop, control: str | None) -> dict[s
             elif word.replace("_", "-") not in (known := _all_keys()):
                 raise _unknown(file.path, f"{table}.{word}", word, known)
     return values
-
-
-def _first_look(command: click.Command, ctx: click.Context, args: list[str]) -> tuple[str, str | None]:
-    """First input, or the current folder, and the control that options or the environment name."""
-    given, _, _ = command.make_parser(ctx).parse_args(args)
-    inputs = next((given.get(str(param.name)) for param in command.params if isinstance(param, click.Argument)), None)
-    first = inputs[0] if isinstance(inputs, (tuple, list)) and inputs else inputs
-    control = given.get("control") or os.environ.get(variable("control"))
-    here = isinstance(first, str) and first != "-"
-    return (str(first) if here else "."), control if isinstance(control, str) else None
 
 
 def settable(command: click.Command) -> list[click.Option]:
@@ -233,19 +223,19 @@ def _all_keys() -> list[str]:
 
 
 def _checked(option: click.Option, value: Any, file: str, where: str) -> Any:
-    """Value as the option takes it."""
+    """Value as the option takes it (SettingsError CS242)."""
+    strings = isinstance(value, list) and all(isinstance(item, str) for item in value)
     if option.is_flag:
-        if not isinstance(value, bool):
-            raise SettingsError("CS242", f"{where} is {value!r}", "give true or false", file=file)
-        return value
-    if option.multiple:
-        if not (isinstance(value, list) and all(isinstance(item, str) for item in value)):
-            raise SettingsError("CS242", f"{where} is {value!r}", "give a list of strings", file=file)
-        return value
-    if isinstance(value, list):
-        value = ",".join(map(str, value))
-    if isinstance(value, bool) or not isinstance(value, (str, int, float)):
-        raise SettingsError("CS242", f"{where} is {value!r}", "give a number or a string", file=file)
+        fits, hint = isinstance(value, bool), "give true or false"
+    elif option.multiple:
+        fits, hint = strings, "give a list of strings"
+    else:
+        value = ",".join(map(str, value)) if isinstance(value, list) else value
+        fits, hint = isinstance(value, (str, int, float)) and not isinstance(value, bool), "give a number or a string"
+    if not fits:
+        raise SettingsError("CS242", f"{where} is {value!r}", hint, file=file)
+    if option.is_flag or option.multiple:
+        return tuple(value) if option.multiple else value
     try:
         return option.type.convert(value if isinstance(value, float) else str(value), option, None)
     except click.BadParameter as wrong:

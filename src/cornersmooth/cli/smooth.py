@@ -10,22 +10,12 @@ from typing import TYPE_CHECKING
 
 import click
 
+from cornersmooth.cli import show
 from cornersmooth.cli.batch import Batch, batch_report, end_lines, interrupted_line, line_of, write_summary
 from cornersmooth.cli.files import STANDARD, check_endings, check_inputs, check_path, find_inputs, read_lines
 from cornersmooth.cli.job import Job, Outcome, run_job
 from cornersmooth.cli.options import Options
 from cornersmooth.cli.shop import command_line, loosened
-from cornersmooth.cli.show import (
-    more,
-    print_line,
-    print_message,
-    progress_bar,
-    say_json,
-    show_findings,
-    show_summary,
-    show_verdict,
-    warn,
-)
 from cornersmooth.errors import Verdict, printable
 from cornersmooth.nc import Frame, fit_settings
 from cornersmooth.system.output import make_folder
@@ -36,6 +26,9 @@ if TYPE_CHECKING:
 #: files named in a warning
 _NAMED = 3
 
+#: lines of a program that a terminal is shown without -o
+_LINES_SHOWN = 20
+
 
 def run_smooth(given: Options) -> int:
     """Do the work of the command; return its exit code."""
@@ -45,7 +38,7 @@ def run_smooth(given: Options) -> int:
 
     ending: Shutdown = click.get_current_context().obj
     worst = 0
-    with progress_bar(given.quiet, rate=True) as progress:
+    with show.progress_bar(given.quiet, rate=True) as progress:
         batch = Batch(jobs, given.jobs, progress, scheduler=given.scheduler if given.jobs == 1 else None)
 
         def keep() -> None:
@@ -61,16 +54,16 @@ def run_smooth(given: Options) -> int:
         for outcome in batch.run(ending):
             printed = outcome.status != "error" and not given.quiet and (progress is None or given.verbose > 0)
             if printed:
-                print_line(line_of(outcome))
+                show.print_line(line_of(outcome))
             _tell(outcome, printed)
             worst = max(worst, outcome.exit_code)
     ending.keep = None
     keep()
     if given.as_json:
-        say_json(batch_report(batch.rows()))
+        show.say_json(batch_report(batch.rows()))
     else:
         for line in lines():
-            print_line(line)
+            show.print_line(line)
     return worst
 
 
@@ -78,18 +71,24 @@ def _alone(job: Job) -> int:
     """Do the only job; return the exit code."""
     given = job.given
     check_inputs(job.source)
-    with progress_bar(given.quiet or (job.target == STANDARD and _to_terminal())) as progress:  # a bar eats lines
+    with show.progress_bar(given.quiet or (job.target == STANDARD and _to_terminal())) as progress:  # a bar eats lines
         outcome = run_job(job, progress)
-    if outcome.held_back and not given.quiet:
-        print_line(f"... {more(outcome.held_back, 'line')}; -o FILE writes them, -o - shows them all")
+    if outcome.text:
+        shown = outcome.text.splitlines(keepends=True)
+        sys.stdout.buffer.write(b"".join(shown[:_LINES_SHOWN]))
+        sys.stdout.buffer.flush()
+        if len(shown) > _LINES_SHOWN and not given.quiet:
+            show.print_line(
+                f"... {show.more(len(shown) - _LINES_SHOWN, 'line')}; -o FILE writes them, -o - shows them all"
+            )
     printed = outcome.contents and not given.quiet and not given.as_json
     if printed:
-        show_verdict(outcome.contents, outcome.saving)
+        show.show_verdict(outcome.contents, outcome.saving)
     _tell(outcome)
     if outcome.contents and given.as_json:
-        say_json(outcome.contents)
+        show.say_json(outcome.contents)
     if printed:
-        show_summary(outcome.contents, outcome.seconds, given.verbose)
+        show.show_summary(outcome.contents, outcome.seconds, given.verbose)
     return outcome.exit_code
 
 
@@ -97,18 +96,18 @@ def _tell(outcome: Outcome, printed: bool = False) -> None:
     """Print what went wrong and what was noticed; where no line has the verdict, any but a plain PASSED."""
     job, given = outcome.job, outcome.job.given
     if outcome.message:
-        print_message(outcome.message)
+        show.print_message(outcome.message)
     elif (
         not printed
         and (given.quiet or job.batch)
         and (outcome.verdict not in ("", Verdict.PASSED) or (outcome.contents and job.loosened))
     ):
-        print_line(f"{job.source}: {outcome.verdict_text}")
+        show.print_line(f"{job.source}: {outcome.verdict_text}")
     if outcome.contents and not given.quiet:
         findings = outcome.contents["findings"]
         if not job.batch:  # the verdict has what is to be checked
             findings = [finding for finding in findings if not finding["to_check"]]
-        show_findings(job.source, findings, given.verbose)
+        show.show_findings(job.source, findings, given.verbose)
 
 
 def _make_jobs(given: Options) -> list[Job]:
@@ -129,7 +128,7 @@ def _make_jobs(given: Options) -> list[Job]:
             frame=replace(frame, stem="" if found.source == STANDARD else os.path.basename(found.stem)),
             plan_feeds=given.planned_limits(),
             alone=len(files) == 1,
-            beginning=not folder and not given.output and _to_terminal(),
+            in_memory=not folder and not given.output and _to_terminal(),
             axes=given.load_limits(),
             loosened=loosened(settings.tolerance),
             command=command_line(),
@@ -182,8 +181,8 @@ def _tell_same_programs(jobs: list[Job]) -> None:
             sources.setdefault(name, []).append(job.source)
     for name, same in sources.items():
         if len(same) > 1:
-            others = f" and {more(len(same) - _NAMED, 'file')}" if len(same) > _NAMED else ""
-            warn(
+            others = f" and {show.more(len(same) - _NAMED, 'file')}" if len(same) > _NAMED else ""
+            show.warn(
                 f"{', '.join(same[:_NAMED])}{others}: all become program {name}, and a control keeps one of "
                 "them; let the names of the files end in different numbers, or give each its --program-name"
             )

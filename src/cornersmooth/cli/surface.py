@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any
+from functools import partial
 
 import click
 
 from cornersmooth.cl import read
-from cornersmooth.cli.files import STANDARD, check_inputs, check_reports, read_input, suffix_of, write_report
+from cornersmooth.cli.files import STANDARD, check_inputs, check_reports, read_input, write_reports
 from cornersmooth.cli.options import Options
 from cornersmooth.cli.show import say
 from cornersmooth.errors import SettingsError, Verdict
 from cornersmooth.geometry.tool import Tool, tools_of
 from cornersmooth.model import Program
 from cornersmooth.nc_reader import read_nc
-from cornersmooth.report import report_json
 from cornersmooth.report.tables import surface_csv, surface_lines
-from cornersmooth.surface import SurfaceMap, measure_surface
+from cornersmooth.surface import measure_surface
 from cornersmooth.verify import verify
 
 
@@ -43,8 +41,15 @@ def run_surface(given: Options) -> int:
         levels=given.levels,
         stations=given.stations,
     )
-    for path in given.reports:
-        write_report(path, _report(suffix_of(path), program, data, written, nc, found, given))
+
+    def page() -> str:
+        from cornersmooth.page import verified_page
+
+        checked = verify(program, written, tolerance=given.tolerance, axis_length=given.axis_length, **how)
+        name, control = written if isinstance(written, str) else "", given.load_control().name
+        return verified_page(program, nc, checked, name=name, control=control, source=data, surface=found)
+
+    write_reports(dict.fromkeys(given.reports, True), found.as_dict(), csv=partial(surface_csv, found), page=page)
     first = f"{Verdict.of(problems=not found.kept)}: the surface is {'' if found.kept else 'not '}within the tolerance"
     say(given, found.as_dict(), (first, *surface_lines(found)), indent=18)
     return 0 if found.kept else 1
@@ -64,19 +69,3 @@ def _tool(program: Program, chosen: Tool | None) -> Tool:
             f"{tool.describe()} (line {line})" for tool, line in distinct[:4]
         )
     raise SettingsError("CS272", what, "say the tool's shape, as in --tool 10,5", file=program.source.name)
-
-
-def _report(
-    form: str, program: Program, source: bytes, written: bytes | str, nc: Any, found: SurfaceMap, given: Options
-) -> Iterator[str | bytes]:
-    if form == ".json":
-        yield report_json(found.as_dict())
-    elif form == ".csv":
-        yield from surface_csv(found)
-    else:
-        from cornersmooth.page import verified_page
-
-        how = {"tolerance": given.tolerance, "axis_length": given.axis_length, **given.reading_back()}
-        checked = verify(program, written, **how)
-        name, control = written if isinstance(written, str) else "", given.load_control().name
-        yield verified_page(program, nc, checked, name=name, control=control, source=source, surface=found)

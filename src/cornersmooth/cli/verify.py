@@ -5,19 +5,12 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 
 import click
 
 from cornersmooth.cl import read
-from cornersmooth.cli.files import (
-    STANDARD,
-    check_inputs,
-    check_reports,
-    read_input,
-    read_lines,
-    suffix_of,
-    write_report,
-)
+from cornersmooth.cli import files
 from cornersmooth.cli.head import take_head
 from cornersmooth.cli.options import Options
 from cornersmooth.cli.shop import command_line, loosened
@@ -26,7 +19,7 @@ from cornersmooth.errors import Verdict
 from cornersmooth.nc import own_words
 from cornersmooth.nc_reader import NcProgram, read_nc
 from cornersmooth.nc_reader.source import readable_twice
-from cornersmooth.report import NcFile, findings_table, report_json
+from cornersmooth.report import NcFile, findings_table
 from cornersmooth.report.record import cl_file, record, sha256_of
 from cornersmooth.report.tables import along_lines, histogram_lines, verification_csv
 from cornersmooth.report.verdict import judge, trusted_blocks
@@ -45,17 +38,17 @@ _REWINDS_SHOWN = 5
 def run_verify(given: Options) -> int:
     """Do the work of the command; return its exit code."""
     source, text = given.source, given.text
-    if source == text == STANDARD:
+    if source == text == files.STANDARD:
         raise click.UsageError("only one of the inputs can be standard input")
     return_large_arrays()
-    check_inputs(source, text)
-    check_reports(given.reports, ".json, .csv or .html", [source, text], force=given.force)
+    files.check_inputs(source, text)
+    files.check_reports(given.reports, ".json, .csv or .html", [source, text], force=given.force)
     data, name, is_program = given.read()
     if is_program:
         from cornersmooth.cli.filter import verify_with_program
 
         return verify_with_program(name, data, given)
-    nc: bytes | str | os.PathLike[str] = read_input(text)[0] if text == STANDARD else text
+    nc: bytes | str | os.PathLike[str] = files.read_input(text)[0] if text == files.STANDARD else text
     head = take_head(given, nc, data)
     given = head.given
     given.check_axis()
@@ -67,7 +60,7 @@ def run_verify(given: Options) -> int:
     program = read(data, name=name, **given.reading())
     if given.verbose or given.reports or given.as_json:  # it is looked at more than once
         nc = readable_twice(nc)
-    trusted = [line for path in given.trusted for line in read_lines(path)]
+    trusted = [line for path in given.trusted for line in files.read_lines(path)]
     if given.work_offset:
         trusted.append("work offset")
     if head.remark:  # first: what follows may be hard to understand without it
@@ -92,9 +85,9 @@ def run_verify(given: Options) -> int:
     contents = record(
         "verify",
         judge(found, findings),
-        source=cl_file(program, sha256_of(data)),
+        source=cl_file(program),
         program=NcFile(
-            name=None if text == STANDARD else text,
+            name=None if text == files.STANDARD else text,
             sha256=sha256_of(nc) if isinstance(nc, bytes) or os.path.isfile(nc) else None,
             control=control.name,
             form=head.form,
@@ -120,7 +113,7 @@ def run_verify(given: Options) -> int:
             program,
             read_again(),
             found,
-            name=text if text != STANDARD else "",
+            name=text if text != files.STANDARD else "",
             control=control.name,
             form=head.form or "",
             source=data,
@@ -129,11 +122,10 @@ def run_verify(given: Options) -> int:
             tool=given.tool,
         )
 
-    for path in given.reports:
-        form = suffix_of(path)
-        table = verification_csv(program, found) if form == ".csv" else None
-        write_report(path, table or [page() if form == ".html" else report_json(contents)])
-    for line in _problems(found, name, "<stdin>" if text == STANDARD else text, given.verbose):
+    files.write_reports(
+        dict.fromkeys(given.reports, True), contents, csv=partial(verification_csv, program, found), page=page
+    )
+    for line in _problems(found, name, "<stdin>" if text == files.STANDARD else text, given.verbose):
         print_message(line)
     verdict = contents["verdict_text"]
     if given.as_json:

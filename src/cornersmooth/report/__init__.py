@@ -33,7 +33,6 @@ def report(
     findings: tuple[Finding, ...] = (),
     verification: Verification | None = None,
     unverified: str = "",
-    source_sha256: str = "",
     nc_file: NcFile | None = None,
     command: str = "",
     loosened: str = "",
@@ -54,8 +53,6 @@ def report(
         What `cornersmooth.verify` measured in the written program.
     unverified : str
         What was not verified, and why; empty for nothing.
-    source_sha256 : str
-        Of the CL file; empty where it is not known.
     command, loosened, times
         As `record` has them.
     machine : Machine, optional
@@ -96,7 +93,7 @@ def report(
     contents = record(
         "smooth",
         judge(verification, all_findings, unverified),
-        source=cl_file(program, source_sha256),
+        source=cl_file(program),
         program=nc_file,
         settings=smoothed.settings.as_dict(),
         findings=all_findings,

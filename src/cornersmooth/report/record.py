@@ -81,13 +81,13 @@ def record(
     }
 
 
-def cl_file(program: Program, sha256: str = "") -> dict[str, Any]:
-    """The CL file that a program was read from; `sha256` is that of the file."""
+def cl_file(program: Program) -> dict[str, Any]:
+    """The CL file that a program was read from."""
     source = program.source
     alone = {"operation": {"number": source.operation, "name": source.operation_name}} if source.operation else {}
     return {
         "name": source.name,
-        "sha256": sha256 or None,
+        "sha256": source.sha256 or None,
         "format": source.format,
         "dialect": source.dialect,
         **alone,

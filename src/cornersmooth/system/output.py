@@ -9,22 +9,18 @@ Windows refuses both for a file that is open.
 from __future__ import annotations
 
 import contextlib
-import ctypes
-import errno
 import filecmp
-import functools
 import glob
 import hashlib
 import json
 import os
-import platform
 import secrets
 import shutil
 import stat
-import sys
 import tempfile
+import time
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import BinaryIO, Final, cast
 
 from cornersmooth.errors import OutputError, SettingsError
@@ -40,18 +36,11 @@ _HASH: Final = "sha256"
 #: bytes that are hashed at once
 _AT_ONCE: Final = 1 << 20
 
-#: extended attribute that holds the mark of a file
-_MARK = "user.cornersmooth"
-
-#: folder beside the outputs with a file of marks for each, where the file system has no extended attributes
+#: folder beside the outputs with a file of marks for each
 _MARKS = ".cornersmooth"
 
-#: what a file system says that has no extended attributes
-_NO_ATTRIBUTES = (errno.ENOTSUP, errno.EPERM)
-
-#: OpenProcess and WaitForSingleObject (winnt.h, winerror.h): a right, the error for a number that is no process's, and
-#: the answer for a process that has not ended
-_SYNCHRONIZE, _NO_SUCH_PROCESS, _WAIT_TIMEOUT = 0x100000, 87, 258
+#: seconds after which a temporary file that nobody has written to is what a killed run has left
+_ABANDONED: Final = 86_400.0
 
 #: names of the files that are being written in this process, for whoever ends it from a signal handler; the number
 #: under which each is open, -1 for not
@@ -98,7 +87,11 @@ def check_output(
     with contextlib.suppress(OSError), open(path, "rb") as stream:
         if beginning and stream.read(len(beginning)) == beginning:
             return True
-    raise OutputError("CS403", "exists already", "use --force to replace it", file=path)
+    raise _taken(path)
+
+
+def _taken(path: str) -> OutputError:
+    return OutputError("CS403", "exists already", "use --force to replace it", file=path)
 
 
 def path_of(target: Target) -> str | None:
@@ -160,8 +153,6 @@ class Output:
     stream: HashedStream
     path: str = ""  #: where the text is until then; empty where it goes straight to a stream or device
     failed: bool = False  #: set by the writer: the text must not take the place of the output
-    #: set by the writer: kept with the file where the file system can, for `read_mark`
-    mark: Mapping[str, str] = field(default_factory=dict)
 
 
 @contextlib.contextmanager
@@ -211,57 +202,29 @@ def open_output(target: Target, *, hold: bool = False, replace: bool = True) -> 
         raise OutputError("CS404", what, "the old file, if any, is untouched", file=name) from failure
 
 
-def read_mark(path: str) -> dict[str, str] | None:
-    """Mark that was set when the file was written; empty without one or after a change, None where nothing is known.
-
-    A mark beside the file, which is written after it, may be lost with the run: without it nothing is known.
-    """
-    try:
-        mark, beside = _stored_mark(path)
-        with open(path, "rb") as file:
-            changed = hashlib.file_digest(file, _HASH).hexdigest() != mark.pop("text")
-    except OSError as failure:
-        return None if isinstance(failure, FileNotFoundError) or failure.errno in _NO_ATTRIBUTES else {}
-    except (ValueError, KeyError, AttributeError):
-        return {}
-    if not changed:
-        return mark
-    return None if beside else {}
-
-
-def _stored_mark(path: str) -> tuple[dict[str, str], bool]:
-    """Mark of a file with its hash, and whether it is kept in a file beside."""
-    if sys.platform == "linux" and hasattr(os, "getxattr"):
-        try:
-            return json.loads(os.getxattr(path, _MARK)), False
-        except OSError as failure:
-            if failure.errno not in _NO_ATTRIBUTES:
-                raise
-    with open(_mark_beside(path), "rb") as file:
-        return json.loads(file.read()), True
-
-
-def _mark_beside(path: str) -> str:
-    folder, name = os.path.split(os.path.realpath(path))
-    return os.path.join(folder, _MARKS, f"{name}.json")
-
-
-def _set_attribute(path: str, mark: bytes) -> bool:
-    """Keep a mark with a file; return whether the file system can."""
-    if sys.platform == "linux" and hasattr(os, "setxattr"):
-        with contextlib.suppress(OSError):
-            os.setxattr(path, _MARK, mark)
-            return True
-    return False
-
-
-def _write_beside(path: str, mark: bytes) -> None:
-    """Keep a mark in a file beside; without it the next run only makes the program again."""
-    beside = _mark_beside(path)
+def write_mark(path: str, digest: str, mark: Mapping[str, str]) -> None:
+    """Keep a mark beside a file of that hash, for `read_mark`; without it the next run only makes the file again."""
+    beside = _mark_of(path)
     with contextlib.suppress(OSError):
         os.makedirs(os.path.dirname(beside), exist_ok=True)
-        with open(beside, "wb") as file:
-            file.write(mark)
+        with open(beside, "w", encoding="utf-8") as file:
+            json.dump({"text": digest, **mark}, file)
+
+
+def read_mark(path: str) -> dict[str, str] | None:
+    """Mark of a file that is as it was when that was set; None where nothing is known, as after a change."""
+    try:
+        with open(_mark_of(path), encoding="utf-8") as beside, open(path, "rb") as file:
+            mark: dict[str, str] = json.load(beside)
+            same = mark.pop("text") == hashlib.file_digest(file, _HASH).hexdigest()
+    except (OSError, ValueError, KeyError, AttributeError):
+        return None
+    return mark if same else None
+
+
+def _mark_of(path: str) -> str:
+    folder, name = os.path.split(os.path.realpath(path))
+    return os.path.join(folder, _MARKS, f"{name}.json")
 
 
 def remove_unfinished() -> None:
@@ -313,21 +276,16 @@ def _moving(target: str, name_in_errors: str, *, replace: bool) -> Iterator[Outp
         output.stream.check(temporary)
         if os.name == "posix" and os.path.exists(target):
             os.chmod(temporary, stat.S_IMODE(os.stat(target).st_mode))
-        mark = json.dumps({"text": output.stream.digest, **output.mark}).encode() if output.mark else b""
-        marked = not mark or _set_attribute(temporary, mark)
         if output.failed:
             os.replace(temporary, target + FAILED)
-            return
-        if replace:
+        elif replace:
             os.replace(temporary, target)
-        else:
-            _move_to_free_place(temporary, target, name_in_errors)
-        if not marked:
-            _write_beside(target, mark)
+        elif not _moved_to_free_place(temporary, target):
+            raise _taken(name_in_errors)
 
 
-def _move_to_free_place(temporary: str, target: str, name_in_errors: str) -> None:
-    """Move a file to a name that nobody else has taken meanwhile."""
+def _moved_to_free_place(temporary: str, target: str) -> bool:
+    """Move a file to a name that nobody else has taken meanwhile; False where another text has it."""
     try:
         try:
             os.link(temporary, target)
@@ -339,11 +297,8 @@ def _move_to_free_place(temporary: str, target: str, name_in_errors: str) -> Non
                 pass
             os.replace(temporary, target)
     except FileExistsError:
-        if filecmp.cmp(temporary, target, shallow=False):  # what stands there is the same
-            return
-        raise OutputError(
-            "CS403", "has appeared while the program was made", "use --force to replace it", file=name_in_errors
-        ) from None
+        return filecmp.cmp(temporary, target, shallow=False)
+    return True
 
 
 @contextlib.contextmanager
@@ -360,49 +315,17 @@ def _opened(path: str, mode: int = 0o666) -> Iterator[BinaryIO]:
 @contextlib.contextmanager
 def temporary_name(folder: str, name: str) -> Iterator[str]:
     """Yield a name for a file that exists no longer than the block, whatever ends that."""
-    _remove_abandoned(folder, name)
-    path = os.path.join(folder, f".{name}.{os.getpid()}-{secrets.token_hex(4)}-{_machine()}.part")
+    for left in _left(folder, name, "*"):
+        with contextlib.suppress(OSError):
+            if os.stat(left).st_mtime < time.time() - _ABANDONED:
+                os.unlink(left)
+    path = os.path.join(folder, f".{name}.{os.getpid()}-{secrets.token_hex(4)}.part")
     _unfinished[path] = -1  # before it exists: a signal at any moment finds a name to remove
     try:
         yield path
     finally:
         _remove([path])
         _unfinished.pop(path, None)
-
-
-def _remove_abandoned(folder: str, name: str) -> None:
-    """Remove what killed runs on this computer have left of an output; those of others may still be at work."""
-    for left in _left(folder, name, f"*-{_machine()}"):
-        process = os.path.basename(left).removeprefix(f".{name}.").partition("-")[0]
-        if process.isdigit() and not _is_running(int(process)):
-            _remove([left])
-
-
-def _is_running(process: int) -> bool:
-    """Whether a process of this number runs on this computer, as far as that can be seen."""
-    if sys.platform == "win32":  # there, signal 0 is Ctrl-C
-        kernel = ctypes.WinDLL("kernel32", use_last_error=True)
-        kernel.OpenProcess.restype = ctypes.c_void_p
-        found = ctypes.c_void_p(kernel.OpenProcess(_SYNCHRONIZE, False, process))
-        if not found:
-            return ctypes.get_last_error() != _NO_SUCH_PROCESS
-        try:
-            return int(kernel.WaitForSingleObject(found, 0)) == _WAIT_TIMEOUT
-        finally:
-            kernel.CloseHandle(found)
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except (OSError, OverflowError):  # it is somebody else's, or no number of a process
-        return True
-    return True
-
-
-@functools.cache
-def _machine() -> str:
-    """Tell computers apart that share a folder."""
-    return hashlib.new(_HASH, platform.node().encode()).hexdigest()[:8]
 
 
 def _same(source: str | os.PathLike[str] | int, path: str) -> bool:

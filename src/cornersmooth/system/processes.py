@@ -15,7 +15,6 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
-from multiprocessing.process import BaseProcess
 from typing import Any, Final, TypeVar
 
 Item = TypeVar("Item")
@@ -50,25 +49,66 @@ def can_fork() -> bool:
 
 
 class Helper:
-    """A process that calls `work` while this one does another thing; it has all that this one has, and may fork."""
+    """A process that works on what it is sent; it has all that this one has, and may fork unless it is a daemon.
 
-    def __init__(self, work: Callable[[], Any]) -> None:
+    It has one item at a time: a pipe full both ways would stand still. `others` are helpers that are there already.
+    """
+
+    def __init__(self, work: Callable[[Any], Any], others: Iterable[Helper] = (), *, daemon: bool = False) -> None:
         self.connection, other_end = _CONTEXT.Pipe()
-        self._process = _forked(_report, work, other_end, self.connection, daemon=False)
+        ends = [*(other.connection for other in others), self.connection]
+        with warnings.catch_warnings():  # newer Pythons warn of threads, of which only numpy's idle ones are left
+            warnings.simplefilter("ignore", DeprecationWarning)
+            self._process = _CONTEXT.Process(target=_serve, args=(work, other_end, ends), daemon=daemon)
+            self._process.start()
         self.pid = self._process.pid
         other_end.close()
+        self._found = deque[Any]()
+        self._working = False
+
+    @property
+    def works(self) -> bool:
+        """Whether it has not found yet what it was given."""
+        return self._working and not self.connection.poll()
+
+    def start(self, item: Any = None) -> None:
+        """Send an item, after what was found for the one before has been taken in."""
+        self._take()
+        try:
+            self.connection.send(item)
+        except BrokenPipeError:
+            raise MemoryError(_ENDED) from None
+        self._working = True
 
     def result(self) -> Any:
-        """Wait for what the work returns, or raise what it raised.
+        """Wait for what the work returns, in the order of the items, or raise what it raised.
 
         Raises MemoryError: the process has been ended from outside, which is what a system short of memory does.
         """
-        return _received(self.connection)
+        if not self._found:
+            self._take()
+        return self._found.popleft()
+
+    def _take(self) -> None:
+        if not self._working:
+            return
+        self._working = False
+        try:
+            good, found = self.connection.recv()
+        except (EOFError, ConnectionResetError):
+            raise MemoryError(_ENDED) from None
+        if not good:
+            raise found
+        self._found.append(found)
 
     def end(self) -> int:
         """End the process, whatever it is at; return its exit code, or the number of its signal with a minus."""
         self.connection.close()
-        return _end([self._process])[0]
+        self._process.terminate()
+        self._process.join()
+        code = self._process.exitcode or 0
+        self._process.close()
+        return code
 
     def kill(self) -> None:
         """End the process without its consent; for signal handlers, too."""
@@ -95,9 +135,9 @@ def map_in_processes(
 
     Raises MemoryError where a process has been ended from outside, which is what a system short of memory does.
     """
-    crew: list[_Member] = []
+    crew: list[Helper] = []
     for _ in range(1 if busy else processes) if processes > 1 and can_fork() else ():
-        crew.append(_Member(work, crew))
+        crew.append(Helper(work, crew, daemon=True))
     waiting: deque[Callable[[], Result]] = deque()
 
     def start(turn: int, item: Item) -> Callable[[], Result]:
@@ -118,49 +158,16 @@ def map_in_processes(
             yield waiting.popleft()()
     finally:
         for member in crew:
-            member.connection.close()
-        _end([member.process for member in crew])
-
-
-class _Member:
-    """A process at the other end of a pipe, with one item at a time: a pipe full both ways would stand still."""
-
-    def __init__(self, work: Callable[[Any], Any], others: list[_Member]) -> None:
-        self.connection, other_end = _CONTEXT.Pipe()
-        own_ends = [*(other.connection for other in others), self.connection]
-        self.process = _forked(_serve, work, other_end, own_ends, daemon=True)
-        other_end.close()
-        self.found = deque[Any]()
-        self.working = False
-
-    @property
-    def works(self) -> bool:
-        """Whether it has not found yet what it was given."""
-        return self.working and not self.connection.poll()
-
-    def start(self, item: Any) -> None:
-        """Send an item, after what was found for the one before has been taken in."""
-        self._take()
-        try:
-            self.connection.send(item)
-        except BrokenPipeError:
-            raise MemoryError(_ENDED) from None
-        self.working = True
-
-    def _take(self) -> None:
-        if self.working:
-            self.found.append(_received(self.connection))
-            self.working = False
-
-    def result(self) -> Any:
-        """Next result, in the order of the items."""
-        if not self.found:
-            self._take()
-        return self.found.popleft()
+            member.end()
 
 
 def _serve(work: Callable[[Any], Any], connection: Connection, parents: list[Connection]) -> None:
-    """Work on what comes until nothing more can come."""
+    """Work on what comes until nothing more can come.
+
+    The parent can end this process; an interruption ends the parent only, which does so.
+    """
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     for other in parents:  # else the end of the parent would not be seen
         other.close()
     while True:
@@ -168,65 +175,16 @@ def _serve(work: Callable[[Any], Any], connection: Connection, parents: list[Con
             item = connection.recv()
         except (EOFError, OSError):
             return
-        _answer(connection, lambda item=item: work(item))  # type: ignore[misc]
+        try:
+            found = True, work(item)
+        except BaseException as error:
+            found = False, error
         del item
-
-
-def _report(work: Callable[[], Any], connection: Connection, parent: Connection) -> None:
-    """Work once."""
-    parent.close()
-    _answer(connection, work)
-
-
-def _answer(connection: Connection, work: Callable[[], Any]) -> None:
-    """Send what the work returns, or what it raises."""
-    try:
-        found = True, work()
-    except BaseException as error:
-        found = False, error
-    try:
-        connection.send(found)
-    except (BrokenPipeError, OSError):
-        return
-
-
-def _received(connection: Connection) -> Any:
-    """Receive what `_answer` sends."""
-    try:
-        good, found = connection.recv()
-    except (EOFError, ConnectionResetError):
-        raise MemoryError(_ENDED) from None
-    if not good:
-        raise found
-    return found
-
-
-def _forked(target: Callable[..., None], *args: Any, daemon: bool) -> BaseProcess:
-    """Start a process that calls `target`; it has all that this one has."""
-    with warnings.catch_warnings():  # newer Pythons warn of threads, of which only numpy's idle ones are left
-        warnings.simplefilter("ignore", DeprecationWarning)
-        process: BaseProcess = _CONTEXT.Process(target=_obeying, args=(target, args), daemon=daemon)
-        process.start()
-    return process
-
-
-def _end(processes: list[BaseProcess]) -> list[int]:
-    """Let processes go home; who is still at work is sent away. Return their exit codes."""
-    for process in processes:
-        process.terminate()
-    codes = []
-    for process in processes:
-        process.join()
-        codes.append(process.exitcode or 0)
-        process.close()
-    return codes
-
-
-def _obeying(target: Callable[..., None], args: tuple[Any, ...]) -> None:
-    """Work so that the parent can end this process, and an interruption ends the parent only, which does so."""
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    target(*args)
+        try:
+            connection.send(found)
+        except (BrokenPipeError, OSError):
+            return
+        del found
 
 
 #: arrays of so many bytes get memory of their own: those with a row for every pose of a large program do, those of a

@@ -152,7 +152,8 @@ class Verifier:
     def __enter__(self) -> Self:
         if self._processes > 1 and isinstance(self._text, Source):
             with contextlib.suppress(OSError):  # without it it takes longer
-                self._helper = Helper(self._work)
+                self._helper = Helper(lambda _: self._work())
+                self._helper.start()
         return self
 
     def __exit__(
