@@ -54,7 +54,7 @@ class ModalState:
 
     modal: Modal
     rotary: Rotary | None = None  #: with the length of the tool in the spindle
-    tip_control: str = ""  #: name of the tool tip control that is on
+    tip: str = ""  #: word of the tool tip control, or of the tool length, that is on
     incremental: bool = False  #: G91 is in force, in which no motion is read
     high_speed: bool = False  #: look ahead of the kind that some controls ask for with curves is on
     clamped: dict[str, bool] = field(default_factory=dict)  #: rotary axes with a clamp: kept, or words let them turn
@@ -65,14 +65,19 @@ class ModalState:
     height: float | None = None  #: at which a run of modal cycles began (G98), in units of the program
     cycle: HoleCycle | None = None  #: that a block defines for others to call
     centre: dict[str, float] = field(default_factory=dict)  #: of circles to come
-    #: how the tool axis is interpolated, and in which coordinates
+    #: words that say how the tool axis is interpolated, and in which coordinates
     orientation: str = ""
-    axis_frame: str = ""
+    coordinates: str = ""
     plane: TiltedPlane | None = None  #: that is on
     left_turned: bool = False  #: a plane that is off again has left the rotary axes where no word says
     idle: Floats = field(
         default_factory=lambda: np.zeros(2)
     )  #: degrees that axes have turned while the tool axis stands
+
+    @property
+    def tip_control(self) -> str:
+        """Name of the tool tip control that is on."""
+        return " ".join(filter(None, (self.tip, self.coordinates, self.orientation))) if self.tip else ""
 
 
 class Move(NamedTuple):

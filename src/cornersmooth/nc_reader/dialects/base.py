@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Set
+from collections.abc import Callable, Container, Mapping, Set
 from typing import Any, Final
 
 from cornersmooth.errors import InputError
-from cornersmooth.nc_reader.acts import Acts, Beside, ModalState
+from cornersmooth.nc_reader.acts import Acts, Beside, ModalState, Move
 from cornersmooth.nc_reader.lexer import Lexer
 from cornersmooth.nc_reader.word_tables import effects_of, means_of, word_table
-from cornersmooth.nc_reader.words import Columns, Line, refused
+from cornersmooth.nc_reader.words import Columns, Line, Word, refused, tools_first
 
 #: how the values of a table `[grammar]` are read, where not as they are
 _READ: Mapping[str, Callable[[Any], Any]] = {
     **dict.fromkeys(("controls", "unsure"), lambda table: {kind: tuple(names) for kind, names in table.items()}),
 }
+
+#: groups, and effects, of M words that change what holds from block to block, for controls that have such
+_MODAL_M: Final = ("feed=", "tip=", "way=", "machine")
 
 #: effects of words that change nothing measured
 SILENT: Final = frozenset("nothing distance=absolute offset=. path=. smoothing=. smoothing=off cycles=off".split())
@@ -49,6 +52,12 @@ class Dialect:
     curves_need: str = ""
     #: whether tip control is switched by blocks that the machine's file names
     switches: bool = False
+    #: names of words whose events stand beside the motion, and of those that say nothing here
+    beside: Set[str] = frozenset("MTS")
+    others: Container[str] = "DN%"
+    quiet: Set[str] = frozenset()  #: words that are no events
+    #: whether M words may change what holds from block to block
+    modal_m: bool = False
     #: the first letter, or letters, of tip and second triple in the lexer, with their decimals
     digits: re.Pattern[bytes] = re.compile(rb"(?:([XYZ])|([IJUVW]))[-+]?\d*\.(\d*)")
 
@@ -81,14 +90,45 @@ class Dialect:
         InputError
             CS503 for words that make it impossible to tell where the tool is.
         """
+        alone = self.alone(line, state)
+        if alone is not None:
+            yield from alone
+            return
+        motion: dict[str, float] = {}
+        for word in tools_first(line.words):
+            if word.spelling in self.quiet:
+                continue
+            if self.moves(word):
+                motion[word.name] = word.value
+            elif word.name in self.beside and not (self.modal_m and self.effect(word).startswith(_MODAL_M)):
+                yield self.event(word)
+            elif word.name not in self.others:
+                yield from self._mode(word, line, state)
+        yield from self.motion(motion, line, state)
+
+    def alone(self, line: Line, state: ModalState) -> Acts | None:
+        """What a line does whose words mean something together, as those of cycles do; None for all others."""
         raise NotImplementedError
 
-    def mode(self, code: float, line: Line, state: ModalState) -> Acts:
-        """Take a G word outside group 01 that changes what holds from block to block, by its row in the table."""
-        effect = self.effect(f"G{code:g}")
+    def moves(self, word: Word) -> bool:
+        """Whether a word is one of the motion."""
+        raise NotImplementedError
+
+    @staticmethod
+    def event(word: Word) -> Beside:
+        """What a word says beside the motion."""
+        return Beside(word.name, word.value, word.text)
+
+    def motion(self, given: dict[str, float], line: Line, state: ModalState) -> Acts:
+        """What the words of the motion of a line do."""
+        yield Move(given)
+
+    def _mode(self, word: Word, line: Line, state: ModalState) -> Acts:
+        """Take a word that changes what holds from block to block, by its row in the table."""
+        effect, name = self.effect(word), word.spelling
         group, _, value = effect.partition("=")
         if group == "plane":
-            state.modal = state.modal.but(plane=int(code))
+            state.modal = state.modal.but(plane=int(word.value))
         elif group == "units":
             state.modal = state.modal.but(inch=value == "inch")
         elif group == "feed":
@@ -96,17 +136,25 @@ class Dialect:
                 what = "inverse time feed (G93) without rotary words"
                 raise InputError("CS503", what, "name the machine with --machine", line=line.number)
             state.modal = state.modal.but(per_revolution=value == "revolution", inverse_time=value == "inverse")
-        elif group == "tool_length" and value != "?":
-            state.tip_control = "" if value == "off" else f"G{code:g}"
-            yield Beside("G", code, f"G{code:g}")
-        elif group == "compensation" and value != "?":
-            yield Beside("G", code, f"G{code:g}")
-        elif effect not in SILENT:
+        elif group in ("tip", "tool_length") and value != "?":
+            state.tip = "" if value == "off" else name
+        elif group in ("orientation", "coordinates"):
+            setattr(state, group, name)
+        elif group == "way":  # without it turns are less than half a turn either way
+            state.shorter_way = name == self.shorter_way
+        elif effect == "distance=absolute":
+            state.incremental = False
+        elif word.name in "GM" and (effect not in SILENT and (group != "compensation" or value == "?")):
             hint = "only absolute milling with tool vectors, axis points or rotary words is read"
-            raise refused(line, f"G{code:g} is not understood", hint)
+            raise refused(line, f"{name} is not understood", hint)
+        elif word.name not in "GM" and effect not in SILENT:
+            raise self.not_understood(line, word.name, word.text)
+        if group in ("tool_length", "compensation"):
+            yield Beside("G", word.value, name)
 
-    def effect(self, name: str) -> str:
+    def effect(self, word: Word) -> str:
         """What a word does in the first place; what is beside it in its row follows from that."""
+        name = word.spelling if word.name in "GM" else word.name
         return next(iter(effects_of(self.control, name)), "unknown")
 
     def machine_axes(self, line: Line, beside: Set[tuple[str, float]]) -> str:

@@ -52,50 +52,46 @@ class Heidenhain(Dialect):
     """
 
     lexer: _KlartextLexer
+    beside = frozenset(("M", "S", "side"))
+    others = ()
+    quiet = frozenset(("M99",))
+    modal_m = True
     digits = re.compile(rb"(?<!K\d)(?:(?<!T)([XYZ])|(T[XYZ]))[-+]?\d*\.(\d*)")
 
     def __init__(self, control: str, rotary: str = "") -> None:
         super().__init__(control, rotary)
         self.lexer = _KlartextLexer(rotary)
 
-    def acts(self, line: Line, state: ModalState) -> Acts:
-        """As `Dialect.acts`."""
+    def alone(self, line: Line, state: ModalState) -> Acts | None:
+        """As `Dialect.alone`: blocks that are words, and positions of the machine."""
         if line.words[0].name == "block":
-            yield from self._block(line.words[0].text, line, state)
-            return
-        if any(word[:2] == ("M", 91.0) for word in line.words):
-            yield from self._to_machine(line, state)
-            return
-        motion: dict[str, float] = {}
-        called = False
-        for name, value, text, *_ in line.words:
-            if (name, value) == ("M", 99.0):
-                called = True
-            elif name == "M":
-                yield from self._miscellaneous(value, text, line, state)
-            elif name == "side":
-                yield Beside("G", value, text)
-            elif name == "S":
-                yield Beside("S", value, text)
-            elif name in self.lexer.names or name in ("circle", "centre", "turn", "R"):
-                motion[name] = value
-            else:
-                raise self.not_understood(line, name, text)
-        if "centre" in motion:
-            state.centre = {axis: motion[axis] for axis in "XY" if axis in motion}
-        elif "circle" in motion:
-            yield Move(self._circle(motion, line, state))
+            return self._block(line.words[0].text, line, state)
+        return self._to_machine(line) if any(word[:2] == ("M", 91.0) for word in line.words) else None
+
+    def moves(self, word: Word) -> bool:
+        """As `Dialect.moves`."""
+        return word.name in self.lexer.names or word.name in ("circle", "centre", "turn", "R")
+
+    @staticmethod
+    def event(word: Word) -> Beside:
+        """As `Dialect.event`."""
+        return Beside("G" if word.name == "side" else word.name, word.value, word.text)
+
+    def motion(self, given: dict[str, float], line: Line, state: ModalState) -> Acts:
+        """As `Dialect.motion`."""
+        if "centre" in given:
+            state.centre = {axis: given[axis] for axis in "XY" if axis in given}
+        elif "circle" in given:
+            yield Move(self._circle(given, line, state))
         else:
-            paths = motion.keys() & set(_PATHS)
-            if motion and not paths and motion.keys() - {"F"}:
+            if given.keys() - {"F"} and not given.keys() & set(_PATHS):
                 raise refused(line, "words of a path without L, LN or SPL", "give the whole block")
-            columns = self.lexer.coded({word.name: word for word in line.words if word.name in motion})
+            columns = self.lexer.coded({word.name: word for word in line.words if word.name in given})
             if columns is None:
-                raise refused(
-                    line, "words that this kind of block does not take", "give L, LN or SPL what belongs to it"
-                )
+                hint = "give L, LN or SPL what belongs to it"
+                raise refused(line, "words that this kind of block does not take", hint)
             yield Move(values(columns))
-        if called:
+        if any(word[:2] == ("M", 99.0) for word in line.words):
             yield from self._call(line, state)
 
     def _call(self, line: Line, state: ModalState) -> Acts:
@@ -132,7 +128,7 @@ class Heidenhain(Dialect):
             raise refused(line, f"CYCL DEF {number} with values that are not understood", "see its parameters")
         state.cycle = cycle
 
-    def _to_machine(self, line: Line, state: ModalState) -> Acts:
+    def _to_machine(self, line: Line) -> Acts:
         """M91: a rapid in machine coordinates."""
         sides = {word for word in line.words if word.name == "side"}
         for word in sides:
@@ -155,18 +151,6 @@ class Heidenhain(Dialect):
         if by_radius:
             return {**row, "G": motion["turn"]}
         return {**row, "G": motion["turn"], "I": centre["X"] - x, "J": centre["Y"] - y}
-
-    def _miscellaneous(self, value: float, text: str, line: Line, state: ModalState) -> Acts:
-        if value in (136.0, 137.0):
-            state.modal = state.modal.but(per_revolution=value == 136.0)
-        elif value in (128.0, 129.0):
-            state.tip_control = "M128" if value == 128.0 else ""
-        elif value in (126.0, 127.0):
-            state.shorter_way = value == 126.0  # for others turns are less than half a turn either way
-        elif value in (91.0, 92.0):
-            raise refused(line, f"{text}: positions of the machine", "only positions of the part are read")
-        else:
-            yield Beside("M", value, text)
 
     def _block(self, text: str, line: Line, state: ModalState) -> Acts:
         """Blocks that are words: tools, cycles, functions."""
@@ -197,9 +181,9 @@ class Heidenhain(Dialect):
         elif text == "STOP":
             yield Beside("M", 0.0, text)
         elif match := re.fullmatch(r"FUNCTION TCPM F (?:TCP|CONT) AXIS POS PATHCTRL (AXIS|VECTOR)(?: .*)?", text):
-            state.tip_control = f"TCPM {match[1]}"
+            state.tip = f"TCPM {match[1]}"
         elif text == "FUNCTION RESET TCPM":
-            state.tip_control = ""
+            state.tip = ""
         elif not text.startswith(_SILENT):
             raise refused(line, f"{text} is not understood", "see that the control is the one the text is for")
 

@@ -23,10 +23,7 @@ from cornersmooth.nc_reader.dialects.base import Dialect
 from cornersmooth.nc_reader.lexer import NUMBER, Lexer, fixed, number_of
 from cornersmooth.nc_reader.planes import TiltedPlane, room_of, rotated_frame, turned_frame
 from cornersmooth.nc_reader.word_tables import word_table
-from cornersmooth.nc_reader.words import MOTION_CODES, NURBS, Columns, Line, Word, refused, tools_first
-
-#: letters whose words are events
-_EVENT_LETTERS = "TSMHD"
+from cornersmooth.nc_reader.words import MOTION_CODES, NURBS, Columns, Line, Word, refused
 
 #: G words that send axes to positions of the machine
 _TO_REFERENCE = (28.0, 30.0)
@@ -54,8 +51,8 @@ class Iso(Dialect):
     lexer: _IsoLexer
     #: milliseconds that ``G4 P`` counts in
     dwell: float = 1.0
-    #: letters that say nothing here
-    others: str = "NOQ"
+    beside = frozenset("TSMHD")
+    others = "NOQ"
     #: whether a comment may begin with a semicolon
     semicolon: bool = False
     #: name of the tool tip control under which hole cycles are taken; ``"none"`` where they are not known
@@ -68,6 +65,7 @@ class Iso(Dialect):
     def __init__(self, control: str, rotary: str = "") -> None:
         super().__init__(control, rotary)
         self.lexer = (_LinuxLexer if self.semicolon else _IsoLexer)(rotary, frozenset(word_table(control)["points"]))
+        self.quiet = frozenset({"M29"} if self.rigid else ())
 
     def decimals(self, text: bytes) -> tuple[int, int | None]:
         """As `Dialect.decimals`: the angles of a tilted plane are no vectors, nor are the centres of arcs."""
@@ -75,49 +73,38 @@ class Iso(Dialect):
         text = _PLANE_LINE.sub(b"", text) if planes else text
         return super().decimals(_ARC_LINE.sub(lambda line: _CENTRE.sub(b"", line[0]), text))
 
-    def acts(self, line: Line, state: ModalState) -> Acts:
-        """As `Dialect.acts`."""
+    def alone(self, line: Line, state: ModalState) -> Acts | None:
+        """As `Dialect.alone`: switched kinematics, positions of the machine, hole cycles, planes and dwells."""
+        codes = {word.value for word in line.words if word.name == "G"}
+        given = {word.name: word.value for word in line.words}
         if self._switched(line, state):
-            return
-        codes = {word[1] for word in line.words if word[0] == "G"}
+            return iter(())
         if codes & {*_TO_REFERENCE, _IN_MACHINE}:
-            yield from self._to_machine(line, codes, state)
-            return
+            return self._to_machine(line, codes, state)
         if codes & _CYCLES.keys():
-            yield from self._cycle(line, codes, state)
-            return
+            return self._cycle(line, codes, state)
         if codes & _PLANE_WORDS.get(self.planes, frozenset()):
-            yield from self._plane(line, codes, state)
-            return
+            return self._plane(line, codes, state)
+        if 4.0 in codes:
+            time = self.dwell * given["P"] if "P" in given else 1000.0 * given.get("X", given.get("U", 0.0))
+            return iter((Beside("G", 4.0, f"{time:.10g}"),))
         if _NO_CYCLE in codes:
             state.height, state.rigid = None, False
-        motion: dict[str, float] = {}
-        late = any(self.after_motion(*word[:2]) for word in line.words)
-        given = {letter: value for letter, value, *_ in line.words}
-        if given.get("G") == 5.0:
+        if 5.0 in codes:
             state.high_speed = given.get("P", 0.0) >= 10000.0
-        for letter, value, text, *_ in tools_first(line.words):
-            if letter == "G":
-                if value in MOTION_CODES:
-                    motion["G"] = value
-                elif value == 4.0:
-                    time = self.dwell * given["P"] if "P" in given else 1000.0 * given.get("X", given.get("U", 0.0))
-                    yield Beside("G", 4.0, f"{time:.10g}")
-                    return
-                else:
-                    yield from self.mode(value, line, state)
-            elif (letter, value) == ("M", 29.0) and self.rigid:
-                state.rigid = True
-            elif letter in _EVENT_LETTERS:
-                yield Beside(letter, value, text)
-            elif letter in self.lexer.letters:
-                motion[letter] = value
-            elif letter not in self.others:
-                raise self.not_understood(line, letter, text)
-        if self.lexer.odd_vector(motion.keys(), motion.get("G")):
+        state.rigid |= any(word.spelling in self.quiet for word in line.words)
+        return None
+
+    def moves(self, word: Word) -> bool:
+        """As `Dialect.moves`."""
+        return word.value in MOTION_CODES if word.name == "G" else word.name in self.lexer.letters
+
+    def motion(self, given: dict[str, float], line: Line, state: ModalState) -> Acts:
+        """As `Dialect.motion`."""
+        if self.lexer.odd_vector(given.keys(), given.get("G")):
             raise refused(line, "I J K beside rotary words", "leave out --machine for a text with tool vectors")
-        of_length = any(self.effect(f"G{code:g}").startswith("tool_length") for code in codes)
-        yield Move(motion, later=of_length and not late)
+        of_length = any(word.name == "G" and self.effect(word).startswith("tool_length") for word in line.words)
+        yield Move(given, later=of_length and not any(self.after_motion(*word[:2]) for word in line.words))
 
     def _switched(self, line: Line, state: ModalState) -> bool:
         """Take a block that switches tip control of the kinematics; return whether it is one."""
@@ -206,11 +193,6 @@ class Iso(Dialect):
         if 0.0 in codes:
             yield Move({"G": 0.0})
         yield ToMachine(axes)
-
-    def mode(self, code: float, line: Line, state: ModalState) -> Acts:
-        """Take a G word outside group 01 that changes what holds from block to block."""
-        state.incremental = state.incremental and code != 90.0
-        yield from super().mode(code, line, state)
 
 
 class _IsoLexer(Lexer):

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -18,13 +17,12 @@ from cornersmooth.nc_reader.acts import (
     Tilt,
     ToMachine,
     drill,
-    numbers,
     wrong,
 )
-from cornersmooth.nc_reader.dialects.base import SILENT, Dialect
+from cornersmooth.nc_reader.dialects.base import Dialect
 from cornersmooth.nc_reader.lexer import NUMBER, Lexer, fixed, number_of
 from cornersmooth.nc_reader.planes import TiltedPlane, room_of, rotated_frame
-from cornersmooth.nc_reader.words import BSPLINE, BY_WORD, POLY, Columns, Line, Word, refused, tools_first
+from cornersmooth.nc_reader.words import BSPLINE, BY_WORD, POLY, Columns, Line, Word, refused
 
 #: names of words of several letters: vectors are I J K, second points U V W, as in `motion`
 _NAMES: Final = {
@@ -43,14 +41,28 @@ _NAMES: Final = {
 _POLYNOMIALS: Final = {"X": "X", "Y": "Y", "Z": "Z", "XH": "U", "YH": "V", "ZH": "W"}
 _NUMBER_ONLY: Final = re.compile(NUMBER)
 
-_AXIS_FRAMES = ("ORIWKS", "ORIMKS")
-_ORIENTATIONS = ("ORIVECT", "ORIPLANE", "ORICURVE", "ORIAXES")
 _CODES = (0.0, 1.0, 2.0, 3.0)
 #: units of lengths, not of feeds
 _LENGTHS_ALONE = (70.0, 71.0)
 
-#: hole cycles, and how many arguments they may have
-_CYCLES: Final = {"CYCLE81": (4,), "CYCLE82": (6,), "CYCLE83": (12,), "CYCLE84": (12,), "CYCLE85": (8,)}
+#: heights of hole cycles; what follows them, and how the manual calls that
+_ZERO, _ONE, _POSITIVE = r"\+?(?:0+\.?0*|\.0+)", r"0*1(?:\.0*)?", r"\+?(?:\d+\.?\d*|\.\d+)"
+_LARGER = rf"(?=[+\d.]*[1-9]){_POSITIVE}"
+_HEIGHTS: Final = rf"(?P<travel>{NUMBER}),(?P<top>{NUMBER}),(?P<setup>{_POSITIVE}),(?P<bottom>{NUMBER})"
+_DWELL: Final = rf"(?P<dwell>{_POSITIVE}|)"
+_CYCLES: Final = {
+    "CYCLE81": ("", ""),
+    "CYCLE82": (f",,{_DWELL}", ",,DTB"),
+    "CYCLE83": (
+        rf",,,(?P<step>{_LARGER}),{_ZERO},{_ZERO},{_ZERO},{_ONE},(?P<out>{_ZERO}|{_ONE})",
+        ",,,FDPR,0,0,0,1,VARI",
+    ),
+    "CYCLE84": (
+        rf",,(?:{_ZERO})?,3,,(?P<pitch>{_LARGER}),(?:{_ZERO})?,(?P<speed>{_POSITIVE}),(?P=speed)",
+        ",,0,3,,PIT,0,SST,SST1",
+    ),
+    "CYCLE85": (rf",,{_DWELL},(?P<feed>{_LARGER}),(?P=feed)", ",,DTB,FFR,RFF"),
+}
 
 #: a new plane (_ST ends in 00, or is 0) with its shifts before and behind the turns, to which the rotary axes turn
 _THREE: Final = rf"{NUMBER},{NUMBER},{NUMBER}"
@@ -72,92 +84,70 @@ class Siemens(Dialect):
     Parameters are those of `Dialect`.
     """
 
+    beside = frozenset(("M", "T", "S", "SPOS"))
+    others = ("D", "N", "%")
     digits = re.compile(rb"(?:([XYZ])|([ABC]3=|[XYZ]H=))[-+]?\d*\.(\d*)")
 
     def __init__(self, control: str, rotary: str = "") -> None:
         super().__init__(control, rotary)
         self.lexer = _SiemensLexer(rotary)
 
-    def acts(self, line: Line, state: ModalState) -> Acts:
-        """As `Dialect.acts`."""
-        if any(name == "G" and value == 4.0 for name, value, *_ in line.words):
-            given = {name: value for name, value, *_ in line.words}
+    def alone(self, line: Line, state: ModalState) -> Acts | None:
+        """As `Dialect.alone`: dwells, positions of the machine, hole cycles and planes."""
+        words = [word for word in line.words if word.name != "N"]
+        names, given = {word.name for word in words}, {word.name: word.value for word in words}
+        if any(word[:2] == ("G", 4.0) for word in words):
             if "F" not in given:
                 raise refused(line, "a dwell in revolutions", "give it in seconds")
-            yield Beside("G", 4.0, f"{1000.0 * given['F']:.10g}")
-            return
-        if any(word[0] == "SUPA" for word in line.words):
-            yield from self._to_machine(line, state)
-            return
-        if any(word[0] in _CYCLES for word in line.words):
-            yield from self._cycle(line, state)
-            return
-        if any(word[0] == "CYCLE800" for word in line.words):
-            yield from self._plane(line, state)
-            return
-        motion: dict[str, float] = {}
-        for name, value, text, *_ in tools_first(line.words):
-            if name == "G" and value in _CODES:
-                motion["G"] = value
-            elif name == "G":
-                yield from self.mode(value, line, state)
-            elif name in ("M", "T", "S"):
-                yield Beside(name, value, text)
-            elif name == "SPOS":
-                yield Beside("M", 19.0, text)
-            elif name in ("F", *self.lexer.places) or name.removeprefix(f"{BY_WORD} ") in self.rotary:
-                motion[name] = value
-            elif name in ("TRAORI", "TRAFOOF", *_AXIS_FRAMES, *_ORIENTATIONS):
-                self._transform(name, state)
-            elif name not in ("D", "N", "%") and self.effect(name) not in SILENT:
-                raise self.not_understood(line, name, text)
-        yield Move(motion)
+            return iter((Beside("G", 4.0, f"{1000.0 * given['F']:.10g}"),))
+        if "SUPA" in names:
+            return self._to_machine(line)
+        if names & _CYCLES.keys():
+            return self._cycle(words, line, state)
+        return self._plane(words, line) if "CYCLE800" in names else None
 
-    def _cycle(self, line: Line, state: ModalState) -> Acts:
+    def moves(self, word: Word) -> bool:
+        """As `Dialect.moves`."""
+        if word.name == "G":
+            return word.value in _CODES
+        return word.name in ("F", *self.lexer.places) or word.name.removeprefix(f"{BY_WORD} ") in self.rotary
+
+    @staticmethod
+    def event(word: Word) -> Beside:
+        """As `Dialect.event`."""
+        return Beside("M", 19.0, word.text) if word.name == "SPOS" else Dialect.event(word)
+
+    def _cycle(self, words: Sequence[Word], line: Line, state: ModalState) -> Acts:
         """CYCLE81 to CYCLE85, called where the tool stands."""
-        words = [word for word in line.words if word.name != "N"]
-        name, (_, _, inside) = words[0].name, words[0].text.partition("(")
-        try:
-            args = numbers(inside.rstrip(") "))
-        except ValueError:
-            args = []
-        if len(words) > 1 or len(args) not in _CYCLES[name] or None in args[:4]:
-            raise refused(
-                line, f"{words[0].text} is not understood", "give RTP, RFP, SDIS and DP first, in its own block"
-            )
+        name, text = words[0].name, words[0].text
+        pattern, arguments = _CYCLES[name]
+        match = re.fullmatch(rf"{name}\({_HEIGHTS}{pattern}\)", re.sub(r"[ \t]", "", text))
+        if len(words) > 1 or match is None:
+            hint = f"write {name}(RTP,RFP,SDIS,DP{arguments}) in its own block"
+            raise refused(line, f"{text} is not understood", hint)
         if state.tip_control:
             yield wrong("CS506", line, f"a hole cycle under {state.tip_control}")
-        whole = [value if value is not None else 0.0 for value in args] + [0.0] * 12
-        travel, top, setup, bottom, _, fifth = whole[:6]
-        known = HoleCycle(travel, top + setup, bottom, top=top, from_clearance=False)
-        wanted = "DP without DPR, and SDIS and DTB that are not negative"
-        right = args[4:5] in ([], [None]) and setup >= 0.0 and (name == "CYCLE83" or fifth >= 0.0)
-        if name == "CYCLE82":
-            known = replace(known, dwell=1000.0 * fifth)
-        elif name == "CYCLE83":
-            right &= (
-                args[5] is None and args[7:11] == [0.0, 0.0, 0.0, 1.0] and args[11] in (0.0, 1.0) and whole[6] > 0.0
-            )
-            wanted = "pecks of one depth (FDPR) alone"
-            known = replace(known, step=whole[6], chip=args[11] == 0.0)
-        elif name == "CYCLE84":
-            right &= fifth == 0.0 and args[6:8] == [3.0, None] and whole[8] > 0.0
-            right &= args[9] in (None, 0.0) and whole[10] == whole[11]
-            wanted = "a pitch, SDAC 3, POSS 0, no DTB and one speed"
-            known = replace(known, pitch=whole[8], feed=whole[8])
-            if state.speed != whole[10]:
-                yield wrong("CS506", line, f"CYCLE84 at {whole[10]:g} revolutions, where S says otherwise")
-        elif name == "CYCLE85":
-            right &= whole[6] == whole[7] and whole[6] > 0.0
-            wanted = "one feed for both ways"
-            known = replace(known, feed=whole[6], feed_out=True, dwell=1000.0 * fifth)
-        if not right:
-            raise refused(line, f"{words[0].text} is not understood", f"give {wanted}")
-        yield from drill(known, state.modal.tip[0], state.modal.tip[1], line, state)
+        given = {key: float(number or 0.0) for key, number in match.groupdict().items()}
+        pitch, feed, top = given.get("pitch"), given.get("feed"), given["top"]
+        cycle = HoleCycle(
+            given["travel"],
+            top + given["setup"],
+            given["bottom"],
+            pitch if feed is None else feed,
+            step=given.get("step", 0.0),
+            from_clearance=False,
+            top=top,
+            chip=given.get("out") == 0.0,
+            dwell=1000.0 * given.get("dwell", 0.0),
+            feed_out=feed is not None,
+            pitch=pitch,
+        )
+        if given.get("speed", state.speed) != state.speed:
+            yield wrong("CS506", line, f"CYCLE84 at {given['speed']:g} revolutions, where S says otherwise")
+        yield from drill(cycle, state.modal.tip[0], state.modal.tip[1], line, state)
 
-    def _plane(self, line: Line, state: ModalState) -> Acts:
+    def _plane(self, words: Sequence[Word], line: Line) -> Acts:
         """CYCLE800: a plane by turns about its own axes, one after another; without arguments none."""
-        words = [word for word in line.words if word.name != "N"]
         match = _SWIVEL.fullmatch(words[0].text)
         if len(words) > 1 or match is None:
             hint = 'write CYCLE800(0,"",0,57,0,0,0,A,B,C,0,0,0,-1), or CYCLE800()'
@@ -175,7 +165,7 @@ class Siemens(Dialect):
             x, y, z = (np.array(before) + frame @ behind).tolist()
             yield Tilt(TiltedPlane(frame, room_of(angles), origin=(x, y, z)))
 
-    def _to_machine(self, line: Line, state: ModalState) -> Acts:
+    def _to_machine(self, line: Line) -> Acts:
         """SUPA: a rapid in machine coordinates, without frames."""
         axes = self.machine_axes(line, {("SUPA", 0.0), ("G", 0.0), ("D", 0.0)})
         if not any(word[:2] == ("G", 0.0) for word in line.words):
@@ -183,23 +173,13 @@ class Siemens(Dialect):
         yield Move({"G": 0.0})
         yield ToMachine(axes)
 
-    def _transform(self, name: str, state: ModalState) -> None:
-        on = state.tip_control.startswith("TRAORI")
-        if name in _ORIENTATIONS:
-            state.orientation = name
-        elif name in _AXIS_FRAMES:
-            state.axis_frame = name
-        else:
-            on = name == "TRAORI"
-        words = ("TRAORI", state.axis_frame, state.orientation) if on else ()
-        state.tip_control = " ".join(filter(None, words))
-
-    def mode(self, code: float, line: Line, state: ModalState) -> Acts:
-        """Take a G word outside group 01 that changes what holds from block to block."""
-        if code in _LENGTHS_ALONE:
-            what = f"feeds under G{code:g}, whose units the machine's basic system says: G{code:g}0 says them"
-            yield wrong("", line, what)
-        yield from super().mode(code, line, state)
+    def _mode(self, word: Word, line: Line, state: ModalState) -> Acts:
+        """As `Dialect._mode`."""
+        if word.name == "G" and word.value in _LENGTHS_ALONE:
+            name = word.spelling
+            text = f"feeds under {name}, whose units the machine's basic system says: {name}0 says them"
+            yield wrong("", line, text)
+        yield from super()._mode(word, line, state)
 
 
 class _SiemensLexer(Lexer):
