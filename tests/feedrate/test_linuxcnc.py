@@ -33,6 +33,52 @@ PROGRAMS = {
 }
 
 
+#: plane, mm that each arc rises, degrees of the corners between them, words of G64, feed mm/min, seconds that the
+#: controller took for the cuts, and how far off the law may be
+ARCS = {
+    "flat arcs": (17, 0.0, 1.0, "", 1500, 2.192, 0.01),
+    "flat arcs in XZ, fast": (18, 0.0, 1.0, "", 6000, 1.612, 0.01),
+    "flat arcs, tangent": (17, 0.0, 0.0, " P0.01 Q0", 6000, 1.750, 0.01),
+    "flat arcs, corners": (17, 0.0, 10.0, " P0.01 Q0", 1500, 2.445, 0.01),
+    "arcs that rise": (17, 0.3, 1.0, "", 1500, 2.583, 0.02),
+    "arcs that rise, fast": (17, 0.3, 1.0, "", 6000, 2.576, 0.02),
+    "arcs that rise, within P": (17, 0.3, 0.0, " P0.01 Q0", 6000, 3.809, 0.06),
+}
+
+
+def arcs(name: str) -> str:
+    """Arcs in waves with small corners between them, and three lines."""
+    plane, rise, corner, blend, feed, *_ = ARCS[name]
+    u, v, w = {17: "XYZ", 18: "ZXY", 19: "YZX"}[plane]
+    lines = ["G21 G90 G94 G40 G49 G80", f"G64{blend}", f"G{plane}", "G0 X0 Y0 Z0 A0 C0"]
+    place, heading = np.zeros(3), 0.0
+    for k in range(24):
+        sense, radius = (1 if (k // 3) % 2 else -1), 1.5 + 0.5 * (k % 4)
+        heading += np.radians(corner) * (-1) ** k
+        centre = place[:2] + sense * radius * np.array([-np.sin(heading), np.cos(heading)])
+        heading += sense * np.radians(40 + 10 * (k % 3))
+        end = centre - sense * radius * np.array([-np.sin(heading), np.cos(heading)])
+        place = np.array([*end, place[2] + rise])
+        word = "G3" if sense > 0 else "G2"
+        lines.append(f"{word} {u}{place[0]:.4f} {v}{place[1]:.4f} {w}{place[2]:.4f} R{radius:.4f} F{feed}")
+        if k % 8 == 7:
+            place = place + [1.0, -0.5, 1.0]
+            lines.append(f"G1 {u}{place[0]:.4f} {v}{place[1]:.4f} {w}{place[2]:.4f}")
+    return "\n".join([*lines, "M2", ""])
+
+
+def seconds_of_cuts(text: str) -> float:
+    lines = program_lines(text)
+    begin, end = line_times(lines, LIMITS)
+    cuts = np.flatnonzero(np.isfinite(lines.feed))
+    return float(end[cuts[-1]] - begin[cuts[0]])
+
+
+@pytest.mark.parametrize("name", list(ARCS))
+def test_the_law_of_arcs_gives_the_controllers_time(name: str) -> None:
+    assert seconds_of_cuts(arcs(name)) == pytest.approx(ARCS[name][-2], rel=ARCS[name][-1])
+
+
 def places(count: int, waves: float, turn: tuple[float, float]) -> Floats:
     """(count + 1, 6) words along a wave."""
     at = np.linspace(0.0, 1.0, count + 1)
@@ -91,16 +137,16 @@ def test_no_lines_take_no_time() -> None:
 
 def main() -> None:
     sys.path.insert(0, str(Path(__file__).parents[1] / "nc"))
-    from linuxcnc_controller import STATED, run_controller
+    from linuxcnc_controller import FEEDING, STATED, run_controller, run_samples
 
     for name in PROGRAMS:
         word, joints, _ = run_controller(program_of(name), 120.0, STATED)
         planned = line_times(lines_of(name), LIMITS)[1][-1]
         print(f"{name}: {word}, {len(joints) * LIMITS.servo_period:.3f} s; planned {planned:.3f} s")
-
-
-if __name__ == "__main__":
-    main()
+    for name in ARCS:
+        word, samples = run_samples(arcs(name).encode(), 60.0, STATED)
+        cutting = int((samples[:, 5] >= FEEDING).sum())
+        print(f"{name}: {word}, {cutting * LIMITS.servo_period:.3f} s; planned {seconds_of_cuts(arcs(name)):.3f} s")
 
 
 def test_a_program_begins_in_g64() -> None:
@@ -111,3 +157,7 @@ def test_a_program_begins_in_g64() -> None:
     times = {word: line_times(program_lines(word + cuts), LIMITS)[1][-1] for word in ("", "G64\n", "G61\n")}
     assert times[""] == times["G64\n"]
     assert times["G61\n"] > 1.5 * times[""]
+
+
+if __name__ == "__main__":
+    main()

@@ -8,11 +8,12 @@ The law is that of LinuxCNC 2.9 (``tp.c``, ``tc.c``, ``blendmath.c``, ``emccanon
    acceleration: ``v = min(F, axes, sqrt(a L / 2))``.
 3. A line starts when the line before it brakes below a blend speed. G64 P bounds that speed:
    ``2 sqrt(a/2 · P / cos θ)``, where 2θ is the angle between the lines. At most two lines run at once.
-4. Where no rotary axis moves on both lines, a corner is passed at a speed: of a small velocity jump, or of the arc that
-   fits within P. The planner looks ahead over such corners.
+4. Where no rotary axis moves on both lines, a corner may be passed at a speed: of a small velocity jump, or of the arc
+   that fits within P, whichever is faster than half of that of 3. The planner looks ahead over such corners.
 5. Between rapid and feed, and in exact stop mode, the motion stops.
 6. An arc is a line of its own length, whose direction turns. Across it at most √3/2 of the smallest acceleration of an
-   axis is used (``tpAddCircle``, ``tcUpdateCircleAccRatio``), so ``v = sqrt(√3/2 · a · R)``; half is left along it.
+   axis is used (``tcUpdateCircleAccRatio``), and along it what that leaves. A jump of velocity beside an arc counts
+   twice. Only in one plane is there an arc that rounds its corner: an arc that rises meets others as 3 says.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import dot, norm, unit
 from cornersmooth.errors import InputError
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import MM_PER_UNIT, Bools, Floats, Ints
@@ -37,6 +39,8 @@ _KINK = 0.1
 _REVERSAL = np.radians(2.0)
 #: ``BLEND_ACC_RATIO_NORMAL`` of blendmath.c, sqrt(3)/2: what an arc may take of the acceleration across the path
 _ARC_SHARE = np.sqrt(3.0) / 2.0
+#: ``TP_ANGLE_EPSILON``, rad: planes that lean by less are one
+_ONE_PLANE = 1e-6
 
 _COMMENT = re.compile(r"\([^)]*\)|;.*")
 _WORD = re.compile(r"([A-Z])\s*([-+]?\d*\.?\d+)")
@@ -69,13 +73,13 @@ class Lines:
     end: Floats
     feed: Floats  #: (n,): inf for a rapid
     blend: Floats  #: (n,) mm: P of G64; 0 for G64 without P; NaN in exact stop mode.
-    #: (n, 8): length, radius, and directions at the start and at the end, of arcs; NaN for lines
-    arc: Floats = field(default_factory=lambda: np.zeros((0, 8)))
+    #: (n, 12): length, radius, angle, directions at the start and at the end, and axis, of arcs; NaN for lines
+    arc: Floats = field(default_factory=lambda: np.zeros((0, 12)))
     number: Ints = field(default_factory=lambda: np.zeros(0, np.int64))  #: (n,): lines of the text, from 1
 
     def __post_init__(self) -> None:
         if len(self.arc) != len(self):
-            object.__setattr__(self, "arc", np.full((len(self), 8), np.nan))
+            object.__setattr__(self, "arc", np.full((len(self), 12), np.nan))
 
     def __len__(self) -> int:
         return len(self.feed)
@@ -91,57 +95,68 @@ def line_times(lines: Lines, limits: AxisLimits) -> tuple[Floats, Floats]:
     """
     if not len(lines):
         return np.zeros(0), np.zeros(0)
-    length, speed, acceleration, direction, turning = _moves(lines, limits)
-    tangent, corner_speed, braked, stop = _corners(lines, limits, length, speed, acceleration, direction, turning)
-    acceleration = acceleration * braked
+    moves = _Moves.of(lines, limits)
+    tangent, corner_speed, braked, stop = _corners(lines, limits, moves)
+    length, (speed, acceleration) = moves.length, moves.braked(braked)
     out = _final_speeds(length, speed, acceleration, np.where(tangent, corner_speed, 0.0))
     into = np.concatenate(([0.0], out[:-1]))
     peak = np.minimum(speed, np.sqrt(acceleration * length + (into**2 + out**2) / 2.0))
     peak = np.maximum(peak, np.maximum(into, out))
     ramps = (2.0 * peak**2 - into**2 - out**2) / (2.0 * acceleration)
     taken = (2.0 * peak - into - out) / acceleration + np.maximum(length - ramps, 0.0) / peak
-    overlap = np.where(tangent | stop, 0.0, _blend_speeds(lines, length, speed, acceleration, direction) / acceleration)
-    return _in_turn(taken, overlap)
+    blends = _blend_speeds(lines, moves, np.minimum(np.sqrt(acceleration * length), speed), acceleration)[0]
+    return _in_turn(taken, np.where(tangent | stop, 0.0, blends / acceleration))
 
 
-def _moves(lines: Lines, limits: AxisLimits) -> tuple[Floats, Floats, Floats, Floats, Bools]:
-    """Length, greatest speed, acceleration, directions of X Y Z, and whether a rotary axis moves (``emccanon.cc``).
+@dataclass(frozen=True)
+class _Moves:
+    """What a line is by itself (``emccanon.cc``)."""
 
-    Directions (2, n, 3) are those at the start and at the end.
-    """
-    step = lines.end - lines.start
-    share = np.abs(step)
-    share[share < FUZZ] = 0.0
-    linear, rotary = np.linalg.norm(share[:, :3], axis=1), np.linalg.norm(share[:, 3:], axis=1)
-    moves = linear > 0.0
-    length = np.where(moves, linear, rotary)
-    axes = length / (share / limits.velocity).max(axis=1)
-    speed = np.minimum(np.minimum(axes, lines.feed), length / limits.servo_period)
-    speed = np.where(moves, np.minimum(speed, limits.linear_velocity), speed)
-    acceleration = length / (share / limits.acceleration).max(axis=1)
-    straight = np.where(moves[:, None], step[:, :3] / np.where(moves, linear, 1.0)[:, None], (1.0, 0.0, 0.0))
-    round_ = ~np.isnan(lines.arc[:, 0])
-    weakest, slowest = limits.acceleration[:3].min(), limits.velocity[:3].min()
-    length = np.where(round_, lines.arc[:, 0], length)
-    across = np.sqrt(_ARC_SHARE * weakest * np.where(round_, lines.arc[:, 1], 1.0))
-    on_arc = np.minimum(np.minimum(lines.feed, min(slowest, limits.linear_velocity)), length / limits.servo_period)
-    speed = np.where(round_, np.minimum(on_arc, across), speed)
-    acceleration = np.where(round_, weakest / 2.0, acceleration)
-    direction = np.stack(
-        [np.where(round_[:, None], lines.arc[:, part], straight) for part in (slice(2, 5), slice(5, 8))]
-    )
-    return length, speed, acceleration, direction, rotary > 0.0
+    length: Floats  #: (n,)
+    fastest: Floats  #: (n,): greatest speed by the limits
+    speed: Floats  #: (n,): the same, and by the feed
+    acceleration: Floats  #: (n,): limit of all of it
+    direction: Floats  #: (2, n, 3): of X Y Z, at the start and at the end
+    push: Floats  #: (2, n, 3): of the acceleration there, as blends take it (``tcGetStartAccelUnitVector``)
+    turning: Bools  #: (n,): whether a rotary axis moves
+    round: Bools  #: (n,): arcs
+    radius: Floats  #: (n,): of arcs, else inf
+
+    @classmethod
+    def of(cls, lines: Lines, limits: AxisLimits) -> _Moves:
+        step = lines.end - lines.start
+        share = np.abs(step)
+        share[share < FUZZ] = 0.0
+        linear, rotary = norm(share[:, :3]), norm(share[:, 3:])
+        moves, arc = linear > 0.0, lines.arc
+        length = np.where(moves, linear, rotary)
+        fastest = length / (share / limits.velocity).max(axis=1)
+        acceleration = length / (share / limits.acceleration).max(axis=1)
+        straight = np.where(moves[:, None], step[:, :3] / np.where(moves, linear, 1.0)[:, None], (1.0, 0.0, 0.0))
+        round_ = ~np.isnan(arc[:, 0])
+        weakest, slowest = limits.acceleration[:3].min(), limits.velocity[:3].min()
+        length, radius = np.where(round_, arc[:, 0], length), np.where(round_, arc[:, 1], np.inf)
+        fastest = np.where(round_, np.minimum(slowest, np.sqrt(_ARC_SHARE * weakest * radius)), fastest)
+        fastest = np.minimum(fastest, length / limits.servo_period)
+        fastest = np.where(moves | round_, np.minimum(fastest, limits.linear_velocity), fastest)
+        acceleration = np.where(round_, weakest, acceleration)
+        speed = np.minimum(fastest, lines.feed)
+        direction, axis = np.tile(straight, (2, 1, 1)), arc[round_, 9:]
+        direction[:, round_] = np.stack((arc[round_, 3:6], arc[round_, 6:9]))
+        push = direction.copy()
+        flat = unit(np.cross(np.cross(axis, direction[:, round_]), axis))  # without the rise
+        inward = (speed / 2.0)[round_] ** 2 / radius[round_] / weakest
+        push[:, round_] = np.stack((unit(flat[0] + inward[:, None] * np.cross(axis, flat[0])), flat[1]))
+        return cls(length, fastest, speed, acceleration, direction, push, rotary > 0.0, round_, radius)
+
+    def braked(self, part: Floats) -> tuple[Floats, Floats]:
+        """Speeds, and accelerations along the lines, with a part of the accelerations (``pmCircleActualMaxVel``)."""
+        whole = part * self.acceleration
+        across = np.minimum(self.fastest**2 / self.radius / whole, _ARC_SHARE)
+        return np.minimum(self.speed, np.sqrt(_ARC_SHARE * whole * self.radius)), whole * np.sqrt(1.0 - across**2)
 
 
-def _corners(
-    lines: Lines,
-    limits: AxisLimits,
-    length: Floats,
-    speed: Floats,
-    acceleration: Floats,
-    direction: Floats,
-    turning: Bools,
-) -> tuple[Bools, Floats, Floats, Bools]:
+def _corners(lines: Lines, limits: AxisLimits, moves: _Moves) -> tuple[Bools, Floats, Floats, Bools]:
     """What happens at the end of each line (``tpSetupTangent``, ``tpChooseBestBlend``, ``handleModeChange``).
 
     Returns
@@ -154,25 +169,29 @@ def _corners(
         Part of its acceleration that each line has: half where it blends.
     stop : (n,) bool
     """
-    rapid = np.isinf(lines.feed)
+    rapid, speed, turning = np.isinf(lines.feed), moves.speed, moves.turning
     stop = np.isnan(lines.blend)
     stop[:-1] |= rapid[:-1] != rapid[1:]
     ahead, behind = slice(1, None), slice(None, -1)
     plain = ~(stop[behind] | turning[behind] | turning[ahead])
-    before, after = direction[1, :-1], direction[0, 1:]
-    cosine = np.clip(np.einsum("ij,ij->i", before, after), -1.0, 1.0)
+    before, after = moves.direction[1, :-1], moves.direction[0, 1:]
+    cosine = np.clip(dot(before, after), -1.0, 1.0)
     reversal = plain & (cosine < _REVERSAL**2 / 2.0 - 1.0)
     stop[behind] |= reversal
     plain &= ~reversal
     both = np.minimum(speed[behind], speed[ahead])
-    jump = np.abs(after - before) * (both / limits.servo_period + acceleration[ahead])[:, None]
-    kink = (jump / limits.acceleration[:3]).max(axis=1)
+    jump = np.abs(after - before) * (both / limits.servo_period + moves.acceleration[ahead])[:, None]
+    kink = (jump / limits.acceleration[:3]).max(axis=1) * np.where(moves.round[behind] | moves.round[ahead], 2.0, 1.0)
     kink_speed = np.where(kink < _KINK, both, both * _KINK / np.maximum(kink, _KINK))
-    arc_speed = np.minimum(_arc_speeds(lines, limits, length, cosine), both)
-    shorter = np.minimum(length[behind], length[ahead])
+    arc_speed = np.minimum(_arc_speeds(lines, limits, moves, cosine), both)
+    # as good as a parabolic blend, of which each line may use half: what is halved there slows the next one, too
+    reached, along = moves.braked(np.full(len(lines), (1.0 - _KINK) / 2.0))
+    parabola = (
+        _blend_speeds(lines, moves, np.minimum(np.sqrt(along * moves.length / 2.0), reached), along)[1][:-1] / 2.0
+    )
     small = kink < _KINK
-    arc = ~small & (arc_speed >= kink_speed)
-    slow = ~small & ~arc & (kink_speed > 0.5 * np.sqrt(acceleration[behind] * shorter / 2.0))
+    arc = ~small & (arc_speed > np.maximum(kink_speed, parabola))
+    slow = ~small & ~arc & (kink_speed > parabola)
     tangent = np.append(plain & (small | arc | slow), False)
     corner_speed = np.append(np.where(arc, arc_speed, kink_speed), 0.0)
     used = np.append(np.where(plain & (small | slow), np.minimum(kink, _KINK), 0.0), 0.0)
@@ -183,18 +202,33 @@ def _corners(
     return tangent, corner_speed, braked, stop
 
 
-def _arc_speeds(lines: Lines, limits: AxisLimits, length: Floats, cosine: Floats) -> Floats:
-    """(n − 1,) speeds on the arcs that round corners within P (``blendComputeParameters``); inf where all is straight.
+def _arc_speeds(lines: Lines, limits: AxisLimits, moves: _Moves, cosine: Floats) -> Floats:
+    """(n − 1,) speeds on the arcs that round corners within P (``blendInit3From...``, ``blendComputeParameters``).
 
-    Both lines give up at most half of their length.
+    Lines give up at most half of their length, arcs a third of their angle at the start and two at the end. 0 beside an
+    arc that is not in the plane of the corner.
     """
-    half = np.arccos(-cosine) / 2.0
-    widest = np.fmin(
-        *(np.where(lines.blend[part] > 0.0, lines.blend[part], np.inf) for part in (slice(1, None), slice(-1)))
-    )
-    height = widest / np.maximum(1.0 - np.sin(half), np.finfo(np.float64).tiny)
-    reach = np.minimum(np.minimum(length[:-1], length[1:]) / 2.0, np.cos(half) * height)
-    return np.sqrt(_ARC_SHARE * limits.acceleration[:3].min() * np.tan(half) * reach)
+    before, after = moves.direction[1, :-1], moves.direction[0, 1:]
+    across = np.cross(before, after)
+    across /= np.maximum(norm(across), np.finfo(np.float64).tiny)[:, None]
+    whole = np.arccos(-cosine) / 2.0
+    half, reach, tolerance, flat = whole, np.full(len(cosine), np.inf), np.full(len(cosine), np.inf), whole >= 0.0
+    for part, own, other, share, sense in (
+        (slice(None, -1), before, after, 2.0 / 3.0, 1.0),
+        (slice(1, None), after, before, 1.0 / 3.0, -1.0),
+    ):
+        (radius, angle), axis, bent = lines.arc[part, 1:3].T, lines.arc[part, 9:], moves.round[part]
+        inside = sense * dot(np.cross(axis, own), other) > 0.0  # the corner turns as the arc does
+        angle = np.minimum(share * angle, np.where(inside, whole, np.pi / 2.0))
+        half = np.where(bent & inside, np.minimum(half, whole - angle / 4.0), half)
+        given_up = radius * np.where(inside, np.sin(angle / 4.0), angle)
+        length, blend = moves.length[part], lines.blend[part]
+        reach = np.minimum(reach, np.where(bent, given_up, length / 2.0))
+        tolerance = np.fmin(tolerance, np.minimum(np.where(blend > 0.0, blend, np.inf), length / 4.0))
+        flat = flat & (~bent | (norm(np.cross(across, axis)) < _ONE_PLANE))
+    height = tolerance / np.maximum(1.0 - np.sin(half), np.finfo(np.float64).tiny)
+    reach = np.minimum(reach, np.cos(half) * height)
+    return np.where(flat, np.sqrt(_ARC_SHARE * limits.acceleration[:3].min() * np.tan(half) * reach), 0.0)
 
 
 def _final_speeds(length: Floats, speed: Floats, acceleration: Floats, corner: Floats) -> Floats:
@@ -205,17 +239,18 @@ def _final_speeds(length: Floats, speed: Floats, acceleration: Floats, corner: F
     return np.sqrt(np.maximum(np.minimum(least - braking, cap), 0.0))
 
 
-def _blend_speeds(lines: Lines, length: Floats, speed: Floats, acceleration: Floats, direction: Floats) -> Floats:
-    """(n,) speed below which the next line starts (``tpComputeBlendVelocity``)."""
-    reach = np.minimum(np.sqrt(acceleration * length), speed)
-    through, ramp = length / reach, reach / acceleration
+def _blend_speeds(lines: Lines, moves: _Moves, reach: Floats, acceleration: Floats) -> tuple[Floats, Floats]:
+    """(n,) speed below which the next line starts, and that along the blend (``tpComputeBlendVelocity``)."""
+    through, ramp = moves.length / reach, reach / acceleration
     time = np.minimum(np.minimum(through, np.roll(through, -1)), np.maximum(ramp, np.roll(ramp, -1)))
-    found = np.minimum(reach, time * acceleration)
-    cosine = np.einsum("ij,ij->i", direction[1], np.roll(direction[0], -1, axis=0))
-    across = np.sqrt(np.maximum((1.0 - cosine) / 2.0, 0.0))  # cos θ
+    cosine = np.clip(dot(moves.push[1], np.roll(moves.push[0], -1, axis=0)), -1.0, 1.0)
+    across, along = np.sqrt((1.0 - cosine) / 2.0), np.sqrt((1.0 + cosine) / 2.0)  # cos θ, sin θ
     bounded = (lines.blend > 0.0) & (across > np.sin(1e-3))  # the planner's own limit for straight on
     allowed = 2.0 * np.sqrt(acceleration * np.where(bounded, lines.blend, 0.0) / np.where(bounded, across, 1.0))
-    return np.where(bounded, np.minimum(found, allowed), found)
+    most = np.where(bounded, allowed, np.inf)
+    this = np.minimum(np.minimum(reach, time * acceleration), most)
+    following = np.minimum(np.minimum(np.roll(reach, -1), time * np.roll(acceleration, -1)), most)
+    return this, along * (this + following) / 2.0
 
 
 def _in_turn(taken: Floats, overlap: Floats) -> tuple[Floats, Floats]:
@@ -283,7 +318,7 @@ def program_lines(text: str, name: str | None = None) -> Lines:
         round_ = code > 1.0 and bool(given.keys() & set("XYZIJKR"))
         if begins == ends and not round_:
             continue
-        arc = _arc(begins, ends, given, plane, clockwise=code == 2.0) if round_ else [np.nan] * 8
+        arc = _arc(begins, ends, given, plane, clockwise=code == 2.0) if round_ else [np.nan] * 12
         if code == 0.0:
             speed = np.inf
         elif timed:
@@ -297,7 +332,7 @@ def program_lines(text: str, name: str | None = None) -> Lines:
         rows.append((begins, ends, float(speed), blend, arc, number))
     starts, targets, speeds, blends, arcs, numbers = zip(*rows, strict=True) if rows else ((), (), (), (), (), ())
     start, end = (np.array(places, np.float64).reshape(-1, 6) for places in (starts, targets))
-    shapes = np.array(arcs, np.float64).reshape(-1, 8)
+    shapes = np.array(arcs, np.float64).reshape(-1, 12)
     limits, rounding = np.array(speeds, np.float64), np.array(blends, np.float64)
     return Lines(start, end, limits, rounding, shapes, np.array(numbers, np.int64))
 
@@ -305,7 +340,7 @@ def program_lines(text: str, name: str | None = None) -> Lines:
 def _arc(
     start: list[float], end: list[float], given: Mapping[str, float], plane: int, *, clockwise: bool
 ) -> list[float]:
-    """Length, radius and directions of an arc by radius or by centre, as in `Lines`."""
+    """Row of an arc by radius or by centre, as in `Lines`."""
     (u, v, w), letters = _PLANES[plane]
     chord, rise = complex(end[u] - start[u], end[v] - start[v]), end[w] - start[w]
     if "R" in given:
@@ -317,9 +352,9 @@ def _arc(
     sense, radius = -1.0 if clockwise else 1.0, abs(centre)
     turn = (sense * (cmath.phase(chord - centre) - cmath.phase(-centre))) % math.tau or math.tau
     length = math.hypot(radius * turn, rise)
-    found = [length, radius]
+    found = [length, radius, turn]
     for spoke in (-centre, chord - centre):
         way, tangent = [0.0] * 3, sense * 1j * spoke / (abs(spoke) or 1.0) * radius * turn / (length or 1.0)
         way[u], way[v], way[w] = tangent.real, tangent.imag, rise / (length or 1.0)
         found += way
-    return found
+    return [*found, *(sense * (axis == w) for axis in range(3))]
