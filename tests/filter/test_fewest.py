@@ -192,11 +192,13 @@ def test_each_cut_keeps_its_feed() -> None:
 def test_the_fastest_is_taken_where_times_are_known() -> None:
     machine = cs.load_machine(Path(__file__).parents[2] / "samples" / "machines" / "three-axis.toml")
     text = PROGRAMS["relief"].replace("%\nO1\n", "").replace("%\n", "").replace("F300", "F3000")
-    for before, share in (("G61\n", 0.6), ("", 1.001)):  # exact stop at each vertex; blending, which is fast already
+    # exact stop at each vertex; blending, which is fast already: on the whole controller 67 lines with arcs took 1.79 s
+    # within 4 m/s² where the 488 of the program took 1.67 s, and 403 without arcs 1.66 s
+    for before, share, lines in (("G61\n", 0.6, 0.5), ("", 1.001, 0.9)):
         found = few(before + text, "linuxcnc", axes=machine)
         assert found.seconds is not None
         assert found.seconds[1] < share * found.seconds[0]
-        assert found.new_lines < 0.5 * found.lines
+        assert found.new_lines < lines * found.lines
     zigzag = "".join(f"X{2 * k} Y{k % 2}\n" for k in range(1, 9))
     text = "G21 G90 G94 G17\nG61\nG0 X0 Y0 Z5\nG1 Z0 F300\n" + zigzag + "G0 Z5\nM2\n"
     found = few(text, "linuxcnc", axes=machine)

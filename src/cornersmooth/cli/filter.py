@@ -21,7 +21,7 @@ from cornersmooth.filter import Filtered, filter_program, verify_programs
 from cornersmooth.filter.checking import measure
 from cornersmooth.filter.program import THREE_AXES, read_program, refuse_cl_file
 from cornersmooth.filter.runs import FILTERED, ProgramReader
-from cornersmooth.filter.times import time_as_it_is
+from cornersmooth.filter.times import Times
 from cornersmooth.kinematics import Machine
 from cornersmooth.nc import Form
 from cornersmooth.nc_reader import Problem
@@ -343,7 +343,7 @@ def time_of_program(data: bytes, name: str, given: Options) -> int:
         else:
             found = filter_program(data, form, settings, verify=False, **how)
         if found.seconds is None and not (found.checked and found.checked.wrong):  # nothing differs
-            alone = time_as_it_is(*read_program(data, form, settings, **how_read(given)), axes)
+            alone = Times(*read_program(data, form, settings, **how_read(given)), axes).as_it_is()
             found = replace(found, seconds=(alone, alone))
     if found.checked is not None and found.checked.wrong:
         show_wrong(given.text, found.checked.wrong)

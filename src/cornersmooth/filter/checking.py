@@ -200,10 +200,15 @@ def shared(old: Reading, new: Reading, where: Sequence[Place]) -> list[list[Plac
 
 def pair(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> tuple[NcProgram, NcProgram]:
     """Give the motion of runs with the same units, before and after."""
-    after = [
-        Stretch(place.run, _DISTANCES.sub(b"", new.lines(place.first, place.stop)), place.first + 1) for place in where
-    ]
-    return motion_of_runs(job, old, [place.run for place in where]), motion(job, after, job.form)
+    return motion_of(job, old, old, where), motion_of(job, old, new, where)
+
+
+def motion_of(job: Job, old: Reading, reading: Reading, where: Sequence[Place]) -> NcProgram:
+    """Give the motion of runs with the same units, in their program or in another one."""
+    if reading is old:
+        return motion_of_runs(job, old, [place.run for place in where])
+    texts = (_DISTANCES.sub(b"", reading.lines(place.first, place.stop)) for place in where)
+    return motion(job, [Stretch(p.run, text, p.first + 1) for p, text in zip(where, texts, strict=True)], job.form)
 
 
 def measure(

@@ -17,7 +17,7 @@ from cornersmooth.filter.fewest import fewest
 from cornersmooth.filter.motion import Job
 from cornersmooth.filter.runs import Left, ProgramReader, Reading
 from cornersmooth.filter.spelling import SAMPLE, Spelling
-from cornersmooth.filter.times import by_own_law, least_time, no_runs, planned_times, run_times, time_as_it_is
+from cornersmooth.filter.times import Times, by_own_law, least_time, no_runs
 from cornersmooth.filter.writing import smoothed
 from cornersmooth.kinematics import Machine
 from cornersmooth.nc import fit_settings
@@ -60,7 +60,7 @@ class Filtered:
     left: tuple[Left, ...]  #: why the others stay
     checked: Checked | None  #: None where it was not wanted
     units_said: bool = True  #: whether the program says its units
-    seconds: tuple[float, float] | None = None  #: planned time before and after; see `planned_times`
+    seconds: tuple[float, float] | None = None  #: planned time before and after; see `Times`
     #: what the control does in the runs before and after, where that was wanted
     motions: tuple[NcProgram, NcProgram] | None = None
     #: first and last line of each run that was replaced, in the old program and in the new one; of those in `motions`
@@ -134,9 +134,10 @@ def filter_program(
     if most is not None:
         left_all_but(old, most)
     texts, why = (fewest if settings.lines is None else smoothed)(job, old, old.runs)
-    if settings.lines is None and axes is not None and old.runs and not old.absent:
-        texts, why = _fastest(job, old, texts, why, axes)
-    return _result(job, old, _way(job, old, texts, why, verify=verify), axes, paths=paths)
+    times = None if axes is None else Times(job, old, axes)
+    if settings.lines is None and times is not None and old.runs and not old.absent:
+        texts, why = _fastest(job, old, texts, why, times)
+    return _result(job, old, _way(job, old, texts, why, verify=verify), times, paths=paths)
 
 
 @dataclass(frozen=True)
@@ -178,32 +179,38 @@ def _way(job: Job, old: Reading, texts: dict[int, bytes], why: dict[int, str], *
 
 
 def _fastest(
-    job: Job, old: Reading, texts: dict[int, bytes], why: dict[int, str], axes: Machine
+    job: Job, old: Reading, texts: dict[int, bytes], why: dict[int, str], planned: Times
 ) -> tuple[dict[int, bytes], dict[int, str]]:
     """Of each run the text with the fewest blocks that is fast, and no slower than the run.
 
-    Corners are smoothed in runs that take longer than their feeds ask for.
+    Corners are smoothed in runs that take longer than their feeds ask for. Lines alone are tried where arcs are slower.
     """
     found: dict[int, list[tuple[float, int, bytes | None]]] = {}
 
     def try_(job: Job, texts: dict[int, bytes]) -> None:
         way = _way(job, old, texts, {}, verify=False)
-        times = run_times(job, old, way.after, way.where, axes).tolist()
+        times = planned.of_runs(way.after, way.where).tolist()
         for place, (before, after) in zip(way.where, times, strict=True):
             own = found.setdefault(place.run.first, [(before, place.run.lines, None)])
             own.append((after, place.stop - place.first, way.text(place)))
 
     try_(job, texts)
-    best = {first: min(seconds for seconds, *_ in own) for first, own in found.items()}
-    slow = [run for run in old.runs if best.get(run.first, math.inf) > (1.0 + _FASTER) * least_time(job, run)]
+    least = {first: min(seconds for seconds, *_ in own) for first, own in found.items()}
+    slow = [run for run in old.runs if least.get(run.first, math.inf) > (1.0 + _FASTER) * least_time(job, run)]
     rows = replace(job, spelling=_fine(job.spelling, job.form, job.settings, inch=old.runs[0].state.unit != 1.0))
     try_(rows, smoothed(rows, old, slow)[0])
-    chosen: dict[int, bytes] = {}
-    for first, own in found.items():
-        fast = min((1.0 + _FASTER) * min(seconds for seconds, *_ in own), (1.0 + _EQUAL) * own[0][0])
-        text = min((one for one in own if one[0] <= fast), key=lambda one: one[1])[2]
-        if text is not None:
-            chosen[first] = text
+
+    def best() -> dict[int, bytes]:
+        chosen: dict[int, bytes] = {}
+        for first, own in found.items():
+            fast = min((1.0 + _FASTER) * min(seconds for seconds, *_ in own), (1.0 + _EQUAL) * own[0][0])
+            text = min((one for one in own if one[0] <= fast), key=lambda one: one[1])[2]
+            if text is not None:
+                chosen[first] = text
+        return chosen
+
+    try_(job, fewest(job, old, [run for run in old.runs if run.first in found.keys() - best().keys()], arcs=False)[0])
+    chosen = best()
     slower = dict.fromkeys(found.keys() - chosen.keys(), "nothing makes it faster")
     return chosen, {first: text for first, text in why.items() if first not in chosen} | slower
 
@@ -227,7 +234,8 @@ def verify_programs(
     after = job.reader.read(new, [place.stop for place in where])
     checked = Checked(tuple(wrong)) if wrong else check(job, before, after, where)
     way = _Way(after, where, {}, checked)
-    found = _result(job, before, way, None if wrong else axes, paths=paths and not wrong)
+    times = None if wrong or axes is None else Times(job, before, axes)
+    found = _result(job, before, way, times, paths=paths and not wrong)
     return replace(found, compared=True)
 
 
@@ -293,7 +301,7 @@ def left_all_but(reading: Reading, most: int) -> None:
     reading.runs[:] = reading.runs[first:stop]
 
 
-def _result(job: Job, old: Reading, way: _Way, axes: Machine | None, *, paths: bool) -> Filtered:
+def _result(job: Job, old: Reading, way: _Way, times: Times | None, *, paths: bool) -> Filtered:
     """What became of a program; how long its runs take, and what the control does in them, as far as needed."""
     new, where, why = way.after, way.where, way.why
     for run in old.runs:
@@ -310,7 +318,7 @@ def _result(job: Job, old: Reading, way: _Way, axes: Machine | None, *, paths: b
         left=old.left(),
         checked=way.checked,
         units_said="units" in old.said,
-        seconds=planned_times(job, old, new, where, axes) if axes is not None and where else None,
+        seconds=times.of_change(new, where) if times is not None and where else None,
         motions=pair(job, old, new, drawn) if paths and where else None,
         changed=tuple((place.run.first + 1, place.run.stop, place.first + 1, place.stop) for place in drawn),
         rounding=where[0].run.state.unit * _rounding(new.data) if where else 0.0,
@@ -338,7 +346,7 @@ def compare_filtered(
     """Smooth, verify and plan the runs of a program in every way; other parameters as of `filter_program`.
 
     `tried` has at least one, in forms with the words of the program; `watch` as of `compare_programs`.
-    CS265: the machine has no limits of axes; CS266: no cut can be smoothed; as `planned_times`.
+    CS265: the machine has no limits of axes; CS266: no cut can be smoothed; as `Times`.
     """
     form, settings, how = tried[0].form, tried[0].settings, {"tip_from_start": tip_from_start, "inch": inch}
     job, old = read_program(data, form, settings, **how)
@@ -350,7 +358,7 @@ def compare_filtered(
         raise no_runs()
     cuts = sum(map(len, old.runs))
     left_all_but(old, most)
-    share, before = sum(map(len, old.runs)) / cuts, time_as_it_is(job, old, axes)
+    share, before = sum(map(len, old.runs)) / cuts, Times(job, old, axes).as_it_is()
 
     def work(candidate: Candidate) -> Row:
         row = Row.of(candidate)

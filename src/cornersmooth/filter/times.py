@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from cornersmooth.feedrate import Limits
 from cornersmooth.feedrate.even_ramps import ramp_times
 from cornersmooth.feedrate.linuxcnc import axis_limits, line_times, program_lines
 from cornersmooth.feedrate.written import text_path
-from cornersmooth.filter.checking import Place, pair, shared
+from cornersmooth.filter.checking import Place, motion_of, shared
 from cornersmooth.filter.motion import Job
 from cornersmooth.filter.runs import NONE, Reading, Run
 from cornersmooth.kinematics import Machine
@@ -21,39 +22,67 @@ from cornersmooth.nc_reader import NcProgram
 from cornersmooth.times.saving import LINUXCNC
 
 
-def planned_times(job: Job, old: Reading, new: Reading, where: Sequence[Place], axes: Machine) -> tuple[float, float]:
-    """Time of what has changed, before and after, s, under the limits of the axes of a machine (`ramp_times`).
+@dataclass
+class Times:
+    """Planned times of the runs of a program, and of what takes their place, under the limits of the axes of a machine.
 
-    On LinuxCNC it is that of the whole program, by the law of its planner. Errors: a pose out of reach; CS264: a
-    program for LinuxCNC has motion of a kind whose law is not known; CS263: the machine does not say how fast its axes
-    may go.
+    They are those of `ramp_times`, and on LinuxCNC by the law of its planner. No text is planned twice.
+
+    Errors: a pose out of reach; CS264: a program for LinuxCNC has motion of a kind whose law is not known; CS263: the
+    machine does not say how fast its axes may go.
     """
-    if by_own_law(job):
-        return float(_on_linuxcnc(old, axes)[-1]), float(_on_linuxcnc(new, axes)[-1])
-    before, after = run_times(job, old, new, where, axes).sum(axis=0).tolist()
-    return before, after
 
+    job: Job
+    old: Reading
+    axes: Machine
+    known: dict[tuple[int, bytes], float] = field(default_factory=dict)  #: by the first line of a run, and its text
+    ends: dict[bytes, Floats] = field(default_factory=dict)  #: of programs: when each line ends
 
-def run_times(job: Job, old: Reading, new: Reading, where: Sequence[Place], axes: Machine) -> Floats:
-    """(p, 2) time of each place before and after, s; errors as of `planned_times`."""
-    if by_own_law(job):
-        lines = [(place.run.first, place.run.stop) for place in where], [(place.first, place.stop) for place in where]
-        ends = [np.concatenate(([0.0], _on_linuxcnc(reading, axes))) for reading in (old, new)]
-        return np.column_stack([[end[b] - end[a] for a, b in own] for end, own in zip(ends, lines, strict=True)])
-    found: dict[int, Floats] = {}
-    for some in shared(old, new, where):
-        firsts = [place.run.first for place in some], [place.first for place in some]
-        times = [_times(job, nc, own, axes) for nc, own in zip(pair(job, old, new, some), firsts, strict=True)]
-        found |= dict(zip(firsts[0], np.column_stack(times), strict=True))
-    return np.array([found[place.run.first] for place in where]).reshape(-1, 2)
+    def of_runs(self, new: Reading, where: Sequence[Place]) -> Floats:
+        """(p, 2) time of each place before and after, s."""
+        before = [Place(place.run, place.run.first, place.run.stop) for place in where]
+        return np.array([self._seconds(self.old, before), self._seconds(new, where)]).reshape(2, -1).T
 
+    def of_change(self, new: Reading, where: Sequence[Place]) -> tuple[float, float]:
+        """Time of what has changed, before and after, s; on LinuxCNC that of the whole program."""
+        if by_own_law(self.job):
+            return float(self._ends(self.old)[-1]), float(self._ends(new)[-1])
+        before, after = self.of_runs(new, where).sum(axis=0).tolist()
+        return before, after
 
-def _times(job: Job, nc: NcProgram, firsts: Sequence[int], axes: Machine) -> Floats:
-    """Time of the stretches of a motion that begin in some lines, without the rapids to them, s."""
-    path = text_path(nc, Limits(), settings=job.settings)
-    taken = np.where(path.rapid, 0.0, ramp_times(path, Limits(), axes))
-    which = np.searchsorted(firsts, np.abs(path.program.line[path.move]) - 1, side="right") - 1
-    return np.bincount(which, taken, len(firsts)).astype(np.float64)
+    def as_it_is(self) -> float:
+        """Time of all runs, s; on LinuxCNC that of the program. CS266: it has no runs."""
+        if not self.old.runs and not by_own_law(self.job):
+            raise no_runs()
+        return self.of_change(self.old, [Place(run, run.first, run.stop) for run in self.old.runs])[0]
+
+    def _seconds(self, reading: Reading, where: Sequence[Place]) -> list[float]:
+        """Time of each place, s."""
+        if by_own_law(self.job):
+            ends = np.concatenate(([0.0], self._ends(reading)))
+            return [float(ends[place.stop] - ends[place.first]) for place in where]
+        keys = {place.run.first: (place.run.first, reading.lines(place.first, place.stop)) for place in where}
+        new = [place for place in where if keys[place.run.first] not in self.known]
+        for some in shared(self.old, reading, new):
+            taken = self._planned(motion_of(self.job, self.old, reading, some), [place.first for place in some])
+            self.known |= zip((keys[place.run.first] for place in some), taken.tolist(), strict=True)
+        return [self.known[key] for key in keys.values()]
+
+    def _planned(self, nc: NcProgram, firsts: Sequence[int]) -> Floats:
+        """Time of the stretches of a motion that begin in some lines, without the rapids to them, s."""
+        path = text_path(nc, Limits(), settings=self.job.settings)
+        taken = np.where(path.rapid, 0.0, ramp_times(path, Limits(), self.axes))
+        which = np.searchsorted(firsts, np.abs(path.program.line[path.move]) - 1, side="right") - 1
+        return np.bincount(which, taken, len(firsts)).astype(np.float64)
+
+    def _ends(self, reading: Reading) -> Floats:
+        """(l,) when each line of a program ends on LinuxCNC, s."""
+        if reading.data not in self.ends:
+            moves = program_lines(reading.data.decode("utf-8", "replace"))
+            ends = np.zeros(max(len(reading), 1))
+            ends[moves.number - 1] = line_times(moves, axis_limits(self.axes))[1]
+            self.ends[reading.data] = np.maximum.accumulate(ends)
+        return self.ends[reading.data]
 
 
 def least_time(job: Job, run: Run) -> float:
@@ -65,16 +94,6 @@ def least_time(job: Job, run: Run) -> float:
     return float((60.0 * norm(np.diff(run.places[:, :3], axis=0)) / run.feeds).sum())
 
 
-def time_as_it_is(job: Job, reading: Reading, axes: Machine) -> float:
-    """Time of all runs of a program, s; on LinuxCNC and errors as `planned_times`, and CS266: it has no runs."""
-    if by_own_law(job):
-        return float(_on_linuxcnc(reading, axes)[-1])
-    if not reading.runs:
-        raise no_runs()
-    where = [Place(run, run.first, run.stop) for run in reading.runs]
-    return planned_times(job, reading, reading, where, axes)[0]
-
-
 def no_runs() -> SettingsError:
     """Make the error of a program in which nothing can be smoothed."""
     hint = "'cornersmooth filter' says why for each, with its line"
@@ -84,11 +103,3 @@ def no_runs() -> SettingsError:
 def by_own_law(job: Job) -> bool:
     """Whether the control has a planner whose law is known: times are those of whole programs then."""
     return job.form.table.lines.planner == LINUXCNC
-
-
-def _on_linuxcnc(reading: Reading, axes: Machine) -> Floats:
-    """(l,) when each line of a program ends, s."""
-    moves = program_lines(reading.data.decode("utf-8", "replace"))
-    ends = np.zeros(len(reading))
-    ends[moves.number - 1] = line_times(moves, axis_limits(axes))[1]
-    return np.maximum.accumulate(ends) if len(ends) else np.zeros(1)
