@@ -71,9 +71,10 @@ class Shelf:
 
     def aliases(self) -> dict[str, str]:
         """Name of the table for each of its other names."""
-        folder = resources.files(self.package) / self.folder
-        tables = {name: _read((folder / f"{name}.toml").read_text(encoding="utf-8")) for name in self.names()}
-        return {alias: name for name, table in tables.items() for alias in table.get("aliases", ())}
+        return {alias: name for name in self.names() for alias in _read(self._text(name)).get("aliases", ())}
+
+    def _text(self, name: str) -> str:
+        return (resources.files(self.package) / self.folder / f"{name}.toml").read_text(encoding="utf-8")
 
     def find(self, name: str) -> str:
         """Return the name, as it is written, of the table that is called so; empty for none."""
@@ -99,9 +100,8 @@ class Shelf:
             what = f"{self.kind} file cannot be read: {reason}"
             raise SettingsError(self.unreadable, what, "check the name", file=given) from error
         if len(text) > _LARGEST:
-            raise SettingsError(
-                self.unreadable, f"{self.kind} file is longer than a table", "check the name", file=given
-            )
+            what = f"{self.kind} file is longer than a table"
+            raise SettingsError(self.unreadable, what, "check the name", file=given)
         return (text, given, Path(name_or_path).stem)
 
     def built_in(self, name: str) -> str:
@@ -114,7 +114,7 @@ class Shelf:
             advice = f"did you mean {meant}? " if close else ""
             hint = f"{advice}use a TOML file or one of {', '.join(known)}"
             raise SettingsError(self.unknown, f"unknown {self.kind} {name!r}", hint)
-        return (resources.files(self.package) / self.folder / f"{found}.toml").read_text(encoding="utf-8")
+        return self._text(found)
 
     def parse(self, text: str | Table) -> tuple[Table, str]:
         """Table of a text, or one that was read already, on top of the one that it is like; the name of that, or "".
@@ -195,11 +195,14 @@ class Shelf:
             return partial(self._choice, choices=args)
         if origin is Mapping:
             return partial(self._mapping, keys=get_args(args[0]), kind=args[1])
-        parts = [part for part in args if part not in (type(None), ...)]
         if origin is tuple:
-            count = None if ... in args else len(parts)
-            return partial(self.texts, count=count) if parts[0] is str else partial(self.numbers, count=count)
-        return self._by_type(parts[0]) if type(None) in args else self.text
+            return self._list(hint)
+        return self._by_type(args[0]) if type(None) in args else self.text
+
+    def _list(self, hint: Any) -> Callable[..., Any]:
+        """How a tuple of texts or numbers is read, so many or any."""
+        parts = get_args(hint)
+        return partial(self.texts if parts[0] is str else self.numbers, count=None if ... in parts else len(parts))
 
     def _annotated(self, value: Any, where: str, hint: Any, rule: Any) -> Any:
         """Value of a type with a rule: `Bound`, function that raises ValueError, keys for names, hint for a list."""
@@ -207,16 +210,12 @@ class Shelf:
             named = self._mapping(value, where, tuple(rule), get_args(hint)[1])
             return {rule[key]: entry for key, entry in named.items()}
         if isinstance(rule, str):
-            parts = get_args(hint)
-            count = None if ... in parts else len(parts)
-            return (self.texts if parts[0] is str else self.numbers)(value, where, count, rule)
+            return self._list(hint)(value, where, hint=rule)
         if hint is int:
             return self.whole(value, where, rule.low, rule.high)
         read = self._by_type(hint)(value, where)
         if isinstance(rule, Bound):
-            if not rule.low <= read <= rule.high:
-                raise self.wrong(f"{where} is {read}", rule.hint)
-            return read
+            return self._need(rule.low <= read <= rule.high, read, where, rule.hint)
         try:
             rule(read)
         except ValueError as error:
@@ -225,11 +224,10 @@ class Shelf:
 
     def _choice(self, value: Any, where: str, choices: tuple[str, ...]) -> str:
         """Refuse what is none of the choices; the empty one is where the key is left out."""
-        if value in choices:
-            return str(value)
         named = [choice for choice in choices if choice]
         several = f"one of {', '.join(named)}" if len(named) > 2 else " or ".join(named)
-        raise self.wrong(f"{where} is {value!r}", f"use {several}{', or leave it out' * (len(named) < 2)}")
+        hint = f"use {several}{', or leave it out' * (len(named) < 2)}"
+        return str(self._need(value in choices, value, where, hint))
 
     def _mapping(self, value: Any, where: str, keys: tuple[str, ...], kind: Any) -> dict[str, Any]:
         """Table of entries of one type, by any keys, or by known ones; dataclasses get their key as a name."""
@@ -243,47 +241,45 @@ class Shelf:
 
     def table(self, value: Any, where: str) -> Table:
         """Refuse what is no table."""
-        if not isinstance(value, dict):
-            raise self.wrong(f"{where} is {value!r}", f"write a table [{where}]")
-        return value
+        return self._need(isinstance(value, dict), value, where, f"write a table [{where}]")
 
-    def flag(self, value: object, where: str) -> bool:
+    def flag(self, value: Any, where: str) -> bool:
         """Refuse what is not true or false."""
-        if not isinstance(value, bool):
-            raise self.wrong(f"{where} is {value!r}", "give true or false")
-        return value
+        return self._need(isinstance(value, bool), value, where, "give true or false")
 
-    def whole(self, value: object, where: str, least: int = 0, most: int = _MOST) -> int:
+    def whole(self, value: Any, where: str, least: int = 0, most: int = _MOST) -> int:
         """Refuse what is no whole number within bounds."""
-        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
-            span = f"from {least} to {most}" if least else f"up to {most}"
-            raise self.wrong(f"{where} is {value!r}", f"give a whole number {span}")
-        return value
+        good = isinstance(value, int) and not isinstance(value, bool) and least <= value <= most
+        span = f"from {least} to {most}" if least else f"up to {most}"
+        return self._need(good, value, where, f"give a whole number {span}")
 
-    def number(self, value: object, where: str) -> float:
+    def number(self, value: Any, where: str) -> float:
         """Refuse what is no number."""
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise self.wrong(f"{where} is {value!r}", "give a number")
-        return float(value)
+        good = isinstance(value, int | float) and not isinstance(value, bool)
+        return float(self._need(good, value, where, "give a number"))
 
-    def numbers(self, value: object, where: str, count: int | None = None, hint: str = "") -> tuple[float, ...]:
+    def numbers(self, value: Any, where: str, count: int | None = None, hint: str = "") -> tuple[float, ...]:
         """Refuse what is no list of so many numbers."""
-        if not isinstance(value, list) or count not in (None, len(value)):
-            raise self.wrong(f"{where} is {value!r}", hint or f"give {_COUNTS[count or 0]} numbers in brackets")
+        good = isinstance(value, list) and count in (None, len(value))
+        self._need(good, value, where, hint or f"give {_COUNTS[count or 0]} numbers in brackets")
         return tuple(self.number(each, where) for each in value)
 
-    def text(self, value: object, where: str) -> str:
+    def text(self, value: Any, where: str) -> str:
         """Refuse what is no text, or none that a terminal only shows."""
-        if not isinstance(value, str) or not value.isprintable():
-            raise self.wrong(f"{where} is {value!r}", "write it as one line of text in quotes")
-        return value
+        good = isinstance(value, str) and value.isprintable()
+        return self._need(good, value, where, "write it as one line of text in quotes")
 
-    def texts(self, value: object, where: str, count: int | None = None, hint: str = "") -> tuple[str, ...]:
+    def texts(self, value: Any, where: str, count: int | None = None, hint: str = "") -> tuple[str, ...]:
         """Refuse what is no list of so many texts."""
-        if not isinstance(value, list) or count not in (None, len(value)) or not all(isinstance(x, str) for x in value):
-            many = "a list of strings" if count is None else f"{_COUNTS[count]} texts in brackets"
-            raise self.wrong(f"{where} is {value!r}", hint or f'give {many}, as in ["M8"]')
+        good = isinstance(value, list) and count in (None, len(value)) and all(isinstance(x, str) for x in value)
+        many = "a list of strings" if count is None else f"{_COUNTS[count]} texts in brackets"
+        self._need(good, value, where, hint or f'give {many}, as in ["M8"]')
         return tuple(self.text(each, where) for each in value)
+
+    def _need(self, good: bool, value: Any, where: str, hint: str) -> Any:
+        if not good:
+            raise self.wrong(f"{where} is {value!r}", hint)
+        return value
 
     def wrong(self, what: str, hint: str) -> SettingsError:
         """Error that says that a value is of a wrong kind."""
@@ -336,17 +332,12 @@ def check_pattern(pattern: str) -> None:
             re.compile(pattern)
     except (re.error, RecursionError, OverflowError, Warning) as error:
         raise ValueError(f"{error}") from error
-    bare = re.sub(r"\\.", "x", pattern)
-    bare = re.sub(r"\[\^?\]?[^\]]*\]", "x", bare)
+    bare = re.sub(r"\[\^?\]?[^\]]*\]", "x", re.sub(r"\\.", "x", pattern))
     bare = bare.replace("(?", "(")  # what kind of group it is
     depths = accumulate((letter == "(") - (letter == ")") for letter in bare)
     choices = any(letter == "|" and depth > 0 for letter, depth in zip(bare, depths, strict=True))
-    if (
-        len(pattern) > _LONGEST_PATTERN
-        or choices
-        or re.search(r"\)[*+{]", bare)
-        or len(re.findall(r"[*+{?]", bare)) > _MOST_REPEATS
-    ):
+    repeats = bool(re.search(r"\)[*+{]", bare)) or len(re.findall(r"[*+{?]", bare)) > _MOST_REPEATS
+    if len(pattern) > _LONGEST_PATTERN or choices or repeats:
         raise ValueError(
             "a choice in a group, a group that is repeated, "
             f"more than {_MOST_REPEATS} repeats, or more than {_LONGEST_PATTERN} characters"

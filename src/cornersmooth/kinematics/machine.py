@@ -28,9 +28,8 @@ class Travel:
     high: float
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low < self.high):
-            what = f"travel of {self.name} is {self.low:g} and {self.high:g}"
-            raise SettingsError("CS253", what, "give the lower one first, in mm")
+        what = f"travel of {self.name} is {self.low:g} and {self.high:g}"
+        _need(-math.inf < self.low < self.high < math.inf, what, "give the lower one first, in mm")
 
 
 @dataclass(frozen=True)
@@ -45,8 +44,7 @@ class Dynamics:
     def __post_init__(self) -> None:
         for key in ("velocity", "acceleration", "jerk"):
             value = getattr(self, key)
-            if not value > 0.0:
-                raise SettingsError("CS253", f"dynamics of {self.name}: {key} is {value:g}", "give a positive number")
+            _need(value > 0.0, f"dynamics of {self.name}: {key} is {value:g}", "give a positive number")
 
     @property
     def linear(self) -> bool:
@@ -93,26 +91,18 @@ class RotaryAxis:
         where = f"rotary axis {self.name}"
         if self.carrier == "none":
             return
-        if self.name not in ("A", "B", "C"):
-            raise SettingsError("CS253", f"rotary axis name {self.name!r} is not an address", "use A, B or C")
-        if self.carrier not in ("table", "head"):
-            raise SettingsError("CS253", f"{where}: carrier is {self.carrier!r}", "use table or head")
-        if self.positive not in ("tool", "table") or (self.carrier == "head" and self.positive != "tool"):
-            choice = "use tool" if self.carrier == "head" else "use tool or table"
-            raise SettingsError("CS253", f"{where}: positive is {self.positive!r}", choice)
+        _need(self.name in ("A", "B", "C"), f"rotary axis name {self.name!r} is not an address", "use A, B or C")
+        _need(self.carrier in ("table", "head"), f"{where}: carrier is {self.carrier!r}", "use table or head")
+        turns = ("tool",) if self.carrier == "head" else ("tool", "table")
+        _need(self.positive in turns, f"{where}: positive is {self.positive!r}", f"use {' or '.join(turns)}")
         _check_vectors(where, direction=self.direction, point=self.point)
-        if not any(self.direction):
-            raise SettingsError("CS253", f"{where}: direction is zero", "give a vector along the axis")
-        if self.clamp is not None and not all(re.fullmatch(r"M[1-9]\d{0,3}", word) for word in self.clamp):
-            raise SettingsError("CS253", f"{where}: clamp is {self.clamp!r}", 'give two M words, as in ["M10", "M11"]')
-        if self.limits is not None and self.modulo:
-            raise SettingsError("CS253", f"{where}: a modulo axis with limits", "leave out one of both")
+        _need(any(self.direction), f"{where}: direction is zero", "give a vector along the axis")
+        m_words = all(re.fullmatch(r"M[1-9]\d{0,3}", word) for word in self.clamp or ())
+        _need(m_words, f"{where}: clamp is {self.clamp!r}", 'give two M words, as in ["M10", "M11"]')
         if self.limits is not None:
-            low, high = self.limits
-            if not (math.isfinite(low) and math.isfinite(high) and low < high):
-                raise SettingsError(
-                    "CS253", f"{where}: limits are {low:g} and {high:g}", "give the lower one first, in degrees"
-                )
+            _need(not self.modulo, f"{where}: a modulo axis with limits", "leave out one of both")
+            what = f"{where}: limits are {self.low:g} and {self.high:g}"
+            _need(-math.inf < self.low < self.high < math.inf, what, "give the lower one first, in degrees")
 
     @property
     def sign(self) -> float:
@@ -171,69 +161,48 @@ class Machine:
 
     def __post_init__(self) -> None:
         where = f"machine {self.name}"
-        if len(self.axes) > 2:
-            raise SettingsError("CS253", f"{where} has {len(self.axes)} rotary axes", "describe two at most")
+        _need(len(self.axes) <= 2, f"{where} has {len(self.axes)} rotary axes", "describe two at most")
         _check_vectors(where, tool_direction=self.tool_direction, part_zero=self.part_zero)
-        if not any(self.tool_direction):
-            raise SettingsError("CS253", f"{where}: tool_direction is zero", "give a vector along the tool")
+        _need(any(self.tool_direction), f"{where}: tool_direction is zero", "give a vector along the tool")
         for length in (self.tool_length, *dict(self.tool_lengths).values()):
-            if not (math.isfinite(length) and length >= 0):
-                raise SettingsError("CS253", f"{where}: tool_length is {length:g}", "give 0 mm or more")
+            _need(0 <= length < math.inf, f"{where}: tool_length is {length:g}", "give 0 mm or more")
         object.__setattr__(self, "axes", (*self.axes, _NO_AXIS, _NO_AXIS)[:2])
         if len(self.names) == 2:
             self._check_pair(where, *self.axes)
-        if not self.names and not _parallel(self.tool, np.array((0.0, 0.0, 1.0))):
-            hint = "leave out tool_direction: the tool is along Z"
-            raise SettingsError("CS253", f"{where}: no rotary axis, and a tool_direction that is not Z", hint)
-        signed = [name + sign for name in self.names for sign in "+-"]
-        if self.preferred is not None and (self.preferred[0] not in self.names or self.preferred[1] not in (-1.0, 1.0)):
-            raise SettingsError(
-                "CS253",
-                f"{where}: preferred names {self.preferred[0]!r}",
-                f"use {', '.join(signed[:-1])} or {signed[-1]}" if signed else "leave it out",
-            )
+        along_z = bool(self.names) or _parallel(self.tool, np.array((0.0, 0.0, 1.0)))
+        hint = "leave out tool_direction: the tool is along Z"
+        _need(along_z, f"{where}: no rotary axis, and a tool_direction that is not Z", hint)
+        if self.preferred is not None:
+            signed = [name + sign for name in self.names for sign in "+-"]
+            hint = f"use {', '.join(signed[:-1])} or {signed[-1]}" if signed else "leave it out"
+            known = self.preferred[0] in self.names and abs(self.preferred[1]) == 1.0
+            _need(known, f"{where}: preferred names {self.preferred[0]!r}", hint)
         switch = self.tip_control or ()
-        if len(set(switch)) not in (0, 2) or not all(re.fullmatch(_SWITCH, block) for block in switch):
-            hint = 'give the blocks that switch it on and off, as in ["M428", "M429"], or [] for none'
-            raise SettingsError("CS253", f"{where}: tip_control is {list(switch)!r}", hint)
-        for key in ("home", "tool_change"):
-            self._check_position(f"{where}: {key}", getattr(self, key))
+        blocks = len(set(switch)) in (0, 2) and all(re.fullmatch(_SWITCH, block) for block in switch)
+        hint = 'give the blocks that switch it on and off, as in ["M428", "M429"], or [] for none'
+        _need(blocks, f"{where}: tip_control is {list(switch)!r}", hint)
+        spans = {one.name: (one.low, one.high) for one in self.axes}
+        spans |= {one.name: (one.low, one.high) for one in self.travel}
+        for key, position in (("home", self.home), ("tool_change", self.tool_change)):
+            for name, value in position:
+                low, high = spans.get(name, (-math.inf, math.inf))
+                hint = "give positions of the machine's axes that they can go to"
+                _need(math.isfinite(value) and low <= value <= high, f"{where}: {key}: {name} is {value:g}", hint)
+        known_axes = (*LINEAR, *self.names)
         for item in self.dynamics:
-            if item.name not in (*LINEAR, *self.names):
-                known = ", ".join((*LINEAR, *self.names))
-                raise SettingsError("CS253", f"{where}: dynamics of {item.name}, which it has not", f"use {known}")
+            what = f"{where}: dynamics of {item.name}, which it has not"
+            _need(item.name in known_axes, what, f"use {', '.join(known_axes)}")
 
     def _check_pair(self, where: str, first: RotaryAxis, second: RotaryAxis) -> None:
         """Refuse two axes that do not make a machine."""
-        if first.name == second.name:
-            raise SettingsError("CS253", f"{where}: both rotary axes are called {first.name}", "give two names")
-        if first.carrier == "head" and second.carrier == "table":
-            raise SettingsError(
-                "CS253",
-                f"{where}: the head axis {first.name} comes before the table axis {second.name}",
-                "list the axes from the part to the tool",
-            )
-        if _parallel(first.unit, second.unit):
-            raise SettingsError(
-                "CS253", f"{where}: {first.name} and {second.name} are parallel", "give two different directions"
-            )
-        if _parallel(second.unit, self.tool):
-            raise SettingsError(
-                "CS253",
-                f"{where}: {second.name} turns the tool about itself",
-                "check the directions and their order, from the part to the tool",
-            )
-
-    def _check_position(self, where: str, position: tuple[tuple[str, float], ...]) -> None:
-        """Refuse a position that the axes cannot go to."""
-        spans = {axis.name: (axis.low, axis.high) for axis in self.axes} | {
-            item.name: (item.low, item.high) for item in self.travel
-        }
-        for name, value in position:
-            low, high = spans.get(name, (-math.inf, math.inf))
-            if not math.isfinite(value) or not low <= value <= high:
-                hint = "give positions of the machine's axes that they can go to"
-                raise SettingsError("CS253", f"{where}: {name} is {value:g}", hint)
+        one, two = first.name, second.name
+        _need(one != two, f"{where}: both rotary axes are called {one}", "give two names")
+        what = f"{where}: the head axis {one} comes before the table axis {two}"
+        _need((first.carrier, second.carrier) != ("head", "table"), what, "list the axes from the part to the tool")
+        what = f"{where}: {one} and {two} are parallel"
+        _need(not _parallel(first.unit, second.unit), what, "give two different directions")
+        hint = "check the directions and their order, from the part to the tool"
+        _need(not _parallel(second.unit, self.tool), f"{where}: {two} turns the tool about itself", hint)
 
     def with_tool(self, number: int | None) -> Machine:
         """Return the machine with the length of a tool; None for one that is not known."""
@@ -281,13 +250,10 @@ class Machine:
             lines.append("  no rotary axis: the tool is along Z")
         places = (", nearest to the part", ", nearest to the tool") if len(self.names) == 2 else ("",)
         for axis, place in zip(self.axes[: len(self.names)], places, strict=False):
-            direction = ", ".join(f"{number:.6g}" for number in axis.unit)
-            point = ", ".join(f"{number:g}" for number in axis.point)
             span = "without end" if axis.limits is None else f"from {axis.low:g} to {axis.high:g} deg"
-            lines.append(
-                f"  {axis.name} in the {axis.carrier}{place}: about ({direction}) through ({point}) mm, {span}, "
-                f"positive turns the {axis.positive}"
-            )
+            about, through = (", ".join(f"{x:.6g}" for x in vector) for vector in (axis.unit, axis.point))
+            where = f"  {axis.name} in the {axis.carrier}{place}: about ({about}) through ({through}) mm"
+            lines.append(f"{where}, {span}, positive turns the {axis.positive}")
         if self.preferred is not None:
             lines.append(f"  starts with {self.preferred[0]} {'positive' if self.preferred[1] > 0 else 'negative'}")
         if self.swings_the_tool:
@@ -314,10 +280,16 @@ def endless(machine: Machine) -> Machine:
     return replace(machine, axes=tuple(replace(axis, limits=None) for axis in machine.axes))
 
 
+def _need(good: bool, what: str, hint: str) -> None:
+    """Refuse what does not make a machine: CS253."""
+    if not good:
+        raise SettingsError("CS253", what, hint)
+
+
 def _check_vectors(where: str, **vectors: Vector) -> None:
     for key, vector in vectors.items():
-        if len(vector) != 3 or not all(map(math.isfinite, vector)):
-            raise SettingsError("CS253", f"{where}: {key} is not a point of space", "give three numbers")
+        point = len(vector) == 3 and all(map(math.isfinite, vector))
+        _need(point, f"{where}: {key} is not a point of space", "give three numbers")
 
 
 def _parallel(one: Floats, other: Floats) -> bool:

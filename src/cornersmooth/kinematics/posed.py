@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -15,8 +15,7 @@ from cornersmooth.kinematics.machine import LINEAR, Machine
 from cornersmooth.kinematics.poses import Solutions, machine_position, nose_position, solutions, tool_axis, wrap
 from cornersmooth.model import Floats
 
-_WORD = re.compile(r"([A-Za-z])\s*=?\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)")
-_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+_POSE_WORD = re.compile(r"([A-Za-z]?)\s*=?\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)")
 _SAME = 1e-9  #: degrees below which angles are the same
 
 
@@ -27,25 +26,21 @@ def parse_pose(machine: Machine, text: str) -> dict[str, float]:
     machine.
     """
     names = sorted(machine.names)
-    known = (*names, *LINEAR)
+    pose = dict.fromkeys((*names, *LINEAR), 0.0)
     example = ",".join([*(f"{name}{angle}" for name, angle in zip(names, (30, 45), strict=False)), "X10,Y0,Z5"])
-    parts = [part for part in re.split(r"[,;\s]+", text.strip()) if part]
-    if parts and all(_NUMBER.fullmatch(part) for part in parts) and len(parts) == len(names):
-        return {**dict.fromkeys(known, 0.0), **dict(zip(names, map(float, parts), strict=True))}
-    pose = dict.fromkeys(known, 0.0)
-    given = set()
-    for part in parts:
-        word = _WORD.fullmatch(part)
-        name = word[1].upper() if word else ""
-        if word is None or name not in known or name in given:
+    words = [(part, _POSE_WORD.fullmatch(part)) for part in re.split(r"[,;\s]+", text.strip()) if part]
+    bare = len(words) == len(names) and all(word and not word[1] for _, word in words)
+    given: dict[str, float] = {}
+    for place, (part, word) in enumerate(words):
+        name = names[place] if bare else word[1].upper() if word else ""
+        if word is None or name not in pose or name in given:
             why = f"{name} twice" if name in given else part
             what = f"{text!r} is no pose of {machine.name}: {why}"
             raise SettingsError("CS375", what, f"write angles and, if you like, the tip, as in {example}")
-        given.add(name)
-        pose[name] = float(word[2])
+        given[name] = float(word[2])
     if not given:
         raise SettingsError("CS375", f"{text!r} is no pose of {machine.name}", f"write angles, as in {example}")
-    return pose
+    return pose | given
 
 
 @dataclass(frozen=True)
@@ -106,44 +101,43 @@ class Posed:
         machine = self.machine
         remark = "with the heads at zero, as travel and points are given"
         lines = [
-            f"{machine.name} at {_rotary(machine, self.angles)} deg" if machine.names else machine.name,
-            f"  tool vector       {_words('IJK', self.axis, 7)}",
-            f"  tip on the part   {_words(LINEAR, self.tip)} mm",
-            f"  machine position  {_words(LINEAR, self.position)} mm, from the zero of the part, tool length taken off",
-            f"  spindle nose      {_words(LINEAR, self.nose)} mm {remark}",
+            f"{machine.name} at {_words(self._named(self.angles))} deg" if machine.names else machine.name,
+            f"  tool vector       {_words(dict(zip('IJK', self.axis, strict=True)), 7)}",
+            f"  tip on the part   {_places(self.tip)} mm",
+            f"  machine position  {_places(self.position)} mm, from the zero of the part, tool length taken off",
+            f"  spindle nose      {_places(self.nose)} mm {remark}",
         ]
         if self._found.singular[0]:
             lines.append(f"  at the pole: {machine.names[0]} does not turn the tool axis")
         elif self.other is not None:
-            lines.append(f"  same tool vector  {_rotary(machine, self.other)} deg")
+            lines.append(f"  same tool vector  {_words(self._named(self.other))} deg")
         return "\n".join((*lines, *(f"  {text}" for text in self.beyond)))
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values; keys carry their unit."""
-
-        def named(angles: Floats) -> dict[str, float]:
-            return dict(zip(self.machine.names, angles.tolist(), strict=False))
-
         return {
             "schema": "cornersmooth-pose/1",
             "machine": self.machine.name,
-            "angles_deg": named(self.angles),
+            "angles_deg": self._named(self.angles),
             "tool_vector": self.axis.tolist(),
             "tip_mm": self.tip.tolist(),
             "machine_position_mm": self.position.tolist(),
             "spindle_nose_mm": self.nose.tolist(),
             "singular": bool(self._found.singular[0]),
-            "other_angles_deg": None if self.other is None else named(self.other),
+            "other_angles_deg": None if self.other is None else self._named(self.other),
             "beyond": self.beyond,
         }
 
-
-def _rotary(machine: Machine, angles: np.ndarray) -> str:
-    named = sorted(zip(machine.names, angles.tolist(), strict=False))
-    return _words([name for name, _ in named], np.array([angle for _, angle in named]))
+    def _named(self, angles: Floats) -> dict[str, float]:
+        return dict(zip(self.machine.names, angles.tolist(), strict=False))
 
 
-def _words(names: Sequence[str], values: np.ndarray, decimals: int = 4) -> str:
-    """Words as in an NC text; never -0."""
-    shown = [round(float(value), decimals) + 0.0 for value in values]
-    return " ".join(f"{name}{value:.{decimals}f}" for name, value in zip(names, shown, strict=True))
+def _words(named: Mapping[str, float], decimals: int = 4) -> str:
+    """Words as in an NC text, in alphabetical order; never -0."""
+    return " ".join(
+        f"{name}{round(float(value), decimals) + 0.0:.{decimals}f}" for name, value in sorted(named.items())
+    )
+
+
+def _places(point: Floats) -> str:
+    return _words(dict(zip(LINEAR, point, strict=True)))

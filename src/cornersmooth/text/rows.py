@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,49 +20,11 @@ from cornersmooth.model import Bools, Ints
 from cornersmooth.text.ticks import MOST_DECIMALS, TICK_LIMIT
 
 BLOCK: Final = 8192  #: rows laid out at a time
-FOLD: Final = 256  #: rows side by side in `_by_column`
-WORD: Final = 8  #: bytes of a text that are copied at once
+GROUP: Final = 4  #: digits in a full group
 _END: Final = b"\1"  #: stands behind each row that is taken by itself
 
-
-class Choices:
-    """One text for each of m rows; `ids` (m,) or () say which.
-
-    Texts are filled up on the right, or with `align_right` on the left: zero bytes that are together are dropped
-    together.
-    """
-
-    def __init__(self, texts: Sequence[bytes], ids: ArrayLike, count: int, *, align_right: bool) -> None:
-        given = np.asarray(ids)
-        self._ids = np.full(count, given) if given.ndim == 0 else given
-        if self._ids.shape != (count,):
-            raise ValueError(f"ids of shape {given.shape} for {count} rows")
-        if count and not 0 <= self._ids.min() <= self._ids.max() < len(texts):
-            raise IndexError(f"ids from {self._ids.min()} to {self._ids.max()} for {len(texts)} texts")
-        refuse_zero_bytes(texts)
-        used = np.bincount(self._ids, minlength=len(texts)).tolist()
-        texts = [text if number else b"" for text, number in zip(texts, used, strict=True)]
-        longest = max(map(len, texts), default=0)
-        self.width = next((w for w in (0, 1, 2, 4) if longest <= w), -(-longest // WORD) * WORD)
-        fill = bytes.rjust if align_right else bytes.ljust
-        table = np.frombuffer(b"".join(fill(text, self.width, b"\0") for text in texts), np.uint8)
-        element = min(self.width, WORD)
-        self._columns = [
-            np.ascontiguousarray(table.reshape(-1, self.width)[:, column : column + element]).view(f"u{element}")[:, 0]
-            for column in range(0, self.width, WORD)
-        ]
-
-    def write(self, start: int, stop: int, matrix: Bytes, column: int) -> None:
-        """Write the texts of rows `start` to `stop` from `column` on."""
-        for place, values in enumerate(self._columns):
-            put(matrix, column + place * WORD, values.take(self._ids[start:stop]))
-
-
-def refuse_zero_bytes(texts: Sequence[bytes]) -> None:
-    """Raise ValueError where a text has a zero byte: it would be lost with those that fill up."""
-    for text in texts:
-        if b"\0" in text:
-            raise ValueError(f"zero byte in {text!r}")
+Bytes = NDArray[np.uint8]
+Table = NDArray[np.unsignedinteger[Any]]  #: entries are unsigned integers of as many bytes as the group has characters
 
 
 @dataclass(frozen=True)
@@ -87,7 +49,7 @@ class RowFormat:
             raise ValueError(f"{len(self.words)} words with {len(self.decimals)} decimals")
         if not all(0 <= places <= MOST_DECIMALS for places in self.decimals):
             raise ValueError(f"decimals are {self.decimals}: give whole numbers from 0 to {MOST_DECIMALS}")
-        refuse_zero_bytes(self.words)
+        _refuse_zero_bytes(self.words)
 
     def rows(
         self,
@@ -110,9 +72,14 @@ class RowFormat:
         m = len(ticks)
         if not m:
             return b""
-        heads = Choices(prefix, prefix_id, m, align_right=True)
-        tails = Choices(suffix, suffix_id, m, align_right=False)
-        layout, drop = self._lay_out(ticks, heads.width, tails.width), None
+        heads, tails = (_chosen(*ends, m) for ends in ((prefix, prefix_id), (suffix, suffix_id)))
+        lowest, highest = ([int(extreme(column)) for column in ticks.T] for extreme in (np.min, np.max))
+        largest = [max(-low, high) for low, high in zip(lowest, highest, strict=True)]
+        if max(largest, default=0) > TICK_LIMIT:
+            raise OutputError("CS301", "a number is too large to be written", "please report this with the input file")
+        digits = tuple(len(str(n // 10**places)) for n, places in zip(largest, self.decimals, strict=True))
+        sizes = heads.itemsize, tails.itemsize
+        layout, drop = lay_out(self, digits, tuple(low < 0 for low in lowest), *sizes), None
         if left_out is not None:
             empty = np.array([not text for text in prefix])[np.broadcast_to(prefix_id, m)]
             blank = np.array([word[:1] == b" " for word in self.words])
@@ -133,51 +100,6 @@ class RowFormat:
         ended = [text + _END for text in suffix]
         return self.rows(ticks, prefix, prefix_id, ended, suffix_id, left_out).split(_END)[:-1]
 
-    def _lay_out(self, ticks: Ints, head: int, tail: int) -> Layout:
-        """Lay out rows for (m, c) ticks between so many bytes at either end."""
-        lowest, highest = _by_column(np.minimum, ticks), _by_column(np.maximum, ticks)
-        if lowest and not -TICK_LIMIT <= min(lowest) <= max(highest) <= TICK_LIMIT:
-            raise OutputError("CS301", "a number is too large to be written", "please report this with the input file")
-        largest = [max(-low, high) for low, high in zip(lowest, highest, strict=True)]
-        digits = tuple(len(str(n // 10**places)) for n, places in zip(largest, self.decimals, strict=True))
-        return lay_out(self, digits, tuple(low < 0 for low in lowest), head, tail)
-
-
-def _by_column(extreme: np.ufunc, ticks: Ints) -> list[int]:
-    """Smallest or largest of each column; many rows side by side take a tenth of the time of one below the other."""
-    m, columns = ticks.shape
-    rest = ticks[m - m % FOLD :]
-    if m >= FOLD:
-        folded = extreme.reduce(ticks[: m - m % FOLD].reshape(m // FOLD, FOLD * columns), axis=0)
-        rest = np.concatenate((folded.reshape(FOLD, columns), rest))
-    return extreme.reduce(rest, axis=0).tolist()
-
-
-def _write_blocks(
-    ticks: Ints, layout: Layout, heads: Choices, tails: Choices, drop: tuple[Bools, Ints] | None
-) -> Iterator[bytes]:
-    """Write rows a block at a time.
-
-    `drop` is what rows have not: (m, c) words, and the blank of a word (m,), -1 for none.
-    """
-    m = len(ticks)
-    matrix = np.repeat(layout.template[None, :], min(BLOCK, m), axis=0)
-    for start in range(0, m, BLOCK):
-        stop = min(start + BLOCK, m)
-        block = matrix[: stop - start]
-        if drop is not None and start:
-            block[:] = layout.template
-        heads.write(start, stop, block, 0)
-        for column, cell in enumerate(layout.cells):
-            cell.write(ticks[start:stop, column], block)
-        if drop is not None:
-            words, blank = (part[start:stop] for part in drop)
-            for column, (first, last) in enumerate(layout.spans):
-                block[words[:, column], first:last] = 0
-                block[blank == column, first] = 0
-        tails.write(start, stop, block, layout.tail)
-        yield block.tobytes().translate(None, b"\0")
-
 
 def interleave(which: Ints, rows: Sequence[list[bytes]]) -> bytes:
     """Put rows together in order: `which` (n,) says from which list each comes."""
@@ -185,58 +107,85 @@ def interleave(which: Ints, rows: Sequence[list[bytes]]) -> bytes:
     return b"".join([next(following[own]) for own in which.tolist()])
 
 
-if TYPE_CHECKING:
-    from cornersmooth.text.rows import RowFormat
+def _refuse_zero_bytes(texts: Sequence[bytes]) -> None:
+    """Raise ValueError where a text has a zero byte: it would be lost with those that fill up."""
+    for text in texts:
+        if b"\0" in text:
+            raise ValueError(f"zero byte in {text!r}")
 
-Bytes = NDArray[np.uint8]
-Table = NDArray[np.unsignedinteger[Any]]  #: entries are unsigned integers of as many bytes as the group has characters
-GROUP = 4  #: digits in a full group
+
+def _chosen(texts: Sequence[bytes], ids: ArrayLike, count: int) -> NDArray[np.void]:
+    """(m,) text of each of so many rows, filled up with zero bytes; `ids` (m,) or () say which."""
+    given = np.asarray(ids)
+    own = np.full(count, given) if given.ndim == 0 else given
+    if own.shape != (count,):
+        raise ValueError(f"ids of shape {given.shape} for {count} rows")
+    if not 0 <= own.min() <= own.max() < len(texts):
+        raise IndexError(f"ids from {own.min()} to {own.max()} for {len(texts)} texts")
+    _refuse_zero_bytes(texts)
+    used = np.bincount(own, minlength=len(texts)).tolist()
+    longest = max(len(text) for text, number in zip(texts, used, strict=True) if number)
+    filled = b"".join(text[:longest].ljust(longest, b"\0") for text in texts)
+    return np.frombuffer(filled, f"V{longest}").take(own) if longest else np.zeros(count, "V0")
+
+
+def _write_blocks(
+    ticks: Ints, layout: Layout, heads: NDArray[np.void], tails: NDArray[np.void], drop: tuple[Bools, Ints] | None
+) -> Iterator[bytes]:
+    """Write rows a block at a time; `drop` are words (m, c) that they have not, and whose blank (m,), -1 for none."""
+    m = len(ticks)
+    matrix = np.repeat(layout.template[None, :], min(BLOCK, m), axis=0)
+    for start in range(0, m, BLOCK):
+        here = slice(start, min(start + BLOCK, m))
+        block = matrix[: here.stop - start]
+        if drop is not None and start:
+            block[:] = layout.template
+        _put(block, 0, heads[here])
+        for column, cell in enumerate(layout.cells):
+            cell.write(ticks[here, column], block)
+        if drop is not None:
+            words, blank = (part[here] for part in drop)
+            for column, (first, last) in enumerate(layout.spans):
+                block[words[:, column], first:last] = 0
+                block[blank == column, first] = 0
+        _put(block, layout.tail, tails[here])
+        yield block.tobytes().translate(None, b"\0")
+
+
+def _put(matrix: Bytes, column: int, values: NDArray[Any]) -> None:
+    """Store one element for each row, its bytes from `column` on."""
+    if values.itemsize:
+        matrix[:, column : column + values.itemsize].view(values.dtype)[:, 0] = values
 
 
 @cache
-def whole_table(digits: int) -> Table:
-    """(3, 10**digits) digits before the point, of a group of 1, 2 or 4.
-
-    By what stands around the group: row 0 drops all leading zeros, row 1 keeps the last digit, row 2 keeps all.
-    """
+def _whole_table(digits: int) -> Table:
+    """(3 · 10**digits,) digits before the point: all leading zeros dropped, then the last digit kept, then all."""
     shown = _characters(digits)
-    significant = np.logical_or.accumulate(shown != ord("0"), axis=1)
-    bare = np.where(significant, shown, 0)
+    bare = np.where(np.logical_or.accumulate(shown != ord("0"), axis=1), shown, 0)
     units = bare.copy()
     units[:, -1] = shown[:, -1]
-    return _pack(bare, units, shown)
+    return _packed(bare, units, shown)
 
 
 @cache
-def part_table(digits: int, point: bool) -> Table:
-    """(2, 10**digits) digits after the point, of a group of 1 to 4; `point` puts the point in front of them.
-
-    Row 0 keeps all digits, row 1 drops trailing zeros.
-    """
+def _part_table(digits: int, point: bool) -> Table:
+    """(2 · 10**digits,) digits after the point: all, then without trailing zeros; `point` puts one in front of them."""
     shown = _characters(digits)
-    significant = np.logical_or.accumulate(shown[:, ::-1] != ord("0"), axis=1)[:, ::-1]
-    trimmed = np.where(significant, shown, 0)
-    if point:
-        shown, trimmed = (np.insert(group, 0, ord("."), axis=1) for group in (shown, trimmed))
-    return _pack(shown, trimmed)
+    trimmed = np.where(np.logical_or.accumulate(shown[:, ::-1] != ord("0"), axis=1)[:, ::-1], shown, 0)
+    return _packed(*(np.insert(group, 0, ord("."), axis=1) if point else group for group in (shown, trimmed)))
 
 
-def _characters(digits: int) -> NDArray[np.uint8]:
+def _characters(digits: int) -> Bytes:
     """(10**digits, digits) ASCII digits of 0, 1, 2, ..."""
     power = 10 ** np.arange(digits)[::-1]
     return (np.arange(10**digits)[:, None] // power % 10 + ord("0")).astype(np.uint8)
 
 
-def _pack(*groups: NDArray[np.uint8]) -> Table:
-    stacked = np.ascontiguousarray(np.stack(groups), np.uint8)
-    packed: Table = stacked.view(f"u{stacked.shape[-1]}")[..., 0]
+def _packed(*groups: NDArray[Any]) -> Table:
+    packed: Table = np.concatenate(groups).astype(np.uint8).view(f"u{groups[0].shape[1]}")[:, 0]
     packed.flags.writeable = False
     return packed
-
-
-def put(matrix: Bytes, column: int, values: NDArray[Any]) -> None:
-    """Store one element for each row, its bytes from `column` on."""
-    matrix[:, column : column + values.itemsize].view(values.dtype)[:, 0] = values
 
 
 @dataclass(frozen=True)
@@ -247,12 +196,9 @@ class Group:
     digits: int
     table: Table
 
-    def put(self, matrix: Bytes, values: Ints, style: Ints | Bools | int) -> None:
-        """Write (r,) values; `style` chooses the row of the table, one for all or one for each."""
-        if isinstance(style, int):
-            put(matrix, self.column, self.table[int(style)].take(values))
-        else:
-            put(matrix, self.column, self.table.reshape(-1).take(values + style * 10**self.digits))
+    def write(self, matrix: Bytes, numbers: Ints, style: Ints | Bools | int) -> None:
+        """Write the last digits of (r,) numbers; `style` chooses the part of the table."""
+        _put(matrix, self.column, self.table.take(numbers + style * 10**self.digits))
 
     def split(self, numbers: Ints) -> tuple[Ints, Ints]:
         """Cut off the last digits: what is left, and the group's values."""
@@ -278,16 +224,16 @@ class Cell:
         ended: Bools | bool = self.form.trim  # whether digits may be dropped: only zeros follow
         for group in self.part:
             left, values = group.split(left)
-            group.put(matrix, values, ended)
+            group.write(matrix, values, ended)
             if self.form.trim:
                 ended = (values == 0) & ended
         # a zero before the point stays where the layout has one, and where it is all there is
         alone: Bools | bool = ended if self.part and not self.form.leading_zero else True
         for group in self.whole[:-1]:
             left, values = group.split(left)
-            group.put(matrix, values, np.where(left > 0, 2, alone))
+            group.write(matrix, values, np.where(left > 0, 2, alone))
             alone = False
-        self.whole[-1].put(matrix, left, alone)
+        self.whole[-1].write(matrix, left, alone)
 
 
 @dataclass(frozen=True)
@@ -317,13 +263,13 @@ def lay_out(form: RowFormat, digits: tuple[int, ...], negative: tuple[bool, ...]
     for word, places, before_point, some_negative in zip(form.words, form.decimals, digits, negative, strict=True):
         start = add(word)
         sign = add(b"\0") if form.plus or some_negative else None
-        whole = [Group(add(bytes(n)), n, whole_table(n)) for n in _groups(before_point, leading=(1, 2, GROUP))]
+        whole = [Group(add(bytes(n)), n, _whole_table(n)) for n in _groups(before_point, leading=(1, 2, GROUP))]
         part: list[Group] = []
         for n in _groups(places, leading=(1, 2, 3, GROUP)):
             with_point = n % 2 == 1  # elements have 2 or 4 bytes: the point makes an odd group even
             if not part and not with_point:
                 add(b".")
-            part.append(Group(add(bytes(n + with_point)), n, part_table(n, with_point)))
+            part.append(Group(add(bytes(n + with_point)), n, _part_table(n, with_point)))
         if not part and form.trim:
             add(b".")
         cells.append(Cell(form, sign, tuple(whole[::-1]), tuple(part[::-1])))
