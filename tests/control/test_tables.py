@@ -128,14 +128,14 @@ def test_a_table_that_is_like_another_has_its_rows_and_takes_some_back(
     finally:
         word_tables.word_table.cache_clear()
         word_tables.means_of.cache_clear()
-    rules = [WordRules(table, (), dialect_of("haas").lexer, 0.01) for table in (shop, haas)]
-    (mine, _), (theirs, _) = (one.of(["G43.4", "H1"]) for one in rules)
+    rules = [WordRules(table, dialect_of("haas").lexer, 0.01) for table in (shop, haas)]
+    (mine, _), (theirs, _) = (one.of(("G43.4", "H1")) for one in rules)
     assert mine[1].tip_on
     assert theirs[1] is UNLISTED
-    ((_, pallet),), ((_, any_function),) = (one.of(["M321"]) for one in rules)
+    ((_, pallet),), ((_, any_function),) = (one.of(("M321",)) for one in rules)
     assert pallet.alone
     assert any_function.compared
-    assert [one.of(["G254"])[0][1] is UNLISTED for one in rules] == [True, False]
+    assert [one.of(("G254",))[0][1] is UNLISTED for one in rules] == [True, False]
     assert haas.row("G43.4") is UNKNOWN
     assert shop.row("G43.4").sets == (("tool_length", "."), ("tip", "angles"))
     assert shop.row("G43.4").beside == {"H"}

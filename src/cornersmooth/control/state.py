@@ -141,6 +141,12 @@ class State:
         if code is not None:
             self.groups["motion"] = MOTIONS.get(code)
 
+    def after(self, line: Line) -> State:
+        """Return the state after a line of words."""
+        after = self.copy()
+        after.execute(line)
+        return after
+
     def execute(self, line: Line) -> bool:
         """Execute a line of words; return whether it may cut."""
         before = self.copy() if line.skipped else self

@@ -34,24 +34,56 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cache, cached_property
 from itertools import chain
-from typing import Any, Final, Self
+from typing import Any, Final, NamedTuple, Self
 
 from cornersmooth.nc_reader.word_tables import word_table
 
 #: groups of words that turn, scale or mirror the places of the part begin so
 FRAME: Final = "frame."
 
-#: modal groups beside those of frames, and the values of those that somebody reads; none where it is any word
-GROUPS: Final[Mapping[str, str]] = {
-    "motion": "rapid line arc",
-    "distance": "absolute incremental",
-    "units": "mm inch",
-    "feed": "minute inverse revolution",
-    "tip": "off angles vectors both",
-    "compensation": "OFF LEFT RIGHT",
-    **dict.fromkeys(("offset", "path", "plane", "spindle", "coolant", "orientation", "coordinates", "way"), ""),
-    **dict.fromkeys(("tool_length", "edge", "cycles", "smoothing"), ""),
+
+class Group(NamedTuple):
+    """A modal group, whatever the control."""
+
+    values: str = ""  #: those that somebody reads; none where it is any word
+    rules: str = ""  #: of all its words
+    title: str = ""  #: how messages call it; by its name where there is none
+
+
+GROUPS: Final[Mapping[str, Group]] = {
+    "motion": Group("rapid line arc"),
+    "distance": Group("absolute incremental", "first", "positions"),
+    "units": Group("mm inch", "first"),
+    "feed": Group("minute inverse revolution", "first follows", "feed mode"),
+    "plane": Group("", "first follows"),
+    "path": Group("", "first", "path control"),
+    "offset": Group("", "first", "work offset"),
+    "tool_length": Group("", "", "tool length"),
+    "edge": Group("", "", "cutting edge"),
+    "compensation": Group("OFF LEFT RIGHT", "follows", "cutter compensation"),
+    "cycles": Group("", "follows"),
+    "spindle": Group("", "compared follows"),
+    "coolant": Group("", "compared follows"),
+    "smoothing": Group("", "", "smoothing of the control"),
+    "tip": Group("off angles vectors both", "", "tool tip control"),
+    "way": Group("", "", "ways of rotary axes"),
+    "orientation": Group("", "", "interpolation of the tool axis"),
+    "coordinates": Group("", "", "coordinates of the tool axis"),
+    f"{FRAME}dynamic": Group("", "follows outside", "dynamic work offset"),
 }
+_FRAME: Final = Group("", "follows outside", "tilted plane")
+
+
+def title_of(name: str) -> str:
+    """How messages call a group."""
+    group = group_of(name)
+    return group.title if group and group.title else name
+
+
+def group_of(name: str) -> Group | None:
+    """The group of a name; None where there is none."""
+    return GROUPS.get(name, _FRAME if name.startswith(FRAME) else None)
+
 
 #: what each effect leaves unknown
 LOSES: Final[Mapping[str, str]] = {
@@ -71,15 +103,6 @@ LOSES: Final[Mapping[str, str]] = {
 
 #: effects with a name in the CL file
 _ALIKE: Final = {"end": "anything", "register": "length", "offset": "length"}
-
-#: rules that are the same for all words of a group, whatever the control
-_OF_GROUPS: Final[Mapping[str, str]] = {
-    **dict.fromkeys(("units", "distance", "offset", "path"), "first"),
-    **dict.fromkeys(("feed", "plane"), "first follows"),
-    **dict.fromkeys(("compensation", "cycles"), "follows"),
-    **dict.fromkeys(("spindle", "coolant"), "compared follows"),
-    "frame": "follows outside",
-}
 
 #: a number, where a row has a letter alone
 _NUMBER: Final = r"[-+]?[\d.]+"
@@ -111,11 +134,11 @@ class Row:
     needs: re.Pattern[str] | None = None
     must: re.Pattern[str] | None = None
     block: bool = False  #: it is a whole block
+    positions: bool = False  #: accepted only where the machine's file has positions, which are compared
     alone: bool = False  #: no other words may stand beside it
     #: what the numbers in its groups may be of the tolerance: ``length`` of ε, ``angle`` of that of the tool axis
     share: float | None = None
     extra: re.Pattern[str] | None = None  #: words of its block that switch on what somebody must have asked for
-    never: bool = False  #: the control has no such word
 
     # blocks before and after
     after: re.Pattern[str] | None = None  #: a word that must have come since the last time
@@ -139,7 +162,6 @@ class Row:
     #: the tool goes away, and none but an approach may follow, in which work offset or tool length are said again
     retract: bool = False
     high: bool = False  #: only after a retract; a control with such a word wants the tool high at the end, too
-    moves: bool = False  #: the tool moves, though the block names no axis
     #: the rotary axes must have been sent to zero before: where a parameter says so, the part program turns with the
     #: angles of that moment
     zero: bool = False
@@ -152,38 +174,40 @@ class Row:
         """
         head, listed, rest = text.partition(";")
         rules, _, says = rest.partition(";")
-        effects, _, letters = head.partition(":")
-        sets: list[tuple[str, str | None]] = []
-        does: set[str] = set()
+        effects, _, beside = head.partition(":")
+        letters, sets, does = beside.split(), list[tuple[str, str | None]](), set[str]()
         for effect in effects.split():
-            group, given, value = effect.partition("=")
-            if given and _is_value(group, value):
-                sets.append((group, None if value == "?" else value))
-            elif (name := _ALIKE.get(effect, "stop" if group == "stop" else effect)) in LOSES:
-                does |= {name, *(("place",) if name == "turn" else ())}
+            name, given, value = effect.partition("=")
+            group, plain = group_of(name), _ALIKE.get(effect, "stop" if name == "stop" else effect)
+            if given and group and (not group.values or value in (*group.values.split(), "?")):
+                sets.append((name, None if value == "?" else value))
+            elif plain in LOSES:
+                does |= {plain, *(("place",) if plain == "turn" else ())}
             else:
                 raise ValueError(
                     f"{word!r} does {effect!r}: not one of {', '.join(LOSES)}, and no group with its value"
                 )
-        own = {letter: letter for letter in letters.split()}
-        if listed:  # a pattern of what comes behind the letter, which is a small one where it is not accepted
-            own = {letter: re.match("[A-Za-z]*", letter)[0].upper() for letter in own}  # type: ignore[index]
-        more = frozenset(name for letter, name in own.items() if letter[0].isupper() and not set(letter) & {*"=~"})
-        row = cls(tuple(sets), frozenset(does), frozenset(own.values()), more)
-        is_frame, is_off = row.group.startswith(FRAME), row.group != "" and dict(row.sets)[row.group] == "off"
-        of_group = _OF_GROUPS.get("frame" if is_frame else row.group, "")
-        row = replace(row, off=is_off, cycle=is_frame and not is_off, follows="follows" in of_group.split())
-        return row._listed(word, letters.split(), f"{of_group} {rules}", says.strip()) if listed else [row]
+        # a pattern of what comes behind the letter, which is a small one where it is not accepted
+        names = [re.match("[A-Za-z]*", letter)[0].upper() if listed else letter for letter in letters]  # type: ignore[index]
+        more = {
+            name for name, letter in zip(names, letters, strict=True) if letter[0].isupper() and not {*letter} & {*"=~"}
+        }
+        row = cls(tuple(sets), frozenset(does), frozenset(names), frozenset(more))
+        if row.group:
+            is_off, of_group = dict(sets)[row.group] == "off", (group_of(row.group) or _FRAME).rules
+            cycle = row.group.startswith(FRAME) and not is_off
+            row = replace(row, off=is_off, cycle=cycle, follows="follows" in of_group)
+            rules = f"{of_group} {rules}"
+        return row._listed(word, letters, rules.split(), says.strip()) if listed else [row]
 
-    def _listed(self, word: str, letters: Sequence[str], rules: str, says: str) -> list[Self]:
-        """The rows of a word that verification accepts, with what it asks of it, and of letters beside it."""
+    def _listed(self, word: str, letters: Sequence[str], rules: Sequence[str], says: str) -> list[Self]:
+        """The rows of a word that verification accepts, with what it wants of it, and of letters beside it."""
         values: dict[str, Any] = {}
-        for name, given, text in (rule.partition("=") for rule in rules.split()):
-            if name.removeprefix("-") not in _RULES:
+        for name, given, text in (rule.removeprefix("-").partition("=") for rule in rules):
+            if name not in _RULES:
                 raise ValueError(f"{word!r} has the rule {name!r}: not one of {', '.join(sorted(_RULES))}")
-            value = _KINDS.get(name, str)(text.replace("_", " ")) if given else not name.startswith("-")
-            values[name.removeprefix("-")] = value
-        values["alone"] = values.get("alone", False) or values.get("block", False)
+            values[name] = _KINDS.get(name, str)(text.replace("_", " ")) if given else f"-{name}" not in rules
+        values["alone"] = "alone" in values or "block" in values
         share = values.pop("share", None)
         pattern = word[1:-1] if word[0] == "/" else re.escape(word) if _LITERAL.fullmatch(word) else word
         rows, needed = [], []
@@ -193,16 +217,9 @@ class Row:
             if plain[0].islower():
                 continue
             needed += [text] * ("!" in marks)
-            rows.append(
-                type(self)(
-                    pattern=re.compile(text),
-                    says=says,
-                    needs=re.compile(pattern),
-                    share=share if "(?P<" in text else None,
-                    compared="=" in marks,
-                    follows="~" in marks,
-                )
-            )
+            row = type(self)(pattern=re.compile(text), says=says, needs=re.compile(pattern))
+            own = share if "(?P<" in text else None
+            rows.append(replace(row, share=own, compared="=" in marks, follows="~" in marks))
         if needed:
             values["must"] = re.compile("|".join(needed))
         values["share"] = share if "(?P<" in pattern else None
@@ -229,13 +246,6 @@ class Row:
 _RULES: Final = frozenset(one.name for one in fields(Row)) - {"sets", "does", "beside", "more", "pattern", "says"}
 
 
-def _is_value(group: str, value: str) -> bool:
-    """Whether a group may have a value."""
-    return group.startswith(FRAME) or (
-        group in GROUPS and (not GROUPS[group] or value in (*GROUPS[group].split(), "?"))
-    )
-
-
 #: what a word without a row does
 UNKNOWN: Final = Row(does=frozenset(("unknown",)))
 
@@ -252,6 +262,7 @@ class Table:
     patterns: tuple[tuple[re.Pattern[str], Row], ...]  #: of words by a pattern, in order
     listed: tuple[Row, ...]  #: of words that verification accepts; what is the control's own comes first
     blocks: tuple[Row, ...]  #: of whole blocks that it accepts
+    positions: tuple[Row, ...]  #: of those that it accepts where the machine's file has positions
     groups: tuple[str, ...]  #: all that are set by a word
     #: letters that belong to a motion while it holds
     arguments: Mapping[str, frozenset[str]]
@@ -301,12 +312,13 @@ def table_of(control: str) -> Table:
     named: dict[str, Row] = {}
     patterns: list[tuple[re.Pattern[str], Row]] = []
     blocks: list[Row] = []
+    positions: list[Row] = []
     for word, text in word_table(control)["words"].items():
         if not text:
             continue
         row, *letters = Row.all_of(word, text)
         if row.block:
-            blocks.append(row)
+            (positions if row.positions else blocks).append(row)
             continue
         is_listed = row.pattern is not UNLISTED.pattern
         for one in (row, *letters) if is_listed else ():
@@ -326,7 +338,8 @@ def table_of(control: str) -> Table:
             if group == "motion" and value is not None:
                 arguments[value] = arguments.get(value, frozenset()) | row.beside
     groups = sorted({group for row in rows for group, _ in row.sets})
-    return Table(control, named, tuple(patterns), tuple(listed.values()), tuple(blocks), tuple(groups), arguments)
+    lists = tuple(listed.values()), tuple(blocks), tuple(positions)
+    return Table(control, named, tuple(patterns), *lists, tuple(groups), arguments)
 
 
 def any_of(pattern: re.Pattern[str], words: Iterable[str]) -> bool:

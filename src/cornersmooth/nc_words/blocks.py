@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Final
 
@@ -24,44 +25,54 @@ _REMEMBERED: Final = 4096
 _MOTION: Final = frozenset(("G0", "G1", "G2", "G3", "G6.2", "L", "LN", "SPL", "BSPLINE", "POLY"))
 
 
+@dataclass(frozen=True)
+class Block:
+    """A line that is no motion block."""
+
+    line: int
+    words: tuple[str, ...] = ()  #: as tables have them
+    ruled: Ruled = field(default_factory=list)
+
+    @property
+    def text(self) -> str:
+        """The whole block."""
+        return " ".join(self.words)
+
+
 class WordRules:
     """Looks at blocks one by one, whatever is before them.
 
     Parameters
     ----------
-    positions : sequence of Row
-        Blocks beyond the table: positions of the machine that its file has.
     tolerance : float
         ε in units of the text.
     axis_tolerance : float
         That of the tool axis, degrees.
     m_words : int
         How many M words of spindle and coolant a block may have.
+    whole : str
+        Addresses whose numbers need no point in a program in millimetres per minute.
     """
 
     def __init__(
         self,
         table: Table,
-        positions: Sequence[Row],
         lexer: Lexer,
         tolerance: float,
         axis_tolerance: float = 0.0,
         m_words: int = 1,
+        whole: str = "",
     ) -> None:
-        self._words, self._blocks = table.listed, (*table.blocks, *positions)
-        self._m_words = m_words
-        self._lexer, self._rooms = lexer, {"length": tolerance, "angle": axis_tolerance}
+        self._table, self._lexer, self._m_words, self._whole = table, lexer, m_words, whole
+        self._rooms = {"length": tolerance, "angle": axis_tolerance}
         # most blocks beside the motion are alike; those of cycles are not, but most of their words are
-        self._find = lru_cache(_REMEMBERED)(self._look_up)
-        self._fitting = lru_cache(_REMEMBERED)(self._rules_for)
+        self.of = lru_cache(_REMEMBERED)(self._of)
+        self._fitting = lru_cache(_REMEMBERED)(self._rows_for)
 
-    def of(self, words: Sequence[str]) -> Ruled:
-        """Rules of the words of a block, or of the whole block where that is on the list."""
-        return self._find(tuple(words))
-
-    def _look_up(self, words: tuple[str, ...]) -> Ruled:
+    def _of(self, words: tuple[str, ...]) -> Ruled:
+        """Rows of the words of a block, or of the whole block where that is on the list."""
         text = " ".join(words)
-        for row in self._blocks:
+        for row in self._table.blocks:
             if row.pattern.fullmatch(text):
                 return [(text, row)]
         ruled: Ruled = []
@@ -72,26 +83,24 @@ class WordRules:
             ruled.append((word, min(fitting, key=lambda row: row.needs is None, default=UNLISTED)))
         return ruled
 
-    def _rules_for(self, word: str) -> list[Row]:
-        fitting = [row for row in self._words if row.pattern.fullmatch(word)]
-        return [] if fitting and fitting[0].never else fitting
+    def _rows_for(self, word: str) -> list[Row]:
+        return [row for row in self._table.listed if row.pattern.fullmatch(word)]
 
-    def problems(self, line: Line, words: Sequence[str], ruled: Ruled, whole: str) -> Iterator[Problem]:
-        """What is wrong with a block by itself: words off the list, twice, without others or beside others.
-
-        Numbers of the addresses in `whole` need no point.
-        """
+    def problems(self, line: Line, block: Block, *, metric: bool) -> Iterator[Problem]:
+        """What is wrong with a block by itself: words off the list, twice, without others or beside others."""
+        words, ruled = block.words, block.ruled
 
         def wrong(text: str) -> Problem:
-            return Problem(NOT_LISTED, 0, line.number, text)
+            return Problem(NOT_LISTED, 0, block.line, text)
 
         for word, row in ruled:
             if row is UNLISTED and self._fitting(word):
                 yield wrong(f"{word} is beside nothing that it belongs to")
             elif row is UNLISTED:
                 yield wrong(f"{word} is not on the list of words for this control")
-        for spelt in (word for word in line.words if word.name not in whole and self._lexer.without_point(word)):
-            yield wrong(f"{spelt.text} without a decimal point: the control may count it in its least increment")
+        for spelt in line.words:
+            if self._lexer.without_point(spelt) and not (metric and spelt.name in self._whole):
+                yield wrong(f"{spelt.text} without a decimal point: the control may count it in its least increment")
         names = [word.name for word in line.words if word.name not in "GM"]
         names += [word for word in words if word[0] in "GM"]
         for name in sorted({name for name in names if names.count(name) > 1}):
@@ -105,13 +114,12 @@ class WordRules:
         if len(set(groups)) < len(groups):
             yield wrong("two words of one group in one block")
         for k, (word, row) in enumerate(ruled):
-            others = [*words[:k], *words[k + 1 :]]
-            if row.must is not None and not any_of(row.must, others):
+            if row.must is not None and not any_of(row.must, (*words[:k], *words[k + 1 :])):
                 yield wrong(f"{word} without {shown(row.must)}")
             if row.alone:
-                own = [bool(theirs.needs and theirs.needs.fullmatch(word)) for _, theirs in ruled]
-                for (other, _), belongs in zip(ruled, own, strict=True):
-                    if other != word and (not belongs or sum(own) > 1):
+                belong = [bool(other.needs and other.needs.fullmatch(word)) for _, other in ruled]
+                for (other, _), belongs in zip(ruled, belong, strict=True):
+                    if other != word and (not belongs or sum(belong) > 1):
                         yield wrong(f"{other} in the block of {word}")
             shared = row.pattern.fullmatch(word) if row.share is not None else None
             for name, number in shared.groupdict().items() if shared else ():

@@ -13,6 +13,7 @@ from __future__ import annotations
 import hashlib
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -50,10 +51,11 @@ class _Part:
     last: int = 1
     words: list[str] = field(default_factory=list)
 
-    def add(self, line: int, word: str) -> None:
-        """Take a word."""
-        self.words.append(word)
-        self.last = line
+    @property
+    def digest(self) -> str:
+        """Digest of the words, never that of none."""
+        digest = hashlib.sha256("\n".join(self.words).encode()).hexdigest()[:_DIGITS]
+        return digest if digest.strip("0") else "0" * (_DIGITS - 1) + "1"
 
 
 class Parts:
@@ -109,13 +111,12 @@ class Parts:
             changed = any(
                 _value(before[group]) != _value(now[group]) or group.startswith(FRAME) for group, _ in row.sets
             )
-            if row.does or changed:
-                own = [other.spelling for other in line.words if other.name in row.beside]
-                text = " ".join(("/" * line.skipped + word.spelling, *own))
-                if not row.does and {group for group, _ in row.sets} <= _SWITCHED:
-                    self._switched.append(text)
-                else:
-                    self._take(line.number, text, stays="tool" not in row.does and "machine" not in does)
+            own = [other.spelling for other in line.words if other.name in row.beside]
+            text = " ".join(("/" * line.skipped + word.spelling, *own))
+            if changed and not row.does and {group for group, _ in row.sets} <= _SWITCHED:
+                self._switched.append(text)
+            elif changed or row.does:
+                self._take(line.number, text, stays="tool" not in row.does and "machine" not in does)
         moved = {word.name for word in line.words} & _PLACES
         if "machine" in does:
             self._take(line.number, " ".join(sorted(word.spelling for word in line.words)))
@@ -132,24 +133,23 @@ class Parts:
         """Take a word; `stays`: the machine does not move by it."""
         if not stays:
             self._flush(line)
-        self._part.add(line, re.sub(r"\s+", " ", word))
-        self._still = True
+        self._part.words.append(re.sub(r"\s+", " ", word))
+        self._part.last, self._still = line, True
 
     def _flush(self, line: int) -> None:
         """Take the words of spindle and coolant that have come since the last motion."""
-        for word in sorted(self._switched):
-            self._part.add(line, word)
-            self._still = True
-        self._switched = []
+        words, self._switched = sorted(self._switched), []
+        for word in words:
+            self._take(line, word, stays=True)
 
     def _moves(self, line: int, names: set[str]) -> None:
         """Take a motion: on the way down from a retract with its letters, elsewhere the first behind a word alone."""
         self._flush(line)
         if self._above:
-            self._part.add(line, "".join(sorted(_PLACES & names)))
+            self._take(line, "".join(sorted(_PLACES & names)))
             self._above = "Z" not in names
         elif self._still and self._part.words:
-            self._part.add(line, ".")
+            self._take(line, ".")
         self._still = False
 
     def _cut(self, line: int) -> None:
@@ -181,36 +181,36 @@ class Parts:
     @property
     def digests(self) -> str:
         """Digests for the head."""
-        return ".".join(_digest(part.words) for part in self._whole)
+        return ".".join(part.digest for part in self._whole)
 
     def changed(self) -> str:
-        """The lines whose parts are not what the head says; empty for none."""
-        wanted = [digest for digest in self._wanted.split(".") if digest.strip("0")]
-        parts = self._whole
-        found = [_digest(part.words) for part in parts]
+        """The lines whose parts are not what the head has; empty for none."""
+        parts, wanted = self._whole, [digest for digest in self._wanted.split(".") if digest.strip("0")]
+        found = [part.digest for part in parts]
         if not wanted or found == wanted:
             return ""
-        same = [one == other for one, other in zip(found, wanted, strict=False)]
-        first = same.index(False) if False in same else len(same)
-        back = [one == other for one, other in zip(found[:first:-1], wanted[:first:-1], strict=False)]
-        behind = len(found) - (back.index(False) if False in back else len(back))
-        middle = parts[first:behind]
+        first = _alike(found, wanted)
+        behind = len(found) - _alike(found[first:][::-1], wanted[first:][::-1])
         if len(found) == len(wanted):
-            low, high = middle[0].first, middle[-1].last
-        else:  # parts are gone, or new
-            low = parts[first - 1].last if first else 1
-            high = parts[behind].first if behind < len(parts) else parts[-1].last if parts else low
-        return f"lines {low} to {high}, which were changed since the program was written"
+            return _changed(parts[first].first, parts[behind - 1].last)
+        # parts are gone, or new
+        low = parts[first - 1].last if first else 1
+        high = parts[behind].first if behind < len(parts) else parts[-1].last if parts else low
+        return _changed(low, high)
 
 
-def _digest(words: list[str]) -> str:
-    """Digest of some words, never that of none."""
-    digest = hashlib.sha256("\n".join(words).encode()).hexdigest()[:_DIGITS]
-    return digest if digest.strip("0") else "0" * (_DIGITS - 1) + "1"
+def _changed(low: int, high: int) -> str:
+    return f"lines {low} to {high}, which were changed since the program was written"
+
+
+def _alike(digests: Sequence[str], others: Sequence[str]) -> int:
+    """How many digests are those of others before the first that is not."""
+    same = [one == other for one, other in zip(digests, others, strict=False)]
+    return [*same, False].index(False)
 
 
 def _compared(name: str, row: Row) -> bool:
-    """Whether a word is compared with what the CL file asks for."""
+    """Whether a word is compared with what the CL file has."""
     if name in _WORDS or name.startswith("TOOL DEF") or row.does & {"dwell", "stop"}:
         return True
     return bool(row.sets) and {group for group, _ in row.sets} <= _GROUPS and not row.does

@@ -1,31 +1,31 @@
-"""What must hold of the groups of a control where the tool moves, changes or stops.
+"""What must hold of the groups of a control where the tool moves, is changed or is retracted.
 
-The machine (`control.state`) remembers the last word of each group; the row of a word (`control.table`) tells when it
+The machine (`control.state`) remembers the last word of each group; the row of a word (`control.table`) has when it
 must have come, until when it may hold, and at which places of the program it may be: after a retract, on
 the way down, under tool tip control.
 
 Posts have many ways to begin, to change tools and to end, and most of them are right. What has changed in a program
-whose head says how it was made, `parts` finds; around its retracts it must be right also without digests
+whose head has how it was made, `parts` finds; around its retracts it must be right also without digests
 (`StateRules._around_retracts`).
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Iterator, Mapping, Set
 from typing import Final
 
 import numpy as np
 
 from cornersmooth.control.state import LastWord, State
-from cornersmooth.control.table import Row, any_of, shown
+from cornersmooth.control.table import Row, any_of, shown, title_of
 from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.nc_reader.rotary import tool_vectors
-from cornersmooth.nc_words.blocks import NOT_LISTED, Ruled
+from cornersmooth.nc_words.blocks import NOT_LISTED, Block
 from cornersmooth.nc_words.machine_positions import MachinePositions
 from cornersmooth.statements.tokens import ENDINGS
 
-#: a retract with the same tool, which only GOHOME of the CL file asks for
+#: a retract with the same tool, which only GOHOME of the CL file wants
 GONE_ON: Final = "a retract that another motion of the same tool follows"
 
 #: code of states that the program never establishes
@@ -36,27 +36,8 @@ FRAME: Final = "program frame"
 
 #: groups of planes to which the control turns the rotary axes
 _PLANES: Final = ("frame.rotation", "frame.plane", "frame.swivel")
-_DYNAMIC: Final = "frame.dynamic"
 
-#: how groups are called where they are not by their names
-_TITLES: Final[Mapping[str, str]] = {
-    **dict.fromkeys(_PLANES, "tilted plane"),
-    _DYNAMIC: "dynamic work offset",
-    "distance": "positions",
-    "feed": "feed mode",
-    "tip": "tool tip control",
-    "compensation": "cutter compensation",
-    "offset": "work offset",
-    "path": "path control",
-    "way": "ways of rotary axes",
-    "orientation": "interpolation of the tool axis",
-    "coordinates": "coordinates of the tool axis",
-    "tool_length": "tool length",
-    "edge": "cutting edge",
-    "smoothing": "smoothing of the control",
-}
-
-#: comments that say how a program was made, and the words in them
+#: comments on how a program was made, and the words in them
 _MADE: Final = re.compile(r"CORNERSMOOTH (\S+): \w+=", re.IGNORECASE)
 _MADE_WORDS: Final = re.compile(r"\b(\w+)=([\w.]*)")
 
@@ -74,31 +55,30 @@ _UPRIGHT: Final = 1.0 - 1e-6
 class StateRules:
     """Follows one program on a machine.
 
-    Groups, blocks and kinds of words that are `left` are the user's own; `FRAME`: the blocks around the motion are.
+    Groups that are `left`, by their titles, are the user's own; `FRAME`: the blocks around the motion are.
     """
 
     def __init__(self, machine: State, positions: MachinePositions, left: Set[str]) -> None:
-        #: what holds between two blocks
-        self.machine = machine
+        self.machine = machine  #: between two blocks
         self._listed, self._positions, self._left = machine.table.listed, positions, left
         self.problems: list[Problem] = []
         #: what is taken on trust, line and text, and what of it may bear on the motion
         self.trusted: list[tuple[int, str]] = []
         self.unsure: list[tuple[int, str]] = []
+        self.made: dict[str, str] = {}  #: words in the head of a program of our own
         self._retracts = any(row.high for row in self._listed)
         self._late = {row.group for row in self._listed if row.late}
         self._approach = {row.group for row in self._listed if row.off} | {"offset", "edge"}
-        self._made: dict[str, str] = {}  # what the head of a program of our own says
         self._words: set[str] = set()  # so far; those that must come again before each of their kind, since then
-        self._first: dict[str, str] | None = None  # groups at the first motion; "" for those that may come later
+        self._first: dict[str, str] | None = None  # groups at the first motion
         # what holds and did not at the first motion, and what is wrong with it
         self._others: dict[LastWord, tuple[str, str]] = {}
         self._cycles = False  # whether the program has any, so that some groups may differ from tool to tool
         self._retract = 0  # line of a retract that no approach has followed
         self._high = False  # the tool has not moved since a retract
-        self.above = False  # Z has not
+        self.above = False  #: Z has not
         self._moved = 0  # line of the last motion
-        self._changed = True  # there have been words since
+        self.attentive = True  #: whether the next motion must be looked at: there have been words since the last
         #: groups that words have ended since, with these: they must come again before the next motion
         self._ended: dict[str, str] = {}
 
@@ -118,7 +98,7 @@ class StateRules:
 
     def _around_retracts(self, line: int, *texts: str, others: list[tuple[int, str]] | None = None) -> None:
         """Complain of what a program of ours never does around a retract; of another post it is put to `others`."""
-        if self._made:
+        if self.made:
             self.unframed(NOT_LISTED, line, *texts)
         elif others is not None:
             others += [(line, text) for text in texts]
@@ -130,93 +110,58 @@ class StateRules:
         """The last word of each group that verification follows."""
         return {group: last for group, last in self.machine.last_words.items() if last.row.group == group}
 
-    @property
-    def _tip_control(self) -> list[str]:
-        """Word of tool tip control that holds, if any."""
-        return [last.text for last in self._followed.values() if last.row.tip_on]
-
-    @property
-    def work_offset(self) -> str:
-        """The work offset that holds, as it is written; empty for none."""
-        last = self.machine.last_words.get("offset")
-        return "" if last is None else last.text
-
-    @property
-    def made(self) -> Mapping[str, str]:
-        """What the head of a program of our own says."""
-        return self._made
-
-    def holds(self, group: str, text: str) -> bool:
-        """Whether a group has been set so."""
-        return group in self.machine.last_words and self.machine.last_words[group].text == text
-
-    def _is_left(self, group: str) -> bool:
+    def is_left(self, group: str) -> bool:
         """Whether a group is the user's own."""
-        return _TITLES.get(group, group) in self._left
-
-    @property
-    def unsure_offset(self) -> str:
-        """Work offset that nothing was compared with; empty for none."""
-        known = self._made and self._made.get("OFFSET") != "NONE" and not self._is_left("offset")
-        return "" if known else self.work_offset
-
-    @property
-    def attentive(self) -> bool:
-        """Whether the next motion must be looked at."""
-        return self._changed or self.above
+        return title_of(group) in self._left
 
     # words
 
     def comment(self, text: str) -> None:
-        """Take note of how the program was made, if a comment says so."""
+        """Take note of how the program was made, if a comment has that."""
         if self._first is None and (match := _MADE.match(text)):
-            self._made = {"VERSION": match[1]} | dict(_MADE_WORDS.findall(text.upper())) | self._made
+            self.made = {"VERSION": match[1]} | dict(_MADE_WORDS.findall(text.upper())) | self.made
 
-    def take(self, line: int, words: Sequence[str], ruled: Ruled, after: State) -> None:
+    def take(self, block: Block, after: State) -> None:
         """Go on to the state after a block, and complain of what in it is not in its place."""
-        self._changed = True
-        self._words |= set(words)
-        self._cycles |= any(row.cycle for _, row in ruled)
-        for word, row in ruled:
-            self._place(line, word, row)
+        self.attentive = True
+        self._words |= set(block.words)
+        self._cycles |= any(row.cycle for _, row in block.ruled)
+        for word, row in block.ruled:
+            self._place(block.line, word, row)
         self.machine = after
-        for word, row in ruled:
-            self._set(line, word, row)
-        self._check_plane(line, ruled)
-
-    def _check_plane(self, line: int, ruled: Ruled) -> None:
-        """Complain of words that are taken in another plane than theirs, and of that while the tool is compensated."""
-        plane, side = self.machine.last_words.get("plane"), self.machine.last_words.get("compensation")
+        for word, row in block.ruled:
+            self._set(block.line, word, row)
+        plane, side = after.last_words.get("plane"), after.last_words.get("compensation")
         kept = [] if side is None else [(side.text, side.row)]
-        for word, row in dict.fromkeys([*ruled, *kept]) if plane is not None else ():
+        for word, row in dict.fromkeys([*block.ruled, *kept]) if plane is not None else ():
             if row.plane and plane is not None and plane.text != f"G{row.plane}":
-                self.wrong(NOT_LISTED, line, f"{word} under {plane.text}, where G{row.plane} must be in force")
+                self.wrong(NOT_LISTED, block.line, f"{word} under {plane.text}, where G{row.plane} must be in force")
 
     def _place(self, line: int, word: str, row: Row) -> None:
         """Complain of a word that is not in its place, as things are before its block."""
+        tips = [(group, last.text) for group, last in self._followed.items() if last.row.tip_on]
         if row.after is not None:
             before = {last for last in self._words if row.after.fullmatch(last)}
+            self._words -= before
             if not before:
                 self.wrong(NOT_LISTED, line, f"{word} without {shown(row.after)} before it")
-            self._words -= before
         if row.zero and (not self.machine.angles or self._positions.away(self.machine.angles)):
             self.unframed(NOT_LISTED, line, f"{word} without the rotary axes at zero before it")
         if row.high and not self._high:
             self.unframed(NOT_LISTED, line, f"{word} without a retract before it")
         if row.retract:
             # of FANUC the length of the tool holds in the retract, with its tip control
-            own = [last.text for group, last in self._followed.items() if last.row.tip_on and group != "tool_length"]
-            under = (f"{word} under {tip}" for tip in own if "Z" in word)
+            under = (f"{word} under {tip}" for group, tip in tips if group != "tool_length" and "Z" in word)
             self._around_retracts(line, *under, others=self.unsure)
             self._retract, self._high, self.above = line, True, True
         if row.changes_tool or row.outside:
             self._retract = 0
-            tell = self.unframed if row.changes_tool else self.wrong
-            for tip in self._tip_control:
-                tell(NOT_LISTED, line, f"{word} under {tip}")
+            wrong = self.unframed if row.changes_tool else self.wrong
+            for _, tip in tips:
+                wrong(NOT_LISTED, line, f"{word} under {tip}")
         spindle = self.machine.last_words.get("spindle")
-        runs = spindle is not None and dict(spindle.row.sets)["spindle"] not in ENDINGS
-        if row.changes_tool and runs and spindle is not None and spindle.line > self._moved:
+        started = spindle is not None and dict(spindle.row.sets)["spindle"] not in ENDINGS
+        if row.changes_tool and started and spindle is not None and spindle.line > self._moved:
             self.wrong(NOT_LISTED, line, f"{word} stops the spindle that was started before it")
 
     def _set(self, line: int, word: str, row: Row) -> None:
@@ -231,22 +176,13 @@ class StateRules:
         if not row.off and row.group in self._approach:  # GOHOME: the same tool comes back as a new one does
             self._retract = 0
 
-    def _missing(self) -> Iterator[tuple[str, str]]:
-        """Groups, and words of which one must have come before the first motion."""
-        rows = [row for row in self._listed if row.first]
-        for group in dict.fromkeys(row.group for row in rows):
-            wanted = [row.pattern for row in rows if row.group == group]
-            if not any(any_of(pattern, self._words) for pattern in wanted):
-                usual = next((row.preset for row in rows if row.group == group and row.preset), "")
-                yield group, f"one such as {usual}" if usual else " or ".join(map(shown, wanted))
-
     # where axes turn, and where the tool moves
 
     def turn(self, line: int, words: Mapping[str, float]) -> None:
         """Look at rotary words: they may not turn the axes alone where a retract has left the tool."""
         if self.above and ROTARY & words.keys() and not LINEAR & words.keys():
-            turns = (f"the rotary axes turn under {word}" for word in self._tip_control)
-            self._around_retracts(line, *turns, others=self.trusted)
+            tips = (last.text for last in self._followed.values() if last.row.tip_on)
+            self._around_retracts(line, *(f"the rotary axes turn under {tip}" for tip in tips), others=self.trusted)
 
     def motion(self, line: int, words: Mapping[str, float], *, drills: bool) -> None:
         """Look at what holds where the tool moves by the words of a block.
@@ -256,46 +192,46 @@ class StateRules:
         if self._high and not drills:
             self._around_retracts(line, *self._comes_down(words), others=self.trusted)
         for group, word in self._ended.items():
-            if not self._is_left(group):
-                text = f"{_TITLES[group]}: it must come after {word}, which deselects it"
+            if not self.is_left(group):
+                text = f"{title_of(group)}: it must come after {word}, which deselects it"
                 self.unframed(NOT_ESTABLISHED, line, text)
         self.above &= "Z" not in words
-        late = set()
-        kind = self.machine.groups["motion"]
-        if self.above and kind == "rapid" and "Z" not in words:
-            late = {group for group, last in self._followed.items() if group in self._late and last.off}
-        first = self._begin(line, late) if self._first is None else self._first
-        self._compare(late, first, arc=kind == "arc")
+        rapid = self.machine.groups["motion"] == "rapid" and self.above
+        late = {group for group, last in self._followed.items() if rapid and group in self._late and last.off}
+        self._first = self._begin(line, late) if self._first is None else self._first
+        for group, last in self._followed.items():
+            if group not in late:
+                self._compare(group, last, self._first)
         if self._retract and not late:
             self.wrong(NOT_LISTED, self._retract, GONE_ON)
             self._retract = 0
         self._moved, self._ended = line, {}
-        self._changed = self._high = False
+        self.attentive = self._high = False
 
     def _begin(self, line: int, late: Set[str]) -> dict[str, str]:
-        """Look at what holds at the first motion, and return it."""
+        """Look at what holds at the first motion, and return it; nothing of what may come later."""
         self._retract = 0
         self.unframed(NOT_LISTED, line, *self._wrong_offset())
         if self._retracts and not self._high:
             self._around_retracts(line, "the first motion without a retract before it")
-        self._first = {group: "" if group in late else last.text for group, last in self._followed.items()}
-        for group, wanted in self._missing():
-            if not self._is_left(group):
-                text = f"{_TITLES.get(group, group)}: {wanted} must come before the first motion"
+        for group in dict.fromkeys(row.group for row in self._listed if row.first):
+            rows = [row for row in self._listed if row.first and row.group == group]
+            if not self.is_left(group) and not any(any_of(row.pattern, self._words) for row in rows):
+                usual = next((f"one such as {row.preset}" for row in rows if row.preset), "")
+                wanted = usual or " or ".join(shown(row.pattern) for row in rows)
+                text = f"{title_of(group)}: {wanted} must come before the first motion"
                 self.unframed(NOT_ESTABLISHED, line, text)
-        return self._first
+        return {group: "" if group in late else last.text for group, last in self._followed.items()}
 
-    def _compare(self, late: Set[str], first: dict[str, str], *, arc: bool) -> None:
-        """Complain of states that are not what they were at the first motion, where nobody else compares them."""
-        for group, last in self._followed.items():
-            if group not in late and first.get(group) == "":
-                first[group] = last.text
-            if group in late or last.text == first.get(group):
-                continue
-            if group == "plane" and last.line > self._moved and not arc:
-                self.wrong(NOT_LISTED, last.line, f"{last.text} where no arc follows")
-            if not last.row.follows:
-                self._others.setdefault(last, (group, first.get(group, "nothing")))
+    def _compare(self, group: str, last: LastWord, first: dict[str, str]) -> None:
+        """Complain of a state that is not what it was at the first motion, where nobody else compares it."""
+        first[group] = first.get(group, "nothing") or last.text
+        if last.text == first[group]:
+            return
+        if group == "plane" and last.line > self._moved and self.machine.groups["motion"] != "arc":
+            self.wrong(NOT_LISTED, last.line, f"{last.text} where no arc follows")
+        if not last.row.follows:
+            self._others.setdefault(last, (group, first[group]))
 
     def _comes_down(self, words: Mapping[str, float]) -> Iterator[str]:
         """What is wrong with the first motion after a retract, by the words of a block."""
@@ -307,11 +243,11 @@ class StateRules:
 
     def _tilted(self, words: Mapping[str, float]) -> bool | None:
         """Whether X and Y lie in another plane in the part than on the machine; None where that is not known."""
-        on = {group: last.text for group, last in self._followed.items() if not last.off}
-        plane = [text for group, text in on.items() if group in _PLANES]
-        if plane:
-            return any(map(float, _DECIMAL.findall(plane[0])))
-        if not (self._positions.keeps_tip or self._tip_control or _DYNAMIC in on):
+        on = {group: last for group, last in self._followed.items() if not last.off}
+        for plane in _PLANES:
+            if plane in on:
+                return any(map(float, _DECIMAL.findall(on[plane].text)))
+        if not (self._positions.keeps_tip or "frame.dynamic" in on or any(last.row.tip_on for last in on.values())):
             return False
         if words.keys() >= _VECTOR:
             axis = np.array([words[name] for name in "IJK"])
@@ -324,22 +260,22 @@ class StateRules:
 
     def _wrong_offset(self) -> Iterator[str]:
         """What is wrong with the work offset, one for the whole program."""
-        kept = self.work_offset
-        wanted = self._made.get("OFFSET") or next((row.preset for row in self._listed if row.preset), "NONE")
-        if not kept or not self._made or self._is_left("offset") or wanted == "NONE":
+        kept = self.machine.last_words.get("offset")
+        wanted = self.made.get("OFFSET") or next((row.preset for row in self._listed if row.preset), "NONE")
+        if kept is None or not self.made or self.is_left("offset") or wanted == "NONE":
             return
-        if re.split(r"=\+?", kept)[-1].replace(" ", "_") != wanted:
-            yield f"{kept}, where the program was made for {wanted.replace('_', ' ')}"
+        if re.split(r"=\+?", kept.text)[-1].replace(" ", "_") != wanted:
+            yield f"{kept.text}, where the program was made for {wanted.replace('_', ' ')}"
 
     def end(self, line: int) -> None:
         """Look at what holds where the program ends; `line` is that of its end."""
         for last, (group, other) in self._others.items():
             if not (last.row.tool and self._cycles):
-                text = f"{_TITLES.get(group, group)}: {last.text} where {other} holds for the whole program"
+                text = f"{title_of(group)}: {last.text} where {other} holds for the whole program"
                 self.wrong(NOT_LISTED, last.line, text)
         for group, last in self._followed.items():
             if not last.off and any(row.off for row in self._listed if row.group == group):
-                text = f"{_TITLES.get(group, group)}: {last.text} of line {last.line} still holds at the end"
+                text = f"{title_of(group)}: {last.text} of line {last.line} still holds at the end"
                 self.unframed(NOT_ESTABLISHED, line, text)
         if not self._high and self._retracts:
             self.unframed(NOT_ESTABLISHED, line, "the tool is not retracted at the end")
