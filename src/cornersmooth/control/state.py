@@ -12,26 +12,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
-from cornersmooth.control.table import FRAME, Row, Table
+from cornersmooth.control.table import FRAME, PRESET, Group, Row, Table, group_of
 from cornersmooth.nc_reader.words import Line, Word
-
-#: what holds where a program begins; groups of frames are ``"off"``, all others as the control has them by itself
-_STARTS: Final[Mapping[str, str | None]] = {
-    "motion": None,
-    "distance": "absolute",
-    "units": "mm",
-    "feed": "minute",
-    "tip": "off",
-    "compensation": "OFF",
-}
-#: value of a group that no word has set yet
-PRESET: Final = "preset"
 
 #: mm
 _UNITS: Final = {"mm": 1.0, "inch": 25.4}
-
-#: what a change of a group does beside
-_CHANGES: Final = {"units": ("length", "feed"), "feed": ("feed",), "offset": ("shift",), "tip": ("length",)}
 
 #: axes of the length of a tool by the plane that holds
 _ALONG: Final = {PRESET: "Z", "G17": "Z", "G18": "YZ", "G19": "XZ"}
@@ -41,9 +26,6 @@ MOTIONS: Final = {0.0: "rapid", 1.0: "line", 2.0: "arc", 3.0: "arc"}
 
 #: motions that cut
 CUTS: Final = ("line", "arc")
-
-#: groups whose value has the letters that belong to its word
-_LETTERED: Final = ("offset", "path", "smoothing")
 
 #: letters of a tool vector, and of all axes that a machine may have
 VECTOR: Final = frozenset("IJK")
@@ -83,13 +65,9 @@ class State:
 
     def __post_init__(self) -> None:
         if not self.groups:
-            starts: dict[str, str | None] = {
-                name: "off" if name.startswith(FRAME) else PRESET for name in (*self.table.groups, "path")
-            }
-            foreign = {
-                f"{FRAME}{letter}": "off" for letter in _AXES if letter not in self.axes and "I" not in self.axes
-            }
-            self.groups = {**starts, **foreign, **_STARTS}
+            foreign = [letter for letter in _AXES if letter not in self.axes and "I" not in self.axes]
+            names = (*self.table.groups, *(f"{FRAME}{letter}" for letter in foreign))
+            self.groups = {name: (group_of(name) or Group()).start for name in names}
         self.place = self.place or dict.fromkeys(self.axes, math.nan)
 
     def copy(self) -> State:
@@ -112,7 +90,7 @@ class State:
     @property
     def rounding(self) -> str:
         """Words that say how exactly corners are passed; empty where there are none, or where that is not known."""
-        path = self.groups["path"]
+        path = self.groups.get("path")
         return "" if path in (None, PRESET) else path
 
     def lose_place(self, letters: Iterable[str] | None = None) -> None:
@@ -205,12 +183,13 @@ class State:
         does: set[str] = set()
         for group, value in row.sets:
             value = word.spelling if value == "." else value
-            if group in _LETTERED and value is not None:
+            kind = group_of(group) or Group()
+            if kind.lettered and value is not None:
                 own = (other.text.replace(" ", "") for other in words if other.name in row.beside)
                 value = " ".join((value, *own))
             # LinuxCNC takes the feed as zero behind any word of its kind, the same one included
             if self.groups.get(group) != value or value is None or group == "feed":
-                does |= set(_CHANGES.get(group, ()))
+                does |= set(kind.changes.split())
             if group.startswith(FRAME):
                 does.add("place")
             self.groups[group] = value

@@ -42,47 +42,54 @@ from cornersmooth.nc_reader.word_tables import word_table
 FRAME: Final = "frame."
 
 
+#: value of a group that no word has set yet
+PRESET: Final = "preset"
+
+
 class Group(NamedTuple):
     """A modal group, whatever the control."""
 
     values: str = ""  #: those that somebody reads; none where it is any word
     rules: str = ""  #: of all its words
     title: str = ""  #: how messages call it; by its name where there is none
+    start: str | None = PRESET  #: what holds where a program begins
+    changes: str = ""  #: what a change of it does beside, of `LOSES`
+    lettered: bool = False  #: whether its value has the letters that belong to its word
 
 
 GROUPS: Final[Mapping[str, Group]] = {
-    "motion": Group("rapid line arc"),
-    "distance": Group("absolute incremental", "first", "positions"),
-    "units": Group("mm inch", "first"),
-    "feed": Group("minute inverse revolution", "first follows", "feed mode"),
+    "motion": Group("rapid line arc", start=None),
+    "distance": Group("absolute incremental", "first", "positions", "absolute"),
+    "units": Group("mm inch", "first", "", "mm", "length feed"),
+    "feed": Group("minute inverse revolution", "first follows", "feed mode", "minute", "feed"),
     "plane": Group("", "first follows"),
-    "path": Group("", "first", "path control"),
-    "offset": Group("", "first", "work offset"),
+    "path": Group("", "first", "path control", lettered=True),
+    "offset": Group("", "first", "work offset", changes="shift", lettered=True),
     "tool_length": Group("", "", "tool length"),
     "edge": Group("", "", "cutting edge"),
-    "compensation": Group("OFF LEFT RIGHT", "follows", "cutter compensation"),
+    "compensation": Group("OFF LEFT RIGHT", "follows", "cutter compensation", "OFF"),
     "cycles": Group("", "follows"),
     "spindle": Group("", "compared follows"),
     "coolant": Group("", "compared follows"),
-    "smoothing": Group("", "", "smoothing of the control"),
-    "tip": Group("off angles vectors both", "", "tool tip control"),
+    "smoothing": Group("", "", "smoothing of the control", lettered=True),
+    "tip": Group("off angles vectors both", "", "tool tip control", "off", "length"),
     "way": Group("", "", "ways of rotary axes"),
     "orientation": Group("", "", "interpolation of the tool axis"),
     "coordinates": Group("", "", "coordinates of the tool axis"),
-    f"{FRAME}dynamic": Group("", "follows outside", "dynamic work offset"),
+    f"{FRAME}dynamic": Group("", "follows outside", "dynamic work offset", "off"),
 }
-_FRAME: Final = Group("", "follows outside", "tilted plane")
+_FRAME: Final = Group("", "follows outside", "tilted plane", "off")
+
+
+def group_of(name: str) -> Group | None:
+    """The group of a name; None where there is none."""
+    return GROUPS.get(name, _FRAME if name.startswith(FRAME) else None)
 
 
 def title_of(name: str) -> str:
     """How messages call a group."""
     group = group_of(name)
     return group.title if group and group.title else name
-
-
-def group_of(name: str) -> Group | None:
-    """The group of a name; None where there is none."""
-    return GROUPS.get(name, _FRAME if name.startswith(FRAME) else None)
 
 
 #: what each effect leaves unknown

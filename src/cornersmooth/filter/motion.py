@@ -10,7 +10,8 @@ from typing import Final
 
 import numpy as np
 
-from cornersmooth.control.state import PRESET, State
+from cornersmooth.control.state import State
+from cornersmooth.control.table import PRESET
 from cornersmooth.errors import InputError
 from cornersmooth.filter.runs import ANY, TURNS, ProgramReader, Reading, Run
 from cornersmooth.filter.spelling import Spelling

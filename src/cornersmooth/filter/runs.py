@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from cornersmooth.arrays import joined_rows
 from cornersmooth.control.program import Act, Stream, Text
 from cornersmooth.control.rows import Rows
-from cornersmooth.control.state import PRESET, State
-from cornersmooth.control.table import FRAME, table_of
+from cornersmooth.control.state import State
+from cornersmooth.control.table import FRAME, PRESET, table_of
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import Bools, Floats
 from cornersmooth.nc_reader.dialects import dialect_of
