@@ -11,7 +11,7 @@ import numpy as np
 from cornersmooth.model import MM_PER_UNIT, Bools, Floats, Ints
 from cornersmooth.nc_reader.arcs import circles
 from cornersmooth.nc_reader.elements import Curves, Element, Elements, NcArcs, Problem
-from cornersmooth.nc_reader.splines import curves_of, cut_long
+from cornersmooth.nc_reader.splines import Blocks, curves_of, cut_long
 from cornersmooth.nc_reader.words import NURBS, Table, filled
 
 _TIP, _VECTOR, _POINT = "XYZ", "IJK", "UVW"
@@ -86,7 +86,7 @@ def execute(table: Table, modal: Modal, problems: list[Problem]) -> tuple[Elemen
     element_rows = placed
     if not (straight | is_arc).all():
         before = np.array((*modal.tip, *modal.second))
-        curves, cut = cut_long(curves_of(table, six, placed, code, before, _TIP + letters, problems))
+        curves, cut = cut_long(curves_of(Blocks(table, six, before, placed, code, _TIP + letters, problems)))
         element_rows = placed & (straight | is_arc)
         element_rows[curves.element] = True
     rows = np.flatnonzero(element_rows)
