@@ -174,7 +174,7 @@ def test_tables_and_programs_without_end_are_errors(tmp_path: Path, monkeypatch:
     found = run("smooth", tmp_path / "part.cls", "--control", tmp_path / "zero.toml", "-o", tmp_path / "o.nc")
     assert found.returncode == 2
     assert b"longer than a table" in found.stderr
-    monkeypatch.setattr("cornersmooth.nc_reader.source._LARGEST", 1 << 16)
+    monkeypatch.setattr("cornersmooth.control.source._LARGEST", 1 << 16)
     found = run("verify", tmp_path / "part.cls", "/dev/zero", "--control", "fanuc")
     assert found.returncode == 3
     assert b"more than 2 GB" in found.stderr

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-LISTS = ROOT / "src" / "cornersmooth" / "nc_reader" / "word_lists"
+LISTS = ROOT / "src" / "cornersmooth" / "control" / "word_lists"
 PAGE = ROOT / "docs" / "dev" / "words.md"
 #: behind a word that must stand beside another
 NEEDED = " (needed)"

@@ -13,8 +13,8 @@ import pytest
 import cornersmooth as cs
 from cornersmooth.control.listing import listing
 from cornersmooth.control.program import Text
+from cornersmooth.control.word_tables import CONTROLS
 from cornersmooth.filter.runs import ProgramReader
-from cornersmooth.nc_reader.word_tables import CONTROLS
 from oracle.command import BAD_INPUT, DONE, USAGE, run
 
 PROGRAMS = sorted((Path(__file__).parent / "streams").glob("*.nc"))

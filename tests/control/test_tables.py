@@ -10,17 +10,18 @@ from pathlib import Path
 import pytest
 
 import cornersmooth as cs
+from cornersmooth.control import word_tables
 from cornersmooth.control.listing import listing
 from cornersmooth.control.program import Act, Text
 from cornersmooth.control.rows import Rows
 from cornersmooth.control.state import State
 from cornersmooth.control.table import UNKNOWN, UNLISTED, Row, table_of
 from cornersmooth.control.unread import execute
+from cornersmooth.control.word_tables import CONTROLS
 from cornersmooth.errors import InputError
 from cornersmooth.filter.runs import ProgramReader
-from cornersmooth.nc_reader import read_nc, word_tables
+from cornersmooth.nc_reader import read_nc
 from cornersmooth.nc_reader.dialects import dialect_of
-from cornersmooth.nc_reader.word_tables import CONTROLS
 from cornersmooth.nc_words.blocks import WordRules
 
 GOLDEN = sorted((Path(__file__).parents[1] / "nc" / "golden").glob("*.nc"))

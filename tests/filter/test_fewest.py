@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 import cornersmooth as cs
+from cornersmooth.control.source import CHUNK
 from cornersmooth.errors import Verdict
 from cornersmooth.filter import Filtered, filter_program, verify_programs
 from cornersmooth.filter.program import THREE_AXES
 from cornersmooth.filter.runs import ProgramReader
-from cornersmooth.nc_reader.source import CHUNK
 from filter.fine_programs import HEAD, PROGRAMS, program, relief
 from filter.foreign import by_rs274, by_words, difference
 from oracle.command import DONE, run

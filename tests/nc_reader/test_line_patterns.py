@@ -10,11 +10,11 @@ from operator import itemgetter
 import numpy as np
 import pytest
 
+from cornersmooth.control import line_patterns, source
+from cornersmooth.control.line_patterns import LinePatterns, Lines
+from cornersmooth.control.words import Table
 from cornersmooth.errors import InputError
-from cornersmooth.nc_reader import line_patterns, source
 from cornersmooth.nc_reader.dialects import dialect_of
-from cornersmooth.nc_reader.line_patterns import LinePatterns, Lines
-from cornersmooth.nc_reader.words import Table
 from oracle.share import covering_share, how_many
 
 NUMBERS = ["0.", "-0.", "5.", ".5", "-.25", "12.3456", "-123.4567", "0.3956870", "-1.0000000", "1234.5678", "7", "-42"]

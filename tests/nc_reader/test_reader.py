@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cornersmooth.control import source
 from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.kinematics import load_machine
-from cornersmooth.nc_reader import read_nc, source
+from cornersmooth.nc_reader import read_nc
 from cornersmooth.nc_reader.elements import Element
 from cornersmooth.nc_reader.rotary import MOST_LINES
 from cornersmooth.nc_reader.tool import written_at

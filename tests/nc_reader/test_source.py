@@ -7,8 +7,8 @@ import time
 
 import pytest
 
+from cornersmooth.control.source import Source
 from cornersmooth.errors import InputError
-from cornersmooth.nc_reader.source import Source
 
 WHOLE = b"".join(b"N%d G1 X%d\n" % (k, k) for k in range(900))
 

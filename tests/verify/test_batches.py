@@ -13,10 +13,11 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
+from cornersmooth.control import source
 from cornersmooth.errors import InputError
 from cornersmooth.model import FeedMode, Move, Program, Statement
 from cornersmooth.nc import Frame, choose_form, fit_settings, write
-from cornersmooth.nc_reader import reader, source
+from cornersmooth.nc_reader import reader
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from cornersmooth.verify import Verifier, Where, batches, verifier, verify

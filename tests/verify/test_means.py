@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 
 from cornersmooth.cl import read
+from cornersmooth.control import word_tables
 from cornersmooth.control.table import table_of
 from cornersmooth.errors import Verdict
 from cornersmooth.kinematics import load_machine
 from cornersmooth.nc import choose_form, control_tables
-from cornersmooth.nc_reader import word_tables
 from cornersmooth.pipeline import postprocess
 from cornersmooth.settings import Settings
 from cornersmooth.tables import Shelf

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cornersmooth.control import source
 from cornersmooth.model import Move, Program, Source, Statement
-from cornersmooth.nc_reader import reader, source
+from cornersmooth.nc_reader import reader
 from cornersmooth.nc_reader.elements import Ahead
 from cornersmooth.verify import batches, parse, verify
 

@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 
 from cornersmooth.cl import read
+from cornersmooth.control.source import read_lines
 from cornersmooth.control.table import table_of
 from cornersmooth.nc import Frame, fit_settings, write
 from cornersmooth.nc_reader.elements import Problem
-from cornersmooth.nc_reader.source import read_lines
 from cornersmooth.nc_words.check import WordCheck
 from cornersmooth.nc_words.states import GONE_ON
 from cornersmooth.settings import Settings

@@ -16,11 +16,11 @@ from typing import TypeVar
 
 import numpy as np
 
+from cornersmooth.control.source import read_lines
 from cornersmooth.errors import InputError
 from cornersmooth.nc import fit_settings, write
 from cornersmooth.nc_reader.options import ReadingOptions
 from cornersmooth.nc_reader.reader import Reader
-from cornersmooth.nc_reader.source import read_lines
 from cornersmooth.nc_words.check import WordCheck
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth

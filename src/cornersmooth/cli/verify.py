@@ -15,10 +15,10 @@ from cornersmooth.cli.head import take_head
 from cornersmooth.cli.options import Options
 from cornersmooth.cli.shop import command_line, loosened
 from cornersmooth.cli.show import more, print_line, print_message, say_json, say_line, show_findings, warn
+from cornersmooth.control.source import readable_twice
 from cornersmooth.errors import Verdict
 from cornersmooth.nc import own_words
 from cornersmooth.nc_reader import NcProgram, read_nc
-from cornersmooth.nc_reader.source import readable_twice
 from cornersmooth.report import NcFile, findings_table
 from cornersmooth.report.record import cl_file, record, sha256_of
 from cornersmooth.report.tables import along_lines, histogram_lines, verification_csv

@@ -5,7 +5,8 @@ Unknown is a value of every group, and what each word without a row makes of all
 ================= =====================================================================================================
 what is decided   where
 ================= =====================================================================================================
-what a word does  `table`, of `[words]` in ``nc_reader/word_lists``
+bytes to rows     `source` (bytes), `lexer` (one line), `line_patterns` (all lines of a kind at once), `words`
+what a word does  `table`, of `[words]` in ``word_lists``; `word_tables` has all keys
 one block         `state`: groups, the place, and the feed, before and after it
 what no lexer     `unread`: variables, jumps, paths of a kind that is not known
 knows

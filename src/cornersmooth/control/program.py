@@ -10,14 +10,14 @@ from typing import Final
 
 import numpy as np
 
+from cornersmooth.control.lexer import Lexer
+from cornersmooth.control.line_patterns import LinePatterns, Lines
 from cornersmooth.control.rows import Rows, execute_rows
+from cornersmooth.control.source import CHUNK
 from cornersmooth.control.state import State
 from cornersmooth.control.table import FRAME
 from cornersmooth.control.unread import execute
 from cornersmooth.model import Bools, Ints
-from cornersmooth.nc_reader.lexer import Lexer
-from cornersmooth.nc_reader.line_patterns import LinePatterns, Lines
-from cornersmooth.nc_reader.source import CHUNK
 
 #: lines before the first block: they name the program
 _TITLE: Final = re.compile(r"(?i)(%.*|[O:]\s*(\d+|<[^>]*>|[A-Z][^#\[(]*))")

@@ -9,8 +9,8 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.control.state import MOTIONS, VECTOR, State
+from cornersmooth.control.words import filled
 from cornersmooth.model import Bools, Floats
-from cornersmooth.nc_reader.words import filled
 
 #: what stands for motions in a column; NaN stands for all others
 _CODES: Final = {"rapid": 0.0, "line": 1.0, "arc": 2.0}

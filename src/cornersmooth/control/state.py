@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from cornersmooth.control.table import FRAME, PRESET, Group, Row, Table, group_of
-from cornersmooth.nc_reader.words import Line, Word
+from cornersmooth.control.words import Line, Word
 
 #: mm
 _UNITS: Final = {"mm": 1.0, "inch": 25.4}

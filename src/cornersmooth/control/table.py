@@ -1,6 +1,6 @@
 """What each word of a control does to what the control remembers, and what verification asks of it: a row a word.
 
-The rows are `[words]` of the control's table in ``nc_reader/word_lists``::
+The rows are `[words]` of the control's table in ``control/word_lists``::
 
     "G44" = "tip=off axis: H"
     "G43" = "tool_length=. tip=off axis: H\\\\d+!=; plane=17 tool; length; H is compared with the statements"
@@ -36,7 +36,7 @@ from functools import cache, cached_property
 from itertools import chain
 from typing import Any, Final, NamedTuple, Self
 
-from cornersmooth.nc_reader.word_tables import word_table
+from cornersmooth.control.word_tables import word_table
 
 #: groups of words that turn, scale or mirror the places of the part begin so
 FRAME: Final = "frame."

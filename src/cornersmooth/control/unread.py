@@ -6,11 +6,11 @@ import math
 import re
 from typing import Final
 
+from cornersmooth.control.lexer import Lexer
 from cornersmooth.control.state import CUTS, State
 from cornersmooth.control.table import UNKNOWN
+from cornersmooth.control.words import Line, Word
 from cornersmooth.errors import InputError
-from cornersmooth.nc_reader.lexer import Lexer
-from cornersmooth.nc_reader.words import Line, Word
 
 #: a value for a variable, which is no axis and no word of its own
 _ASSIGNMENT: Final = re.compile(r"(#|Q[LRS]?\d+\s*=|(R\d*|[A-Z_]{2,}\w*)(\[[^]]*\])?\s*=(?!=)|DEF\s|FN ?[0-8] ?:)")

@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.arrays.vectors import norm, unit
+from cornersmooth.control.source import CHUNK
 from cornersmooth.control.state import VECTOR, State
 from cornersmooth.errors import CornersmoothError
 from cornersmooth.filter.meaning import Meanings
@@ -20,7 +21,6 @@ from cornersmooth.model import Program
 from cornersmooth.nc_reader import NcProgram, Problem
 from cornersmooth.nc_reader.elements import Element
 from cornersmooth.nc_reader.rotary import LINE_SHARE
-from cornersmooth.nc_reader.source import CHUNK
 from cornersmooth.settings import Settings
 from cornersmooth.verify import Verification, verify
 

@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.arrays.vectors import square, unit
+from cornersmooth.control.source import CHUNK
 from cornersmooth.control.state import State
 from cornersmooth.filter.motion import Job, plane_of, says_motion
 from cornersmooth.filter.runs import ANGLES, ANY, NONE, TURNS, VECTOR, Reading, Run
@@ -20,7 +21,6 @@ from cornersmooth.kinematics import tip_position, tool_axis
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc.control import Mode
 from cornersmooth.nc.rotary_rows import LARGEST_TURN, line_limits
-from cornersmooth.nc_reader.source import CHUNK
 from cornersmooth.smoothing.fewest_pieces import PieceLimits, Pieces, Polyline, fewest_pieces
 from cornersmooth.smoothing.long_lines import Vertices, fewest_lines
 from cornersmooth.text import RowFormat, interleave, to_ticks

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from typing import Final
 
 from cornersmooth.control.state import State
+from cornersmooth.control.words import Word
 from cornersmooth.errors import InputError
 from cornersmooth.filter.runs import ProgramReader, Reading
-from cornersmooth.nc_reader.words import Word
 
 #: what a line says: its words, in order
 Meaning = tuple[tuple[str, str], ...]

@@ -16,10 +16,10 @@ from cornersmooth.control.program import Act, Stream, Text
 from cornersmooth.control.rows import Rows
 from cornersmooth.control.state import State
 from cornersmooth.control.table import FRAME, PRESET, table_of
+from cornersmooth.control.word_tables import CONTROLS
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import Bools, Floats
 from cornersmooth.nc_reader.dialects import dialect_of
-from cornersmooth.nc_reader.word_tables import CONTROLS
 
 #: what a run asks of tool tip control: the words of its tool axis, none, or either of both
 ANGLES, VECTOR, NONE, ANY = "angles", "vectors", "off", "any"

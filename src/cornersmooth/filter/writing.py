@@ -11,6 +11,7 @@ from typing import Final
 
 import numpy as np
 
+from cornersmooth.control.source import CHUNK
 from cornersmooth.errors import CornersmoothError
 from cornersmooth.filter.motion import Job, motion_of_runs, program_of
 from cornersmooth.filter.runs import Reading, Run
@@ -18,7 +19,6 @@ from cornersmooth.kinematics import Machine, solutions, tool_axis
 from cornersmooth.model import Floats
 from cornersmooth.nc import Frame, write
 from cornersmooth.nc.form import Form
-from cornersmooth.nc_reader.source import CHUNK
 from cornersmooth.pipeline import smooth
 from cornersmooth.settings import Settings
 

@@ -16,16 +16,14 @@ event             a word that stands beside the motion
 
 Where is what:
 
-- what a text is: `source` (bytes), `dialects` (grammar), `acts` (what it gives), `word_tables` (words, their effects)
-- bytes to tables: `lexer`, `words`, `line_patterns`, `source`
-- tables to elements: `reader` holds the modal state, `execution` executes: `arcs`, `splines`, `rotary`;
-  `needed_states` says which words want another state; `retracts` leads back from retracts
-- what comes out: `elements`; `curves` evaluates; `reader` puts a
-  whole text together
+- bytes to tables: `control` (lines, words and what they mean), `dialects` (grammar), `acts` (what a block does)
+- tables to elements: `reader` goes through the text, `execution` executes: `arcs`, `splines`, `rotary`;
+  `needed_states` says which words want another state; `retracts` leads back from retracts, `planes` are tilted
+- what comes out: `elements`; `curves` evaluates, `tool` says where the tool is
 """
 
+from cornersmooth.control.word_tables import CONTROLS
 from cornersmooth.nc_reader.elements import Event, NcProgram, Problem
 from cornersmooth.nc_reader.reader import read_nc
-from cornersmooth.nc_reader.word_tables import CONTROLS
 
 __all__ = ["CONTROLS", "Event", "NcProgram", "Problem", "read_nc"]

@@ -14,12 +14,12 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from cornersmooth.control.words import Line, refused
 from cornersmooth.model import Floats
 from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.nc_reader.execution import Modal
 from cornersmooth.nc_reader.planes import TiltedPlane
 from cornersmooth.nc_reader.rotary import Rotary
-from cornersmooth.nc_reader.words import Line, refused
 
 #: share of a peck that the tool stays above the last depth when it comes back
 _ABOVE: Final = 0.05

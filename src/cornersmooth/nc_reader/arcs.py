@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from cornersmooth.control.words import Table
 from cornersmooth.model import Bools, Floats
 from cornersmooth.nc_reader.elements import Problem
-from cornersmooth.nc_reader.words import Table
 
 _PLANE_NORMAL = {17: (0.0, 0.0, 1.0), 18: (0.0, 1.0, 0.0), 19: (1.0, 0.0, 0.0)}
 _FULL_TURN = 2 * np.pi

@@ -12,9 +12,9 @@ from typing import Any, Final, Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from cornersmooth.control.word_tables import Means
 from cornersmooth.errors import message
 from cornersmooth.model import MM_PER_UNIT, Bools, Floats, Ints, Units
-from cornersmooth.nc_reader.word_tables import Means
 
 #: relative slack of arithmetic on feeds
 _ARITHMETIC: Final = 1e-9

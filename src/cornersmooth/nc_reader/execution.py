@@ -8,11 +8,11 @@ from typing import Any, Final
 
 import numpy as np
 
+from cornersmooth.control.words import NURBS, Table, filled
 from cornersmooth.model import MM_PER_UNIT, Bools, Floats, Ints
 from cornersmooth.nc_reader.arcs import circles
 from cornersmooth.nc_reader.elements import Curves, Element, Elements, NcArcs, Problem
 from cornersmooth.nc_reader.splines import Blocks, curves_of, cut_long
-from cornersmooth.nc_reader.words import NURBS, Table, filled
 
 _TIP, _VECTOR, _POINT = "XYZ", "IJK", "UVW"
 

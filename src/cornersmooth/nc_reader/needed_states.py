@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from cornersmooth.control.words import BY_WORD, NURBS, Table
 from cornersmooth.model import Bools, Floats
 from cornersmooth.nc_reader.acts import ModalState
 from cornersmooth.nc_reader.dialects.base import Dialect
 from cornersmooth.nc_reader.elements import Element, Elements, Problem
 from cornersmooth.nc_reader.execution import Modal
 from cornersmooth.nc_reader.rotary import Rotary, tool_vectors
-from cornersmooth.nc_reader.words import BY_WORD, NURBS, Table
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine

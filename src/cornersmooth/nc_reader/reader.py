@@ -12,6 +12,9 @@ from typing import TYPE_CHECKING, Final, NoReturn
 
 import numpy as np
 
+from cornersmooth.control.source import Readable, Source, read_lines, readable_twice
+from cornersmooth.control.word_tables import word_table
+from cornersmooth.control.words import MOTION_CODES, Line, Table, joined_tables, table_of
 from cornersmooth.errors import InputError
 from cornersmooth.model import MM_PER_UNIT, Floats, Units
 from cornersmooth.nc_reader.acts import Act, Beside, ModalState, Move, Tilt, ToMachine, TurnToPlane
@@ -30,9 +33,6 @@ from cornersmooth.nc_reader.options import DIGITS_SAMPLE, ReadingOptions, Steps
 from cornersmooth.nc_reader.planes import ASIDE, NOT_ABOVE, TiltedPlane
 from cornersmooth.nc_reader.retracts import Retracts
 from cornersmooth.nc_reader.rotary import MOST_LINES
-from cornersmooth.nc_reader.source import Readable, Source, read_lines, readable_twice
-from cornersmooth.nc_reader.word_tables import word_table
-from cornersmooth.nc_reader.words import MOTION_CODES, Line, Table, joined_tables, table_of
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cornersmooth.control.words import BSPLINE, NURBS, POLY, SPL, Table
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.elements import Curves, Problem
-from cornersmooth.nc_reader.words import BSPLINE, NURBS, POLY, SPL, Table
 
 #: FANUC: order of a curve whose first block has no P (B-63324EN/03 4.17)
 DEFAULT_ORDER = 4

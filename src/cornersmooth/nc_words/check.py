@@ -9,12 +9,12 @@ from typing import Final
 
 import numpy as np
 
+from cornersmooth.control.lexer import Lexer
 from cornersmooth.control.state import State
 from cornersmooth.control.table import UNLISTED, Row, any_of, shown, table_of
+from cornersmooth.control.word_tables import word_table
+from cornersmooth.control.words import Line, Table
 from cornersmooth.errors import InputError
-from cornersmooth.nc_reader.lexer import Lexer
-from cornersmooth.nc_reader.word_tables import word_table
-from cornersmooth.nc_reader.words import Line, Table
 from cornersmooth.nc_words.blocks import NOT_LISTED, Block, WordRules
 from cornersmooth.nc_words.machine_positions import MachinePositions
 from cornersmooth.nc_words.parts import Parts

@@ -17,11 +17,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
+from cornersmooth.control.lexer import Lexer
 from cornersmooth.control.state import CUTS, State
 from cornersmooth.control.table import FRAME, Row
-from cornersmooth.nc_reader.lexer import Lexer
-from cornersmooth.nc_reader.words import Line, Table
-from cornersmooth.nc_reader.words import table_of as table_of_rows
+from cornersmooth.control.words import Line, Table
+from cornersmooth.control.words import table_of as table_of_rows
 from cornersmooth.provenance import PARTS, PARTS_WORD
 
 #: hexadecimal digits of a part

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 from itertools import zip_longest
 from typing import Final
 
+from cornersmooth.control.word_tables import Means
 from cornersmooth.nc_reader.elements import Problem
-from cornersmooth.nc_reader.word_tables import Means
 from cornersmooth.statements.tokens import ENDINGS, Token
 
 #: codes and names of kinds: of states, and of actions

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from cornersmooth.control.word_tables import Means
 from cornersmooth.nc_reader.elements import RETRACT, Event
-from cornersmooth.nc_reader.word_tables import Means
 
 #: decimals of a spindle speed that count: FANUC's S takes whole numbers only
 SPEED_DECIMALS = 0

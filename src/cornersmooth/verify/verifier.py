@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
+from cornersmooth.control.source import Source, readable_twice
 from cornersmooth.errors import SettingsError
 from cornersmooth.model import Program
 from cornersmooth.nc_reader.elements import Element, Elements, Event, NcProgram, Problem
@@ -19,7 +20,6 @@ from cornersmooth.nc_reader.needed_states import CONTROL_WORDS
 from cornersmooth.nc_reader.options import DIGITS_SAMPLE, ReadingOptions
 from cornersmooth.nc_reader.reader import Reader, program_of
 from cornersmooth.nc_reader.rotary import sagitta
-from cornersmooth.nc_reader.source import Source, readable_twice
 from cornersmooth.nc_words.check import WordCheck
 from cornersmooth.nc_words.machine_positions import MachinePositions
 from cornersmooth.nc_words.states import FRAME, GONE_ON

@@ -12,10 +12,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from cornersmooth.control.word_tables import Means
 from cornersmooth.model import Bools, Ints, Move
 from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem
 from cornersmooth.nc_reader.tool import leads_somewhere
-from cornersmooth.nc_reader.word_tables import Means
 from cornersmooth.statements.asked import asked
 from cornersmooth.statements.comparison import Comparison, changed_unseen, without_word
 from cornersmooth.statements.tokens import Token, said

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Final
 
+from cornersmooth.control.word_tables import CONTROLS, word_table
 from cornersmooth.errors import SettingsError
 from cornersmooth.nc_reader.dialects.base import Dialect
 from cornersmooth.nc_reader.dialects.heidenhain import Heidenhain
 from cornersmooth.nc_reader.dialects.iso import Iso
 from cornersmooth.nc_reader.dialects.siemens import Siemens
-from cornersmooth.nc_reader.word_tables import CONTROLS, word_table
 
 __all__ = ["CONTROLS", "Dialect", "dialect_of"]
 

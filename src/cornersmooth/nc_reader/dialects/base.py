@@ -6,11 +6,11 @@ import re
 from collections.abc import Callable, Container, Mapping, Set
 from typing import Any, Final
 
+from cornersmooth.control.lexer import Lexer
+from cornersmooth.control.word_tables import effects_of, means_of, word_table
+from cornersmooth.control.words import Columns, Line, Word, refused, tools_first
 from cornersmooth.errors import InputError
 from cornersmooth.nc_reader.acts import Acts, Beside, ModalState, Move
-from cornersmooth.nc_reader.lexer import Lexer
-from cornersmooth.nc_reader.word_tables import effects_of, means_of, word_table
-from cornersmooth.nc_reader.words import Columns, Line, Word, refused, tools_first
 
 #: how the values of a table `[grammar]` are read, where not as they are
 _READ: Mapping[str, Callable[[Any], Any]] = {

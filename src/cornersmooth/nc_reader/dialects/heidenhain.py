@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
 
+from cornersmooth.control.lexer import NUMBER, Lexer, fixed, number_of
+from cornersmooth.control.words import SPL, Columns, Line, Word, refused
 from cornersmooth.nc_reader.acts import Acts, Beside, HoleCycle, ModalState, Move, Tilt, ToMachine, drill, wrong
 from cornersmooth.nc_reader.dialects.base import Dialect, values
-from cornersmooth.nc_reader.lexer import NUMBER, Lexer, fixed, number_of
 from cornersmooth.nc_reader.planes import TiltedPlane, room_of, rotated_frame
-from cornersmooth.nc_reader.words import SPL, Columns, Line, Word, refused
 
 _VECTOR: Final = {"TX": "I", "TY": "J", "TZ": "K"}
 _PATHS: Final = ("L", "LN", "SPL")

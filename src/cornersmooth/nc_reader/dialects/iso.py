@@ -7,6 +7,9 @@ import re
 from collections.abc import Mapping, Set
 from dataclasses import replace
 
+from cornersmooth.control.lexer import NUMBER, Lexer, fixed, number_of
+from cornersmooth.control.word_tables import word_table
+from cornersmooth.control.words import MOTION_CODES, NURBS, Columns, Line, Word, refused
 from cornersmooth.nc_reader.acts import (
     Acts,
     Beside,
@@ -20,10 +23,7 @@ from cornersmooth.nc_reader.acts import (
     wrong,
 )
 from cornersmooth.nc_reader.dialects.base import Dialect
-from cornersmooth.nc_reader.lexer import NUMBER, Lexer, fixed, number_of
 from cornersmooth.nc_reader.planes import TiltedPlane, room_of, rotated_frame, turned_frame
-from cornersmooth.nc_reader.word_tables import word_table
-from cornersmooth.nc_reader.words import MOTION_CODES, NURBS, Columns, Line, Word, refused
 
 #: G words that send axes to positions of the machine
 _TO_REFERENCE = (28.0, 30.0)

@@ -8,6 +8,8 @@ from typing import Final
 
 import numpy as np
 
+from cornersmooth.control.lexer import NUMBER, Lexer, fixed, number_of
+from cornersmooth.control.words import BSPLINE, BY_WORD, POLY, Columns, Line, Word, refused
 from cornersmooth.nc_reader.acts import (
     Acts,
     Beside,
@@ -20,9 +22,7 @@ from cornersmooth.nc_reader.acts import (
     wrong,
 )
 from cornersmooth.nc_reader.dialects.base import Dialect
-from cornersmooth.nc_reader.lexer import NUMBER, Lexer, fixed, number_of
 from cornersmooth.nc_reader.planes import TiltedPlane, room_of, rotated_frame
-from cornersmooth.nc_reader.words import BSPLINE, BY_WORD, POLY, Columns, Line, Word, refused
 
 #: names of words of several letters: vectors are I J K, second points U V W, as in `motion`
 _NAMES: Final = {

@@ -14,10 +14,10 @@ from typing import BinaryIO, Final, Protocol
 
 import numpy as np
 
+from cornersmooth.control.lexer import Lexer
+from cornersmooth.control.line_patterns import LinePatterns, Lines
+from cornersmooth.control.words import Line, Table
 from cornersmooth.errors import InputError
-from cornersmooth.nc_reader.lexer import Lexer
-from cornersmooth.nc_reader.line_patterns import LinePatterns, Lines
-from cornersmooth.nc_reader.words import Line, Table
 
 #: bytes read at a time
 CHUNK = 1 << 20

@@ -10,8 +10,8 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Final
 
+from cornersmooth.control.words import Columns, Line, Word
 from cornersmooth.errors import InputError
-from cornersmooth.nc_reader.words import Columns, Line, Word
 
 #: a number as controls write it
 NUMBER: Final = r"[-+]?(?:\d+\.?\d*|\.\d+)"

@@ -19,10 +19,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from cornersmooth.control.lexer import Lexer
+from cornersmooth.control.words import Word
 from cornersmooth.errors import InputError
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.nc_reader.lexer import Lexer
-from cornersmooth.nc_reader.words import Word
 from cornersmooth.text.parse import DIGITS, LAST_DIGITS, Bytes, Words, join_digits, words_of
 
 #: line ends that must stand before a chunk, so that words beyond its begin can be fetched
