@@ -142,17 +142,14 @@ class Settings:
         if self.method != AUTO and not self._allows(self.method):
             names = " and ".join(METHODS[self.method].prescribed)
             raise SettingsError("CS207", f"the method {self.method} has its own {names}", f"leave out {names}")
-        for name in BOUNDS:
-            value = getattr(self, name)
-            for number in value if isinstance(value, tuple) else (value,):
-                if not (number is None or isinstance(number, Real)) or isinstance(number, bool):
-                    raise SettingsError("CS202", f"{name} is {number!r}", "give a number")
-        object.__setattr__(self, "weights", tuple(round(float(w), WEIGHT_DECIMALS) for w in self.weights))
         for name, (low, high) in BOUNDS.items():
             value = getattr(self, name)
-            for number in value if isinstance(value, tuple) else (value,):
-                if number is not None and not (math.isfinite(number) and low <= number <= high):
+            for number in value if isinstance(value, tuple) else () if value is None else (value,):
+                if not isinstance(number, Real) or isinstance(number, bool):
+                    raise SettingsError("CS202", f"{name} is {number!r}", "give a number")
+                if not (math.isfinite(number) and low <= float(number) <= high):
                     raise SettingsError("CS202", f"{name} is {number:g}", f"give a value from {low:g} to {high:g}")
+        object.__setattr__(self, "weights", tuple(round(float(w), WEIGHT_DECIMALS) for w in self.weights))
         if self.axis_tolerance is not None:
             object.__setattr__(self, "axis_length", self._check_axis_tolerance(self.axis_tolerance))
         if self.tip_tolerance <= 0 or self.axis_point_tolerance <= 0:

@@ -66,21 +66,10 @@ class Command(click.Command):
                 ctx.fail(f"{wrong.option_name} is no option any more; {GONE[wrong.option_name]}")
             raise
 
-    def get_params(self, ctx: click.Context) -> list[click.Parameter]:
-        """Arguments and options, and what shows the help."""
-        every = click.Option(["--help-all"], is_flag=True, is_eager=True, expose_value=False, help="Show all options.")
-        every.callback = _show_all
-        return [*self.params, *([every] if self._many else []), *super().get_params(ctx)[len(self.params) :]]
-
-    @property
-    def _many(self) -> bool:
-        """Whether there are options that the short help leaves out."""
-        return sum(isinstance(param, _Option) for param in self.params) > _SHORT
-
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the options of each heading."""
         parts: dict[str, list[tuple[str, str]]] = {heading: [] for heading in HEADINGS}
-        few = self._many and not ctx.meta.get(_ALL)
+        few = _HELP_ALL in self.params and not ctx.meta.get(_ALL)
         for param in self.get_params(ctx):
             if isinstance(param, click.Option) and (record := param.get_help_record(ctx)) is not None:
                 heading = getattr(param, "heading", "Everyday" if few else "Output")
@@ -96,6 +85,12 @@ def _show_all(ctx: click.Context, param: click.Parameter, value: bool) -> None:
         ctx.meta[_ALL] = True
         click.echo(ctx.get_help())
         ctx.exit()
+
+
+#: of commands with more options than a short help has
+_HELP_ALL: Final = click.Option(
+    ["--help-all"], is_flag=True, is_eager=True, expose_value=False, help="Show all options.", callback=_show_all
+)
 
 
 class _Option(click.Option):
@@ -156,6 +151,9 @@ def new_command(
         for field in dict.fromkeys(names.split()):
             change = changes.get(field, {})
             params.append(_option(kind, field, {"help": change} if isinstance(change, str) else change))
+
+    if sum(isinstance(param, _Option) for param in params) > _SHORT:
+        params.append(_HELP_ALL)
 
     def called(**given: Any) -> int:
         run = getattr(import_module(f"cornersmooth.cli.{module or name}"), f"run_{name}")

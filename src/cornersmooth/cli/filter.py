@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, replace
-from typing import Any
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Self
 
 import click
 
@@ -45,9 +45,35 @@ ALIKE = ("grbl", "grblhal", "fluidnc", "mach", "mach3", "mach4")
 _SHOWN, _WRONG_SHOWN = 10, 20
 
 
+@dataclass(frozen=True)
+class OldProgram:
+    """A finished program, and how it is read and written."""
+
+    data: bytes
+    name: str
+    given: Options  #: with the control that it looks like
+    settings: Settings
+    form: Form
+
+    @classmethod
+    def of(cls, data: bytes, name: str, given: Options) -> Self:
+        """One with options as typed (SettingsError CS240: a control whose programs are not read as a filter)."""
+        given = options_for(data, name, given)
+        control = given.load_control()
+        if control.dialect not in FILTERED:
+            hint = f"use one of {', '.join(sorted(FILTERED))}"
+            raise SettingsError("CS240", f"programs for {control.name} are not read as a filter", hint)
+        return cls(data, name, given, given.settings(), given.choose_form())
+
+    @property
+    def paths(self) -> bool:
+        """Whether a page shows its runs."""
+        return any(files.suffix_of(path) == ".html" for path in self.given.reports)
+
+
 def run_filter(given: Options) -> int:
     """Do the work of the command; return its exit code."""
-    settings = given.settings()
+    given.settings()  # refuses wrong ones before any file is touched
     files.check_endings("report", given.reports, ".json or .html")
     jobs = files.find_inputs(given, PATTERNS)
     if given.as_json and (len(jobs) != 1 or jobs[0].target == files.STANDARD):
@@ -64,7 +90,7 @@ def run_filter(given: Options) -> int:
     worst, words = 0, Counter[str]()
     for job in jobs:
         try:
-            verdict = _filter(job, settings, given)
+            verdict = _filter(job, given)
             worst, words = max(worst, int(_bad(verdict, given))), words + Counter((verdict,))
         except CornersmoothError as error:
             if len(jobs) == 1:
@@ -82,24 +108,19 @@ def _bad(verdict: Verdict, given: Options) -> bool:
     return verdict is Verdict.FAILED or (given.strict and verdict is not Verdict.PASSED)
 
 
-def _pages(reports: Iterable[str]) -> bool:
-    return any(files.suffix_of(path) == ".html" for path in reports)
-
-
-def _filter(job: files.Input, settings: Settings, given: Options) -> Verdict:
+def _filter(job: files.Input, given: Options) -> Verdict:
     """Filter one program; return the verdict."""
-    data, name = files.read_input(job.source)
-    given = options_for(data, name, given)
-    form, axes = filter_form_of(given), given.load_limits()
-    with files.told_of(name):
+    old = OldProgram.of(*files.read_input(job.source), given)
+    given, axes = old.given, old.given.load_limits()
+    with files.told_of(old.name):
         found = filter_program(
-            data,
-            form,
-            settings,
+            old.data,
+            old.form,
+            old.settings,
             **how_read(given),
             verify=not given.no_verify,
             axes=axes,
-            paths=_pages(job.reports),
+            paths=old.paths,
             processes=useful_processes(),
         )
     bad = _bad(found.verdict, given)
@@ -110,16 +131,13 @@ def _filter(job: files.Input, settings: Settings, given: Options) -> Verdict:
     saving = None if found.seconds is None else Saving(*found.seconds, against="the program as it was")
     contents = _reported(
         "filter",
+        old,
         found,
-        _judgement(found, settings.tolerance),
-        (name, data),
+        _judgement(found, old.settings.tolerance),
+        NcFile.of(path, output.stream.digest, old.form),
         os.path.basename(job.target),
-        NcFile.of(path, output.stream.digest, form),
-        form,
-        settings,
         job.reports,
-        axes,
-        saving=saving,
+        saving,
         summary={
             "cuts": found.cuts,
             "smoothed": found.smoothed,
@@ -132,64 +150,56 @@ def _filter(job: files.Input, settings: Settings, given: Options) -> Verdict:
     if given.as_json:
         show.say_json(contents)
     elif not given.quiet:
-        _show(name, contents, found, given)
-    elif loosened(settings.tolerance):
-        show.print_line(f"{name}: {contents['verdict_text']}")
+        _show(old.name, contents, found, given)
+    elif loosened(old.settings.tolerance):
+        show.print_line(f"{old.name}: {contents['verdict_text']}")
     return found.verdict
 
 
-def verify_with_program(source: str, old: bytes, given: Options) -> int:
+def verify_with_program(data: bytes, name: str, given: Options) -> int:
     """Compare an NC program with what was made of it; return the exit code of ``verify``."""
-    new, name = files.read_input(given.text)
+    new, new_name = files.read_input(given.text)
     if is_cl_file(new[:HEAD]):
         order = command_text(["cornersmooth", "verify", given.text, given.source])
-        raise click.UsageError(f"{name} is a CL file, and the CL file comes first; write: {order}")
-    given = options_for(old, source, given)
-    settings, form = given.settings(), filter_form_of(given)
-    found = verify_programs(
-        old, new, form, settings, **how_read(given), paths=_pages(given.reports), processes=useful_processes()
-    )
-    checked = found.checked
-    assert checked is not None
-    what = _problems(checked.wrong) or _measured(found, settings.tolerance)
-    judgement = Judgement(found.verdict, _to_check(found), 0, "", what)
+        raise click.UsageError(f"{new_name} is a CL file, and the CL file comes first; write: {order}")
+    old = OldProgram.of(data, name, given)
+    how = {**how_read(old.given), "paths": old.paths, "processes": useful_processes()}
+    found = verify_programs(data, new, old.form, old.settings, **how)
+    assert found.checked is not None
+    wrong, tolerance = found.checked.wrong, old.settings.tolerance
+    judgement = Judgement(found.verdict, _to_check(found), 0, "", _problems(wrong) or _measured(found, tolerance))
     path = None if given.text == files.STANDARD else given.text
-    written = replace(NcFile.of(path, sha256_of(new), form), form=None)
-    contents = _reported("verify", found, judgement, (source, old), name, written, form, settings, given.reports)
-    show_wrong(name, checked.wrong)
+    program = replace(NcFile.of(path, sha256_of(new), old.form), form=None)
+    contents = _reported("verify", old, found, judgement, program, new_name, given.reports)
+    show_wrong(new_name, wrong)
     if given.as_json:
         show.say_json(contents)
-    elif loosened(settings.tolerance) or not given.quiet:
+    elif loosened(tolerance) or not given.quiet:
         show.say_line(contents["verdict_text"])
     return int(found.verdict is not Verdict.PASSED)
 
 
 def _reported(
     kind: Kind,
+    old: OldProgram,
     found: Filtered,
     judgement: Judgement,
-    source: tuple[str, bytes],
-    name: str,
     program: NcFile,
-    form: Form,
-    settings: Settings,
+    name: str,
     reports: Iterable[str],
-    axes: Machine | None = None,
     saving: Saving | None = None,
     **more: Any,
 ) -> dict[str, Any]:
-    """Make the report of two programs, write it where it is wanted, and the page of the runs before and after."""
-    from cornersmooth.page import verified_page
-
-    old_name, old = source
+    """Make the report of two programs, the new one of a name; write it to paths, or a page of their runs."""
+    axes, form, motions = old.given.load_limits(), old.form, found.motions
     contents = record(
         kind,
         judgement,
-        source={"name": old_name, "sha256": sha256_of(old), "format": "nc"},
+        source={"name": old.name, "sha256": sha256_of(old.data), "format": "nc"},
         program=program,
-        settings=settings.as_dict(),
+        settings=old.settings.as_dict(),
         command=command_line(),
-        loosened=loosened(settings.tolerance),
+        loosened=loosened(old.settings.tolerance),
         times=planned_times(saving, axes),
     )
     checked = found.checked
@@ -200,16 +210,17 @@ def _reported(
         "problems": [{"code": one.code, "nc_line": one.nc_line, "text": one.text} for one in checked.wrong],
     }
     contents |= more
-    motions = found.motions
 
     def page() -> str:
+        from cornersmooth.page import verified_page
+
         assert motions is not None
         return verified_page(
-            *measure(*motions, settings, os.path.basename(old_name)),
+            *measure(*motions, old.settings, os.path.basename(old.name)),
             name=name,
             control=form.table.name,
             form=form.name,
-            source=old,
+            source=old.data,
             machine=axes or form.machine,
             planner=form.table.lines.planner,
             judgement=judgement,
@@ -219,11 +230,11 @@ def _reported(
             saving=saving,
         )
 
-    written = [path for path in reports if motions is not None or files.suffix_of(path) != ".html"]
     for path in reports:
-        if path not in written:
+        if motions is None and files.suffix_of(path) == ".html":
             show.warn("no page is written: no run differs", path)
-    files.write_reports(dict.fromkeys(written, True), contents, page=page)
+        else:
+            files.write_reports({path: True}, contents, page=page)
     return contents
 
 
@@ -307,18 +318,6 @@ def options_for(data: bytes, name: str, given: Options) -> Options:
     return replace(head.given, machine=THREE_AXES) if alone else head.given
 
 
-def filter_form_of(given: Options) -> Form:
-    """Form of the control that blocks are read and written in.
-
-    Raises SettingsError CS240: a control whose programs are not read as a filter.
-    """
-    control = given.load_control()
-    if control.dialect not in FILTERED:
-        known = ", ".join(sorted(FILTERED))
-        raise SettingsError("CS240", f"programs for {control.name} are not read as a filter", f"use one of {known}")
-    return given.choose_form()
-
-
 def how_read(given: Options) -> dict[str, Any]:
     """What is to be known of a program that it does not say."""
     return {"tip_from_start": given.tip_control, "inch": given.units == "inch"}
@@ -334,8 +333,8 @@ def axes_of(given: Options) -> Machine:
 
 def time_of_program(data: bytes, name: str, given: Options) -> int:
     """Say the time of a program as it is and smoothed, or beside another one; return the exit code of ``time``."""
-    given = options_for(data, name, given)
-    form, settings, axes = filter_form_of(given), given.settings(), axes_of(given)
+    old = OldProgram.of(data, name, given)
+    given, form, settings, axes = old.given, old.form, old.settings, axes_of(old.given)
     how = {**how_read(given), "axes": axes, "processes": useful_processes()}
     with files.told_of(name):
         if given.text:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import io
+import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
@@ -140,23 +141,18 @@ def _made_of(job: Job, source: bytes) -> str:
     wanted = (given.no_verify, given.strict, given.feed, job.plan_feeds)
     digest = hashlib.sha256(source).hexdigest()
     parts = (__version__, digest, given.reading(), job.settings, job.form, job.frame, job.axes, *wanted)
-    return hashlib.sha256(_plain(parts).encode("utf-8", "surrogateescape")).hexdigest()
+    return hashlib.sha256(json.dumps(parts, default=_plain, sort_keys=True).encode()).hexdigest()
 
 
-def _plain(value: object) -> str:
-    """Text that tells a value from others and does not depend on the order of sets or the place in memory."""
-    if is_dataclass(value) and not isinstance(value, type):
-        parts = [f"{item.name}={_plain(getattr(value, item.name))}" for item in fields(value)]
-        return f"{type(value).__name__}({', '.join(parts)})"
+def _plain(value: object) -> object:
+    """What JSON has words for, of a record, a mapping, a set or an array; it does not depend on any order or place."""
+    if is_dataclass(value):
+        return {item.name: getattr(value, item.name) for item in fields(value)}
     if isinstance(value, Mapping):
-        return f"{{{', '.join(sorted(f'{_plain(key)}: {_plain(item)}' for key, item in value.items()))}}}"
+        return dict(value)
     if isinstance(value, (set, frozenset)):
-        return f"{{{', '.join(sorted(map(_plain, value)))}}}"
-    if isinstance(value, (list, tuple)):
-        return f"({', '.join(map(_plain, value))})"
-    if hasattr(value, "tolist"):
-        return _plain(value.tolist())
-    return repr(value)
+        return sorted(map(str, value))
+    return value.tolist() if hasattr(value, "tolist") else repr(value)
 
 
 def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> None:

@@ -32,7 +32,7 @@ _OWN_TABLES = {"controls": ("control",), "machines": ("machine", "limits")}
 
 #: options that belong to one run
 ONE_RUN = frozenset(
-    "output directory force reports csv summary as_json law no_verify operation help table pose".split()
+    "output directory force reports csv summary as_json law no_verify operation help_all table pose".split()
 )
 
 #: commands with a verdict, whose line says what settings loosen

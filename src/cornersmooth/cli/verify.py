@@ -47,7 +47,7 @@ def run_verify(given: Options) -> int:
     if is_program:
         from cornersmooth.cli.filter import verify_with_program
 
-        return verify_with_program(name, data, given)
+        return verify_with_program(data, name, given)
     nc: bytes | str | os.PathLike[str] = files.read_input(text)[0] if text == files.STANDARD else text
     head = take_head(given, nc, data)
     given = head.given
