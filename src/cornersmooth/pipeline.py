@@ -32,7 +32,7 @@ from cornersmooth.report.verdict import Judgement, Saving, judge, trusted_blocks
 from cornersmooth.settings import Settings
 from cornersmooth.system.output import FAILED, Output, Target, check_output, open_output, path_of
 from cornersmooth.system.processes import return_free_memory
-from cornersmooth.verify import Verification, Verifier, useful_processes
+from cornersmooth.verify import Trust, Verification, Verifier, useful_processes
 
 if TYPE_CHECKING:
     from cornersmooth.feedrate import Limits
@@ -248,17 +248,22 @@ def postprocess(
     ):
         verifier = None
         if not unverified:
+            trust = Trust(
+                trusted=(*back.pop("trusted"), *_users_blocks(frame, form, program, smoothed.settings)),
+                accepted=back.pop("accepted"),
+                weights=provenance.weights,
+                slower=provenance.planned_feeds,
+                skip_cycles=frame.skip_cycles,
+            )
             verifier = Verifier(
                 program,
                 output.path,
                 tolerance=smoothed.settings.tolerance,
                 axis_length=smoothed.settings.axis_length,
                 axis_tolerance=smoothed.settings.axis_tolerance,
-                weights=provenance.weights,
-                slower=provenance.planned_feeds,
-                skip_cycles=frame.skip_cycles,
+                trust=trust,
                 processes=processes,
-                **back | {"trusted": (*back["trusted"], *_users_blocks(frame, form, program, smoothed.settings))},
+                **back,
             )
             stack.enter_context(verifier)
         with timed(seconds, "write"):

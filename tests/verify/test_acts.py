@@ -9,6 +9,7 @@ from functools import cache
 import pytest
 
 from cornersmooth.cl import read
+from cornersmooth.errors import Verdict
 from cornersmooth.model import Program
 from cornersmooth.nc import Frame, choose_form
 from cornersmooth.pipeline import postprocess
@@ -107,6 +108,22 @@ def test_nothing_but_a_dwell_and_a_tap_is_said_in_a_hole() -> None:
     for word in ("M1", "M8", "S2000", "M4"):
         assert found(HOLES, (*lines[: first + 1], word, *lines[first + 1 :])).problems, word
     assert found(HOLES, (*lines[: first + 1], "M3", *lines[first + 1 :])).passed  # it turns already
+
+
+def test_holes_above_one_another_are_not_verified_where_they_are_not_done_as_their_cycles_say() -> None:
+    """Which of them a move belongs to, nobody can tell; a hole beside others is wrong at its line."""
+    lines = right(HOLES)
+    for number, depth in ((0, "Z-10."), (1, "Z-20.")):
+        at = next(k for k, line in enumerate(lines) if line.startswith("G1") and depth in line)
+        deeper = (*lines[:at], lines[at].replace(depth, depth[:-1] + ".5"), *lines[at + 1 :])
+        judged = found(HOLES, deeper)
+        assert (judged.verdict, judged.problems) == (Verdict.NOT_VERIFIED, ()), number
+        assert judged.unverified.startswith("holes above one another in one line at NC line")
+    beside = HOLES.replace("GOTO/0,0,-10", "GOTO/5,0,-10").replace("GOTO/0,0,80", "GOTO/5,0,80")
+    lines = right(beside)
+    at = next(k for k, line in enumerate(lines) if "Z-20." in line)
+    deeper = (*lines[:at], lines[at].replace("Z-20.", "Z-20.5"), *lines[at + 1 :])
+    assert [(one.code, one.nc_line) for one in found(beside, deeper).problems] == [("CS562", at + 1)]
 
 
 def test_what_does_not_change_anything_may_be_said() -> None:

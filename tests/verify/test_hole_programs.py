@@ -76,6 +76,10 @@ REFUSED_ONCE = {
     1503386: "a bore that is left to where a rapid leads, and holes above each other behind it",
     1503417: "taps left out, and a rapid along the tool before a retract",
     1510120: "a feed move to where a hole has been left, with words before it, and nothing behind it",
+    1600308: "taps left out, and bores above each other with coolant between them",
+    1600475: "ten holes at one place, by another digit",
+    1520289: "holes of two tools in one line",
+    1520304: "holes above each other that are not drilled",
     1005030: "the CL file's own rapid into a hole that is drilled behind it",
 }
 

@@ -2,5 +2,4 @@
 
 Verification's own, as `nc_reader` is: shares no code with what writes. `asked` and `cycles` interpret the CL file,
 `tokens` the words of a program; both give tokens, and `comparison` compares them.
-`tool_changes` divides both alike.
 """

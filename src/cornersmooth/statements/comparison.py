@@ -7,7 +7,6 @@ the same between two motions: one is left over without harm where it is optional
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set
-from copy import deepcopy
 from dataclasses import dataclass, field
 from itertools import zip_longest
 from typing import Final
@@ -82,12 +81,8 @@ class _Side:
     unsure: set[str] = field(default_factory=set)
     read: int = 0
     line: int = 0  #: of the last word that has been read
-    #: what of spindle and coolant is on since the last motion, by kind: the word that started it, and its tool
-    starting: dict[str, tuple[Token, Key]] = field(default_factory=dict)
-    #: what has been started, and was something else before anything moved
-    idle: list[tuple[Token, Key]] = field(default_factory=list)
-    #: what is on with each tool since the last motion, where it is written, or goes on behind a tool change
-    running: set[Key] = field(default_factory=set)
+    #: spindle and coolant that are on with a tool since the last motion, and the words that do it
+    running: dict[Key, Token] = field(default_factory=dict)
 
     def value(self, kind: str) -> float | str | None:
         """What holds of a state; None for nothing."""
@@ -110,25 +105,15 @@ class _Side:
                 self.held |= {kind: Token(kind, "OFF", token.place, 0) for kind in _STOPPED}
             elif token.kind == "tool":
                 self.unsure.update(_STOPPED)
-            for kind in _STOPPED if token.kind == "tool" else {token.kind} & {*_STOPPED} if changes else ():
-                self._starts(kind)
-            self.running |= {self._key(kind) for kind in _STOPPED if token.kind in (kind, "tool")}
+            for kind in _STOPPED:
+                on = self.value(kind) not in ENDINGS and (changes or not self.stops)
+                if on and token.kind in (kind, "tool"):
+                    self.running[self.key(kind)] = self.held[kind]
         return done
 
-    def _key(self, kind: str) -> Key:
+    def key(self, kind: str) -> Key:
+        """What holds of a state, and with which tool."""
         return kind, self.value(kind), self.value("tool")
-
-    def _starts(self, kind: str) -> None:
-        """Something starts or ends: what has been started before it is idle."""
-        self.idle += [self.starting.pop(kind)] if kind in self.starting else []
-        if self.value(kind) not in ENDINGS:
-            self.starting[kind] = self.held[kind], self._key(kind)
-
-    def idle_starts(self, *, moves: bool) -> list[tuple[Token, Key]]:
-        """What has been started for no motion, now that one comes, or the end."""
-        found = self.idle + ([] if moves else [*self.starting.values()])
-        self.idle, self.starting = [], {}
-        return found
 
 
 class Comparison:
@@ -160,9 +145,10 @@ class Comparison:
         for kind in _ACTIONS:
             self._same(*([one for one in some if one[0].kind == kind] for some in (requested, done)))
         self._moved = True
-        for token, key in self.nc.idle_starts(moves=moves):
-            if key not in self.cl.running:
+        for key, token in self.nc.running.items():  # what is on for no motion is on in the CL file, too
+            if key not in self.cl.running and not (moves and key == self.nc.key(token.kind)):
                 self._say(None, token)
+        self.nc.running.clear()
         self.cl.running.clear()
         for kind in _STATES:
             if kind == "speed" and not {self.cl.value("spindle"), self.nc.value("spindle")}.isdisjoint(ENDINGS):
@@ -174,13 +160,6 @@ class Comparison:
                 self._agreed[kind] = self.nc.held[kind]
             elif wanted != value and (moves or (kind in _ENDED and wanted == "OFF")):
                 self._other(kind)
-
-    def agrees(self, move: int, element: int) -> bool:
-        """Whether both are right before a motion, which is not met by that."""
-        kept = {id(side.tokens): side.tokens for side in (self.cl, self.nc)}
-        trial = deepcopy(self, dict[int, object](kept))
-        trial.meet(move, element)
-        return len(trial.problems) == len(self.problems)
 
     def in_hole(self, line: int, tokens: Iterable[Token], dwell: float, *, tap: bool) -> None:
         """Within a hole, which CL `line` asks for, the program says its dwell and its tap, and changes nothing else."""

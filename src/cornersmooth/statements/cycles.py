@@ -51,6 +51,11 @@ class Drilling:
     breaks_chips: bool = False  #: whether they stay in the hole
 
     @property
+    def says(self) -> bool:
+        """Whether words are written in the hole: a dwell or a tap."""
+        return bool(self.dwell or self.tap)
+
+    @property
     def level(self) -> float:
         """Height above the pose, mm, below which no rapid leads from hole to hole."""
         known = [height for height in (self.retract, self.clearance) if not math.isnan(height)]

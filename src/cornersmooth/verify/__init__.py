@@ -17,7 +17,7 @@ both as polylines   `cl_motion`, `motions`; how far they leave their chords, pro
 run beside another  `passage`: by a `chain` of nearest places, where that fails exactly (`free_space`)
 stretch by stretch  `parse`: which elements do the acts; `batches` cuts long stretches; `decision`, `match`: its places
 retracts            `along_tool`: rapids beside them that posts add, and cuts that are left for them
-holes               `holes`; poses that are named by their digits: `motions`; tool changes: package `statements`
+holes               `holes`; poses that are named by their digits: `motions`; tool changes: `parse`
 what parts          `deviation`: the lines and the distances; poses that must be exact
 feeds               `feeds`; where a vertex may also be: `match`
 words               package `nc_words`; what the CL file asks for: `statements`, and where: `word_places`
@@ -31,9 +31,11 @@ A *stretch* is the run of feed moves between two stops. The *bend* of a step is 
 from cornersmooth.system.processes import useful_processes
 from cornersmooth.verify.findings import Where
 from cornersmooth.verify.result import Verification
+from cornersmooth.verify.task import Trust
 from cornersmooth.verify.verifier import Verifier, verify
 
 __all__ = [
+    "Trust",
     "Verification",
     "Verifier",
     "Where",

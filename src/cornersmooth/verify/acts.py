@@ -11,7 +11,7 @@ import numpy as np
 from cornersmooth.model import Ints, Move
 from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.nc_reader.tool import beyond_digits
-from cornersmooth.statements.asked import NOTHING
+from cornersmooth.statements.asked import NOTHING, Asking
 from cornersmooth.statements.cycles import Drilling, drillings
 from cornersmooth.verify.cl_motion import Original
 from cornersmooth.verify.holes import HoleLines
@@ -33,7 +33,7 @@ class Hole(NamedTuple):
     move: int
     first: int  #: the first element that belongs to it
     leaves: int  #: the element with which the tool leaves it
-    cycle: Drilling
+    cycle: Drilling | None  #: None where it cannot be told from others in its line
 
 
 @dataclass
@@ -50,10 +50,9 @@ class Acts:
     #: CS561 for holes that the program leaves out and may leave out if requested
     left_out: list[Problem] = field(default_factory=list)
     moves_left_out: set[int] = field(default_factory=set)
-    #: holes that an element may be the way up from, by the element: it also ends at the rapid behind them
-    ways_up: dict[int, range] = field(default_factory=dict)
     rewinds: list[tuple[int, int]] = field(default_factory=list)  #: NC lines where cuts are left, and where they go on
     still: set[int] = field(default_factory=set)  #: elements that lead nowhere, as a rapid is put elsewhere
+    unlooked: list[tuple[int, str]] = field(default_factory=list)  #: what cannot be decided, and its NC line
     #: CS531 a rapid goes elsewhere, CS532 one is missing, CS533 one too many; CS536 a feed move too many; of holes
     problems: list[Problem] = field(default_factory=list)
 
@@ -69,6 +68,7 @@ class Stops:
     fed: list[bool]  #: whether feed moves follow each
     cycles: dict[int, Drilling]  #: by the moves of the holes
     stated: list[int]  #: moves that statements which ask for something are before, ascending
+    loads: list[int]  #: poses that tool changes are in front of, ascending
 
     @classmethod
     def of(cls, original: Original, lines: HoleLines) -> Self:
@@ -85,6 +85,11 @@ class Stops:
         cycles = drillings(original.program, original.pose[hole].tolist())
         asks = [one.pose for one in original.program.statements if one.word == "GOHOME" or one.word not in NOTHING]
         stated = np.searchsorted(original.pose, asks)
+        asking = Asking(original.program)
+        for statement in original.program.statements:
+            asking.take(statement, statement.pose)
+        tools = [token for token in asking.tokens if token.kind == "tool"]
+        changes = [one.place for k, one in enumerate(tools) if not k or one.value != tools[k - 1].value]
         return cls(
             moves,
             [*moves.tolist(), len(chosen)],
@@ -93,4 +98,5 @@ class Stops:
             np.logical_or.reduceat(fed, moves).tolist(),
             dict(zip(np.flatnonzero(hole).tolist(), cycles, strict=True)),
             np.unique(stated).tolist(),
+            changes,
         )

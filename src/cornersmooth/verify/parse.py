@@ -11,6 +11,7 @@ decides what is named, and never whether a program passes.
 from __future__ import annotations
 
 import math
+from array import array
 from bisect import bisect_left, bisect_right
 from collections.abc import Generator, Iterator, Sequence
 from typing import Final, NamedTuple
@@ -20,7 +21,6 @@ import numpy as np
 from cornersmooth.model import Move
 from cornersmooth.nc_reader.elements import Ahead, Event, Problem
 from cornersmooth.nc_reader.tool import directions, moving_rapids
-from cornersmooth.statements.tool_changes import ToolChanges
 from cornersmooth.verify.acts import Acts, Hole, Step, Stops
 from cornersmooth.verify.along_tool import AlongTool
 from cornersmooth.verify.feeds import feed_at, out_of_hole
@@ -52,11 +52,15 @@ class Parse:
 
     def __init__(self, task: Task, ahead: Ahead, events: Sequence[Event], along: AlongTool, acts: Acts) -> None:
         self._task, self._ahead, self._events, self._along, self.acts = task, ahead, events, along, acts
-        self._changes = ToolChanges(task.original.program, events)
+        self._changes, self._words, self._tools = (
+            array("q"),
+            0,
+            (-1.0, -1.0),
+        )  # elements behind tool changes; words so far
         self.lines = HoleLines(task.original, ahead, task.axis_length, task.tolerance)
         stops = Stops.of(task.original, self.lines)
         self.moves, self._move, self._hole, self._holes = stops.moves, stops.move, stops.hole, stops.holes
-        self._fed, self._cycles, self._stated = stops.fed, stops.cycles, stops.stated
+        self._fed, self._cycles, self._stated, self._loads = stops.fed, stops.cycles, stops.stated, stops.loads
         self._steps: list[Step] = []
         self._given = 0  #: elements given out so far
         self._begun = -1  #: the element with which the run begins that goes on; -1 within a hole and in front of all
@@ -173,7 +177,10 @@ class Parse:
             idle = lines.stands(element) or (rapid and stop >= 0 and lines.negligible(element))
             if idle and not (rapid and stop >= 0 and self._comes_down_first(stop, element)):
                 element += 1
-            elif self._hole[following] and (self._over(following, element) or self._may_pass_over(following, element)):
+            elif self._hole[following] and (
+                self._over(following, element)
+                or (self._may_be_left_out(following) and self._begins(following, element))
+            ):
                 break
             elif along.stays(element):
                 lines.forget()
@@ -194,34 +201,23 @@ class Parse:
 
     def _drill(self, stop: int, element: int) -> tuple[int, int]:
         """Take a hole: it ends where it is done as its cycle says, and where what follows can begin."""
-        ahead, lines, move = self._ahead, self.lines, self._move[stop]
-        cycle, end, surplus = self._cycles[move], element, list[int]()
-        while ahead.has(end):
-            if not (self._over(stop, end) or (end > element and lines.stands(end))):
-                goes_on = end > element and self._over(stop, end + 1) and self._begins(stop, end) is None
-                if not goes_on or lines.reach(self.moves[stop + 1 :][:_AFTER_FAULT], end).any():
-                    break
-                surplus.append(end)
+        lines, move, end = self.lines, self._move[stop], element
+        cycle, lowest = self._cycles[move], math.inf  # of the feed moves
+        while self._over(stop, end) or (end > element and self._ahead.has(end) and lines.stands(end)):
             end += 1
-        best, late = end, self._hole[stop + 1] and not self._fed[stop]
-        found: tuple[bool, int, bool] | None = None
-        lowest = math.inf  # of the feed moves
+        late = -1 if self._hole[stop + 1] and not self._fed[stop] else 1
+        ends = [(True, True, end, end)]
         for one in range(element, end + 1):
             if one > element and lines.feeds(one - 1):
                 lowest = min(lowest, lines.height(move, one - 1))
             done = lowest <= lines.room - cycle.depth or (math.isinf(lowest) and self._may_be_left_out(stop))
-            following = self._begins(stop, one) if done or one == end else None
-            if following is None and one < end:
-                continue
-            problems, left = lines.check(move, range(element, self._end_of(stop, element, one)), cycle)
-            lacks = len(self.moves) if following is None else following
-            rank = left, lacks, one == element or not self._has_words(one)
-            if not problems and (found is None or rank < found or (late and rank == found)):
-                best, found = one, rank
-        for one in surplus:
-            if one < best:
-                self._surplus(stop + 1, one)
-        return self._leave(stop, element, best)
+            if (done or one == end) and self._begins(stop, one):
+                found, left = lines.check(move, range(element, self._end_of(stop, element, one)), cycle)
+                ends.append((bool(found), left, late * one, one))
+        wrong, *_, best = min(ends)
+        if not wrong or (doubt := self._doubt(stop, element)) is None:
+            return self._leave(stop, element, best)
+        return doubt
 
     def _end_of(self, stop: int, element: int, end: int) -> int:
         """First element that does not belong to a hole: the way up is the hole's, wherever else it leads."""
@@ -231,28 +227,23 @@ class Parse:
             return end + int(lines.height(move, end) > before)
         return end
 
-    def _begins(self, stop: int, element: int) -> int | None:
-        """How many holes are left out if what follows a stop begins with an element; None if nothing does."""
+    def _begins(self, stop: int, element: int) -> bool:
+        """Whether what follows a stop can begin with an element."""
         lines, following, has = self.lines, stop + 1, self._ahead.has(element)
         inside = self._hole[stop] and lines.height(self._move[stop], element - 1) < -lines.room
         at_feed = inside and self._cycles[self._move[stop]].feed_out  # the way out is the hole's
-        if self._fed[stop] and has and lines.feeds(element) and not at_feed:
-            return 0 if self._feeds_on(stop, element) else 2
+        if self._fed[stop] and not at_feed and self._feeds_on(stop, element):
+            return True
         if self._fed[stop] and not self._done(stop, element):
-            return None
-        lacks = int(self._fed[stop])  # feed moves that lead nowhere
+            return False
         if following == len(self.moves):
-            return None if has else lacks
+            return not has
         if self._hole[following]:
             below = lines.height(self._move[following], element - 1) < -lines.room  # from there no hole is fed
-            if not inside and self._over(following, element) and not (below and lines.feeds(element)):
-                return lacks
-            behind = self._begins(following, element) if self._may_be_left_out(following) else None
-            return None if behind is None else behind + 1 + lacks
-        if self._reaches(following, element):
-            return lacks
-        shared = self._begins(following, element) if element and lines.at(self._move[following], element - 1) else None
-        return None if shared is None else shared + lines.feeds(element - 1)  # a rapid is rather written as one
+            over = not inside and self._over(following, element) and not (below and lines.feeds(element))
+            return over or (self._may_be_left_out(following) and self._begins(following, element))
+        there = element > 0 and lines.at(self._move[following], element - 1)
+        return self._reaches(following, element) or (there and self._begins(following, element))
 
     def _feeds_on(self, stop: int, element: int) -> bool:
         """Whether feed moves from an element on may lead to the last pose before the next stop."""
@@ -262,12 +253,46 @@ class Parse:
                 return self._ahead.has(one) and self.lines.feeds(one)
         return True
 
+    def _doubt(self, stop: int, element: int) -> tuple[int, int] | None:
+        """Of holes above one another in one line nobody can tell which a move belongs to: NOT VERIFIED, not wrong."""
+        lines, move, acts, first, last = self.lines, self._move, self.acts, stop, stop
+        while self._hole[last + 1] and self._are_alike(last, last + 1):
+            last += 1
+        while first > 0 and self._hole[first - 1] and self._are_alike(first - 1, first):
+            first -= 1
+        alike = range(first, last + 1)
+        if len(alike) == 1 or not self._over(stop, element):
+            return None
+        acts.unlooked.append((lines.nc_line(element), "holes above one another in one line"))
+        self._begin_hole(move[stop], element)
+        begin, end = element, element
+        while acts.holes and acts.holes[-1].move >= move[first]:  # those before are in doubt, too
+            begin = acts.holes.pop().first
+            del acts.begins[-2:]
+        while self._ahead.has(end) and not self._reaches(last + 1, end):
+            if not (lines.stands(end) or any(self._over(one, near) for one in alike for near in (end, end + 1))):
+                break
+            end += 1
+        acts.holes.append(Hole(move[first], begin, end, None))
+        acts.begins.extend((move[first], begin))
+        return self._go_out(last, element, end)
+
+    def _are_alike(self, one: int, other: int) -> bool:
+        """Whether two holes are in one line, for the same tool."""
+        moves = self._move[one], self._move[other]
+        loads = {bisect_right(self._loads, self._task.original.pose[move]) for move in moves}
+        return len(loads) == 1 and self.lines.in_line(*moves)
+
+    def _begin_hole(self, move: int, element: int) -> None:
+        """End the run of feed moves that leads to a hole."""
+        if self._begun >= 0:
+            self._steps.append(Step(move, element, False, -1))
+        self._end_run(move, element)
+
     def _leave(self, stop: int, begin: int, end: int) -> tuple[int, int]:
         """Take down a hole that some elements belong to."""
-        lines, move, following = self.lines, self._move[stop], stop + 1
-        if self._begun >= 0:
-            self._steps.append(Step(move, begin, False, -1))
-        self._end_run(move, begin)
+        lines, move = self.lines, self._move[stop]
+        self._begin_hole(move, begin)
         behind = self._end_of(stop, begin, end)
         found, left = lines.check(move, range(begin, behind), self._cycles[move])
         if self._along.next_retract(begin) != begin and (slant := lines.slant(move, begin)):
@@ -275,7 +300,11 @@ class Parse:
             found.append(lines.problem("CS563", move, begin, text, slant))
         self.acts.problems += found
         self._drilled(stop, begin, behind, left=left)
-        ahead = self._ahead
+        return self._go_out(stop, begin, end)
+
+    def _go_out(self, stop: int, begin: int, end: int) -> tuple[int, int]:
+        """Begin the run of feed moves that leads out of a hole, or take the rapid that its way up is."""
+        ahead, lines, move, following = self._ahead, self.lines, self._move[stop], stop + 1
         while self._fed[stop] and ahead.has(end) and lines.feeds(end) and lines.stands(end):
             end += 1
         if self._fed[stop] and ahead.has(end) and lines.feeds(end):
@@ -294,14 +323,12 @@ class Parse:
             self.acts.problems.append(lines.problem("CS535", move + 1, end - 1, text))
         if following < len(self.moves) and not self._hole[following]:
             if self._reaches(following, end):
-                self._open(following, end)
-                self._note_way_up(following, begin, end)
+                self._open(following, end, up=self._is_way_up(following, begin, end))
                 return following, end + 1
             there = lines.at(self._move[following], end - 1) and self._has_tool(self._move[following], end - 1)
             if there and not lines.fed_above(move, end - 1, self._cycles[move]):
                 reached = next(one for one in range(end - 1, -1, -1) if not lines.stands(one))
-                self._open(following, reached)
-                self._note_way_up(following, begin, reached)
+                self._open(following, reached, up=self._is_way_up(following, begin, reached))
                 return following, end
         return stop, end
 
@@ -369,12 +396,18 @@ class Parse:
         return has and self.lines.over(self._move[stop], element)
 
     def _has_tool(self, move: int, element: int) -> bool:
-        """Whether no tool change parts an element from a move."""
-        first, behind = self._changes.elements_of(int(self._task.original.pose[move]))
-        return first <= element < behind
+        """Whether as many tool changes are in front of an element as in front of a move."""
+        chosen, tool = self._tools
+        for event in self._events[self._words :]:
+            chosen = event.value if event.letter == "T" else chosen
+            if (event.letter, event.value) == ("M", 6.0) and chosen != tool:
+                tool = chosen
+                self._changes.append(event.element)
+        self._words, self._tools = len(self._events), (chosen, tool)
+        return bisect_right(self._loads, self._task.original.pose[move]) == bisect_right(self._changes, element)
 
     def _has_words(self, element: int) -> bool:
-        """Whether words stand in front of an element that do not belong into a hole."""
+        """Whether words are in front of an element that do not belong into a hole."""
         first, stop = (side(self._events, element, key=lambda one: one.element) for side in (bisect_left, bisect_right))
         return any((one.letter, one.value) not in _IN_HOLES for one in self._events[first:stop])
 
@@ -382,22 +415,18 @@ class Parse:
         cycle = self._cycles[self._move[stop]]
         return cycle.tap or not cycle.depth > self.lines.room
 
-    def _may_pass_over(self, stop: int, element: int) -> bool:
-        """Whether a hole is left out in front of an element with which what follows begins."""
-        return self._may_be_left_out(stop) and self._begins(stop, element) is not None
-
     def _done(self, stop: int, element: int) -> bool:
         """Whether no move between a hole and the next stop leads away from where the tool is before an element."""
         return all(self.lines.at(move, element - 1) for move in range(self._move[stop] + 1, self._move[stop + 1]))
 
-    def _open(self, stop: int, element: int) -> None:
-        """Take down the begin of a run: a rapid, or the way out of a hole."""
+    def _open(self, stop: int, element: int, *, up: bool = False) -> None:
+        """Take down the begin of a run: a rapid, which may be the way `up` from a hole, or the way out of one."""
         last, move = self._move[stop + 1] - 1, self._move[stop]
         first = move
         if self._hole[stop]:  # the first move that leads anywhere from where the hole is left
             leads = (one for one in range(move + 1, last) if not self.lines.at(one, element - 1))
             first = next(leads, last)
-        if self._hole[stop] or not self._is_way_out(element):
+        if not up:
             self.acts.begins.extend((first, element))
         self._end_run(move, element)
         self._steps.append(Step(move, element, True, last))
@@ -409,30 +438,21 @@ class Parse:
         self.acts.runs.extend((*self._from, move, element) if self._from else ())
         self._from, self._begun = (), -1
 
-    def _note_way_up(self, stop: int, begin: int, element: int) -> None:
-        """Take down from which holes the element that reaches a rapid may be the way up, behind one that has begun.
+    def _is_way_up(self, stop: int, begin: int, element: int) -> bool:
+        """Whether the element that reaches a rapid is the way up from the hole before it: then the rapid leads nowhere.
 
-        It is the first that goes up, and no higher than the cycle does, or than where the tool came from.
+        It is the first that goes up, no higher than the cycle does, or than where the tool came from; no words are in
+        front of it.
         """
-        lines, first, nc = self.lines, stop, self._ahead.nc
-        came_from = nc.tip[max(begin - 1 - self._ahead.base, 0)]
-        goes_up = element == begin or lines.feeds(element - 1)
-        while goes_up and first and self._hole[first - 1] and self._over(first - 1, element):
-            move = self._move[first - 1]
-            highest = max(self._cycles[move].level, float((came_from - lines.tip[move]) @ lines.axis[move]))
-            left = first == stop or (move in self.acts.moves_left_out and element == begin)
-            if not left or lines.height(move, element) > highest + lines.tolerance:
-                break
-            first -= 1
-        if first < stop:
-            self.acts.ways_up[element] = range(self._move[first], self._move[stop])
-
-    def _is_way_out(self, element: int) -> bool:
-        """Whether an element belongs to the block with which the tool leaves the last hole."""
-        if not self.acts.holes:
+        lines, nc, first = self.lines, self._ahead.nc, stop - 1
+        holes = self.acts.holes
+        if holes and (element <= holes[-1].leaves or lines.block(element).start <= holes[-1].leaves):
+            return True
+        if self._has_words(element) or not (element == begin or lines.feeds(element - 1)):
             return False
-        leaves, lines = self.acts.holes[-1].leaves, self.lines
-        return element <= leaves or (leaves >= self._ahead.base and lines.nc_line(element) == lines.nc_line(leaves))
+        move, came_from = self._move[first], nc.tip[max(begin - 1 - self._ahead.base, 0)]
+        highest = max(self._cycles[move].level, float((came_from - lines.tip[move]) @ lines.axis[move]))
+        return self._over(first, element) and lines.height(move, element) <= highest + lines.tolerance
 
     def _drilled(self, stop: int, begin: int, end: int, *, left: bool) -> None:
         """Take down a hole."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence, Set
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
@@ -19,6 +20,30 @@ ARITHMETIC: Final = 1e-9
 
 #: how many tolerances tip and axis point may be away from one common pose, though each is near its own path
 APART: Final = 2.0
+
+
+@dataclass(frozen=True)
+class Trust:
+    """What of a program is not compared, or may be otherwise."""
+
+    #: whether words beside the motion must say what the CL file asks for, and be on the list of the control's words;
+    #: not where nobody knows what they mean
+    words: bool = True
+    #: blocks that belong where they are because the user put them there, and names of states or statements that are
+    #: his own (`own_words` of a control table)
+    trusted: Sequence[str] = ()
+    #: words of the user's own that move nothing, as he declares: the program is verified with them
+    accepted: Set[str] = frozenset()
+    #: those that curves have, where that is known: any other is a problem. Parts of arcs have their own besides
+    weights: Sequence[float] | None = None
+    #: whether feeds may be below those of the CL file, as in a program with those of a plan
+    slower: bool = False
+    #: whether the program may leave out holes to be tapped and those of cycles that are not understood
+    skip_cycles: bool = False
+
+
+#: nothing but the program counts
+TRUST: Final = Trust()
 
 
 @dataclass(frozen=True)

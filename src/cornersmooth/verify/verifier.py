@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import os
-from collections.abc import Callable, Iterator, Sequence, Set
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields, replace
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final, Self
@@ -39,7 +39,7 @@ from cornersmooth.verify.findings import Findings, Where, problems_of
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.passage import MORE_BREAKS, MOST_BREAKS
 from cornersmooth.verify.result import Verification
-from cornersmooth.verify.task import Task, length_of
+from cornersmooth.verify.task import TRUST, Task, Trust, length_of
 from cornersmooth.verify.word_places import WordPlaces
 
 if TYPE_CHECKING:
@@ -86,21 +86,8 @@ class Verifier:
         What the tool axis may be off where the tip is within ε: takes the place of the axis point and H.
     control, machine, tcp
         As in `read_nc`.
-    words : bool
-        Whether words beside the motion must say what the CL file asks for, and be on the list of the control's words;
-        not where nobody knows what they mean.
-    trusted : sequence of str
-        Blocks that belong where they stand because the user put them there: what they do is taken on trust. Names of
-        states or statements that are his own; `own_words` of a control table says them.
-    accepted : set of str
-        Words of the user's own that move nothing, as he declares: the text is verified with them.
-    weights : sequence of float, optional
-        Those that curves have, where that is known: any other is a problem, even if the curve stays within ε. Parts of
-        arcs have their own besides.
-    slower : bool
-        Whether feeds may be below those of the CL file, as where the text has those of a plan.
-    skip_cycles : bool
-        Whether the text may leave out holes to be tapped and those of cycles that are not understood.
+    trust : Trust
+        What is not compared, or may be otherwise.
     processes : int
         Processes to work on long texts with, where the system can fork; the result does not depend on it.
 
@@ -123,12 +110,7 @@ class Verifier:
         control: str = "fanuc",
         machine: Machine | None = None,
         tcp: bool = True,
-        words: bool = True,
-        trusted: Sequence[str] = (),
-        accepted: Set[str] = frozenset(),
-        weights: Sequence[float] | None = None,
-        slower: bool = False,
-        skip_cycles: bool = False,
+        trust: Trust = TRUST,
         processes: int = 1,
     ) -> None:
         self._axis_tolerance = axis_tolerance
@@ -136,14 +118,8 @@ class Verifier:
             _check_bounds(axis_tolerance=axis_tolerance)
             axis_length = length_of(tolerance, axis_tolerance)
         _check_bounds(tolerance=tolerance, axis_length=axis_length)
-        self._program, self._words = program, words
+        self._program, self._trust, self._machine = program, trust, machine
         self._processes = processes if can_fork() and len(program) >= _LONG else 1
-        self._trusted, self._slower = tuple(trusted), slower
-        self._own = (self._trusted, accepted, None if weights is None else (*weights, *_arc_weights(program)))
-        self._skip_cycles = skip_cycles
-        self._machine = machine
-        said = () if machine is None else (word for axis in machine.axes for word in axis.clamp or ())
-        self._clamps = frozenset(float(word[1:]) for word in said)
         self._options = ReadingOptions.of(control, machine, tcp=tcp, tolerance=tolerance, axis_length=axis_length)
         self._text = nc if isinstance(nc, NcProgram) else Source(readable_twice(nc))
         self._name = None if isinstance(nc, NcProgram | bytes) else str(nc)
@@ -183,7 +159,7 @@ class Verifier:
             task, read = self._task(rotary=text.rotary, apart=apart), (text, len(text.curves))
             found = self._found(task, iter([elements]), list(text.events), text.retracts, lambda: read)
             words = "the words of the text: they are looked at where it is read, not afterwards"
-            return found.not_verified(words if self._words else "")
+            return found.not_verified(words if self._trust.words else "")
         text.begin()
         steps = options.steps(text.head(DIGITS_SAMPLE))
         rotary = options.rotary(steps)
@@ -193,13 +169,15 @@ class Verifier:
         lever = None if rotary is None else float(rotary.levers(task.path.points[:, :3]).max(initial=0.0))
         reader = Reader(self._name, options, steps, lever)
         machine = self._machine if options.dialect.retracts else None
-        scale, switches = self._program.mm_per_unit, options.dialect.switches
-        positions = MachinePositions(machine, scale, switches=switches, tcp=options.tcp)
+        scale, trust = self._program.mm_per_unit, self._trust
+        positions = MachinePositions(machine, scale, switches=options.dialect.switches, tcp=options.tcp)
         own_axis, (tip, length) = self._axis_tolerance, (options.tolerance, options.axis_length)
         turn = math.degrees(tip / length) if own_axis is None else own_axis
-        check = WordCheck(options.control, options.dialect.lexer, tip / scale, *self._own, positions, turn)
+        weights = None if trust.weights is None else (*trust.weights, *_arc_weights(self._program))
+        own = trust.trusted, trust.accepted, weights
+        check = WordCheck(options.control, options.dialect.lexer, tip / scale, *own, positions, turn)
         lines = reader.lines(text)
-        chunks = reader.chunks(check.watch(lines) if self._words else lines)
+        chunks = reader.chunks(check.watch(lines) if self._trust.words else lines)
 
         def said() -> tuple[NcProgram, int]:
             nc = program_of(reader, [])
@@ -207,13 +185,17 @@ class Verifier:
             return replace(nc, problems=problems), reader.curves
 
         found = self._found(task, chunks, reader.events, reader.retracts.places, said)
-        unlooked = check.unlooked if self._words else "words beside the motion, which a table of your own may define"
+        unlooked = (
+            check.unlooked if self._trust.words else "words beside the motion, which a table of your own may define"
+        )
         found = replace(found.not_verified(unlooked), rounding=scale * check.rounding, offset=check.offset)
-        return replace(found, trusted=tuple(check.trusted), parts=check.parts.digests if self._words else "")
+        return replace(found, trusted=tuple(check.trusted), parts=check.parts.digests if self._trust.words else "")
 
     def _wrong_offset(self, found: str) -> list[Problem]:
         """What is wrong with the work offset of the text, where the CL file names one."""
-        number = work_offset_of(self._program) if self._words and "work offset" not in self._trusted else None
+        number = (
+            work_offset_of(self._program) if self._trust.words and "work offset" not in self._trust.trusted else None
+        )
         if number is None or found in spellings(number):
             return []
         text = f"work offset {found or 'none'} where the CL file asks for number {number}, {spellings(number)[0]}"
@@ -237,7 +219,7 @@ class Verifier:
         program, batches, findings = self._program, Batches(task, events, retracts), Findings()
         places = WordPlaces(batches, events)
         poses = np.empty((4, len(program)))
-        if self._slower:
+        if self._trust.slower:
             chunks = (part.at_most() for part in chunks)
         chunks = Compensated(task, events, findings).watch(_watch_feeds(chunks, findings))
 
@@ -266,8 +248,8 @@ class Verifier:
                 text = f"what comes after {len(findings.breaks)} places where the motions part"
                 findings.unlooked.append((findings.breaks[-1], text))
         nc, curves = said()
-        findings.unlooked += nc.unlooked
-        problems = [problem for problem in nc.problems if self._words or problem.code != CONTROL_WORDS]
+        findings.unlooked += [*nc.unlooked, *batches.acts.unlooked]
+        problems = [problem for problem in nc.problems if self._trust.words or problem.code != CONTROL_WORDS]
         if nc.units != program.units:
             text = f"the program is in {nc.units}, the CL file in {program.units}"
             problems.append(Problem("CS505", 0, 1, text))
@@ -277,12 +259,14 @@ class Verifier:
         feeds = [problem for problem in findings.feeds.problems if problem.nc_line not in off]
         problems += batches.acts.problems + feeds + problems_of(findings.violations)
         problems += half_turns(program)
-        if not self._skip_cycles:
+        if not self._trust.skip_cycles:
             problems += batches.acts.left_out
-        if self._words and batches.elements:  # without any motion nothing has a place
-            up = self._options.dialect.retracts and FRAME not in self._trusted
+        if self._trust.words and batches.elements:  # without any motion nothing has a place
+            axes = () if self._machine is None else self._machine.axes
+            clamps = {float(word[1:]) for axis in axes for word in axis.clamp or ()}
+            up = self._options.dialect.retracts and FRAME not in self._trust.trusted
             of_statements, at_home, unsaid = places.problems(
-                findings, nc.means, self._own_kinds, self._clamps, retracts=up
+                findings, nc.means, KINDS & set(self._trust.trusted), clamps, retracts=up
             )
             problems = [one for one in problems if one.text != GONE_ON or one.nc_line not in at_home] + of_statements
         if nc.coarse:  # a pose missed within the tolerance where digits are too few for it is not verified
@@ -299,18 +283,15 @@ class Verifier:
             blocks=nc.blocks,
             elements=batches.elements,
             curves=curves,
-            left_out=len(batches.acts.left_out) if self._skip_cycles else 0,
+            left_out=len(batches.acts.left_out) if self._trust.skip_cycles else 0,
             rewinds=tuple(batches.acts.rewinds),
         ).not_verified(not_understood_text(program), unsaid)
 
-    @property
-    def _own_kinds(self) -> frozenset[str]:
-        """Kinds of statements that the user says in words of his own."""
-        return KINDS & set(self._trusted)
-
 
 def verify(program: Program, nc: NcProgram | bytes | str | os.PathLike[str], **how: Any) -> Verification:
-    """Measure an NC text, that is whole, against the CL program it was made from; `how` and errors as in `Verifier`.
+    """Measure an NC text, that is whole, against the CL program it was made from.
+
+    `how` and errors are as in `Verifier`; fields of `Trust` may be given by themselves.
 
     Returns
     -------
@@ -322,7 +303,8 @@ def verify(program: Program, nc: NcProgram | bytes | str | os.PathLike[str], **h
     InputError, SettingsError
         The text cannot be read as a program, or a tolerance is out of its bounds.
     """
-    with Verifier(program, nc, **how) as verifier:
+    trust = {one.name: how.pop(one.name) for one in fields(Trust) if one.name in how}
+    with Verifier(program, nc, trust=Trust(**trust), **how) as verifier:
         return verifier.result()
 
 

@@ -114,33 +114,21 @@ class WordPlaces:
             for k, (some, act_of) in enumerate(((cl_places, cl_act), (nc_places, nc_act)))
         )
         cl_alone, cl_at, nc_alone, nc_at = cl_places[cl_in], cl_act[cl_in], nc_places[nc_in], nc_act[nc_in]
-        of_cycles = [first for first, (one, some) in holes.items() if some or one.cycle.dwell or one.cycle.tap]
+        of_cycles = [first for first, (one, some) in holes.items() if one.cycle and (some or one.cycle.says)]
         wanted = {*cl_act.tolist(), *nc_act.tolist(), *np.searchsorted(acts[:, 1], of_cycles).tolist()}
-        wanted |= {act + 1 for act in wanted if act < len(acts) and int(acts[act, 1]) in batches.acts.ways_up}
         at_home: set[int] = set()
-        before, behind_way = (-1, -1), None
+        before = -1, -1
         for act in sorted(one for one in wanted if one < len(acts)):
             end = int(acts[act, 0]), int(acts[act, 1])
             alone = [some[act_of == act].tolist() for some, act_of in ((cl_alone, cl_at), (nc_alone, nc_at))]
             meetings = [] if missed & {*range(before[0], end[0])} else _apart(before, *alone)
-            if behind_way is not None and behind_way[1] < end[1]:
-                meetings.insert(0, behind_way)
-            behind_way = None
             for move, element in [*(one for one in meetings if one[0] < end[0] and one[1] < end[1]), end]:
-                ways_up = batches.acts.ways_up.get(element, ()) if (move, element) == end else ()
-                if ways_up and not comparison.agrees(*end):
-                    # a rapid that ends where the tool goes up from a hole is that way, or leads nowhere behind it
-                    readings = ((one, element) for one in reversed(ways_up))
-                    if (reading := next((one for one in readings if comparison.agrees(*one)), None)) is not None:
-                        lead = self._leading(np.array([move + 1]), set())[move + 1]
-                        behind_way = min(lead, int(acts[act + 1, 0])), self._moving(element + 1)
-                        move, element = reading
                 comparison.meet(move, element, moves=(move, element) != (moves, batches.elements))
                 if not homes.isdisjoint(range(before[0] + 1, move + 1)):
                     at_home |= {one.line for one in events if before[1] < one.element <= element}
                 before = move, element
-            if end[1] in holes and act + 1 < len(acts):
-                hole, some = holes[end[1]]
+            hole, some = holes.get(end[1], (None, []))
+            if hole is not None and hole.cycle is not None and act + 1 < len(acts):
                 line = int(program.line[original.pose[hole.move]])
                 comparison.in_hole(line, some, hole.cycle.dwell, tap=hole.cycle.tap)
         hidden = changed_unseen(requested, leading, beyond) if batches.acts.moves_left_out else ""
