@@ -5,7 +5,6 @@ in .ci/windows.
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import signal
 from collections.abc import Callable
@@ -53,7 +52,7 @@ def elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.delattr(os, name, raising=False)
     for name in SIGNALS:
         monkeypatch.delattr(signal, name)
-    monkeypatch.setattr(processes, "_CONTEXT", multiprocessing.get_context("spawn"))
+    monkeypatch.setattr(processes, "_START", "spawn")
 
 
 @pytest.fixture

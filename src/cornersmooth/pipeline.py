@@ -144,20 +144,18 @@ def smooth(
 
 
 def reading_back(form: Form) -> dict[str, Any]:
-    """Keyword arguments with which `cornersmooth.verify` reads a text of the form."""
-    known = form.table.dialect in CONTROLS
+    """Keyword arguments with which a text of the form is read; the control is empty where it is like none."""
+    dialect = form.table.dialect
     return {
-        "control": form.table.dialect if known else "",
+        "control": dialect if dialect in CONTROLS else "",
         "machine": form.machine,
         "tcp": form.orientation != "machine",
-        "trusted": nc.own_words(form.table) if known else (),
-        "accepted": form.table.trusted,
     }
 
 
 def read_back(text: bytes | str, form: Form, settings: Settings, name: str | None = None) -> NcProgram:
     """Read a text of the form, or the file that holds it, as its control does; see `nc_reader.read_nc`."""
-    how = {key: value for key, value in reading_back(form).items() if key not in ("trusted", "accepted")}
+    how = reading_back(form)
     return read_nc(text, **how, name=name, tolerance=settings.tolerance, axis_length=settings.axis_scale)
 
 
@@ -249,8 +247,8 @@ def postprocess(
         verifier = None
         if not unverified:
             trust = Trust(
-                trusted=(*back.pop("trusted"), *_users_blocks(frame, form, program, smoothed.settings)),
-                accepted=back.pop("accepted"),
+                trusted=(*nc.own_words(form.table), *_users_blocks(frame, form, program, smoothed.settings)),
+                accepted=form.table.trusted,
                 weights=provenance.weights,
                 slower=provenance.planned_feeds,
                 skip_cycles=frame.skip_cycles,

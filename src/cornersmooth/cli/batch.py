@@ -5,9 +5,7 @@ What became of the files is printed in lines, and as a table for other programs:
 
 from __future__ import annotations
 
-import csv
 import ctypes
-import io
 import os
 import signal
 import sys
@@ -17,10 +15,9 @@ from itertools import islice
 from multiprocessing import parent_process
 from typing import TYPE_CHECKING, Any
 
-from cornersmooth.cli.files import suffix_of, write_report
+from cornersmooth.cli.files import csv_table, write_reports
 from cornersmooth.cli.job import STATUSES, Job, Outcome, run_job
 from cornersmooth.errors import Verdict, message
-from cornersmooth.report.record import report_json
 from cornersmooth.system.output import remove_leftovers, remove_unfinished
 from cornersmooth.system.processes import Helper, first_ready
 
@@ -49,7 +46,8 @@ class Batch:
         scheduler: str | None = None,
     ) -> None:
         self.jobs, self._progress, self._scheduler = jobs, progress, scheduler
-        self._rows: list[dict[str, Any] | None] = [None] * len(jobs)
+        #: of each file, as `row_of` gives it; also of those that nothing was done with yet
+        self.rows = [row_of(Outcome(job, unfinished=True)) for job in jobs]
         self._processes = min(processes or os.cpu_count() or 1, len(jobs))
 
     def run(self, ending: Shutdown) -> Iterator[Outcome]:
@@ -65,16 +63,12 @@ class Batch:
         early: dict[int, Outcome] = {}
         turn = 0
         for ended, (place, outcome) in enumerate(ends, 1):
-            self._rows[place], early[place] = row_of(outcome), outcome
+            self.rows[place], early[place] = row_of(outcome), outcome
             if self._progress is not None:
                 self._progress("files", ended, len(self.jobs))
             while turn in early:
                 yield early.pop(turn)
                 turn += 1
-
-    def rows(self) -> list[dict[str, Any]]:
-        """A row for each file, as `row_of` gives them; also for those that nothing was done with yet."""
-        return [row or row_of(Outcome(job, unfinished=True)) for job, row in zip(self.jobs, self._rows, strict=True)]
 
     def _beside(self, ending: Shutdown) -> Iterator[tuple[int, Outcome]]:
         """Places and outcomes of jobs, each in a process of its own, as they end."""
@@ -237,26 +231,21 @@ def _warnings(findings: Iterable[Mapping[str, Any]]) -> dict[str, tuple[int, str
 
 def batch_report(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """What became of a batch: counts, warnings by code, a row for each file."""
+    counted = ({code: count for code, (count, _) in row["warnings"].items()} for row in rows)
     return {
         "schema": "cornersmooth-batch/2",
         "counts": {status: sum(row["status"] == status for row in rows) for status in STATUSES},
         "warnings": warnings_of(rows),
-        "files": [{**row, "warnings": _counts(row)} for row in rows],
+        "files": [{**row, "warnings": warnings} for row, warnings in zip(rows, counted, strict=True)],
     }
 
 
 def write_summary(path: str, rows: Sequence[Mapping[str, Any]]) -> None:
     """Write a row for each file, as `row_of` gives them; as JSON, with the counts."""
-    text = io.StringIO()
-    if suffix_of(path) == ".json":
-        text.write(report_json(batch_report(rows)))
-    else:
-        table = csv.DictWriter(text, fieldnames=list(rows[0]), lineterminator="\n")
-        table.writeheader()
-        warning_counts = ("; ".join(f"{code} {count}" for code, count in _counts(row).items()) for row in rows)
-        table.writerows({**row, "warnings": warnings} for row, warnings in zip(rows, warning_counts, strict=True))
-    write_report(path, [text.getvalue()])
+    report = batch_report(rows)
 
+    def table() -> list[str]:
+        words = ("; ".join(f"{code} {count}" for code, count in row["warnings"].items()) for row in report["files"])
+        return [csv_table([{**row, "warnings": text} for row, text in zip(report["files"], words, strict=True)])]
 
-def _counts(row: Mapping[str, Any]) -> dict[str, int]:
-    return {code: count for code, (count, _) in row["warnings"].items()}
+    write_reports({path: True}, report, table=table)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -12,7 +10,7 @@ from typing import Any
 import click
 
 from cornersmooth.cl import read
-from cornersmooth.cli.files import check_inputs, check_path, told_of, write_report
+from cornersmooth.cli.files import check_inputs, check_path, csv_table, naming, write_report
 from cornersmooth.cli.options import Options, typed
 from cornersmooth.cli.show import progress_bar, say, say_line
 from cornersmooth.errors import command_text
@@ -38,7 +36,7 @@ def run_compare(given: Options) -> int:
     machine, limits = given.load_machine(), given.load_limits()
     axes = axes_of(given)
     control, settings = given.load_control(), given.settings()
-    with told_of(name), progress_bar(given.quiet or not given.as_json) as progress:
+    with naming(name), progress_bar(given.quiet or not given.as_json) as progress:
         if is_program:  # it has one kind of words, and lines
             tried = candidates(control, settings, machine)
             tried = [one for one in tried if one.form.machine == machine and not one.form.curves]
@@ -63,14 +61,23 @@ def run_compare(given: Options) -> int:
     machine_named = named or given.limits
     made_by = ("filter", os.path.splitext(source)[1]) if is_program else ("smooth", control.layout.suffix)
     commands = [_command(given, row, machine_named, *made_by) for row in table.rows]
-    if given.csv:
-        write_report(given.csv, [_csv(table, commands)])
     contents = table.as_dict()
     for row, text in zip(contents["rows"], commands, strict=True):
         row["command"] = text
+    if given.csv:
+        rows = [{title: row[name] for name, title in _COLUMNS.items()} for row in contents["rows"]]
+        write_report(given.csv, [csv_table(rows)])
     say(given, contents, _end(table, commands))
     return 0
 
+
+#: columns of the CSV file by what the rows call them
+_COLUMNS = {
+    **{name: name for name in "form words method lines verdict blocks bytes seconds saved".split()},
+    "tip": "tip_mm",
+    "axis_point": "axis_point_mm",
+    **{name: name for name in ("best", "command")},
+}
 
 #: columns and the room of their numbers; that of the others follows from the rows
 _HEAD = ("form", "words", "method", "lines", "blocks", "kB", "s", "saves", "tip mm", "axis mm")
@@ -168,15 +175,3 @@ def _command(given: Options, row: Row, machine: Any, command: str, suffix: str) 
         options[options.index("--machine") + 1] = called
     target = os.path.splitext(os.path.basename(given.source))[0] + (".smooth" if command == "filter" else "") + suffix
     return command_text(["cornersmooth", command, given.source, *words, *options, "-o", target])
-
-
-def _csv(table: Table, commands: list[str]) -> str:
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(
-        "form,words,method,lines,verdict,blocks,bytes,seconds,saved,tip_mm,axis_point_mm,best,command".split(",")
-    )
-    for number, (row, text) in enumerate(zip(table.rows, commands, strict=True)):
-        numbers = (row.blocks, row.bytes, row.seconds, row.saved, row.tip, row.axis_point)
-        writer.writerow([row.form, row.words, row.method, row.lines, row.verdict, *numbers, number == table.best, text])
-    return stream.getvalue()

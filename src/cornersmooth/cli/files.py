@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import os
 import re
 import stat
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatch
 from pathlib import Path
@@ -117,11 +118,22 @@ def write_report(path: str, parts: Iterable[str | bytes], *, replace: bool = Tru
             made.stream.write(part if isinstance(part, bytes) else part.encode("utf-8", "backslashreplace"))
 
 
+def csv_table(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Rows with the same keys as CSV text."""
+    import csv
+
+    text = io.StringIO()
+    table = csv.DictWriter(text, fieldnames=list(rows[0]), lineterminator="\n")
+    table.writeheader()
+    table.writerows(rows)
+    return text.getvalue()
+
+
 def write_reports(
     paths: Mapping[str, bool],
     contents: Mapping[str, Any],
     *,
-    csv: Callable[[], Iterable[str]] | None = None,
+    table: Callable[[], Iterable[str]] | None = None,
     page: Callable[[], str] | None = None,
 ) -> None:
     """Write reports in the forms that their names end in; of each path, whether it may be replaced."""
@@ -129,15 +141,15 @@ def write_reports(
 
     for path, replace in paths.items():
         form = suffix_of(path)
-        if form == ".csv" and csv is not None:
-            write_report(path, csv(), replace=replace)
+        if form == ".csv" and table is not None:
+            write_report(path, table(), replace=replace)
         else:
             text = page() if form == ".html" and page is not None else report_json(contents)
             write_report(path, [text], replace=replace)
 
 
 @contextlib.contextmanager
-def told_of(name: str) -> Iterator[None]:
+def naming(name: str) -> Iterator[None]:
     """Name the file in errors that do not."""
     try:
         yield

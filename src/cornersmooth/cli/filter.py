@@ -80,7 +80,7 @@ def run_filter(given: Options) -> int:
         raise click.UsageError("--json needs one input and -o FILE; --report '{stem}.json' tells of several")
     if len(jobs) == 1:  # what is wrong with the input comes before what is wrong with the output
         files.check_inputs(jobs[0].source)
-        with files.told_of(jobs[0].source):
+        with files.naming(jobs[0].source):
             refuse_cl_file(files.read_head(jobs[0].source))
     for job in jobs:
         if given.directory:
@@ -112,7 +112,7 @@ def _filter(job: files.Input, given: Options) -> Verdict:
     """Filter one program; return the verdict."""
     old = OldProgram.of(*files.read_input(job.source), given)
     given, axes = old.given, old.given.load_limits()
-    with files.told_of(old.name):
+    with files.naming(old.name):
         found = filter_program(
             old.data,
             old.form,
@@ -336,7 +336,7 @@ def time_of_program(data: bytes, name: str, given: Options) -> int:
     old = OldProgram.of(data, name, given)
     given, form, settings, axes = old.given, old.form, old.settings, axes_of(old.given)
     how = {**how_read(given), "axes": axes, "processes": useful_processes()}
-    with files.told_of(name):
+    with files.naming(name):
         if given.text:
             found = verify_programs(data, files.read_input(given.text)[0], form, settings, **how)
         else:
@@ -372,7 +372,7 @@ def time_of_program(data: bytes, name: str, given: Options) -> int:
 def explain_program(source: str, given: Options) -> int:
     """Show what the control does in each block of a program."""
     data, name = files.read_input(source)
-    with files.told_of(name):
+    with files.naming(name):
         refuse_cl_file(data[:HEAD])
     control = given.reading_back()["control"]
     reader = ProgramReader(control, given.load_machine(), tcp=not given.no_tcp, **how_read(given))

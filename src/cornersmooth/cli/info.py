@@ -7,7 +7,7 @@ from typing import Any
 
 from cornersmooth.cl import read
 from cornersmooth.cli.options import Options
-from cornersmooth.cli.show import say, say_line, told_finding
+from cornersmooth.cli.show import finding_text, say, say_line
 from cornersmooth.report import marks_text
 from cornersmooth.report.info import describe
 
@@ -34,7 +34,7 @@ def run_info(given: Options) -> int:
     say(given, info, (f"{label:<{width}}  {text}".rstrip() for label, text in rows), indent=width + 2)
     if not given.as_json:
         for finding in info["findings"]:
-            for line in told_finding(name, finding).split("\n"):
+            for line in finding_text(name, finding).split("\n"):
                 say_line(line)
     return 0
 

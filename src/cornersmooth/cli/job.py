@@ -225,7 +225,7 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> None:
     contents = result.report(command=job.command, loosened=job.loosened, saving=outcome.saving, limits=job.axes)
     outcome.contents = contents
     table = partial(corners_csv, result.smoothed, dense=not result.form.curve)
-    write_reports(replace, contents, csv=table, page=page)
+    write_reports(replace, contents, table=table, page=page)
 
 
 def _settings_for(job: Job, program: Program) -> Settings:

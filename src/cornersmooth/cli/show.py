@@ -105,12 +105,12 @@ def show_findings(source: str, findings: Sequence[dict[str, Any]], verbose: int)
     count = max(_FINDINGS_SHOWN, sum(finding["to_check"] for finding in ranked))
     shown = ranked if verbose else ranked[:count]
     for finding in shown:
-        print_message(told_finding(source, finding))
+        print_message(finding_text(source, finding))
     if len(ranked) > len(shown):
         print_line(f"{source}: {more(len(ranked) - len(shown), 'finding')}; -v shows them")
 
 
-def told_finding(source: str, finding: Mapping[str, Any]) -> str:
+def finding_text(source: str, finding: Mapping[str, Any]) -> str:
     """Give the message of a finding in the table of a report."""
     place = f"{source}:{finding['line']}" if finding["line"] else source
     return message(finding["severity"], finding["text"], code=finding["code"], place=place, count=finding["count"])

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import click
 
 from cornersmooth.cli import show
-from cornersmooth.cli.batch import Batch, batch_report, end_lines, interrupted_line, line_of, write_summary
 from cornersmooth.cli.files import STANDARD, check_endings, check_inputs, check_path, find_inputs, read_lines
 from cornersmooth.cli.job import Job, Outcome, run_job
 from cornersmooth.cli.options import Options
@@ -36,31 +34,32 @@ def run_smooth(given: Options) -> int:
     if len(jobs) == 1 and not given.directory:
         return _alone(jobs[0])
 
+    from cornersmooth.cli import batch
+
     ending: Shutdown = click.get_current_context().obj
     worst = 0
     with show.progress_bar(given.quiet, rate=True) as progress:
-        batch = Batch(jobs, given.jobs, progress, scheduler=given.scheduler if given.jobs == 1 else None)
+        running = batch.Batch(jobs, given.jobs, progress, scheduler=given.scheduler if given.jobs == 1 else None)
 
         def keep() -> None:
             if given.summary:
-                write_summary(given.summary, batch.rows())
+                batch.write_summary(given.summary, running.rows)
 
-        def lines() -> Iterator[str]:
-            if not given.quiet:
-                yield from map(printable, end_lines(batch.rows()))
+        def lines() -> list[str]:
+            return [] if given.quiet else [*map(printable, batch.end_lines(running.rows))]
 
         ending.keep = keep
-        ending.say = lambda: "\n".join((*lines(), interrupted_line(batch.rows())))
-        for outcome in batch.run(ending):
+        ending.say = lambda: "\n".join((*lines(), batch.interrupted_line(running.rows)))
+        for outcome in running.run(ending):
             printed = outcome.status != "error" and not given.quiet and (progress is None or given.verbose > 0)
             if printed:
-                show.print_line(line_of(outcome))
-            _tell(outcome, printed)
+                show.print_line(batch.line_of(outcome))
+            _print_notes(outcome, printed)
             worst = max(worst, outcome.exit_code)
     ending.keep = None
     keep()
     if given.as_json:
-        show.say_json(batch_report(batch.rows()))
+        show.say_json(batch.batch_report(running.rows))
     else:
         for line in lines():
             show.print_line(line)
@@ -84,7 +83,7 @@ def _alone(job: Job) -> int:
     printed = outcome.contents and not given.quiet and not given.as_json
     if printed:
         show.show_verdict(outcome.contents, outcome.saving)
-    _tell(outcome)
+    _print_notes(outcome)
     if outcome.contents and given.as_json:
         show.say_json(outcome.contents)
     if printed:
@@ -92,7 +91,7 @@ def _alone(job: Job) -> int:
     return outcome.exit_code
 
 
-def _tell(outcome: Outcome, printed: bool = False) -> None:
+def _print_notes(outcome: Outcome, printed: bool = False) -> None:
     """Print what went wrong and what was noticed; where no line has the verdict, any but a plain PASSED."""
     job, given = outcome.job, outcome.job.given
     if outcome.message:
@@ -136,7 +135,7 @@ def _make_jobs(given: Options) -> list[Job]:
         for found in files
     ]
     if not given.quiet:
-        _tell_same_programs(jobs)
+        _warn_of_same_programs(jobs)
     if folder:
         make_folder(folder)
     return jobs
@@ -159,21 +158,17 @@ def _frame(given: Options) -> Frame:
     """What stands around the motion, with the texts of header and footer."""
     return Frame(
         given.program_name,
-        given.block_numbers,
         header=read_lines(given.header) if given.header else (),
         footer=read_lines(given.footer) if given.footer else (),
         comments=not given.no_comments,
-        skip_cycles=given.skip_cycles,
-        cycles=given.cycles,
-        modal=given.modal,
-        line_ends=given.line_ends,
         approach=given.approach or 0.0,
         retract=given.retract or 0.0,
         work_offset="" if given.work_offset == "none" else given.work_offset,
+        **{name: getattr(given, name) for name in ("block_numbers", "skip_cycles", "cycles", "modal", "line_ends")},
     )
 
 
-def _tell_same_programs(jobs: list[Job]) -> None:
+def _warn_of_same_programs(jobs: list[Job]) -> None:
     """Say which programs a control would take for the same one."""
     sources: dict[str, list[str]] = {}
     for job in jobs:

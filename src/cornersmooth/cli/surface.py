@@ -49,7 +49,7 @@ def run_surface(given: Options) -> int:
         name, control = written if isinstance(written, str) else "", given.load_control().name
         return verified_page(program, nc, checked, name=name, control=control, source=data, surface=found)
 
-    write_reports(dict.fromkeys(given.reports, True), found.as_dict(), csv=partial(surface_csv, found), page=page)
+    write_reports(dict.fromkeys(given.reports, True), found.as_dict(), table=partial(surface_csv, found), page=page)
     first = f"{Verdict.of(problems=not found.kept)}: the surface is {'' if found.kept else 'not '}within the tolerance"
     say(given, found.as_dict(), (first, *surface_lines(found)), indent=18)
     return 0 if found.kept else 1

@@ -123,7 +123,7 @@ def run_verify(given: Options) -> int:
         )
 
     files.write_reports(
-        dict.fromkeys(given.reports, True), contents, csv=partial(verification_csv, program, found), page=page
+        dict.fromkeys(given.reports, True), contents, table=partial(verification_csv, program, found), page=page
     )
     for line in _problems(found, name, "<stdin>" if text == files.STANDARD else text, given.verbose):
         print_message(line)

@@ -13,9 +13,10 @@ import sys
 import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from multiprocessing import get_context
-from multiprocessing.connection import Connection, wait
-from typing import Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeVar
+
+if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -26,8 +27,8 @@ MOST_PROCESSES: Final = 4
 #: items taken ahead of what has been given out, whatever the number of processes: what comes out never depends on it
 _AHEAD: Final = 5
 
-#: elsewhere the system's own: a process of a batch begins anew there
-_CONTEXT: Final = get_context("fork" if sys.platform == "linux" else None)
+#: how processes begin; elsewhere as the system has it: a process of a batch begins anew there
+_START: Final = "fork" if sys.platform == "linux" else None
 
 #: after so many seconds a wait looks for signals: Windows ends it for Ctrl-C only
 _LOOK: Final = 0.5
@@ -55,11 +56,14 @@ class Helper:
     """
 
     def __init__(self, work: Callable[[Any], Any], others: Iterable[Helper] = (), *, daemon: bool = False) -> None:
-        self.connection, other_end = _CONTEXT.Pipe()
+        from multiprocessing import get_context  # a small program needs no other process, and this takes long to load
+
+        context = get_context(_START)
+        self.connection, other_end = context.Pipe()
         ends = [*(other.connection for other in others), self.connection]
         with warnings.catch_warnings():  # newer Pythons warn of threads, of which only numpy's idle ones are left
             warnings.simplefilter("ignore", DeprecationWarning)
-            self._process = _CONTEXT.Process(target=_serve, args=(work, other_end, ends), daemon=daemon)
+            self._process = context.Process(target=_serve, args=(work, other_end, ends), daemon=daemon)
             self._process.start()
         self.pid = self._process.pid
         other_end.close()
@@ -118,6 +122,8 @@ class Helper:
 
 def first_ready(helpers: Iterable[Helper]) -> list[Helper]:
     """Wait until one or more have ended their work."""
+    from multiprocessing.connection import wait
+
     by_connection = {helper.connection: helper for helper in helpers}
     while not (ready := wait([*by_connection], _LOOK)):
         pass
