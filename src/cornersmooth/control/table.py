@@ -157,7 +157,6 @@ class Row:
     follows: bool = False  #: but not this one: it follows the CL file, and others compare it
     tool: bool = False  #: it may differ from tool to tool in a program with a `cycle`
     cycle: bool = False  #: a hole cycle of the control, a tilted plane, cutter compensation
-    late: bool = False  #: after a retract it may come as late as in the block that first moves Z
     compared: bool = False  #: others compare the word with the CL file
     first: bool = False  #: one of its group must come before the first motion
     preset: str = ""  #: the usual one of these

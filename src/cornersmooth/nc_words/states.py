@@ -67,10 +67,9 @@ class StateRules:
         self.unsure: list[tuple[int, str]] = []
         self.made: dict[str, str] = {}  #: words in the head of a program of our own
         self._retracts = any(row.high for row in self._listed)
-        self._late = {row.group for row in self._listed if row.late}
         self._approach = {row.group for row in self._listed if row.off} | {"offset", "edge"}
         self._words: set[str] = set()  # so far; those that must come again before each of their kind, since then
-        self._first: dict[str, str] | None = None  # groups at the first motion
+        self._first: dict[str, str] | None = None  # groups at the first motion; empty for what may come later
         # what holds and did not at the first motion, and what is wrong with it
         self._others: dict[LastWord, tuple[str, str]] = {}
         self._cycles = False  # whether the program has any, so that some groups may differ from tool to tool
@@ -196,11 +195,14 @@ class StateRules:
                 text = f"{title_of(group)}: it must come after {word}, which deselects it"
                 self.unframed(NOT_ESTABLISHED, line, text)
         self.above &= "Z" not in words
-        rapid = self.machine.groups["motion"] == "rapid" and self.above
-        late = {group for group, last in self._followed.items() if rapid and group in self._late and last.off}
-        self._first = self._begin(line, late) if self._first is None else self._first
-        for group, last in self._followed.items():
-            if group not in late:
+        # the length of a tool may come as late as in the block that first moves Z
+        holds, length = self._followed, self.machine.last_words.get("tool_length")
+        late = self.above and self.machine.groups["motion"] == "rapid" and length is not None and length.off
+        if self._first is None:
+            self._begin(line)
+            self._first = {group: "" if late and last is length else last.text for group, last in holds.items()}
+        for group, last in holds.items():
+            if not (late and last is length):
                 self._compare(group, last, self._first)
         if self._retract and not late:
             self.wrong(NOT_LISTED, self._retract, GONE_ON)
@@ -208,8 +210,8 @@ class StateRules:
         self._moved, self._ended = line, {}
         self.attentive = self._high = False
 
-    def _begin(self, line: int, late: Set[str]) -> dict[str, str]:
-        """Look at what holds at the first motion, and return it; nothing of what may come later."""
+    def _begin(self, line: int) -> None:
+        """Look at what holds at the first motion."""
         self._retract = 0
         self.unframed(NOT_LISTED, line, *self._wrong_offset())
         if self._retracts and not self._high:
@@ -221,7 +223,6 @@ class StateRules:
                 wanted = usual or " or ".join(shown(row.pattern) for row in rows)
                 text = f"{title_of(group)}: {wanted} must come before the first motion"
                 self.unframed(NOT_ESTABLISHED, line, text)
-        return {group: "" if group in late else last.text for group, last in self._followed.items()}
 
     def _compare(self, group: str, last: LastWord, first: dict[str, str]) -> None:
         """Complain of a state that is not what it was at the first motion, where nobody else compares it."""
