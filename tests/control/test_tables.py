@@ -128,7 +128,6 @@ def test_a_table_that_is_like_another_has_its_rows_and_takes_some_back(
         shop, haas = table_of.__wrapped__("shop"), table_of("haas")
     finally:
         word_tables.word_table.cache_clear()
-        word_tables.means_of.cache_clear()
     rules = [WordRules(table, dialect_of("haas").lexer, 0.01) for table in (shop, haas)]
     (mine, _), (theirs, _) = (one.of(("G43.4", "H1")) for one in rules)
     assert mine[1].tip_on

@@ -53,7 +53,7 @@ AIR = {
 def _with_air(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[None]:
     """Tables of both sides with one entry more; HEIDENHAIN has none."""
     written = Shelf.built_in
-    caches = (control_tables._built_in, word_tables.word_table, word_tables.means_of, table_of)
+    caches = (control_tables._built_in, word_tables.word_table, table_of)
 
     def table(self: Shelf, name: str) -> str:
         text = written(self, name)

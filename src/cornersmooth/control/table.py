@@ -36,7 +36,7 @@ from functools import cache, cached_property
 from itertools import chain
 from typing import Any, Final, NamedTuple, Self
 
-from cornersmooth.control.word_tables import word_table
+from cornersmooth.control.word_tables import Means, word_table
 
 #: groups of words that turn, scale or mirror the places of the part begin so
 FRAME: Final = "frame."
@@ -108,7 +108,8 @@ LOSES: Final[Mapping[str, str]] = {
     "unknown": "all",
 }
 
-#: effects with a name in the CL file
+#: groups and effects that the CL file has words for, and what effects are that have another name there
+_IN_CL: Final = frozenset(("spindle", "coolant", "stop", "end", "compensation", "register", "offset"))
 _ALIKE: Final = {"end": "anything", "register": "length", "offset": "length"}
 
 #: a number, where a row has a letter alone
@@ -129,6 +130,7 @@ _LITERAL: Final = re.compile(r"[GM][\d.]+|R0|[A-Z_]{2}.*")
 class Row:
     """What a word does, and what verification asks of it; of a letter beside another word that alone."""
 
+    effects: tuple[str, ...] = ()  #: as the row has them
     sets: tuple[tuple[str, str | None], ...] = ()  #: groups and their values; None where it is not known which
     does: frozenset[str] = frozenset()  #: of `LOSES`
     beside: frozenset[str] = frozenset()  #: letters of words of its own
@@ -198,7 +200,7 @@ class Row:
         more = {
             name for name, letter in zip(names, letters, strict=True) if letter[0].isupper() and not {*letter} & {*"=~"}
         }
-        row = cls(tuple(sets), frozenset(does), frozenset(names), frozenset(more))
+        row = cls(tuple(effects.split()), tuple(sets), frozenset(does), frozenset(names), frozenset(more))
         if row.group:
             is_off, of_group = dict(sets)[row.group] == "off", (group_of(row.group) or _FRAME).rules
             cycle = row.group.startswith(FRAME) and not is_off
@@ -249,7 +251,15 @@ class Row:
 
 
 #: names of rules
-_RULES: Final = frozenset(one.name for one in fields(Row)) - {"sets", "does", "beside", "more", "pattern", "says"}
+_RULES: Final = frozenset(one.name for one in fields(Row)) - {
+    "effects",
+    "sets",
+    "does",
+    "beside",
+    "more",
+    "pattern",
+    "says",
+}
 
 
 #: what a word without a row does
@@ -287,6 +297,12 @@ class Table:
             return self.named[name]
         found = (row for pattern, row in self.patterns if pattern.fullmatch(name) or row.pattern.fullmatch(text))
         return next(found, UNKNOWN)
+
+    @cached_property
+    def means(self) -> Means:
+        """What words of the control do beside the motion, as the CL file has it."""
+        effects = ((word, effect.partition("=")) for word, row in self.named.items() for effect in row.effects)
+        return {word: (kind, value) for word, (kind, _, value) in effects if kind in _IN_CL and value not in (".", "?")}
 
     @cached_property
     def _with_others(self) -> frozenset[str]:

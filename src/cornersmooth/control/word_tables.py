@@ -29,22 +29,14 @@ Keys:
 
 from __future__ import annotations
 
-import re
 import tomllib
 from collections.abc import Mapping
-from functools import cache, lru_cache
+from functools import cache
 from importlib.resources import files
-from itertools import chain
 from typing import Any, Final
 
 #: words, and kind and value of what each says beside the motion
 Means = Mapping[str, tuple[str, str]]
-
-#: kinds of what words say beside the motion, as `statements` has them
-_KINDS: Final = frozenset(("spindle", "coolant", "stop", "end", "compensation", "register", "offset"))
-
-#: words whose effects are remembered
-_REMEMBERED: Final = 4096
 
 _LISTS: Final = files(__package__).joinpath("word_lists")
 
@@ -61,24 +53,3 @@ def word_table(control: str) -> Mapping[str, Any]:
     base = word_table(table.pop("like")) if "like" in table else {"words": {}}
     words |= {word: row for word, row in base["words"].items() if word not in words}
     return {**base, **table, "words": words}
-
-
-@cache
-def means_of(control: str) -> Means:
-    """What the words of a control say beside the motion: the kind, and the word of the CL file."""
-    rows = word_table(control)["words"].items()
-    effects = ((word, effect.partition("=")) for word, row in rows for effect in _effects(row))
-    return {word: (kind, value) for word, (kind, _, value) in effects if kind in _KINDS and value not in (".", "?")}
-
-
-@lru_cache(_REMEMBERED)
-def effects_of(control: str, name: str) -> tuple[str, ...]:
-    """What a word does, by its name and as its row has it; empty where there is no such row."""
-    rows = word_table(control)["words"]
-    alike = (row for word, row in rows.items() if row and word[0] == "/" and re.fullmatch(word[1:-1], name))
-    begins = (row for word, row in rows.items() if row and word[-1] == "*" and name.startswith(word[:-1]))
-    return _effects(rows.get(name) or next(chain(alike, begins), ""))
-
-
-def _effects(row: str) -> tuple[str, ...]:
-    return tuple(re.split("[:;]", row, maxsplit=1)[0].split())

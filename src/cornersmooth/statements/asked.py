@@ -59,7 +59,7 @@ Handler = Callable[[list[str], list[float], Statement], bool]
 class Asking:
     """Goes through the CL statements and notes what they ask for, and those that are not understood.
 
-    What words of the control say (`means_of`) is for AUXFUN.
+    What words of the control say (`Table.means`) is for AUXFUN.
     """
 
     def __init__(self, program: Program, means: Means | None = None) -> None:
@@ -307,7 +307,7 @@ def asked(program: Program, places: Sequence[int], end: int, means: Means) -> li
     places : sequence of int
         The moves that the statements stand before, of which there are `end`.
     means : mapping
-        What words of the control say, as of `means_of`.
+        What words of the control say, as of `Table.means`.
     """
     asking, homes = Asking(program, means), list[Token]()
     for statement, place in zip(program.statements, places, strict=True):

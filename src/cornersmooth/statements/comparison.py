@@ -124,7 +124,7 @@ class Comparison:
     asked_for, found : list of Token
         Of the CL file and of the program, each in order.
     means : mapping
-        What words of the control say, as of `means_of`: for what none says nothing is missing.
+        What words of the control say, as of `Table.means`: for what none says nothing is missing.
     own : set of str
         Kinds that the user says in words of his own, which are no tokens; of most there must be no others.
     """

@@ -48,12 +48,12 @@ _CHANGE = ("M", 6.0)
 
 
 def of_m(value: float, means: Means) -> tuple[str, float | str]:
-    """Kind and value of what an M word other than M6 does on a control; `means` as of `means_of`."""
+    """Kind and value of what an M word other than M6 does on a control; `means` as of `Table.means`."""
     return means.get(f"M{value:g}", ("auxiliary", value))
 
 
 def said(events: Sequence[Event], means: Means) -> list[Token]:
-    """What the words of the NC program do, each before its element; `means` as of `means_of`."""
+    """What the words of the NC program do, each before its element; `means` as of `Table.means`."""
     tokens: list[Token] = []
     chosen: float | None = None
     words = [(event.letter, event.value) for event in events]

@@ -7,7 +7,8 @@ from collections.abc import Callable, Container, Mapping, Set
 from typing import Any, Final
 
 from cornersmooth.control.lexer import Lexer
-from cornersmooth.control.word_tables import effects_of, means_of, word_table
+from cornersmooth.control.table import table_of
+from cornersmooth.control.word_tables import word_table
 from cornersmooth.control.words import Columns, Line, Word, refused, tools_first
 from cornersmooth.errors import InputError
 from cornersmooth.nc_reader.acts import Acts, Beside, ModalState, Move
@@ -65,8 +66,9 @@ class Dialect:
         table = word_table(control)
         for key, value in table["grammar"].items():
             setattr(self, key, _READ[key](value) if key in _READ else value)
-        self.switches, self.means, self.rotary = table.get("switches", False), means_of(control), rotary
-        self.control = control
+        self.switches, self.rotary, self.control = table.get("switches", False), rotary, control
+        self._table = table_of(control)
+        self.means = self._table.means
         if rotary:
             self.digits = re.compile(
                 rb"(?<!K\d)(?:([XYZ])|(?<![A-Z0-9])([%b])(?:=DC\()?)[-+]?\d*\.(\d*)" % rotary.encode()
@@ -155,7 +157,7 @@ class Dialect:
     def effect(self, word: Word) -> str:
         """What a word does in the first place; what is beside it in its row follows from that."""
         name = word.spelling if word.name in "GM" else word.name
-        return next(iter(effects_of(self.control, name)), "unknown")
+        return next(iter(self._table.row(name).effects), "unknown")
 
     def machine_axes(self, line: Line, beside: Set[tuple[str, float]]) -> str:
         """Axes that a block sends to positions of the machine; refuses words beside them but for some."""
