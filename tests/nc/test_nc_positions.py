@@ -129,6 +129,16 @@ def test_what_is_elsewhere_is_found(control: str) -> None:
                 assert "CS583" in codes(program, wrong, control, machine), wrong[at]
 
 
+def test_the_end_that_is_spelt_as_a_path_is_at_home_too() -> None:
+    machine = machine_of()
+    program, lines = text_of("heidenhain", machine)
+    path = [re.sub(r"^(\d+ )M30$", r"\1L M30", line) for line in lines]
+    assert path != lines
+    assert codes(program, path, "heidenhain", machine) == set()
+    home = WORDS["heidenhain"][2]
+    assert "CS583" in codes(program, [line for line in path if home not in line], "heidenhain", machine)
+
+
 def test_inches() -> None:
     machine = machine_of({"X": -254.0, "Z": -12.7}, {"Y": 25.4})
     program, lines = text_of("fanuc", machine, CL.replace("UNITS/MM", "UNITS/INCHES").replace("MMPM", "IPM"))
