@@ -21,7 +21,7 @@ ARRAYS = ("tip", "axis", "kind", "feed", "line", "feed_mode", "keep")
 
 
 def outcome(data: bytes, *, fast: bool) -> Program | str:
-    finds = bulk.find_plain if fast else lambda text, first: None
+    finds = bulk.find_plain if fast else lambda text: None
     try:
         with patch.object(bulk, "find_plain", finds):
             return read_apt(clean(data, "x.cls"), name="x.cls")
@@ -124,11 +124,13 @@ def test_random_programs(lines: list[str], head: str, small: bool) -> None:
 
 def test_plain_lines_take_the_fast_path() -> None:
     text = b"GOTO/1.,2.,3.,0,0,1\nGOTO/1.,2.,4.\n" * 10 + b"RAPID\nGOTO / 1., 2., 3.,  $\n0., 0., 1.\n"
-    (chunk,) = bulk.chunks(text)
-    assert len(chunk.poses) == 21
-    assert chunk.runs.tolist() == [[0, 20], [21, 23]]
-    assert chunk.poses[:, 6].tolist() == [*range(1, 21), 22]
-    assert np.array_equal(~np.isnan(chunk.poses[:, 3]), [True, False] * 10 + [True])
+    first, between, last = bulk.parts(text)
+    assert between == (21, b"RAPID\n", None, "GOTO")
+    assert first.poses is not None
+    assert last.poses is not None
+    poses = np.concatenate((first.poses, last.poses))
+    assert poses[:, 6].tolist() == [*range(1, 21), 22]
+    assert np.array_equal(~np.isnan(poses[:, 3]), [True, False] * 10 + [True])
 
 
 @pytest.mark.parametrize(
@@ -137,5 +139,4 @@ def test_plain_lines_take_the_fast_path() -> None:
     "|GOTO/1,2,3\n 4,5,6|GOTO/1,2,3,$ 9\n0,0,1|GOTO/1,-,3|GOTO/1,2,3,$\nRAPID|GOTO/1,2,3\n5e1,1,1".split("|"),
 )
 def test_odd_lines_are_left_to_the_careful_reader(line: str) -> None:
-    (chunk,) = bulk.chunks(f"{line}\n".encode())
-    assert len(chunk.poses) == 0
+    assert [part.poses for part in bulk.parts(f"{line}\n".encode())] == [None]

@@ -627,28 +627,33 @@ LISTING = ["UNITS/MM", "FEDRAT/500,MMPM", "$$ a comment", "GOTO/1,2,3,$", "0,.6,
 
 
 @pytest.mark.parametrize(
-    ("form", "code"),
+    ("form", "refused"),
     [
-        (lambda text, n: f"{text:<72}{n:08d}", "CS191"),
-        (lambda text, n: f"{text:<72}PT {n:5d}" if "GOTO" in text else text, "CS191"),
-        (lambda text, n: f"{text:<72}{n:<8d}", "CS191"),
-        (lambda text, n: f"{text:<80}" if n % 2 else f"{text:<72}A{n:07d}", "CS191"),
-        (lambda text, n: f"{n:05d} {text}", "CS192"),
-        (lambda text, n: f"{n:5d}:  {text}", "CS192"),
-        (lambda text, n: f"{n}\t{text}", "CS192"),
+        (lambda text, n: f"{text:<72}{n:08d}", "CS189:1"),
+        (lambda text, n: f"{text:<72}PT {n:5d}" if "GOTO" in text else text, "CS189:7"),
+        (lambda text, n: f"{text:<72}{n:<8d}", "CS189:1"),
+        (lambda text, n: f"{text:<80}" if n % 20 else f"{text:<72}A{n:07d}", "CS189:2"),
+        (lambda text, n: f"{n:05d} {text}", "CS190:1"),
+        (lambda text, n: f"{n:5d}:  {text}", "CS190:1"),
+        (lambda text, n: f"{n}\t{text}", "CS190:1"),
         (lambda text, n: f"N{n} {text}" if text[0].isalpha() else text, None),
         (lambda text, n: f"{text:<90}", None),
     ],
 )
 @pytest.mark.parametrize("end", ["\n", "\r\n"])
-def test_numbers_beside_the_statements(form: Callable[[str, int], str], code: str | None, end: str) -> None:
+def test_numbers_beside_the_statements(form: Callable[[str, int], str], refused: str | None, end: str) -> None:
     text = "".join(form(line, 10 * n) + end for n, line in enumerate(LISTING, 1))
+    if refused is not None:
+        with pytest.raises(InputError) as caught:
+            program(text)
+        assert f"{caught.value.code}:{caught.value.line}" == refused
+        return
     result = program(text)
     assert result.tip.tolist() == [[1, 2, 3], [4, 5, 6]]
     assert np.allclose(result.axis, [[0, 0.6, 0.8]] * 2, rtol=0, atol=1e-15)
     assert result.feed.tolist() == [500, 500]
     assert result.line.tolist() == [4, 7]
-    assert codes(result) == ({code: 1} if code else {})
+    assert not codes(result)
 
 
 def test_long_lines_are_not_cut() -> None:

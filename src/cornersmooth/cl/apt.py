@@ -13,14 +13,13 @@ from numpy.typing import NDArray
 from cornersmooth.cl import arcs as arc_geometry
 from cornersmooth.cl import motion_statements, state_statements
 from cornersmooth.cl.arcs import ArcRule
-from cornersmooth.cl.bulk import chunks
+from cornersmooth.cl.bulk import parts
 from cornersmooth.cl.dialects import DIALECTS, recognise
 from cornersmooth.cl.grammar import Decode, Record, joined, number, read_records
 from cornersmooth.cl.messages import error, finding
 from cornersmooth.cl.nurbs import curves_of
 from cornersmooth.cl.poses import AXIS_NOISE
 from cornersmooth.cl.reader_state import ReaderState
-from cornersmooth.cl.source import without_card_columns
 from cornersmooth.cl.words import (
     GOTO_WORDS,
     KNOWN_WORDS,
@@ -79,65 +78,36 @@ def read_apt(
     `nurbs.MOST_LINES` poses for each control point. Raises InputError CS101-CS128 and CS181-CS193, with the line.
     """
     refuse_program(data, name)
-    data, cut = without_card_columns(data, name)
     known = next(one for one in DIALECTS if one.name == dialect) if dialect else recognise(data)
-    decode = _decoder(data)
     state = ReaderState(
-        file=name,
-        dialect=known,
-        short_axis_up=known.short_axis == "up",
-        off_known=known.multax_off is not None,
-        wanted_units=units,
-        arc_rule=arc_rule,
-        lenient=lenient,
-        cycle_order=cycle_order,
+        file=name, dialect=known, wanted_units=units, arc_rule=arc_rule, lenient=lenient, cycle_order=cycle_order
     )
-    if cut:
-        state.note(cut, 0)
-    _run(data, state, decode)
+    decode = _decoder(data)
+    for part in parts(data):
+        if state.stopped:
+            break
+        if part.poses is not None:
+            _plain(state, part.poses, part.first)
+            continue
+        for record in read_records(part.text.split(b"\n")[:-1], part.first, decode, name, part.follows):
+            _obey(state, record)
     _end(state)
     if not state.n:
         raise error("CS101", name, 1)
     return _program(state)
 
 
-def _run(data: bytes, state: ReaderState, decode: Decode) -> None:
-    """Carry out all statements: plain GOTO lines by whole runs, the lines between them one after the other."""
-    done = 0
-
-    def take(lines: list[bytes], first: int, follows: str) -> None:
-        for record in read_records(lines, first, decode, state.file, follows):
-            _obey(state, record)
-
-    for chunk in chunks(data):
-        state.enter(chunk)
-        done += chunk.size
-        begin = 0
-        begins = chunk.begins.tolist()
-        for run, (start, stop) in enumerate(chunk.runs.tolist()):
-            if begin < start:
-                take(chunk.lines[begin:start], chunk.first + begin, "GOTO")
-            if state.stopped:
-                return
-            _plain(state, begins[run + 1] - begins[run], chunk.first + start)
-            begin = stop
-        if begin < len(chunk.lines):
-            take(chunk.lines[begin:], chunk.first + begin, "GOTO" if done < len(data) else "the end of the file")
-        if state.stopped:
-            return
-
-
-def _plain(state: ReaderState, count: int, line: int) -> None:
-    """Carry out some plain GOTO statements, whose poses are in the chunk."""
+def _plain(state: ReaderState, poses: Floats, line: int) -> None:
+    """Carry out some plain GOTO statements."""
     if state.finished:
         raise error("CS118", state.file, line, word="GOTO")
     if state.curve is not None:
         motion_statements.finish_curve(state)
     if state.spline is not None:
-        motion_statements.pass_points(state, state.skip(count))
+        motion_statements.pass_points(state, poses)
         return
     state.arrive()
-    state.take(count)
+    state.take(poses)
 
 
 def _obey(state: ReaderState, record: Record) -> None:
@@ -250,8 +220,8 @@ def _program(state: ReaderState) -> Program:
     scale = MM_PER_UNIT[units]
     tip = state.tips()
     axis, axis_findings = state.axes()
-    kind = state.kinds()
-    line = state.lines()
+    kind = state.kind.spread(state.n).astype(np.uint8)
+    line = state.rows[:, 6].astype(np.int64)
     arcs, straight, kept, arc_findings = arc_geometry.resolve(state.arcs, tip, kind, state.file, state.arc_rule)
     kind[straight] = Move.LINEAR
     keep = state.exact.spread(state.n).astype(np.uint8)
@@ -285,13 +255,11 @@ def _program(state: ReaderState) -> Program:
 
 def _fed_from_elsewhere(tip: Floats, kind: NDArray[np.uint8]) -> Ints:
     """Poses of FROM that name another place than the tool's, which then feeds on: nothing says how it gets there."""
-    poses = np.arange(len(kind))
-    stated = kind == Move.FROM
-    stands = np.maximum.accumulate(np.where(stated, -1, poses))
-    feeds = np.zeros(len(kind), np.bool_)
-    feeds[:-1] = np.isin(kind[1:], (Move.LINEAR, Move.ARC))
-    away = np.abs(tip - tip[stands]).max(axis=1, initial=0.0) > 0.0
-    return np.flatnonzero(stated & feeds & away & (stands >= 0))
+    stated, stands = np.flatnonzero(kind[:-1] == Move.FROM), np.flatnonzero(kind != Move.FROM)
+    before = np.searchsorted(stands, stated) - 1
+    stated, before = stated[before >= 0], stands[before[before >= 0]]
+    feeds = np.isin(kind[stated + 1], (Move.LINEAR, Move.ARC))
+    return stated[feeds & (tip[stated] != tip[before]).any(axis=1)]
 
 
 def _units(state: ReaderState) -> tuple[Units, list[Finding]]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final
 
 from cornersmooth.model import Units
 
@@ -22,10 +22,10 @@ class Dialect:
 
     name: str
     fingerprint: bytes  #: regular expression, searched in the head of a file, line by line
-    short_axis: Literal["hold", "up"] = "hold"  #: what a GOTO of three numbers means for the axis: the last one, or +Z
-    #: What it means after MULTAX/OFF: the axis is locked where it is (CATIA V5, Syntax of Generated APT Instructions;
-    #: PostWorks 7.2), or +Z (ISO 4343:2000, 5.32); None where nothing says.
-    multax_off: Literal["lock", "up"] | None = None
+    short_axis_up: bool = False  #: whether the axis of a GOTO of three numbers is +Z, and not the last one
+    #: Whether the axis after MULTAX/OFF is known: locked where it is (CATIA V5, Syntax of Generated APT Instructions;
+    #: PostWorks 7.2), or +Z (ISO 4343:2000, 5.32) with `short_axis_up`.
+    multax_off_known: bool = False
     units: Units = "mm"  #: where the file does not say
     decimals: int = 4  #: digits after the point of coordinates
     #: whether zeros at their end are left out, so that a statement alone does not tell the digits
@@ -40,17 +40,17 @@ DIALECTS: Final[tuple[Dialect, ...]] = (
         "creo",
         # with words of GPOST, the comments are REMARK
         rb"^(\$\$|REMARK *)(\* *Pro/CLfile|-> *(FEATNO|MFGNO|CSYS|CUTTER|END) */)|^[ \t]*(PPWORD|CAMERA)[ \t]*/",
-        short_axis="up",
-        multax_off="up",
+        short_axis_up=True,
+        multax_off_known=True,
         decimals=10,
     ),
-    Dialect("catia", rb"^\$\$ +CATIA APT VERSION|^\$\$\*CATIA0", multax_off="lock", decimals=5),
+    Dialect("catia", rb"^\$\$ +CATIA APT VERSION|^\$\$\*CATIA0", multax_off_known=True, decimals=5),
     Dialect("nx", rb"^[ \t]*(TOOL PATH/|TLDATA/|MSYS/|END-OF-PATH|PAINT/)"),
     Dialect(
         "hsm",
         rb"^[ \t]*(MODE[ \t]*/[ \t]*(MILL|TURN)\b|MOVARC[ \t]*/|CSI_TOOL_PATH[ \t]*/|MCSYS[ \t]*/[ \t]*NUM\b)",
-        short_axis="up",
-        multax_off="up",
+        short_axis_up=True,
+        multax_off_known=True,
         decimals=6,
         strips_zeros=True,
     ),
@@ -60,7 +60,7 @@ DIALECTS: Final[tuple[Dialect, ...]] = (
         decimals=6,
         strips_zeros=True,
     ),
-    Dialect("ncl", rb"^REMARK .*NCLCAM", multax_off="lock", units="inch"),
+    Dialect("ncl", rb"^REMARK .*NCLCAM", multax_off_known=True, units="inch"),
     Dialect("plain", rb""),
 )
 

@@ -30,6 +30,9 @@ _LABEL: Final = re.compile(r"(?:[NC][0-9]+[ \t]*,|N[0-9]+(?=[ \t])|[A-Z0-9]+\))[
 #: the number of a line before its statement
 _NUMBERED: Final = re.compile(r"[0-9]+[ \t]*[:.]?[ \t]*[A-Z]{2}", re.IGNORECASE)
 
+#: columns 73 to 80 of punched cards: a number, with a name before it (CATIA: ``PT     6``)
+_CARD: Final = re.compile(r"[ \t]*[A-Z]{0,7}[ \t]*[0-9]+[ \t]*", re.IGNORECASE)
+
 #: a text word at the start of a statement; six letters are a field of their own in APT, blanks may not follow
 _TEXT: Final = re.compile(r"(PARTNO|PPRINT|INSERT|REMARK|LETTER|TPRINT|DISPLY|TOOL[ \t]+PATH)[ \t]*(/?)", re.IGNORECASE)
 
@@ -124,12 +127,21 @@ def read_records(lines: Sequence[bytes], first: int, decode: Decode, file: str, 
         found = _TEXT.match(text)
         if found is not None:
             yield _text_statement(source, line, text, found)
+        elif _is_card(decode(lines[source.at - 1]).rstrip()):
+            raise error("CS189", file, line)
         elif _NUMBERED.match(text):
             raise error("CS190", file, line, text=text)
         elif _NUMERIC_LINE.match(text) or (text[0] in "+-.0123456789" and "," in text):
             raise error("CS105", file, line, text=text)
         else:
             yield from _statements(source, line, text)
+
+
+def _is_card(line: str) -> bool:
+    """Whether a number in columns 73 to 80 is no part of the statement before it."""
+    before = line[:72]
+    apart = before[71:].isspace() and not before.rstrip().endswith((",", "/", "=")) and "$" not in before
+    return apart and len(line) <= 80 and _CARD.fullmatch(line[72:]) is not None
 
 
 def _comment(source: _Lines, line: int, text: str) -> Record:

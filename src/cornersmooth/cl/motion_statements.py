@@ -67,7 +67,7 @@ def _goto(state: ReaderState, record: Record) -> None:
 
 def _from(state: ReaderState, record: Record) -> None:
     tip, axis = _pose(state, record, record.args, record.line)
-    state.add_special(tip, axis, record.line, Move.FROM)
+    state.add(tip, axis, record.line, Move.FROM)
 
 
 def _gohome(state: ReaderState, record: Record) -> None:
@@ -77,7 +77,7 @@ def _gohome(state: ReaderState, record: Record) -> None:
         return
     tip, axis = _pose(state, record, record.args, record.line)
     state.rapid = False
-    state.add_special(tip, axis, record.line, Move.RAPID)
+    state.add(tip, axis, record.line, Move.RAPID)
 
 
 def _retract(state: ReaderState, record: Record) -> None:

@@ -11,10 +11,10 @@ from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cornersmooth.arrays.vectors import norm
-from cornersmooth.cl.bulk import FARTHEST, Chunk
+from cornersmooth.cl.bulk import FARTHEST
+from cornersmooth.cl.dialects import Dialect
 from cornersmooth.cl.messages import error, finding
 from cornersmooth.errors import Finding
 from cornersmooth.model import Floats, Ints, Keep, Move
@@ -46,13 +46,17 @@ class System:
 
     def point(self, point: Vector) -> Vector:
         """One point of this system, in the other one."""
-        x, y, z = self.points(np.array([point]))[0].tolist()
-        return x, y, z
+        return triple(self.points(np.array([point]))[0])
 
     def vector(self, vector: Vector) -> Vector:
         """One vector of this system, in the other one."""
-        x, y, z = self.vectors(np.array([vector]))[0].tolist()
-        return x, y, z
+        return triple(self.vectors(np.array([vector]))[0])
+
+
+def triple(array: Floats) -> Vector:
+    """Three numbers of an array."""
+    x, y, z = array.tolist()
+    return x, y, z
 
 
 IDENTITY: Final = System(np.eye(3), np.zeros(3))
@@ -120,8 +124,7 @@ class Poses:
     """Poses and state changes of one file; lengths and feeds as written."""
 
     file: str  #: for messages
-    short_axis_up: bool = False  #: whether a pose without an axis has +Z instead of the last one
-    off_known: bool = True  #: whether MULTAX/OFF surely locks the axis where it is
+    dialect: Dialect
     lenient: bool = False  #: go on where that is safe, with a finding
     n: int = 0
     feed: Changes = field(default_factory=lambda: Changes([float("nan")]))
@@ -129,67 +132,38 @@ class Poses:
     exact: Changes = field(default_factory=lambda: Changes([Keep.NO]))
     kind: Changes = field(default_factory=lambda: Changes([Move.LINEAR]))
     axis_locked: Changes = field(default_factory=lambda: Changes([_FREE]))
-    special: dict[int, Move] = field(default_factory=dict)
     axis_set: list[tuple[int, Vector]] = field(default_factory=lambda: [(0, UP)])
     systems: list[tuple[int, System]] = field(default_factory=list)  #: first pose, system seen from the first one
     _last_axis: Vector = UP
     _settled: int = 0  #: poses that `_last_axis` knows of
     _rows: Floats = field(default_factory=lambda: np.empty((_ROOM, 7)))
-    _filled: int = 0  #: rows that hold their poses; those of the others are in the chunk
-    _chunk: Chunk | None = None
-    _taken: int = 0  #: poses of the chunk
 
-    def enter(self, chunk: Chunk) -> None:
-        """Take the next chunk; its plain poses follow by `take`."""
-        _ = self.rows  # those of the chunk before
-        self._chunk, self._taken = chunk, 0
+    @property
+    def rows(self) -> Floats:
+        """(n, 7) float64: tip, axis and line of every pose, as in `Part`."""
+        return self._rows[: self.n]
 
-    def take(self, count: int) -> None:
-        """Append the next poses of the chunk."""
-        self.n += count
-        self._taken += count
-
-    def skip(self, count: int) -> Floats:
-        """Pass over the next poses of the chunk: (count, 7) rows as `rows`."""
-        _ = self.rows  # those before them
-        assert self._chunk is not None
-        self._taken += count
-        return self._chunk.poses[self._taken - count : self._taken].copy()
+    def take(self, rows: Floats) -> None:
+        """Append poses (m, 7)."""
+        begin, self.n = self.n, self.n + len(rows)
+        if self.n > len(self._rows):
+            self._rows = np.concatenate((self._rows[:begin], np.empty((2 * self.n - begin, 7))))
+        self._rows[begin : self.n] = rows
 
     def append(self, tip: Vector, axis: Vector | None, line: int) -> None:
         """Append one pose (InputError CS113)."""
         check_range(tip, self.file, line)
-        _ = self.rows  # those before it
-        self.n += 1
-        self._fill(np.array([(*tip, *(axis or _NONE), line)]))
-
-    @property
-    def rows(self) -> Floats:
-        """(n, 7) float64: tip, axis and line of every pose, as `Chunk.poses`."""
-        if self._filled < self.n and self._chunk is not None:
-            self._fill(self._chunk.poses[self._taken - self.n + self._filled : self._taken])
-        return self._rows[: self.n]
-
-    def _fill(self, rows: Floats) -> None:
-        """Put further rows in their places, which there is room for."""
-        end = self._filled + len(rows)
-        if end > len(self._rows):
-            old = self._rows
-            self._rows = np.empty((2 * end, 7))
-            self._rows[: self._filled] = old[: self._filled]
-        self._rows[self._filled : end] = rows
-        self._filled = end
+        self.take(np.array([(*tip, *(axis or _NONE), line)]))
 
     @property
     def last_axis(self) -> Vector:
         """Axis of the last pose; where it has none of its own, the one that was set before it, or +Z."""
         rows, self._settled = self.rows[self._settled :, 3:6], self.n
         if len(rows) and not self.axis_locked.now:
-            if self.short_axis_up and np.isnan(rows[-1, 0]):
+            if self.dialect.short_axis_up and np.isnan(rows[-1, 0]):
                 self._last_axis = self.axis_set[-1][1]
             elif len(own := np.flatnonzero(~np.isnan(rows[:, 0]))):
-                x, y, z = rows[own[-1]].tolist()
-                self._last_axis = x, y, z
+                self._last_axis = triple(rows[own[-1]])
         return self._last_axis
 
     def _hold(self, axis: Vector) -> None:
@@ -210,15 +184,15 @@ class Poses:
 
     def last_tip(self) -> Vector:
         """Tip of the last pose, in the coordinate system of what follows."""
-        x, y, z = self.rows[-1, :3].tolist()
+        tip = triple(self.rows[-1, :3])
         if not self.systems or self.systems[-1][0] < self.n:
-            return x, y, z
+            return tip
         before = next((system for pose, system in reversed(self.systems) if pose < self.n), IDENTITY)
-        return before.seen_from(self.system).point((x, y, z))
+        return before.seen_from(self.system).point(tip)
 
     def held_axis(self) -> Vector | None:
         """Axis to give to a pose that keeps the last one: None where that is what having none means."""
-        return self.last_axis if self.short_axis_up else None
+        return self.last_axis if self.dialect.short_axis_up else None
 
     def set_axis(self, axis: Vector) -> None:
         """Let poses without an axis of their own have this one from here on."""
@@ -234,16 +208,6 @@ class Poses:
     def tips(self) -> Floats:
         """(n, 3) float64: all tips, in the first coordinate system."""
         return self._placed(self.rows[:, :3], System.points)
-
-    def lines(self) -> Ints:
-        """(n,) int64: line of every pose."""
-        return self.rows[:, 6].astype(np.int64)
-
-    def kinds(self) -> NDArray[np.uint8]:
-        """(n,) uint8: `Move` of every pose."""
-        kind = self.kind.spread(self.n).astype(np.uint8)
-        kind[list(self.special)] = np.array(list(self.special.values()), np.uint8)
-        return kind
 
     def axes(self) -> tuple[Floats, list[Finding]]:
         """(n, 3) float64: the unit axis of every pose in the first system, and findings about them.
@@ -262,7 +226,7 @@ class Poses:
             findings.append(finding("CS137", int(self.rows[off_axes[0][0], 6]), int(dropped.sum())))
             unit, given = unit[~dropped], given[~dropped]
         axis = self._held(unit, given)
-        if not self.off_known:
+        if not self.dialect.multax_off_known:
             self._check_off(axis, state, *off_axes)
         return self._placed(axis, System.vectors), findings
 
@@ -272,7 +236,7 @@ class Poses:
             return unit
         at = np.array([pose for pose, _ in self.axis_set])
         known = np.array([axis for _, axis in self.axis_set])
-        if not self.short_axis_up:
+        if not self.dialect.short_axis_up:
             order = np.argsort(np.concatenate((at, given)), kind="stable")  # what was set before a pose comes first
             at, known = np.concatenate((at, given))[order], np.concatenate((known, unit))[order]
         axis = known[np.searchsorted(at, np.arange(self.n), side="right") - 1]

@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from cornersmooth.cl.arcs import Arc, ArcRule
-from cornersmooth.cl.dialects import Dialect
 from cornersmooth.cl.grammar import Argument, Record, joined, number
 from cornersmooth.cl.messages import error, finding
 from cornersmooth.cl.movnrb import Spline
@@ -23,7 +22,6 @@ from cornersmooth.model import Move, Statement, Units
 class ReaderState(Poses):
     """State of the reading of one file."""
 
-    dialect: Dialect
     wanted_units: Units | None = None  #: override those of the file
     arc_rule: ArcRule | None = None  #: overrides the dialect's sense of rotation
     cycle_order: tuple[str, ...] = ()  #: what the numbers without a word of CYCLE are
@@ -98,26 +96,29 @@ class ReaderState(Poses):
         """Return the error for a wrong number of numbers, to be raised."""
         return self.fail("CS110", record, line, count=count, s="s"[: count != 1], want=want)
 
-    def add(self, tip: Vector, axis: Vector | None, line: int) -> None:
-        """Append a pose that a feed motion or the pending RAPID reaches."""
-        self.arrive()
-        self.append(tip, axis, line)
-
-    def add_special(self, tip: Vector, axis: Vector | None, line: int, move: Move) -> None:
-        """Append a pose that is reached in a way of its own."""
-        self.special[self.n] = move
+    def add(self, tip: Vector, axis: Vector | None, line: int, move: Move | None = None) -> None:
+        """Append a pose that this move reaches: by default a feed motion, or the pending RAPID."""
+        if move is None:
+            self.arrive()
+        else:
+            self._reach(move)
         self.append(tip, axis, line)
 
     def arrive(self) -> None:
         """Settle how the next pose is reached."""
         if self.arc is not None:
             self.arcs.append(replace(self.arc, pose=self.n))
-            self.special[self.n] = Move.ARC
+            self._reach(Move.ARC)
             self.arc = None
         elif self.rapid and not self.hole:
-            self.special[self.n] = Move.RAPID
+            self._reach(Move.RAPID)
         self.rapid = False
 
-    def set_kind(self) -> None:
-        """Let the modal kind of motion hold from here on."""
-        self.kind.set(self.n, Move.HOLE if self.hole else Move.RAPID if self.rapid_on else Move.LINEAR)
+    def _reach(self, move: Move) -> None:
+        """Let one pose be reached by another move than those after it."""
+        self.kind.append(self.n, move)
+        self.set_kind(self.n + 1)
+
+    def set_kind(self, pose: int) -> None:
+        """Let the modal kind of motion hold from a pose on."""
+        self.kind.append(pose, Move.HOLE if self.hole else Move.RAPID if self.rapid_on else Move.LINEAR)

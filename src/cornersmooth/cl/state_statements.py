@@ -63,7 +63,7 @@ def _rapid(state: ReaderState, record: Record) -> None:
     if option in ("ON", "OFF"):
         state.rapid_on = option == "ON"
         state.rapid = False
-        state.set_kind()
+        state.set_kind(state.n)
     elif record.args in ((), ("",), ("MODIFY",)):
         state.rapid = True
         if state.hole:
@@ -285,7 +285,7 @@ def _cutcom(state: ReaderState, record: Record) -> None:
 
 def _cycle(state: ReaderState, record: Record) -> None:
     state.hole = record.option not in _ENDS
-    state.set_kind()
+    state.set_kind(state.n)
     state.keep(replace(record, args=plain_cycle(record.args, state.dialect.name, state.cycle_order)))
 
 
