@@ -45,7 +45,9 @@ def circles(
     radius = table.column("R")
     by_radius = ~np.isnan(radius)
     half = np.divide(length, 2 * np.abs(radius), out=np.ones_like(length), where=by_radius & (radius != 0))
-    for k in np.flatnonzero(by_radius & ((length == 0) | (half > 1 + _slack(radius, length)))).tolist():
+    # by so much of the radius a half circle may be missed because of printed digits
+    slack = np.maximum(1e-6, np.divide(1e-3, np.abs(radius), out=np.zeros_like(length), where=radius != 0))
+    for k in np.flatnonzero(by_radius & ((length == 0) | (half > 1 + slack))).tolist():
         text = f"an arc of radius {radius[k]:g} does not reach its end"
         problems.append(Problem("CS520", 0, int(table.line[k]), text))
     rise = np.sqrt(np.maximum(1 - half**2, 0)) * np.abs(np.nan_to_num(radius)) * np.sign(np.nan_to_num(radius))
@@ -61,11 +63,6 @@ def circles(
         problems.append(Problem("CS520", 0, int(table.line[k]), text))
     normals = sense[:, None] * upright
     return centre, normals, _sweep(before - centre, end - centre, normals, by_radius)
-
-
-def _slack(radius: Floats, length: Floats) -> Floats:
-    """How much, relative to the radius, a half circle may be missed because of printed digits."""
-    return np.maximum(1e-6, np.divide(1e-3, np.abs(radius), out=np.zeros_like(length), where=radius != 0))
 
 
 def _sweep(start: Floats, end: Floats, normal: Floats, by_radius: Bools) -> Floats:
@@ -94,7 +91,7 @@ def arc_points(start: Floats, end: Floats, centre: Floats, normal: Floats, sweep
         What start, sweep and end contradict each other by (height of a helix, printed digits) grows evenly.
     """
     radius = start - centre
-    radius = radius - _dot(radius, normal)[:, None] * normal
+    radius = radius - np.einsum("ij,ij->i", radius, normal)[:, None] * normal
     across = np.cross(normal, radius)
 
     def turned(angle: Floats) -> Floats:
@@ -102,7 +99,3 @@ def arc_points(start: Floats, end: Floats, centre: Floats, normal: Floats, sweep
 
     rest = end - turned(sweep)
     return turned(fraction * sweep) + fraction[:, None] * rest
-
-
-def _dot(a: Floats, b: Floats) -> Floats:
-    return np.einsum("ij,ij->i", a, b)

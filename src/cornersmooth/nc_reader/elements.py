@@ -52,13 +52,8 @@ class _Shapes:
 
     def part(self, first: int, stop: int) -> Self:
         """Those that are elements from `first` to `stop`, the latter excluded."""
-        rows = slice(*np.searchsorted(self.element, (first, stop)).tolist())
-        chosen = {name: values[self._place(name, rows)] for name, values in _stored(self).items()}
-        return replace(self, **chosen | {"element": chosen["element"] - first})
-
-    def _place(self, name: str, rows: slice) -> slice:
-        """Where a field has what belongs to some rows."""
-        return rows
+        found = self.only(np.arange(*np.searchsorted(self.element, (first, stop))))
+        return replace(found, element=found.element - first)
 
     @classmethod
     def joined(cls, parts: Sequence[Self], start: Sequence[int] | None = None) -> Self:
@@ -109,14 +104,6 @@ class Curves(_Shapes):
         place, at = _slices(self.points, chosen), _slices(self.points + self.order, chosen)
         rows = {"point": place, "weight": place, "knot": at}
         return replace(self, **{name: values[rows.get(name, chosen)] for name, values in _stored(self).items()})
-
-    def _place(self, name: str, rows: slice) -> slice:
-        """Where a field has what belongs to some of the curves."""
-        if name not in ("point", "weight", "knot"):
-            return rows
-        size = self.points + self.order if name == "knot" else self.points
-        first = int(size[: rows.start].sum())
-        return slice(first, first + int(size[rows].sum()))
 
 
 def _slices(size: Ints, chosen: Ints) -> Ints:
@@ -266,25 +253,6 @@ class NcProgram(Elements):
     def mm_per_unit(self) -> float:
         """Millimetres per unit of the text."""
         return MM_PER_UNIT[self.units]
-
-
-def settle(elements: Elements) -> int | None:
-    """Put the tool where words that come later first send it, as long as it moves at rapid only: in place, for NaN.
-
-    Return the NC line where a feed move goes from or to such a place although a part of it has been written, or None.
-    """
-    for values in (elements.tip, elements.second):
-        if not len(values) or not np.isnan(values[0]).any():  # what has been written holds
-            continue
-        unknown = np.isnan(values)
-        first = np.where(unknown.all(axis=0), len(values), unknown.argmin(axis=0))
-        feed = elements.kind[: int(first.max()) + 1] != Element.RAPID
-        if feed.any():
-            # the first move has no start that could be known, but it has an end
-            return int(elements.line[min(max(int(feed.argmax()), int(first.min())), len(values) - 1)])
-        for column, begin in zip(values.T, first.tolist(), strict=True):
-            column[:begin] = column[begin] if begin < len(column) else 0.0
-    return None
 
 
 class Ahead:

@@ -121,14 +121,6 @@ def execute(table: Table, modal: Modal, problems: list[Problem]) -> tuple[Elemen
         tip_room=none.copy(),
         curves=replace(curves, element=curved) if len(curves) else curves,
     )
-    problems += Problem.at("CS502", np.isnan(code[rows]), run.line, "a motion before the first G0 or G1", most=1)
-    _check_straight(table, straight, problems, knots="R PL PW K" if points or modal.rotary else "R PL PW")
-    if modal.inverse_time:
-        _check_inverse_time(table, code, rows, problems)
-    if len(curves):
-        _check_starts(run, modal, code[rows[curved]] == NURBS, problems)
-    if is_arc.any():
-        run = replace(run, arcs=_arcs(run, modal, table, rows, code, problems))
     after = modal.but(
         code=float(code[-1]),
         tip=tuple(tip[-1].tolist()),
@@ -137,6 +129,9 @@ def execute(table: Table, modal: Modal, problems: list[Problem]) -> tuple[Elemen
         points=points,
         vector_length=vector_length,
     )
+    _check(run, replace(modal, points=points), table, rows, code, straight, problems)
+    if is_arc.any():
+        run = replace(run, arcs=_arcs(run, modal, table, rows, code, problems))
     return run, after
 
 
@@ -215,26 +210,26 @@ def _to_unit_length(vectors: Floats, given: Bools) -> float:
     return float(length[given].min())
 
 
-def _check_starts(run: Elements, modal: Modal, exact: Bools, problems: list[Problem]) -> None:
-    """First control points must be where the tool is, digit for digit (FANUC alarm PS1009)."""
-    element = run.curves.element[exact]
-    control = run.curves.point.take(run.curves.first_point[exact], axis=0)
-    before = np.hstack((run.tip[element - 1], run.second[element - 1]))
-    before[element == 0] = (*modal.tip, *modal.second)
-    text = "first control point is not the current position"
-    problems += Problem.at("CS519", (control != before).any(axis=1), run.line[element], text)
-
-
-def _check_straight(table: Table, straight: Bools, problems: list[Problem], *, knots: str) -> None:
-    """Words of curves have no meaning on lines: what was to begin the curve is missing."""
-    given = [~np.isnan(table.columns[name]) for name in knots.split() if name in table.columns]
-    if given:
-        text = "curve blocks without what begins a curve before them"
-        problems += Problem.at("CS511", straight & np.any(given, axis=0), table.line, text, most=1)
-
-
-def _check_inverse_time(table: Table, code: Floats, rows: Ints, problems: list[Problem]) -> None:
-    """Under G93 every block of feed needs its F, and curves are refused (FANUC alarm PS1006)."""
-    line, missing = table.line[rows], np.isnan(table.column("F")[rows]) & (code[rows] > 0)
-    problems += Problem.at("CS542", missing, line, "a block without F at inverse time feed (G93)", most=1)
-    problems += Problem.at("CS511", code[rows] == NURBS, line, "a curve at inverse time feed (G93)", most=1)
+def _check(
+    run: Elements, modal: Modal, table: Table, rows: Ints, code: Floats, straight: Bools, problems: list[Problem]
+) -> None:
+    """Note what breaks the rules of a run; `rows` are the blocks of its elements, `code` the G word of each block."""
+    line, own = run.line, code[rows]
+    problems += Problem.at("CS502", np.isnan(own), line, "a motion before the first G0 or G1", most=1)
+    # words of curves have no meaning on lines: what was to begin the curve is missing
+    names = ["R", "PL", "PW", *("K" if modal.points or modal.rotary else "")]
+    given = [~np.isnan(table.columns[name]) for name in names if name in table.columns]
+    text = "curve blocks without what begins a curve before them"
+    problems += Problem.at("CS511", straight & np.any(given, axis=0), table.line, text, most=1) if given else []
+    if modal.inverse_time:  # under G93 every block of feed needs its F, and curves are refused (FANUC alarm PS1006)
+        missing = np.isnan(table.column("F")[rows]) & (own > 0)
+        problems += Problem.at("CS542", missing, line, "a block without F at inverse time feed (G93)", most=1)
+        problems += Problem.at("CS511", own == NURBS, line, "a curve at inverse time feed (G93)", most=1)
+    if len(run.curves):  # first control points are where the tool is, digit for digit (FANUC alarm PS1009)
+        exact = own[run.curves.element] == NURBS
+        element = run.curves.element[exact]
+        control = run.curves.point.take(run.curves.first_point[exact], axis=0)
+        before = np.hstack((run.tip[element - 1], run.second[element - 1]))
+        before[element == 0] = (*modal.tip, *modal.second)
+        text = "first control point is not the current position"
+        problems += Problem.at("CS519", (control != before).any(axis=1), line[element], text)

@@ -18,7 +18,7 @@ from cornersmooth.control.words import MOTION_CODES, Line, Table, joined_tables,
 from cornersmooth.errors import InputError
 from cornersmooth.model import MM_PER_UNIT, Floats, Units
 from cornersmooth.nc_reader.acts import Act, Beside, ModalState, Move, Tilt, ToMachine, TurnToPlane
-from cornersmooth.nc_reader.elements import RETRACT, Element, Elements, Event, NcProgram, Problem, Second, settle
+from cornersmooth.nc_reader.elements import RETRACT, Element, Elements, Event, NcProgram, Problem, Second
 from cornersmooth.nc_reader.execution import Modal, execute, in_mm
 from cornersmooth.nc_reader.needed_states import (
     AS_WRITTEN,
@@ -215,8 +215,7 @@ class Reader:
         if plane is not None:
             self._told = set()
             self._leave(line, "XYZ")
-            if plane.turned:
-                self._turn(line)
+            self._turn(line, plane)
         elif before is not None:
             state.modal = before.left(state.modal, rotary=state.rotary is not None)
 
@@ -226,19 +225,18 @@ class Reader:
             self._wrong("CS506", line, "the tool is turned to a tilted plane, and none waits for it")
             return
         self._above(line, "the tool is turned to a tilted plane where it is not retracted")
-        self.state.plane = replace(self.state.plane, turned=True)
-        self._turn(line)
+        self._turn(line, replace(self.state.plane, turned=True))
+
+    def _turn(self, line: Line, plane: TiltedPlane) -> None:
+        """Switch a tilted plane on; rotary axes that it turns must not be clamped."""
+        self.state.plane = plane
+        for name in [name for name, clamped in self.state.clamped.items() if clamped and plane.turned]:
+            self._wrong("CS538", line, f"{name} turns to a tilted plane while it is clamped")
 
     def _above(self, line: Line, text: str) -> None:
         """Complain where the tool is not above a retract."""
         if not self.retracts.open:
             self._wrong(NOT_ABOVE, line, text)
-
-    def _turn(self, line: Line) -> None:
-        """Complain of rotary axes that are clamped where a plane turns them."""
-        for name, clamped in self.state.clamped.items():
-            if clamped:
-                self._wrong("CS538", line, f"{name} turns to a tilted plane while it is clamped")
 
     def _leave(self, line: Line, axes: str) -> None:
         """Say that axes go to positions of the machine."""
@@ -291,8 +289,11 @@ class Reader:
             self._add(state.plane.in_part(self._in_mm(run), MM_PER_UNIT[self.units]))
             return
         self._note(control_problems(run), once=True)
-        if state.modal.points and not before.points:
-            self._know_points(run.elements)
+        if state.modal.points and not before.points:  # what was written before of the axis is no point on it
+            if self.placed:
+                self._refuse_unknown(int(run.elements.line[0]))
+            for part in self.ready:
+                part.second[:] = np.nan
         elements = self._in_mm(run)
         self._add(elements if state.rotary is None else self._resolved(replace(run, elements=elements)))
 
@@ -341,13 +342,6 @@ class Reader:
         self.lever = max(self.lever, float(levers.max(initial=0.0, where=~np.isnan(levers))))
         return found
 
-    def _know_points(self, run: Elements) -> None:
-        """From here on U V W are a point on the axis: what was written before of the axis is no such point."""
-        if self.placed:
-            self._refuse_unknown(int(run.line[0]))
-        for part in self.ready:
-            part.second[:] = np.nan
-
     # what comes out
 
     def _add(self, run: Elements) -> None:
@@ -379,16 +373,24 @@ class Reader:
             self._settle()
 
     def _settle(self) -> None:
-        """Where words of the position come late, put the tool where they send it first."""
+        """Put the tool where words of the position that come late send it first, as long as it moves at rapid only."""
         if self.placed or not self.ready:
             return
         whole = Elements.joined(self.ready)
         whole = replace(whole, tip=whole.tip.copy(), second=whole.second.copy())
-        line = settle(whole)
-        if line is not None:
-            self._refuse_unknown(line)
-        self.ready = [whole]
-        self.placed = bool((whole.kind != Element.RAPID).any())
+        feed = whole.kind != Element.RAPID
+        for values in (whole.tip, whole.second):
+            unknown = np.isnan(values)
+            if not unknown[0].any():  # what has been written holds
+                continue
+            first = np.where(unknown.all(axis=0), len(values), unknown.argmin(axis=0))
+            if feed[: int(first.max()) + 1].any():
+                # the first move has no start that could be known, but it has an end
+                row = max(int(feed.argmax()), int(first.min()))
+                self._refuse_unknown(int(whole.line[min(row, len(values) - 1)]))
+            for column, begin in zip(values.T, first.tolist(), strict=True):
+                column[:begin] = column[begin] if begin < len(column) else 0.0
+        self.ready, self.placed = [whole], bool(feed.any())
 
     def _refuse_unknown(self, line: int) -> NoReturn:
         hint = "say X Y Z, and U V W where there are any, before the first feed"
