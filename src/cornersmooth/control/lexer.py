@@ -16,6 +16,11 @@ from cornersmooth.errors import InputError
 #: a number as controls write it
 NUMBER: Final = r"[-+]?(?:\d+\.?\d*|\.\d+)"
 
+#: such that are zero, not below zero, above zero
+ZERO: Final = r"\+?(?:0+\.?0*|\.0+)"
+NOT_NEGATIVE: Final = r"\+?(?:\d+\.?\d*|\.\d+)"
+POSITIVE: Final = rf"(?=[+\d.]*[1-9]){NOT_NEGATIVE}"
+
 #: no control reads so many digits before the point
 _LARGEST: Final = 1e12
 

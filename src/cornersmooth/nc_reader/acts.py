@@ -8,6 +8,7 @@ measured on these moves.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
@@ -46,6 +47,25 @@ class HoleCycle:
     dwell: float = 0.0
     feed_out: bool = False
     pitch: float | None = None  #: of a tap, per revolution
+
+    @classmethod
+    def written(cls, match: re.Match[str]) -> HoleCycle:
+        """Cycle by its numbers as named groups; depth, setup and above count from the top, the dwell in seconds."""
+        given = {name: float(number or 0.0) for name, number in match.groupdict().items()}
+        top, pitch = given["top"], given.get("pitch")
+        return cls(
+            given["travel"] if "travel" in given else top + given["above"],
+            top + given["setup"],
+            given["bottom"] if "bottom" in given else top + given["depth"],
+            given.get("feed", pitch),
+            step=given.get("step", 0.0),
+            from_clearance=False,
+            top=top,
+            chip=given.get("out") == 0.0,
+            dwell=1000.0 * given.get("dwell", 0.0),
+            feed_out="back" in given,
+            pitch=pitch,
+        )
 
 
 @dataclass

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Final
 
-from cornersmooth.control.lexer import NUMBER, Lexer, fixed, number_of
+from cornersmooth.control.lexer import NOT_NEGATIVE, NUMBER, POSITIVE, ZERO, Lexer, fixed, number_of
 from cornersmooth.control.words import SPL, Columns, Line, Word, refused
 from cornersmooth.nc_reader.acts import Acts, Beside, HoleCycle, ModalState, Move, Tilt, ToMachine, drill, wrong
 from cornersmooth.nc_reader.dialects.base import Dialect, values
@@ -33,14 +32,15 @@ _SILENT = (
     "*-",
     "LBL",
 )
-#: parameters of hole cycles, and their names
-_PARAMETER: Final = re.compile(rf" Q(\d+)=({NUMBER})")
+#: hole cycles with their parameters, in the order of the control
+_TOP: Final = rf"Q203=(?P<top>{NUMBER}) Q204=(?P<above>{NUMBER})"
+_HOLE: Final = rf"Q200=(?P<setup>{NUMBER}) Q201=(?P<depth>-{NOT_NEGATIVE}|{ZERO})"
+_FEED, _DWELL = rf"Q206=(?P<feed>{NUMBER})", rf"Q211=(?P<dwell>{NOT_NEGATIVE})"
 _CYCLES: Final = {
-    200: {200, 201, 206, 202, 210, 203, 204, 211},
-    201: {200, 201, 206, 211, 208, 203, 204},
-    207: {200, 201, 239, 203, 204},
+    "200": rf"DRILLING {_HOLE} {_FEED} Q202=(?P<step>{POSITIVE}) Q210={ZERO} {_TOP} {_DWELL}",
+    "201": rf"REAMING {_HOLE} {_FEED} {_DWELL} Q208=(?P<back>(?P=feed)) {_TOP}",
+    "207": rf"RIGID TAPPING NEW {_HOLE} Q239=(?P<pitch>{POSITIVE}) {_TOP}",
 }
-_CYCLE_NAMES: Final = {200: "DRILLING", 201: "REAMING", 207: "RIGID TAPPING NEW"}
 
 _SIDES = {"R0": 40.0, "RL": 41.0, "RR": 42.0}
 
@@ -91,42 +91,12 @@ class Heidenhain(Dialect):
                 hint = "give L, LN or SPL what belongs to it"
                 raise refused(line, "words that this kind of block does not take", hint)
             yield Move(values(columns))
-        if any(word[:2] == ("M", 99.0) for word in line.words):
-            yield from self._call(line, state)
-
-    def _call(self, line: Line, state: ModalState) -> Acts:
-        """M99: the hole cycle that was defined last, where the block ends."""
-        defined = state.cycle
-        if defined is None:
-            raise refused(line, "M99 without a cycle before it", "define the cycle that it calls")
-        if state.tip_control:
-            yield wrong("CS506", line, f"a hole cycle under {state.tip_control}")
-        yield from drill(defined, state.modal.tip[0], state.modal.tip[1], line, state)
-
-    def _define(self, number: int, text: str, line: Line, state: ModalState) -> None:
-        """CYCL DEF 200, 201, 207 with their parameters."""
-        given = {int(q): float(value) for q, value in _PARAMETER.findall(text)}
-        rest = _PARAMETER.sub("", text).split("CYCL DEF", 1)[1].split()
-        if given.keys() != _CYCLES[number] or rest[1:] != _CYCLE_NAMES[number].split():
-            raise refused(
-                line, f"CYCL DEF {number} with other parameters", f"give {_shown(_CYCLES[number])} and no others"
-            )
-        top, depth = given[203], -given[201]
-        cycle = HoleCycle(top + given[204], top + given[200], top - depth, top=top, from_clearance=False)
-        if number == 207:
-            cycle = replace(cycle, pitch=given[239], feed=given[239])
-        else:
-            cycle = replace(cycle, feed=given[206], dwell=1000.0 * given[211])
-        if number == 200:
-            cycle = replace(cycle, step=given[202])
-        if number == 201:
-            cycle = replace(cycle, feed_out=True)
-        wrong = (
-            (number == 200 and (given[210] != 0.0 or not given[202] > 0.0)) or depth < 0.0 or given.get(211, 0.0) < 0.0
-        )
-        if wrong or given.get(208, given.get(206)) != given.get(206) or given.get(239, 1.0) <= 0.0:
-            raise refused(line, f"CYCL DEF {number} with values that are not understood", "see its parameters")
-        state.cycle = cycle
+        if any(word[:2] == ("M", 99.0) for word in line.words):  # calls the cycle that was defined last, at the end
+            if state.cycle is None:
+                raise refused(line, "M99 without a cycle before it", "define the cycle that it calls")
+            if state.tip_control:
+                yield wrong("CS506", line, f"a hole cycle under {state.tip_control}")
+            yield from drill(state.cycle, state.modal.tip[0], state.modal.tip[1], line, state)
 
     def _to_machine(self, line: Line) -> Acts:
         """M91: a rapid in machine coordinates."""
@@ -171,7 +141,13 @@ class Heidenhain(Dialect):
         elif match := re.fullmatch(rf"CYCL DEF 9\.1 (?:DWELL|V\.ZEIT) ?({NUMBER})", text):
             yield Beside("G", 4.0, f"{1000.0 * float(match[1]):.10g}")
         elif match := re.match(r"CYCL DEF (200|201|207) ", text):
-            self._define(int(match[1]), text, line, state)
+            pattern = _CYCLES[match[1]]
+            cycle = re.fullmatch(rf"CYCL DEF {match[1]} {pattern}", text)
+            if cycle is None:
+                names = ", ".join(re.findall(r"Q\d+", pattern))
+                hint = f"give {names}, in this order, and no others; Q210 is 0"
+                raise refused(line, f"CYCL DEF {match[1]} with parameters that are not understood", hint)
+            state.cycle = HoleCycle.written(cycle)
         elif match := _SPATIAL.fullmatch(text):
             angles = match.groups()
             turns = [(axis, float(angle)) for axis, angle in zip("ZYX", angles[::-1], strict=True)]
@@ -186,10 +162,6 @@ class Heidenhain(Dialect):
             state.tip = ""
         elif not text.startswith(_SILENT):
             raise refused(line, f"{text} is not understood", "see that the control is the one the text is for")
-
-
-def _shown(parameters: set[int]) -> str:
-    return ", ".join(f"Q{number}" for number in sorted(parameters))
 
 
 class _KlartextLexer(Lexer):

@@ -8,19 +8,9 @@ from typing import Final
 
 import numpy as np
 
-from cornersmooth.control.lexer import NUMBER, Lexer, fixed, number_of
+from cornersmooth.control.lexer import NOT_NEGATIVE, NUMBER, POSITIVE, ZERO, Lexer, fixed, number_of
 from cornersmooth.control.words import BSPLINE, BY_WORD, POLY, Columns, Line, Word, refused
-from cornersmooth.nc_reader.acts import (
-    Acts,
-    Beside,
-    HoleCycle,
-    ModalState,
-    Move,
-    Tilt,
-    ToMachine,
-    drill,
-    wrong,
-)
+from cornersmooth.nc_reader.acts import Acts, Beside, HoleCycle, ModalState, Move, Tilt, ToMachine, drill, wrong
 from cornersmooth.nc_reader.dialects.base import Dialect
 from cornersmooth.nc_reader.planes import TiltedPlane, room_of, rotated_frame
 
@@ -46,22 +36,21 @@ _CODES = (0.0, 1.0, 2.0, 3.0)
 _LENGTHS_ALONE = (70.0, 71.0)
 
 #: heights of hole cycles; what follows them, and how the manual calls that
-_ZERO, _ONE, _POSITIVE = r"\+?(?:0+\.?0*|\.0+)", r"0*1(?:\.0*)?", r"\+?(?:\d+\.?\d*|\.\d+)"
-_LARGER = rf"(?=[+\d.]*[1-9]){_POSITIVE}"
-_HEIGHTS: Final = rf"(?P<travel>{NUMBER}),(?P<top>{NUMBER}),(?P<setup>{_POSITIVE}),(?P<bottom>{NUMBER})"
-_DWELL: Final = rf"(?P<dwell>{_POSITIVE}|)"
+_ONE: Final = r"0*1(?:\.0*)?"
+_HEIGHTS: Final = rf"(?P<travel>{NUMBER}),(?P<top>{NUMBER}),(?P<setup>{NOT_NEGATIVE}),(?P<bottom>{NUMBER})"
+_DWELL: Final = rf"(?P<dwell>{NOT_NEGATIVE}|)"
 _CYCLES: Final = {
     "CYCLE81": ("", ""),
     "CYCLE82": (f",,{_DWELL}", ",,DTB"),
     "CYCLE83": (
-        rf",,,(?P<step>{_LARGER}),{_ZERO},{_ZERO},{_ZERO},{_ONE},(?P<out>{_ZERO}|{_ONE})",
+        rf",,,(?P<step>{POSITIVE}),{ZERO},{ZERO},{ZERO},{_ONE},(?P<out>{ZERO}|{_ONE})",
         ",,,FDPR,0,0,0,1,VARI",
     ),
     "CYCLE84": (
-        rf",,(?:{_ZERO})?,3,,(?P<pitch>{_LARGER}),(?:{_ZERO})?,(?P<speed>{_POSITIVE}),(?P=speed)",
+        rf",,(?:{ZERO})?,3,,(?P<pitch>{POSITIVE}),(?:{ZERO})?,(?P<speed>{NOT_NEGATIVE}),(?P=speed)",
         ",,0,3,,PIT,0,SST,SST1",
     ),
-    "CYCLE85": (rf",,{_DWELL},(?P<feed>{_LARGER}),(?P=feed)", ",,DTB,FFR,RFF"),
+    "CYCLE85": (rf",,{_DWELL},(?P<feed>{POSITIVE}),(?P<back>(?P=feed))", ",,DTB,FFR,RFF"),
 }
 
 #: a new plane (_ST ends in 00, or is 0) with its shifts before and behind the turns, to which the rotary axes turn
@@ -127,24 +116,9 @@ class Siemens(Dialect):
             raise refused(line, f"{text} is not understood", hint)
         if state.tip_control:
             yield wrong("CS506", line, f"a hole cycle under {state.tip_control}")
-        given = {key: float(number or 0.0) for key, number in match.groupdict().items()}
-        pitch, feed, top = given.get("pitch"), given.get("feed"), given["top"]
-        cycle = HoleCycle(
-            given["travel"],
-            top + given["setup"],
-            given["bottom"],
-            pitch if feed is None else feed,
-            step=given.get("step", 0.0),
-            from_clearance=False,
-            top=top,
-            chip=given.get("out") == 0.0,
-            dwell=1000.0 * given.get("dwell", 0.0),
-            feed_out=feed is not None,
-            pitch=pitch,
-        )
-        if given.get("speed", state.speed) != state.speed:
-            yield wrong("CS506", line, f"CYCLE84 at {given['speed']:g} revolutions, where S says otherwise")
-        yield from drill(cycle, state.modal.tip[0], state.modal.tip[1], line, state)
+        if (speed := match.groupdict().get("speed")) and float(speed) != state.speed:
+            yield wrong("CS506", line, f"CYCLE84 at {float(speed):g} revolutions, where S says otherwise")
+        yield from drill(HoleCycle.written(match), state.modal.tip[0], state.modal.tip[1], line, state)
 
     def _plane(self, words: Sequence[Word], line: Line) -> Acts:
         """CYCLE800: a plane by turns about its own axes, one after another; without arguments none."""
