@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import inspect
 import io
 import re
@@ -152,6 +153,18 @@ def test_one_call_does_what_the_command_does(tmp_path, capsys):
         cornersmooth.postprocess(SAMPLE, ours)
     with pytest.raises(CornersmoothError, match="is the input"):
         cornersmooth.postprocess(ours, ours, force=True)
+
+
+def test_a_program_that_was_read_knows_its_file():
+    whole, step = io.BytesIO(), io.BytesIO()
+    cornersmooth.postprocess(SAMPLE, whole, Settings(tolerance=0.02))
+    program = cornersmooth.read(SAMPLE)
+    result = cornersmooth.postprocess(program, step, Settings(tolerance=0.02))
+    digest = hashlib.sha256(SAMPLE.read_bytes()).hexdigest()
+    assert program.source.sha256 == result.report()["input"]["sha256"] == digest
+    assert step.getvalue() == whole.getvalue()
+    assert f"SHA256={digest}".encode() in whole.getvalue()
+    assert cornersmooth.from_poses([[0, 0, 0]], [[0, 0, 1]]).source.sha256 == ""
 
 
 def test_a_failed_program_is_an_error_and_the_old_file_stays(tmp_path, monkeypatch):

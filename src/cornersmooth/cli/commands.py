@@ -330,6 +330,7 @@ COMPLETION = new_command(
       cornersmooth completion fish | source     # in ~/.config/fish/config.fish
       cornersmooth completion powershell | Out-String | Invoke-Expression
     """,
+    module="group",
 )
 
 #: as the list of them shows them
