@@ -119,10 +119,7 @@ class Tilt(NamedTuple):
     """A tilted plane is switched on, or off (None)."""
 
     plane: TiltedPlane | None
-
-
-class TurnToPlane(NamedTuple):
-    """The rotary axes turn to the tilted plane that is on."""
+    turn: bool = False  #: neither: the rotary axes turn to the plane that is on
 
 
 class ToMachine(NamedTuple):
@@ -132,7 +129,7 @@ class ToMachine(NamedTuple):
 
 
 #: problems are what breaks the rules of the control, or without a code what is not known and bears on the motion
-Act = Move | Beside | Tilt | TurnToPlane | ToMachine | Problem
+Act = Move | Beside | Tilt | ToMachine | Problem
 Acts = Iterator[Act]
 
 

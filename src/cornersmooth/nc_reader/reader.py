@@ -17,7 +17,7 @@ from cornersmooth.control.word_tables import word_table
 from cornersmooth.control.words import MOTION_CODES, Line, Table, joined_tables, table_of
 from cornersmooth.errors import InputError
 from cornersmooth.model import MM_PER_UNIT, Floats, Units
-from cornersmooth.nc_reader.acts import Act, Beside, ModalState, Move, Tilt, ToMachine, TurnToPlane
+from cornersmooth.nc_reader.acts import Act, Beside, ModalState, Move, Tilt, ToMachine
 from cornersmooth.nc_reader.elements import RETRACT, Element, Elements, Event, NcProgram, Problem, Second
 from cornersmooth.nc_reader.execution import Modal, execute, in_mm
 from cornersmooth.nc_reader.needed_states import (
@@ -151,10 +151,8 @@ class Reader:
                 self._move(line, act.columns, later=act.later)
             case Beside():
                 self._beside(line, act)
-            case Tilt():
-                self._tilt(line, act.plane)
-            case TurnToPlane():
-                self._turn_to_plane(line)
+            case Tilt(plane, turn):
+                self._turn_to_plane(line) if turn else self._tilt(line, plane)
             case ToMachine():
                 self._leave(line, act.axes)
             case Problem():

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Container, Mapping, Set
-from typing import Any, Final
+from collections.abc import Container, Mapping, Sequence, Set
+from typing import Final
 
 from cornersmooth.control.lexer import Lexer
 from cornersmooth.control.table import table_of
@@ -12,11 +12,6 @@ from cornersmooth.control.word_tables import word_table
 from cornersmooth.control.words import Columns, Line, Word, refused, tools_first
 from cornersmooth.errors import InputError
 from cornersmooth.nc_reader.acts import Acts, Beside, ModalState, Move
-
-#: how the values of a table `[grammar]` are read, where not as they are
-_READ: Mapping[str, Callable[[Any], Any]] = {
-    **dict.fromkeys(("controls", "unsure"), lambda table: {kind: tuple(names) for kind, names in table.items()}),
-}
 
 #: groups, and effects, of M words that change what holds from block to block, for controls that have such
 _MODAL_M: Final = ("feed=", "tip=", "way=", "machine")
@@ -42,9 +37,9 @@ class Dialect:
     #: inches per minute that F counts in, in a text in inches
     inch_feed = 1.0
     #: what must be in force for words of a kind: ``"vector"``, ``"point"``, ``"angles"``, ``"machine"``
-    controls: Mapping[str, tuple[str, ...]] = {}
+    controls: Mapping[str, Sequence[str]] = {}
     #: what is not known to be in force for them: machine data or parameters decide
-    unsure: Mapping[str, tuple[str, ...]] = {}
+    unsure: Mapping[str, Sequence[str]] = {}
     #: whether texts can send the tool up, so that rotary axes turn there
     retracts: bool = True
     #: what sends a modulo axis the shorter way: `BY_WORD`, a word that is in force, or empty for a parameter
@@ -65,7 +60,7 @@ class Dialect:
     def __init__(self, control: str, rotary: str = "") -> None:
         table = word_table(control)
         for key, value in table["grammar"].items():
-            setattr(self, key, _READ[key](value) if key in _READ else value)
+            setattr(self, key, value)
         self.switches, self.rotary, self.control = table.get("switches", False), rotary, control
         self._table = table_of(control)
         self.means = self._table.means
@@ -146,11 +141,11 @@ class Dialect:
             state.shorter_way = name == self.shorter_way
         elif effect == "distance=absolute":
             state.incremental = False
-        elif word.name in "GM" and (effect not in SILENT and (group != "compensation" or value == "?")):
+        elif effect not in SILENT and (group != "compensation" or value == "?"):
+            if word.name not in "GM":
+                raise self.not_understood(line, word.name, word.text)
             hint = "only absolute milling with tool vectors, axis points or rotary words is read"
             raise refused(line, f"{name} is not understood", hint)
-        elif word.name not in "GM" and effect not in SILENT:
-            raise self.not_understood(line, word.name, word.text)
         if group in ("tool_length", "compensation"):
             yield Beside("G", word.value, name)
 

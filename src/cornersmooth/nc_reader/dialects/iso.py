@@ -5,23 +5,11 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Set
-from dataclasses import replace
 
 from cornersmooth.control.lexer import NUMBER, Lexer, fixed, number_of
 from cornersmooth.control.word_tables import word_table
 from cornersmooth.control.words import MOTION_CODES, NURBS, Columns, Line, Word, refused
-from cornersmooth.nc_reader.acts import (
-    Acts,
-    Beside,
-    HoleCycle,
-    ModalState,
-    Move,
-    Tilt,
-    ToMachine,
-    TurnToPlane,
-    drill,
-    wrong,
-)
+from cornersmooth.nc_reader.acts import Acts, Beside, HoleCycle, ModalState, Move, Tilt, ToMachine, drill, wrong
 from cornersmooth.nc_reader.dialects.base import Dialect
 from cornersmooth.nc_reader.planes import TiltedPlane, room_of, rotated_frame, turned_frame
 
@@ -118,40 +106,36 @@ class Iso(Dialect):
 
     def _cycle(self, line: Line, codes: set[float], state: ModalState) -> Acts:
         """A hole cycle, with G98: all that it takes stands in its block."""
-        code = next(iter(codes & _CYCLES.keys()))
-        given = {letter: value for letter, value, *_ in line.words if letter != "N"}
-        needed = {*"GXYZR", *_CYCLES[code]} - ({"P"} if code == 84.0 else set())
-        if codes != {code, _BACK_TO_START} or len(given) + 1 != len([w for w in line.words if w[0] != "N"]):
+        code, modal = next(iter(codes & _CYCLES.keys())), state.modal
+        words = [word for word in line.words if word.name != "N"]
+        given, tap = {word.name: word.value for word in words}, code == 84.0
+        needed = {*"GXYZR", *("" if tap else _CYCLES[code])}
+        if codes != {code, _BACK_TO_START} or len(given) + 1 != len(words):
             raise refused(line, f"G{code:g} beside other words", "give it G98 and nothing else")
         if not needed <= given.keys() <= needed | {"F", *_CYCLES[code]} or self.cycles_in == "none":
-            raise refused(
-                line, f"G{code:g} with words that are missing or not understood", "give X Y Z R and F in its block"
-            )
+            what, hint = f"G{code:g} with words that are missing or not understood", "give X Y Z R and F in its block"
+            raise refused(line, what, hint)
         if state.tip_control != self.cycles_in:
             yield wrong("CS506", line, f"a hole cycle under {state.tip_control or 'no length of the tool'}")
-        travel = state.modal.tip[2] if state.height is None else state.height
-        state.height = travel
-        feed, turning = given.get("F", state.modal.feed), state.modal.per_revolution
-        speed = state.speed
+        if modal.inverse_time:
+            yield wrong("CS506", line, "a hole cycle at inverse time feed (G93)")
+        if tap and self.rigid and not state.rigid:
+            yield wrong("CS506", line, "a tap without M29, which turns the spindle with the feed")
+        state.height = modal.tip[2] if state.height is None else state.height
+        feed = given.get("F", modal.feed)
+        pitch = (feed if modal.per_revolution else feed / state.speed) if tap else None
         cycle = HoleCycle(
-            travel,
+            state.height,
             given["R"],
             given["Z"],
-            given.get("F"),
+            given.get("F") if pitch is None else pitch,
             step=given.get("Q", 0.0),
             chip=code == 73.0,
             dwell=self.dwell * given.get("P", 0.0),
             feed_out=code in (85.0, 89.0),
+            pitch=pitch,
         )
-        if state.modal.inverse_time:
-            yield wrong("CS506", line, "a hole cycle at inverse time feed (G93)")
-        tap = code == 84.0
-        if tap:
-            if self.rigid and not state.rigid:
-                yield wrong("CS506", line, "a tap without M29, which turns the spindle with the feed")
-            pitch = feed if turning else feed / speed
-            cycle = replace(cycle, feed=pitch, pitch=pitch)
-        state.modal = state.modal.but(feed=feed)  # that of the blocks after it, too
+        state.modal = modal.but(feed=feed)  # that of the blocks after it, too
         yield from drill(cycle, given["X"], given["Y"], line, state)
 
     def _plane(self, line: Line, codes: set[float], state: ModalState) -> Acts:
@@ -163,7 +147,7 @@ class Iso(Dialect):
         if codes & {69.0, 255.0}:
             yield Tilt(None)
         elif 53.1 in codes:
-            yield TurnToPlane()
+            yield Tilt(None, turn=True)
         elif _TILTED in codes:
             if given.keys() != set("XYZIJK"):
                 raise refused(line, "G68.2 in another form", "give its zero X Y Z and the Euler angles I J K")
@@ -176,13 +160,11 @@ class Iso(Dialect):
             frame = turned_frame(state.rotary, angles) if state.rotary is not None else None
             if frame is None or state.rotary is None or math.isnan(sum(angles)):
                 raise refused(line, "G254 where the angles of the tables are not known", "name the machine")
-            else:
-                yield Tilt(TiltedPlane(frame, math.radians(state.rotary.angle_step), "G43"))
+            yield Tilt(TiltedPlane(frame, math.radians(state.rotary.angle_step), "G43"))
 
     def _to_machine(self, line: Line, codes: set[float], state: ModalState) -> Acts:
         """G91 G28 Z0. and the like: to the reference position without a detour; G53: in machine coordinates."""
-        incremental = state.incremental
-        incremental = 91.0 in codes or (incremental and 90.0 not in codes)
+        incremental = 91.0 in codes or (state.incremental and 90.0 not in codes)
         axes = self.machine_axes(line, {("G", code) for code in (*_TO_REFERENCE, _IN_MACHINE, 0.0, 90.0, 91.0)})
         for word in line.words:
             if word.name in axes and _IN_MACHINE not in codes and not (incremental and word.value == 0.0):
