@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from cornersmooth.control import source
 from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.kinematics import load_machine
-from cornersmooth.nc_reader import read_nc
+from cornersmooth.nc_reader import read_nc, reader
 from cornersmooth.nc_reader.elements import Element
 from cornersmooth.nc_reader.rotary import MOST_LINES
 from cornersmooth.nc_reader.tool import written_at
@@ -217,6 +219,18 @@ def test_chunks_make_no_difference(monkeypatch):
     assert np.array_equal(whole.curves.knot, pieces.curves.knot)
     assert np.array_equal(whole.curves.element, pieces.curves.element)
     assert pieces.problems == ()
+
+
+def test_finer_digits_of_a_later_chunk_leave_the_tool_in_the_spindle(monkeypatch):
+    """Words of the machine's axes with a head: the tip hangs on the length of the tool that was changed in before."""
+    machine = replace(load_machine("head-ac"), tool_length=100.0, tool_lengths=((1, 50.0),))
+    text = HEAD + b"G91 G28 Z0.\nG90\nT1 M6\nG43 H1\nG0 X0. Y0. A0. C0.\nZ50.\nG1 X1. A10. F100.\n"
+    text += b"".join(b"X%d. A10.\n" % k for k in range(2, 60)) + b"X60.0001 A20.0001\n"
+    whole = read_nc(text, machine=machine, tcp=False)
+    monkeypatch.setattr(source, "CHUNK", 500)
+    monkeypatch.setattr(reader, "DIGITS_SAMPLE", 100)
+    cut = read_nc(text, machine=machine, tcp=False)
+    assert cut.tip[-1].tolist() == whole.tip[-1].tolist()
 
 
 def test_digits_before_the_first_word_are_none():

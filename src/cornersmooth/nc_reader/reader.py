@@ -87,9 +87,11 @@ class Reader:
 
     def note_digits(self, lines: bytes) -> None:
         """Take the digits of some lines where they are finer than those before."""
-        finer = self.steps.finer(self.options.steps(lines))
-        if finer != self.steps:
-            self.steps, self.state.rotary = finer, self.options.rotary(finer)
+        finer, before = self.steps.finer(self.options.steps(lines)), self.state.rotary
+        rotary = self.options.rotary(finer) if finer != self.steps else None
+        if before is not None and rotary is not None:  # the tool stays
+            self.state.rotary = replace(rotary, machine=before.machine)
+        self.steps = finer
 
     def chunks(self, items: Iterable[Table | Line]) -> Iterator[Elements]:
         """Take runs of motion blocks and other lines, and give out the path elements as they come."""
