@@ -50,11 +50,32 @@ def key_of(name: str, unit: str) -> str:
     return f"{name}_{unit.replace('/', '_per_')}" if unit else name
 
 
+class OptionFields:
+    """Fields that `option` makes, of a frozen dataclass."""
+
+    def _value(self, name: str) -> Any:
+        """Value of an option, or of that which counts instead."""
+        value = getattr(self, name)
+        item = self.__dataclass_fields__[name]  # type: ignore[attr-defined]
+        return getattr(self, item.metadata["instead"] or name) if value is None else value
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values in field order, for reports; keys carry their unit.
+
+        Returns
+        -------
+        dict
+            Numbers in the units of their keys, words, and None for what is not set.
+        """
+        items = self.__dataclass_fields__.values()  # type: ignore[attr-defined]
+        return {key_of(item.name, item.metadata["unit"]): self._value(item.name) for item in items}
+
+
 Lines = Literal["dense", "long"]
 
 
 @dataclass(frozen=True)
-class Settings:
+class Settings(OptionFields):
     """What `cornersmooth.smooth` promises and how it goes about it. Lengths in mm, angles in degrees."""
 
     #: ε: of the written tip path and axis-point path (docs/method.md)
@@ -274,16 +295,6 @@ class Settings:
         """
         return replace(self, **changes)
 
-    def as_dict(self) -> dict[str, Any]:
-        """Plain values in field order, for the report; keys carry their unit.
-
-        Returns
-        -------
-        dict
-            Numbers in mm, degrees and s, words, and None for what is not set.
-        """
-        return {key_of(item.name, item.metadata["unit"]): getattr(self, item.name) for item in fields(self)}
-
 
 #: unit of each setting that has one
 UNITS = {item.name: item.metadata["unit"] for item in fields(Settings) if item.metadata["unit"]}
@@ -324,7 +335,7 @@ BOUNDS: dict[str, tuple[float, float]] = {
 
 
 @dataclass(frozen=True)
-class Limits:
+class Limits(OptionFields):
     """Limits of the motion; the defaults are those of the paper's Example 2."""
 
     feed: float | None = option(None, "Feed of all feed moves instead of the programmed ones.", unit="mm/min")
@@ -350,11 +361,6 @@ class Limits:
             if value is not None and not (math.isfinite(value) and value > 0.0):
                 raise SettingsError("CS260", f"{item.name} is {value:g}", "give a positive number")
 
-    def _value(self, name: str) -> Any:
-        """Value of a limit, or of that which counts instead."""
-        value = getattr(self, name)
-        return getattr(self, self.__dataclass_fields__[name].metadata["instead"] or name) if value is None else value
-
     @property
     def centripetal_accel(self) -> float:
         """Limit of κ·v², mm/s²."""
@@ -369,16 +375,6 @@ class Limits:
     def angular_limits(self) -> tuple[float, float, float]:
         """Speed, acceleration and jerk of pure rotations in rad/s, rad/s², rad/s³."""
         return math.radians(self.angular_feed), math.radians(self.angular_accel), math.radians(self.angular_jerk)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain values with their units in the keys, for reports.
-
-        Returns
-        -------
-        dict
-            Numbers, or None for no limit; feeds in mm/min, all else in mm, degrees and s.
-        """
-        return {key_of(item.name, item.metadata["unit"]): self._value(item.name) for item in fields(self)}
 
 
 @dataclass(frozen=True)

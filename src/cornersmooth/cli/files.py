@@ -104,11 +104,15 @@ def check_endings(option: str, paths: Iterable[str], endings: str) -> None:
             raise click.UsageError(f"--{option} {path}: let the name end in {endings}")
 
 
-def check_reports(reports: Iterable[str], endings: str, inputs: list[str], *, force: bool) -> None:
-    """Refuse reports whose names have none of the endings, or that would destroy something."""
-    check_endings("report", reports, endings)
-    for path in reports:
-        check_path(path, inputs, force=force)
+def check_pair(given: Options) -> None:
+    """Refuse two standard inputs, inputs that cannot be read, and reports that would destroy something."""
+    pair = [given.source, given.text]
+    if pair == [STANDARD, STANDARD]:
+        raise click.UsageError("only one of the inputs can be standard input")
+    check_inputs(*pair)
+    check_endings("report", given.reports, ".json, .csv or .html")
+    for path in given.reports:
+        check_path(path, pair, force=given.force)
 
 
 def write_report(path: str, parts: Iterable[str | bytes], *, replace: bool = True) -> None:

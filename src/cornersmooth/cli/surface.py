@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from functools import partial
 
-import click
-
 from cornersmooth.cl import read
-from cornersmooth.cli.files import STANDARD, check_inputs, check_reports, read_input, write_reports
+from cornersmooth.cli.files import STANDARD, check_pair, read_input, write_reports
 from cornersmooth.cli.options import Options
 from cornersmooth.cli.show import say
 from cornersmooth.errors import SettingsError, Verdict
@@ -21,11 +19,8 @@ from cornersmooth.verify import verify
 
 def run_surface(given: Options) -> int:
     """Do the work of the command; return its exit code."""
+    check_pair(given)
     source, text = given.source, given.text
-    if source == text == STANDARD:
-        raise click.UsageError("only one of the inputs can be standard input")
-    check_inputs(source, text)
-    check_reports(given.reports, ".json, .csv or .html", [source, text], force=given.force)
     how = given.reading_back()
     data, name = read_input(source, size_limit=not given.no_size_limit)
     program = read(data, name=name, **given.reading())

@@ -37,12 +37,9 @@ _REWINDS_SHOWN = 5
 
 def run_verify(given: Options) -> int:
     """Do the work of the command; return its exit code."""
-    source, text = given.source, given.text
-    if source == text == files.STANDARD:
-        raise click.UsageError("only one of the inputs can be standard input")
+    files.check_pair(given)
     return_large_arrays()
-    files.check_inputs(source, text)
-    files.check_reports(given.reports, ".json, .csv or .html", [source, text], force=given.force)
+    text = given.text
     data, name, is_program = given.read()
     if is_program:
         from cornersmooth.cli.filter import verify_with_program
