@@ -221,6 +221,14 @@ def test_chunks_make_no_difference(monkeypatch):
     assert pieces.problems == ()
 
 
+def test_cycles_of_siemens_stand_alone_and_need_no_speed() -> None:
+    head = b"G90 G94 G17 G40 G710\nG0 X1. Y2. Z60.\n"
+    drilled = read_nc(head + b"CYCLE81(60.0,0.0,3.0,-9.0)\n", control="siemens")
+    assert drilled.tip[:, 2].tolist() == [60.0, 60.0, 3.0, -9.0, 60.0]
+    with pytest.raises(InputError, match="MCALL is not understood"):
+        read_nc(head + b"MCALL CYCLE81(60.0,0.0,3.0,-9.0)\n", control="siemens")
+
+
 def test_finer_digits_of_a_later_chunk_leave_the_tool_in_the_spindle(monkeypatch):
     """Words of the machine's axes with a head: the tip hangs on the length of the tool that was changed in before."""
     machine = replace(load_machine("head-ac"), tool_length=100.0, tool_lengths=((1, 50.0),))

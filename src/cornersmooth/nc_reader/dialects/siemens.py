@@ -108,7 +108,7 @@ class Siemens(Dialect):
 
     def _cycle(self, words: Sequence[Word], line: Line, state: ModalState) -> Acts:
         """CYCLE81 to CYCLE85, called where the tool stands."""
-        name, text = words[0].name, words[0].text
+        name, text = next(word.name for word in words if word.name in _CYCLES), words[0].text
         pattern, arguments = _CYCLES[name]
         match = re.fullmatch(rf"{name}\({_HEIGHTS}{pattern}\)", re.sub(r"[ \t]", "", text))
         if len(words) > 1 or match is None:
