@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cornersmooth.errors import Finding, SettingsError
 from cornersmooth.methods import CURVES_METHOD, DEFAULT_METHOD
-from cornersmooth.model import Bools, FeedMode, Ints, Move, SmoothProgram, Units
+from cornersmooth.model import Bools, FeedMode, Move, SmoothProgram, Units
 from cornersmooth.nc.blocks import Blocks
 from cornersmooth.nc.circles import Circles, plan_circles, with_arcs
 from cornersmooth.nc.control import Control
@@ -24,7 +23,6 @@ from cornersmooth.nc.control_tables import (
     parse_control,
 )
 from cornersmooth.nc.coordinates import Coordinates
-from cornersmooth.nc.curves import SplineCount
 from cornersmooth.nc.form import Form, check_program, choose_form
 from cornersmooth.nc.hole_cycles import upright_poses
 from cornersmooth.nc.holes import Holes
@@ -60,7 +58,6 @@ __all__ = [
 ]
 
 
-_MANY = 4096  #: poses from which on it saves time to compute in a thread what is written next
 _POLYNOMIAL = ("poly", "spl")  #: curve styles without weights
 #: curve styles of controls that may turn the tool in their own way on a line between two axis points
 _TURNING = ("bspline", "poly")
@@ -187,27 +184,24 @@ def write(
     upright = upright_poses(program, chosen, drills=native)
     planes = plan_planes(program, smoothed.settings, chosen, upright, findings, drills=native)
     check_travel_of_words(planes, program, chosen, findings)
-    of_rows = Findings()  # rows are made in a thread of their own: their findings come last
+    of_rows = Findings()  # rows are made as they are written: their findings come last
     rows, circles = _rows(smoothed, chosen, planes, upright, of_rows)
     _add_warnings(chosen, smoothed, circles, upright, findings)
     stretch = chosen.stretch(smoothed.settings.axis_length)
     tilting = Coordinates(chosen, program.units, stretch, modal=frame.modal)
-    counted = SplineCount(program.line, findings) if chosen.curve == "bspline" else None
-    blocks = Blocks(program, circles, modals, findings, counted, usual_blend=usual_blend)
+    blocks = Blocks(program, circles, modals, findings, usual_blend=usual_blend)
     approach = max(frame.approach, POINT_APPROACH) if chosen.orientation == "point" else frame.approach
     motion = Motion(program, tilting, modals, blocks, findings, approach, frame.retract)
     script = Script(statements, motion, Holes(motion, statements, native), upright, planes)
-    with _BackgroundWriter(stream) as behind:
-        text = frame.start(behind, chosen)
-        motion.say(modals.start())
-        chunks = ((some, tilting.ticks(some.tip, some.other)) for some in rows)
-        for some, ticks in chunks if len(program) < _MANY else _one_ahead(chunks):
-            script.run(some, ticks)
-            script.hand_on(text)
-            if progress is not None and len(some.move):
-                progress(int(some.move[-1]) + 1, len(program))
-        script.finish()
+    text = frame.start(stream, chosen)
+    motion.say(modals.start())
+    for some in rows:
+        script.run(some)
         script.hand_on(text)
+        if progress is not None and len(some.move):
+            progress(int(some.move[-1]) + 1, len(program))
+    script.finish()
+    script.hand_on(text)
     findings.add_all(of_rows.all())
     return Written(blocks.written, findings.all())
 
@@ -234,6 +228,8 @@ def _add_warnings(form: Form, smoothed: SmoothProgram, circles: Circles, upright
         findings.note("CS394", 0, control=form.control, method=CURVES_METHOD, default=DEFAULT_METHOD)
     if form.curve == "g6.2" and form.orientation == "point" and not (upright | (program.kind == Move.FROM)).all():
         findings.note("CS395", 0)
+    if form.curve == "bspline":
+        findings.note("CS325", 0)
     rounded = bool(smoothed.corners.smoothed.any()) or smoothed.runs is not None
     if rounded and not form.curves and smoothed.settings.lines == "dense" and not form.extras:
         for name, extra in form.table.extras.items():
@@ -269,39 +265,3 @@ def _rows(
     else:
         rows = dense_rows(smoothed, circles)
     return with_arcs(rows, program, circles), circles
-
-
-def _one_ahead(chunks: Iterator[tuple[Rows, Ints]]) -> Iterator[tuple[Rows, Ints]]:
-    """Compute the next chunk of rows while the last one is written: numpy leaves the interpreter free meanwhile."""
-    with ThreadPoolExecutor(1) as pool:
-        coming = pool.submit(next, chunks, None)
-        while (chunk := coming.result()) is not None:
-            coming = pool.submit(next, chunks, None)
-            yield chunk
-
-
-class _BackgroundWriter:
-    """A stream that is written to while the next text is made; an error shows with the next write."""
-
-    def __init__(self, stream: Stream) -> None:
-        self._stream, self._pool = stream, ThreadPoolExecutor(1)
-        self._done: Future[object] | None = None
-
-    def __enter__(self) -> _BackgroundWriter:
-        return self
-
-    def __exit__(self, kind: object, error: object, trace: object) -> None:
-        try:
-            if kind is None:
-                self._wait()
-        finally:
-            self._pool.shutdown()
-
-    def _wait(self) -> None:
-        if self._done is not None:
-            self._done.result()
-
-    def write(self, data: bytes, /) -> None:
-        """Take the bytes; wait for those handed on before."""
-        self._wait()
-        self._done = self._pool.submit(self._stream.write, data)

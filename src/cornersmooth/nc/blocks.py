@@ -14,7 +14,7 @@ from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program
 from cornersmooth.nc.circles import Circles
 from cornersmooth.nc.control import INVERSE_TIME
 from cornersmooth.nc.coordinates import BlockRows, Coordinates
-from cornersmooth.nc.curves import Part, SplineCount, joined, prepared, shapes_of, spelt
+from cornersmooth.nc.curves import Part, joined, prepared, shapes_of, spelt
 from cornersmooth.nc.messages import Findings, refused
 from cornersmooth.nc.modals import Modals
 from cornersmooth.nc.program_frame import BLEND_STEP
@@ -32,7 +32,6 @@ class Blocks:
     circles: Circles  #: how arcs are written
     modals: Modals
     findings: Findings
-    counted: SplineCount | None = None  #: where the control wants splines side by side
     written: int = 0  #: blocks
     usual_blend: int = 0  #: how far the head lets the control round the corners of lines, in steps; 0 for no other
 
@@ -42,8 +41,6 @@ class Blocks:
         if at.form.curve == "bspline":
             modals.now["spline"] &= bool((rows.curve > 0).any())
         rows = prepared(rows, at)
-        if self.counted is not None:
-            self.counted.take(rows)
         count, rapid = len(rows), rows.rapid.astype(np.int64)
         shapes = shapes_of(rows, at, self.circles, open_spline=modals["spline"])
         none = np.zeros(count, np.int64)

@@ -180,10 +180,7 @@ def _deviation(
     frames: Floats,
     flat: Bools,
 ) -> Floats:
-    """(k,) mm from the written circles to the arcs at equal shares; infinite for a block that is too short.
-
-    Infinite, too, where the ends of an arc that has to be flat differ in height.
-    """
+    """(k,) mm from the written circles to the arcs at equal shares; infinite for a block that is too short."""
     rows, share = divided(blocks)
     before = share - 1.0 / blocks[rows]
     frames = frames[rows]

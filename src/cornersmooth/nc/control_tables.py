@@ -180,10 +180,7 @@ def _form(name: str, entry: Any, motion: Table) -> FormTable:
 
 
 def _trusted(given: Any, where: str, dialect: str) -> frozenset[str]:
-    """All machine functions that some patterns hold which a shop's own table declares not to move the tool.
-
-    Refused are patterns of other words, of none, or of words that may move the tool or that the control knows.
-    """
+    """All machine functions that some patterns hold which a shop's own table declares not to move the tool."""
     found: set[str] = set()
     rows = table_of(dialect).listed if dialect in CONTROLS else ()
 

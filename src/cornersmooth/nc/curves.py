@@ -14,7 +14,6 @@ from cornersmooth.geometry.ragged import ranges
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc.circles import Circles
 from cornersmooth.nc.coordinates import BlockRows, Coordinates
-from cornersmooth.nc.messages import Findings
 from cornersmooth.text import RowFormat, format_number, to_ticks
 
 #: texts, and which of them each of some rows has
@@ -25,9 +24,6 @@ _DEGREE = 3
 
 #: combinations of texts that are made whether a row has them or not
 _FEW = 256
-
-#: blocks that are counted together, and how many of them must be splines
-_WINDOW, _LEAST = 10, 6
 
 
 @dataclass(frozen=True)
@@ -167,36 +163,31 @@ def _polynomial(rows: BlockRows, curved: Bools, at: Coordinates) -> Shape:
     return Shape(curved, ([b"SPL "], none), numbers=(SplFormat(at.words, at.decimals, digits), numbers))
 
 
+@dataclass(frozen=True)
 class SplFormat:
     """Rows of SPL: coefficients of ten and more have an exponent, so rows are put together one by one."""
 
-    def __init__(self, letters: Sequence[str], decimals: Sequence[int], coefficient: int) -> None:
-        self._letters, self._decimals, self._digits = letters, decimals, coefficient
+    letters: Sequence[str]
+    decimals: Sequence[int]
+    digits: int  #: of coefficients
 
     def each(
         self, ticks: Ints, prefix: Sequence[bytes], prefix_id: Ints, suffix: Sequence[bytes], suffix_id: Ints
     ) -> list[bytes]:
         """Text of each row."""
-        axes = len(self._letters)
-        texts = []
+        words = [*self.letters, *(f"K{power}{letter}" for letter in self.letters for power in (3, 2, 1))]
+        decimals, texts = (*self.decimals, *(self.digits,) * (3 * len(self.letters))), []
         for row, numbers in enumerate(ticks.tolist()):
-            words = [
-                letter + format_number(number / 10.0**decimals, decimals, plus=True)
-                for letter, number, decimals in zip(self._letters, numbers[:axes], self._decimals, strict=True)
-            ]
-            words += [
-                f"K{3 - place % 3}{self._letters[place // 3]}{self._coefficient(number)}"
-                for place, number in enumerate(numbers[axes:])
-            ]
-            texts.append(prefix[int(prefix_id[row])] + " ".join(words).encode() + suffix[int(suffix_id[row])])
+            text = []
+            for k, (word, number, places) in enumerate(zip(words, numbers, decimals, strict=True)):
+                value = number / 10.0**places
+                if k < len(self.letters) or abs(value) < 10.0:
+                    text.append(word + format_number(value, places, plus=True))
+                else:
+                    mantissa, exponent = f"{value:+.8E}".split("E")
+                    text.append(f"{word}{mantissa}E{exponent[0]}{int(exponent[1:]):03d}")
+            texts.append(prefix[int(prefix_id[row])] + " ".join(text).encode() + suffix[int(suffix_id[row])])
         return texts
-
-    def _coefficient(self, ticks: int) -> str:
-        value = ticks / 10.0**self._digits
-        if abs(value) < 10.0:
-            return format_number(value, self._digits, plus=True)
-        mantissa, exponent = f"{value:+.8E}".split("E")
-        return f"{mantissa}E{exponent[0]}{int(exponent[1:]):03d}"
 
 
 def _intervals(spline: Floats, curve: NDArray[np.int8]) -> Floats:
@@ -214,10 +205,7 @@ def _intervals(spline: Floats, curve: NDArray[np.int8]) -> Floats:
 
 
 def _spans(rows: BlockRows, decimals: Sequence[int]) -> BlockRows:
-    """Leave the rows that carry an interval; each begins and ends in printed digits, where the one before ended.
-
-    Its tangents stay: their control points move with the ends.
-    """
+    """Leave the rows that carry an interval; each begins and ends in printed digits, where the one before ended."""
     kept = some_rows(rows, (rows.curve == 0) | (rows.curve > _DEGREE))
     curved = np.flatnonzero(kept.curve > 0)
     if len(curved):
@@ -257,43 +245,3 @@ def _splines(curve: NDArray[np.int8], spline: Floats, counts: Ints) -> Splines:
     chosen = (curve == 1) | (curve > _DEGREE + 1)
     knots = np.insert(knot[chosen], np.cumsum(chosen)[last], spline[last, 2])
     return Splines(knots, counts - 2)
-
-
-class SplineCount:
-    """Counts the places at which fewer than six of ten blocks are BSPLINE (SINUMERIK programming manual 12/2019).
-
-    Ten feed blocks from the beginning of every spline on are counted; what comes after a rapid is no spline.
-    """
-
-    def __init__(self, line: Ints, findings: Findings) -> None:
-        self._line, self._findings = line, findings
-        self._flags, self._moves = np.zeros(0, np.bool_), np.zeros(0, np.int64)  # of blocks that are not counted yet
-        self._before = False  # whether the block before these is a spline
-
-    def take(self, rows: BlockRows) -> None:
-        """Count blocks, one a row."""
-        for part in np.split(np.arange(len(rows)), np.flatnonzero(np.diff(rows.rapid.astype(np.int8))) + 1):
-            if rows.rapid[part[0]]:
-                self.finish()
-                continue
-            self._flags = np.concatenate((self._flags, rows.curve[part] > 0))
-            self._moves = np.concatenate((self._moves, rows.move[part]))
-            self._count(len(self._flags) - _WINDOW)
-
-    def finish(self) -> None:
-        """Count what is left where no further feed block follows."""
-        self._count(len(self._flags) - 1)
-        self._before = False
-
-    def _count(self, last: int) -> None:
-        """Count the windows that begin up to a block, and forget these blocks."""
-        if last < 0:
-            return
-        flags = self._flags
-        starts = np.flatnonzero(flags & ~np.concatenate(([self._before], flags[:-1])))
-        starts = starts[starts <= last]
-        total = np.concatenate(([0], np.cumsum(flags)))
-        few = starts[total[np.minimum(starts + _WINDOW, len(flags))] - total[starts] < _LEAST]
-        self._findings.note_each("CS325", self._line[self._moves[few]])
-        self._before = bool(flags[last])
-        self._flags, self._moves = flags[last + 1 :], self._moves[last + 1 :]

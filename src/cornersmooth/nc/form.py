@@ -6,7 +6,7 @@ Combinations that a control cannot run are refused with what works instead.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -199,55 +199,63 @@ def choose_form(
         raise SettingsError("CS215", what, "leave out modulo in the machine file")
     plane = _plane(table, chosen, machine) if planes else None
     found = Form(table, name, chosen.curve, orientation, mode, machine, chosen_extras, chosen.upright, rewind, plane)
-    _check_rewind(found)
+    if rewind:
+        _check_rewind(found)
     return found
 
 
+def _instead(table: Control, fits: Callable[[FormTable], bool]) -> str:
+    """Say which form to use: the first that fits; empty where none does."""
+    return next((f"use -f {name}" for name, form in table.forms.items() if fits(form)), "")
+
+
 def _mode(table: Control, form: FormTable, machine: Machine | None, tcp: bool) -> tuple[Orientation, Mode]:
-    """What says the orientation, and how; refuses what the form has not."""
-    if machine is not None and not machine.names:
-        return "fixed", _without_rotary_axes(table, form)
-    wanted: tuple[Orientation, ...] = ("vector", "point", "fixed") if machine is None else ("angles",)
-    wanted = wanted if tcp else ("machine",)
+    """What says the orientation, and how; refuses what the form has not (CS215)."""
+    here = f"{table.name} form {form.name}"
+    if machine is not None and not machine.names:  # blocks without words of the tool axis, along Z
+        mode = form.modes.get("fixed", None if form.curve else form.upright)
+        if mode is None:
+            lines = _instead(table, lambda one: not one.curve and bool("fixed" in one.modes or one.upright))
+            what = f"{here} has no blocks without words of the tool axis"
+            raise SettingsError("CS215", what, lines or "leave out --machine")
+        return "fixed", mode
+    turning: tuple[Orientation, ...] = ("vector", "point", "fixed") if machine is None else ("angles",)
+    wanted = turning if tcp else ("machine",)
     for orientation in wanted:
         if orientation in form.modes:
             return orientation, form.modes[orientation]
-    raise _refusal(table, form, wanted, machine)
-
-
-def _without_rotary_axes(table: Control, form: FormTable) -> Mode:
-    """Return the mode for a machine without rotary axes: blocks without words of the tool axis, along Z."""
-    mode = form.modes.get("fixed", None if form.curve else form.upright)
-    if mode is None:
-        here = f"{table.name} form {form.name}"
-        with_such = (name for name, other in table.forms.items() if "fixed" in other.modes or other.upright)
-        lines = next((name for name in with_such if not table.forms[name].curve), "")
-        hint = f"use -f {lines}" if lines else "leave out --machine"
-        raise SettingsError("CS215", f"{here} has no blocks without words of the tool axis", hint)
-    return mode
+    hint = _instead(table, lambda one: any(orientation in one.modes for orientation in wanted))
+    if not tcp:
+        curves = ": its curves are refused at inverse time feed (G93)" if form.curve else ""
+        what, lines = f"{here} cannot run without tool tip control{curves}", _instead(table, lambda one: not one.curve)
+        if hint and machine is None:
+            hint += " and name your machine with --machine"
+        elif not hint:
+            hint = f"{lines} and leave out --no-tcp" if form.curve and lines else "leave out --no-tcp"
+    elif machine is not None:
+        what, hint = f"{here} has no rotary words", hint or "leave out --machine"
+    else:
+        what, hint = f"{here} has no tool vectors, only rotary words", hint or "name your machine with --machine"
+    raise SettingsError("CS215", what, hint)
 
 
 def _check_rewind(form: Form) -> None:
     """Refuse to leave cuts where there is nothing above which rotary axes could turn."""
-    if not form.rewind:
-        return
-    here = f"{form.control} form {form.name}"
     if not form.rewind >= LEAST_REWIND:
         raise SettingsError("CS202", f"rewind is {form.rewind:g} mm", f"give {LEAST_REWIND:g} mm or more")
+    what = f"the table of {form.control} has no retract above which rotary axes could turn back"
     if not form.rotary:
-        raise SettingsError("CS215", f"{here} has no rotary axes here that could turn back", "leave out --rewind")
-    if not form.table.program.retract:
-        what = f"the table of {form.control} has no retract above which rotary axes could turn back"
+        what = f"{form.control} form {form.name} has no rotary axes here that could turn back"
+    if not (form.rotary and form.table.program.retract):
         raise SettingsError("CS215", what, "leave out --rewind")
 
 
 def _plane(table: Control, form: FormTable, machine: Machine | None) -> Mode:
     """Mode of the tilted planes of a form; refuses a control, form or machine without such."""
     if form.plane is None:
-        others = [name for name, other in table.forms.items() if other.plane is not None]
-        what = f"{table.name} form {form.name}" if others else table.name
-        hint = f"use -f {others[0]}" if others else "leave out --planes"
-        raise SettingsError("CS232", f"{what} has no tilted planes", hint)
+        other = _instead(table, lambda one: one.plane is not None)
+        what = f"{table.name} form {form.name}" if other else table.name
+        raise SettingsError("CS232", f"{what} has no tilted planes", other or "leave out --planes")
     if not form.plane.rotations and machine is not None and machine.swings_the_tool:
         text = f"{table.name} has tilted planes for machines whose tables turn the part only; {machine.name} has a head"
         raise SettingsError("CS232", text, "leave out --planes")
@@ -269,15 +277,14 @@ def check_program(form: Form, program: Program, settings: Settings) -> None:
     if form.orientation == "fixed":
         tilt = norm(program.axis - (0.0, 0.0, 1.0))
         tilt[program.kind == Move.FROM] = 0.0
-        text = "the tool is not parallel to Z, and {} has no words for its axis"
-        vectors = [name for name, other in form.table.forms.items() if "vector" in other.modes]
-        hint = f"use -f {vectors[0]}" if vectors else "name your machine with --machine"
+        what = f"{form.control} form {form.name} has no words for its axis"
+        hint = _instead(form.table, lambda one: "vector" in one.modes) or "name your machine with --machine"
         if form.machine is not None:
-            text = f"the tool is not parallel to Z, and {form.machine.name} has no rotary axis"
+            what = f"{form.machine.name} has no rotary axis"
             hint = "turn the part for an operation of its own, or use a machine that reaches it"
         tilted = np.flatnonzero(settings.axis_scale * tilt > ROTARY_SHARE * settings.tolerance)
         if len(tilted):  # by more than a rounding error at the axis point
-            what, line = text.format(f"{form.control} form {form.name}"), int(program.line[tilted[0]])
+            what, line = f"the tool is not parallel to Z, and {what}", int(program.line[tilted[0]])
             raise SettingsError("CS219", what, hint, file=program.source.name, line=line)
     if form.orientation == "machine" and form.machine is not None and form.machine.swings_the_tool:
         _check_lengths(form.machine, program)
@@ -285,38 +292,13 @@ def check_program(form: Form, program: Program, settings: Settings) -> None:
 
 def _check_lengths(machine: Machine, program: Program) -> None:
     """Refuse a program with tools whose lengths are not known, where these go into every position."""
-    loads = [(statement, tool[0]) for statement, tool in tool_loads(program)]
-    known = dict(machine.tool_lengths)
-    missing = [statement for statement, number in loads if number not in known]
-    if known and missing:
+    loads, known = tool_loads(program), dict(machine.tool_lengths)
+    wrong = [one for one, (number, _) in loads if (number not in known if known else number != loads[0][1][0])]
+    if wrong:
         what = f"a tool that [tool_lengths] of {machine.name} does not have, and whose length goes into every position"
         hint = "write its length into the machine file"
-        raise SettingsError("CS219", what, hint, file=program.source.name, line=missing[0].line)
-    others = [statement for statement, number in loads if number != loads[0][1]]
-    if others and not known:
-        tools = len({number for _, number in loads})
-        what = f"{tools} tools, and {machine.name} has one tool_length that goes into every position"
-        hint = "write [tool_lengths] into the machine file, or let the control keep the tool tip"
-        raise SettingsError("CS219", what, hint, file=program.source.name, line=others[0].line)
-
-
-def _refusal(
-    table: Control, form: FormTable, wanted: tuple[Orientation, ...], machine: Machine | None
-) -> SettingsError:
-    here = f"{table.name} form {form.name}"
-    others = [name for name, other in table.forms.items() if any(mode in other.modes for mode in wanted)]
-    instead = f"use -f {others[0]}" if others else ""
-    if "machine" in wanted:
-        what = f"{here} cannot run without tool tip control"
-        if form.curve:
-            what += ": its curves are refused at inverse time feed (G93)"
-        if instead and machine is None:
-            instead += " and name your machine with --machine"
-        lines = next((name for name, other in table.forms.items() if not other.curve), form.name)
-        hint = "leave out --no-tcp" if lines == form.name else f"use -f {lines} and leave out --no-tcp"
-        return SettingsError("CS215", what, instead or hint)
-    if "angles" in wanted:
-        return SettingsError("CS215", f"{here} has no rotary words", instead or "leave out --machine")
-    return SettingsError(
-        "CS215", f"{here} has no tool vectors, only rotary words", instead or "name your machine with --machine"
-    )
+        if not known:
+            tools = len({number for _, (number, _) in loads})
+            what = f"{tools} tools, and {machine.name} has one tool_length that goes into every position"
+            hint = "write [tool_lengths] into the machine file, or let the control keep the tool tip"
+        raise SettingsError("CS219", what, hint, file=program.source.name, line=wrong[0].line)

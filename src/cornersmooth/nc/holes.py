@@ -86,10 +86,7 @@ class Holes:
         return crossings(program, poses, travel, came)
 
     def _come_from(self, pose: int, next_last: int, above: float) -> float:
-        """Height over a hole, along its axis, at which the tool is over the one right before it, mm; NaN elsewhere.
-
-        The tool will leave another hole at a height `above` it then.
-        """
+        """Height over a hole, along its axis, at which the tool is over the one right before it, mm; NaN elsewhere."""
         motion, program, (last, place) = self.motion, self.motion.program, self._left
         self._left = int(next_last), program.tip[next_last] + above * program.axis[next_last]
         away = motion.position is None or motion.modals["high"] or last != pose - 1
@@ -98,10 +95,7 @@ class Holes:
         return float((place - program.tip[pose]) @ program.axis[pose])
 
     def _cycle_of_control(self, cycle: Cycle | None, poses: Ints) -> tuple[str, str]:
-        """Cycle of the control that drills holes, as `kind_of` names it; empty for none, and then why no tap can be.
-
-        Plain moves cannot turn the spindle with the feed.
-        """
+        """Cycle of the control that drills holes, as `kind_of` names it; empty for none, and then why no tap can be."""
         motion = self.motion
         if cycle is None:
             return "", "its words are not understood; numbers without words need --cycle-order"

@@ -38,7 +38,6 @@ WARNINGS: Final = {
     # feeds and rows
     "CS311": "feed move without a feed in the CL file: most controls stop with an alarm; give one with --feed",
     "CS324": "feed per revolution while no spindle speed is given: controls stop there or stand still",
-    "CS325": "fewer than six of ten blocks are BSPLINE, which SINUMERIK wants; -f poly (vectors) has no such rule",
     # statements
     "CS310": "{word} is not translated: written as a comment; see whether the machine needs it",
     "CS318": "END comes before the last motion: written as a program stop; see that this is meant",
@@ -104,6 +103,7 @@ NOTES: Final = {
         "rounded corners are many short lines, and a control that does not look ahead slows down on them; give --with "
         "{name}, unless the machine has such a function on"
     ),
+    "CS325": "SINUMERIK joins curves well where six of ten blocks are BSPLINE; -f poly (vectors) has no such rule",
     "CS313": "arc written as circular blocks",
     "CS313b": "arc written as curves",
     "CS314": "arc written as lines",

@@ -78,11 +78,10 @@ class Motion:
 
     # ------------------------------------------------------------------------------------------------ rows
 
-    def lines(self, rows: Rows, ticks: Ints) -> None:
-        """Write rows of one kind, with their numbers in ticks of `tilting`."""
+    def lines(self, rows: Rows) -> None:
+        """Write rows of one kind."""
         move, arc, program, at = rows.move, rows.arc, self.program, self.at
-        if at is not self.tilting:
-            ticks = at.ticks(rows.tip, rows.other)
+        ticks = at.ticks(rows.tip, rows.other)
         self._go_back(int(move[0]), rows.other[:1])
         elsewhere = self._begins_elsewhere(int(move[0]))
         circular, curved = arc is not None and arc[0] >= 0, rows.curve[0] == 1 and program.kind[move[0]] == Move.ARC
@@ -121,10 +120,7 @@ class Motion:
         self.emit(BlockRows.straight(self.program, self._again(self.last, passed[:1], near), np.array([move])))
 
     def _again(self, last: Ints, pose: Ints, near: Floats) -> Ints:
-        """Ticks (1, c) of what was written last, a pose (1,), in the coordinates at hand.
-
-        `near` is the orientation of the first row to come.
-        """
+        """Ticks (1, c) of what was written last, a pose (1,), in the coordinates at hand."""
         form = self.at.form
         if self.last_at is self.at:
             return last[None]
@@ -319,10 +315,7 @@ class Motion:
         self.findings.note_each("CS384", self.program.line[poses[turned]])
 
     def _note_tip_control(self, pose: int) -> None:
-        """Say that a tilted tool has left the rotary axes anywhere, and no words bring them back.
-
-        An upright tool may stand at any angle of the table, too, once a tool has been tilted.
-        """
+        """Say that a tilted tool has left the rotary axes anywhere, and no words bring them back."""
         if self.at.form.rotary or "{rotary_zero}" not in self.at.form.table.program.begin:
             return
         since = slice(self._looked_until, pose)

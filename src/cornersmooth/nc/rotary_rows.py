@@ -196,11 +196,7 @@ class _Chunk:
         return some_rows(filled, kept)
 
     def _rates(self, path: FilledPath) -> Floats | None:
-        """(m,) moves per minute where blocks are timed by us, NaN elsewhere; None where none is.
-
-        Where the tip stands still, the axis point runs with the feed: so it does where the tip stays within ε and the
-        axis point does not.
-        """
+        """(m,) moves per minute where blocks are timed by us, NaN elsewhere; None where none is."""
         timed, form, program, settings = self.timed, self.form, self.smoothed.program, self.smoothed.settings
         if timed is None and not form.mode.timed_turns:
             return None
@@ -210,6 +206,7 @@ class _Chunk:
         swing = step + settings.axis_scale * np.diff(axis, axis=0, prepend=axis[:1])
         length = norm(step)
         digits = form.rounding(program.units)
+        # where the tip stands, or stays within ε while the axis point does not, that point runs with the feed
         still = (length < digits) | ((length < settings.tolerance) & (norm(swing) > settings.tolerance))
         turn = np.abs(np.diff(path.angles, axis=0, prepend=path.angles[:1])).max(axis=1)
         chosen = _cuts(own, program) & still & (turn > _NO_TURN) if timed is None else timed[path.pose]
@@ -247,10 +244,7 @@ def _with_stations(filled: FilledPath, cut: Bools, limits: LineLimits) -> Filled
 
 
 def _beside_far_corners(rows: Vertices, at_pose: Bools, limits: LineLimits) -> Bools:
-    """(m,) bool: rows of the two moves at poses that the motion is far from at their own parameter.
-
-    Where tip and axis point run by parameters of their own, another row may be the one that is near the pose.
-    """
+    """(m,) bool: rows of the two moves at poses that the motion is far from at their own parameter."""
     axis_point = rows.tip + limits.axis_length * limits.axis_of(rows.words)
     off_tip, off_axis_point = norm(rows.tip - rows.original_tip), norm(axis_point - rows.original_axis_point)
     far = at_pose & ((off_tip > limits.tip) | (off_axis_point > limits.axis_point))

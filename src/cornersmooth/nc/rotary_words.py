@@ -127,10 +127,7 @@ def within_reach(smoothed: SmoothProgram, form: Form) -> SmoothProgram:
 
 
 def _near_limits(smoothed: SmoothProgram, form: Form) -> Bools:
-    """(r,) bool: runs with a pose so near to the limit of an axis that the curve may go beyond it.
-
-    All runs on a machine with one rotary axis, whose limits are those of the directions, too.
-    """
+    """(r,) bool: runs with a pose so near to the limit of an axis that the curve may go beyond it."""
     runs, machine, settings = smoothed.runs, form.machine, smoothed.settings
     assert runs is not None
     assert machine is not None

@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from cornersmooth.arrays import some_rows
-from cornersmooth.model import Bools, Ints, Move, Statement
+from cornersmooth.model import Bools, Move, Statement
 from cornersmooth.nc.coordinates import Coordinates
 from cornersmooth.nc.holes import Holes
 from cornersmooth.nc.motion import Motion
@@ -47,18 +47,18 @@ class Script:
         stream.write(b"".join(self.motion.text))
         self.motion.text = []
 
-    def run(self, rows: Rows, ticks: Ints) -> None:
-        """Write a block of rows, with their numbers in ticks, and the statements before and between them."""
+    def run(self, rows: Rows) -> None:
+        """Write a block of rows, and the statements before and between them."""
         moves, start = rows.move, 0
         for statement in self._statements_until(int(moves[-1])) if len(moves) else []:
             if statement.word == "PAINT":  # thousands of them must not cut the rows to pieces
                 self.statements.blocks(statement)
                 continue
             stop = int(np.searchsorted(moves, statement.pose))
-            self._between(rows, ticks, start, stop)
+            self._between(rows, start, stop)
             start = max(start, stop)
             self._statement(statement)
-        self._between(rows, ticks, start, len(moves))
+        self._between(rows, start, len(moves))
 
     def finish(self) -> None:
         """Write the statements after the last row, and the blocks that end the program."""
@@ -67,8 +67,6 @@ class Script:
             self._statement(statement)
         if motion.repeated:
             motion.findings.note("CS312", 0, motion.repeated)
-        if motion.blocks.counted is not None:
-            motion.blocks.counted.finish()
         last = modals.set(compensation=())
         rotary = {} if motion.last is None else motion.rotary_blocks(motion.last, unwind=False)
         motion.say([*last, *modals.end(rotary)])
@@ -88,7 +86,7 @@ class Script:
             self.motion.modals.now["feed"] = -1
         self.motion.say(blocks)
 
-    def _between(self, rows: Rows, ticks: Ints, start: int, stop: int) -> None:
+    def _between(self, rows: Rows, start: int, stop: int) -> None:
         """Write rows between statements, holes apart from the others."""
         if start >= stop:
             return
@@ -101,7 +99,7 @@ class Script:
             if hole[first]:
                 self.holes.write(some_rows(rows, part))
             else:
-                self.motion.lines(some_rows(rows, part), ticks[part])
+                self.motion.lines(some_rows(rows, part))
 
     def _take_coordinates(self, pose: int) -> None:
         """Take the coordinates of a pose; between tilted planes, and beside them, the tool goes up."""

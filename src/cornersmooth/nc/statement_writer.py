@@ -126,10 +126,7 @@ class StatementWriter:
         return blocks
 
     def _tool_change(self, number: int, statement: Statement) -> list[str]:
-        """Blocks of a tool change; a speed in them is the first that the tool is given, or else what holds.
-
-        Where the table says so, the tool of the next change is brought near, if the CL file selects none.
-        """
+        """Blocks of a tool change; a speed in them is the first that the tool is given, or else what holds."""
         (gap, after), staged = self._until_next_tool[id(statement)], self.words.tool_select
         between = self.program.statements[gap]
         if not self.words.stage_tool or after in (None, number) or any(s.word == "SELECT" for s in between):

@@ -45,10 +45,6 @@ class RotaryPath:
     """Rotary words of n poses."""
 
     angles: Floats  #: (n, 2), degrees; in the order of `Machine.axes`, unwrapped but for rewinds in rapids
-    #: (n,), degrees; angle between the axis that the angles give and the given one: within the tolerance, 0 but at
-    #: the pole
-    deviation: Floats
-    branch: NDArray[np.int8]  #: (n,) which of `Solutions.angles` they are, -1 at the pole
     findings: tuple[Finding, ...]
 
 
@@ -81,16 +77,16 @@ def rotary_angles(
     rapid = np.zeros(n, np.bool_) if rapid is None else rapid
     left = np.zeros(n, np.bool_) if left is None else left
     if n == 0:
-        return RotaryPath(np.zeros((0, 2)), np.zeros(0), np.zeros(0, np.int8), ())
+        return RotaryPath(np.zeros((0, 2)), ())
     cone = np.full(n, tolerance / 2)
     if still is not None:
         cone[still] = still_tolerance / 2
     at_pole, steady, beyond, both = _sorted_poses(machine, axis, tolerance, cone, line, file)
     del cone  # with millions of poses every array counts
     run = np.cumsum(rapid | left, dtype=np.int32)
-    branch, swaps = np.full(n, -1, np.int8), np.zeros(0, np.int64)
+    swaps = np.zeros(0, np.int64)
     if len(steady):
-        angles, branch[steady], swaps = _Steady(machine, axis, steady, both, run, line, file).angles(tolerance, divide)
+        angles, swaps = _Steady(machine, axis, steady, both, run, line, file).angles(tolerance, divide)
         del both
         if len(at_pole):
             known, angles = angles, np.full((n, 2), np.nan)
@@ -104,19 +100,17 @@ def rotary_angles(
         for here in _chunks(n):
             angles[here, 1] = closest_second(machine, axis[here], angles[here, 0])
     angles[at_pole] = np.clip(angles[at_pole], *machine.limits.T)  # at the pole the axis hardly notices
-    deviation = np.zeros(n)
     for off in (at_pole, beyond):
-        for here in _chunks(len(off)):
-            deviation[off[here]] = angle_between(tool_axis(machine, angles[off[here]]), axis[off[here]])
-            if (over := deviation[off[here]] > tolerance).any():
-                pose = int(off[here][np.argmax(over)])
+        for some in (off[here] for here in _chunks(len(off))):
+            if (over := angle_between(tool_axis(machine, angles[some]), axis[some]) > tolerance).any():
+                pose = int(some[np.argmax(over)])
                 both = solutions(machine, axis[pose : pose + 1]).angles[0]
                 raise limit_error(machine, both, None, int(line[pose]), file)
     findings = pole_finding(machine, tip, axis, angles, rapid | left, line)
     findings += rewind_finding(machine, angles, rapid & ~left, line)
     if len(machine.names) == 2:
         findings += swap_finding(machine, swaps[~left[swaps]], line)
-    return RotaryPath(angles, deviation, branch, findings)
+    return RotaryPath(angles, findings)
 
 
 def rewound_angles(
@@ -130,23 +124,13 @@ def rewound_angles(
     """
     source, left = np.arange(len(tip)), np.zeros(len(tip), np.bool_)
     for number in range(REWIND_ROUNDS + 1):
+        how |= {"rapid": rapid[source], "still": still[source], "line": line[source], "left": left}
         try:
-            path = rotary_angles(
-                machine,
-                tip[source],
-                axis[source],
-                rapid=rapid[source],
-                left=left,
-                still=still[source],
-                divide=number < REWIND_ROUNDS,
-                line=line[source],
-                **how,
-            )
+            path = rotary_angles(machine, tip[source], axis[source], divide=number < REWIND_ROUNDS, **how)
+            break
         except CutTooFarError as far:
             behind = far.poses + 1
             source, left = np.insert(source, behind, source[far.poses]), np.insert(left, behind, True)
-            continue
-        break
     return path, source, left
 
 
@@ -171,10 +155,7 @@ def still_poses(kind: NDArray[np.uint8]) -> Bools:
 def _sorted_poses(
     machine: Machine, axis: Floats, tolerance: float, cones: Floats, line: Ints, file: str | None
 ) -> tuple[Ints, Ints, Ints, Floats]:
-    """Poses in their cones of the pole, degrees, those outside and their solutions, and those just out of reach.
-
-    Solutions are (s, 2, 2) degrees ``[pose, branch, axis]`` in (-180, 180].
-    """
+    """Poses in their cones of the pole, degrees, those outside and their solutions, and those just out of reach."""
     n, count = len(axis), 0
     angles, steady = np.empty((n, 2, 2)), np.empty(n, np.int64)
     cone, beyond = [], []
@@ -205,8 +186,8 @@ class _Steady:
     line: Ints
     file: str | None
 
-    def angles(self, tolerance: float, divide: bool) -> tuple[Floats, NDArray[np.int8], Ints]:
-        """Angles (s, 2) and branches (s,), and poses before which a rapid changes branch."""
+    def angles(self, tolerance: float, divide: bool) -> tuple[Floats, Ints]:
+        """Angles (s, 2), and poses before which a rapid changes branch."""
         machine, axis, steady, unwrapped, run = self.machine, self.axis, self.steady, self.unwrapped, self.run
         dislike = _dislike(machine, unwrapped[0])
         free, first = [np.ones(1, np.bool_)], [np.zeros(1, np.int64)]
@@ -234,17 +215,15 @@ class _Steady:
         try:
             branch, turns = choose(stretches, machine.limits)
         except NoChoiceError as stuck:
-            left = self._divided(stretches, stuck, begins, way) if divide else None
-            if left is not None:
+            if divide and len(left := self._left(stretches, stuck.stretch, begins, way)):
                 raise CutTooFarError(steady[left]) from None
             raise self._error(stuck, stretch, way) from stuck
-        angles, chosen = np.empty((len(steady), 2)), np.empty(len(steady), np.int8)
+        angles = np.empty((len(steady), 2))
         for here in _chunks(len(steady)):
             own = stretch[here]
-            chosen[here] = branch[own]
             angles[here] = unwrapped[here][np.arange(len(own)), branch[own]] + 360 * turns[own]
         swaps = begins[1:][stretches.free[1:] & (branch[1:] != branch[:-1])]
-        return angles, chosen, steady[swaps]
+        return angles, steady[swaps]
 
     def _extremes(self, members: Ints, way: WideSteps) -> tuple[Floats, Floats]:
         """Lowest and highest angles on the way into rows that follow one another: twice (m, 2, 2)."""
@@ -254,21 +233,18 @@ class _Steady:
         low[row], high[row] = np.minimum(low[row], way.low[own]), np.maximum(high[row], way.high[own])
         return low, high
 
-    def _divided(self, stretches: Stretches, stuck: NoChoiceError, begins: Ints, way: WideSteps) -> Ints | None:
-        """Rows after which cuts are to be left: in the one that is stuck, and in all that can be in no turn."""
-        limits = self.machine.limits
-        ends = np.append(begins[1:], len(self.unwrapped))
-        left = []
-        for number in np.union1d(too_far(stretches, limits), stuck.stretch).tolist():
+    def _left(self, stretches: Stretches, stuck: int, begins: Ints, way: WideSteps) -> Ints:
+        """Rows after which cuts are left: in stretches that fit in no turn, else ahead of the pole before one."""
+        ends, left = np.append(begins[1:], len(self.unwrapped)), list[int]()
+        for number in too_far(stretches, self.machine.limits).tolist():
             members = np.arange(begins[number], ends[number])
-            low, high = self._extremes(members, way)
-            entered = stuck if number == stuck.stretch else None
-            rows = parts_of_cut(self.unwrapped[members], low, high, limits, entered)
-            if rows is None:
-                return None
-            left.append(members[rows])
-        rows = np.concatenate(left)
-        return rows if len(rows) else None
+            rows = parts_of_cut(self.unwrapped[members], *self._extremes(members, way), self.machine.limits)
+            if not rows:
+                return members[:0]
+            left += members[rows].tolist()
+        if not left and not (stretches.free[stuck - 1] and begins[stuck] - begins[stuck - 1] == 1):  # left already
+            left.append(begins[stuck] - 1)
+        return np.array(left, np.int64)
 
     def _error(self, stuck: NoChoiceError, stretch: NDArray[np.int32], way: WideSteps) -> InputError:
         """Message for the pose that no choice gets beyond."""
@@ -300,10 +276,8 @@ def _dislike(machine: Machine, start: Floats) -> Floats:
 def _fill_cone(
     machine: Machine, length: Floats, axis: Floats, angles: Floats, poses: Ints, steady: Ints, run: NDArray[np.int32]
 ) -> None:
-    """Angles of poses inside the cone, in place; `length` is that of the path up to each pose.
-
-    The first angle goes evenly with the length of the path between two poses outside, and waits at the ends of a cut.
-    """
+    """Angles of poses inside the cone, in place; `length` is that of the path up to each pose."""
+    # the first angle goes evenly with the length between two poses outside, and waits at the ends of a cut
     after = np.searchsorted(steady, poses)
     before = np.maximum(after - 1, 0)
     left, right = steady[before], steady[np.minimum(after, len(steady) - 1)]

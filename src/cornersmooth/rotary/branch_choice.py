@@ -192,38 +192,22 @@ class CutTooFarError(Exception):
 def too_far(stretches: Stretches, limits: Floats) -> Ints:
     """Stretches that are inside the limits on no branch and in no turn: (k,) int64."""
     fewest, most = turns_inside(stretches.low, stretches.high, limits)
-    return np.flatnonzero(np.logical_and.reduce(np.logical_or.reduce(fewest > most, axis=2), axis=1))
+    return np.flatnonzero((fewest > most).any(axis=2).min(axis=1))
 
 
-def parts_of_cut(
-    angles: Floats, low: Floats, high: Floats, limits: Floats, stuck: NoChoiceError | None = None
-) -> Ints | None:
-    """Rows (k,) of a stretch after which the cut is left, so that all parts of it are inside the limits.
+def parts_of_cut(angles: Floats, low: Floats, high: Floats, limits: Floats) -> list[int]:
+    """Rows of a stretch after which the cut is left, so that all parts of it are inside the limits: as few as can be.
 
-    None where a single move, or the way in, leaves the limits. Angles (m, 2, 2) are ``[row, branch, axis]`` in degrees,
-    unwrapped: at each row, and extremes on the way into it. `stuck` says in which states the stretch can be entered.
+    None where a single move leaves the limits. Angles (m, 2, 2) are ``[row, branch, axis]`` in degrees, unwrapped: at
+    each row, and extremes on the way into it.
     """
-    count, begin = len(angles), 0
-    left: list[int] = []
-    while True:
-        if stuck is not None and not left:
-            stop = max(_first_outside(low, high, limits, state[0], state[1:]) for state in stuck.states.astype(float))
-        else:
-            stop = begin + _farthest(angles[begin:], low[begin:], high[begin:], limits)
-        if stop == count:
-            return np.array(left, np.int64)
-        if stop - 1 < begin or (stop - 1 == begin and left):
-            return None
-        begin = stop - 1
+    begin, left = 0, list[int]()
+    while begin + (reached := _farthest(angles[begin:], low[begin:], high[begin:], limits)) < len(angles):
+        if reached < 1 + bool(left):
+            return []
+        begin += reached - 1
         left.append(begin)
-
-
-def _first_outside(low: Floats, high: Floats, limits: Floats, branch: float, turns: Floats) -> int:
-    """First row outside of the limits; the number of rows where none is."""
-    own = int(branch)
-    beyond = np.maximum(limits[:, 0] - low[:, own] - 360 * turns, high[:, own] + 360 * turns - limits[:, 1])
-    rows = np.flatnonzero(beyond.max(axis=1) > LIMIT_SLACK)
-    return int(rows[0]) if len(rows) else len(low)
+    return left
 
 
 def _farthest(angles: Floats, low: Floats, high: Floats, limits: Floats) -> int:

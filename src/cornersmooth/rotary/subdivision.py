@@ -202,10 +202,7 @@ class RuledMotion:
         return np.minimum(parts, PARTS)
 
     def _needed(self, part: Intervals, bends: Floats, number: int) -> Ints:
-        """Into how many parts to divide intervals, by their errors in so many even samples: a power of two from 4 on.
-
-        1 where the tolerances are kept everywhere: between samples by the bounds.
-        """
+        """Into how many parts to divide intervals, by their errors in 4, 8, 16 ... even samples; 1 where they are good."""
         shape = (len(part.segment), number + 1)
         samples = np.tile(np.arange(number + 1) / number, shape[0])
         repeated = some_rows(part, np.repeat(np.arange(shape[0]), number + 1))
@@ -252,11 +249,7 @@ class RuledMotion:
         return [*tips, *(machine_position(self.machine, *end) for end in zip(tips, angles, strict=True))]
 
     def _errors(self, part: Intervals, ends: list[Floats], fraction: Floats) -> Iterator[tuple[Floats, Floats, Floats]]:
-        """Errors at one share of each interval, the ruled motion paired with the real one in two ways.
-
-        Yields the share of the ruled motion, first the same one, then where it is nearest to the tip, and errors there
-        of tip and axis over their tolerances, (p,) each. Where the tip hardly moves the nearest share says nothing.
-        """
+        """Errors at one share of each interval, the ruled motion paired with the real one in two ways."""
         share = fraction[:, None]
         words = part.start_angles * (1 - share) + part.end_angles * share
         axis = tool_axis(self.machine, words)
@@ -275,10 +268,7 @@ class RuledMotion:
             yield along, tip, angle_between(axis, wanted) / self.tolerance[part.segment + 1]
 
     def _swept(self, part: Intervals, axis: Floats, fraction: Floats) -> Floats:
-        """Share of each interval where the ruled axis is nearest to another, where the tip stands: else `fraction`.
-
-        About a standing tip all that counts is the great circle that the axis sweeps.
-        """
+        """Share of each interval where the ruled axis is nearest to another, where the tip stands: else `fraction`."""
         still = np.flatnonzero((self.tip[part.segment] == self.tip[part.segment + 1]).all(axis=1))
         along = fraction.copy()
         if len(still):
