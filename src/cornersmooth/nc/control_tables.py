@@ -220,25 +220,17 @@ def _mode(entry: Any, where: str, motion: Table) -> Mode:
     return mode
 
 
-#: names of what verification leaves to such a table, by the fields of `Words` that say it
-_KINDS: dict[str, tuple[str, ...]] = {
-    "tool_change": ("tool", "next tool"),
-    "tool_select": ("next tool",),
-    "spindle_speed": ("spindle", "speed"),
-    "clockwise": ("spindle",),
-    "counterclockwise": ("spindle",),
-    "spindle_off": ("spindle",),
-    "spindle_orient": ("spindle",),
-    "coolant": ("coolant",),
-    "dwell": ("dwell",),
-    "stop": ("stop",),
-    "optional_stop": ("stop",),
-    "compensation_left": ("compensation", "register"),
-    "compensation_right": ("compensation", "register"),
-    "compensation_off": ("compensation",),
+#: names of what verification leaves to such a table, and the fields of `Words` that say it
+_STATED: dict[tuple[str, ...], tuple[str, ...]] = {
+    ("tool", "next tool"): ("tool_change", "tool_select"),
+    ("spindle", "speed"): ("spindle_speed", "clockwise", "counterclockwise", "spindle_off", "spindle_orient"),
+    ("coolant",): ("coolant",),
+    ("dwell",): ("dwell",),
+    ("stop",): ("stop", "optional_stop"),
+    ("compensation", "register"): ("compensation_left", "compensation_right", "compensation_off"),
 }
-#: fields of which only new blocks are the table's own: stops for a tool are named by the words of the tool
-_TOOLS = {"tool_change", "tool_select", "stop", "optional_stop"}
+#: those of which only new blocks are the table's own: stops for a tool are named by the words of the tool
+_TOOLS = (("tool", "next tool"), ("stop",))
 #: blocks around the motion
 _FRAME = ("start", "begin", "tool_end", "between_tools", "end", "retract", "work_offset_block")
 FRAME = "program frame"  #: name of the frame of the program in what is left to a table
@@ -254,38 +246,27 @@ def own_words(table: Control) -> tuple[str, ...]:
     if not table.own:
         return ()
     base = load_control(table.dialect)
-    known = set(_blocks(base))
+    known, names = set(_blocks(base)), list[str]()
     blocks = [block for block in _blocks(table) if block not in known and not re.fullmatch(r"\{\w+\}", block)]
-    changed = {name for name in _KINDS if getattr(table.words, name) != getattr(base.words, name)}
-    for _ in _KINDS:  # one field may say several kinds, and several fields one
-        stated = {kind for name in changed for kind in _KINDS[name]}
-        changed |= {name for name, own in _KINDS.items() if stated & set(own)}
-    names = [kind for name in _KINDS if name in changed for kind in _KINDS[name]]
-    blocks += [block for name in _KINDS if name in changed - _TOOLS for block in _of_field(table, name)]
-    own_modes, base_modes = _modes(table, base), _modes(base, table)
-    if [mode.on for mode in own_modes] != [mode.on for mode in base_modes]:
+    for kinds, words in _STATED.items():
+        if any(getattr(table.words, name) != getattr(base.words, name) for name in words):
+            names += kinds
+            blocks += [block for name in words if kinds not in _TOOLS for block in _of_field(table, name)]
+    modes = [  # of the forms that both tables have
+        (form.modes[turn], base.forms[name].modes[turn])
+        for name, form in sorted(table.forms.items())
+        if name in base.forms
+        for turn in sorted(form.modes.keys() & base.forms[name].modes.keys())
+    ]
+    if any(own.on != other.on for own, other in modes):
         names.append("offset")
-        blocks += [block for mode in own_modes for block in mode.on]
+        blocks += [block for own, _ in modes for block in own.on]
     if table.program.end != base.program.end:
         names.append("end")
     framed = any(getattr(table.program, name) != getattr(base.program, name) for name in _FRAME)
-    framed |= _around(own_modes) != _around(base_modes)
+    around = ("off", "within_on", "within_off", "begin")
+    framed |= any(getattr(own, name) != getattr(other, name) for own, other in modes for name in around)
     return (*dict.fromkeys(blocks), *dict.fromkeys(names), *((FRAME,) if framed else ()))
-
-
-def _modes(table: Control, other: Control) -> list[Mode]:
-    """Modes of the forms that both tables have."""
-    return [
-        mode
-        for name, form in sorted(table.forms.items())
-        if name in other.forms
-        for turn, mode in sorted(form.modes.items())
-        if turn in other.forms[name].modes
-    ]
-
-
-def _around(modes: list[Mode]) -> list[tuple[object, ...]]:
-    return [(mode.off, mode.within_on, mode.within_off, mode.begin) for mode in modes]
 
 
 def _blocks(table: Control) -> Iterator[str]:

@@ -231,17 +231,13 @@ def bezier_points(points: Floats, curve: NDArray[np.int8], spline: Floats) -> Fl
     ends = np.append(np.flatnonzero((curve[1:] <= 1) & (curve[:-1] > 0)) + 1, len(curve) if curve[-1] > 0 else [])
     counts = (ends - first).astype(np.int64)
     rows = ranges(first, counts)
-    own = _splines(curve[rows], spline[rows], counts)
+    # rows 1, 5, 6 and so on of a clamped curve have its distinct knots but for the last
+    number, last = curve[rows], np.cumsum(counts) - 1
+    chosen = (number == 1) | (number > _DEGREE + 1)
+    knots = np.insert(spline[rows[chosen], 0], np.cumsum(chosen)[last], spline[rows[last], 2])
+    own = Splines(knots, counts - 2)
     low = own.knot[own.span_knot]
     matrix = own.bernstein(np.arange(len(low)), low, low + own.width)
     taps = rows[own.span_control[:, None] + np.arange(4)]
     intervals[taps[:, -1]] = matrix @ points[taps]
     return intervals
-
-
-def _splines(curve: NDArray[np.int8], spline: Floats, counts: Ints) -> Splines:
-    """Knot vectors of clamped curves: rows 1, 5, 6 and so on of each have the distinct knots but for the last."""
-    knot, last = spline[:, 0], np.cumsum(counts) - 1
-    chosen = (curve == 1) | (curve > _DEGREE + 1)
-    knots = np.insert(knot[chosen], np.cumsum(chosen)[last], spline[last, 2])
-    return Splines(knots, counts - 2)

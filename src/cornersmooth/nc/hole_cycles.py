@@ -35,7 +35,7 @@ import numpy as np
 from cornersmooth.kinematics import machine_position, tool_axis
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program, Statement
 from cornersmooth.nc.form import Form
-from cornersmooth.nc.messages import Findings, refused
+from cornersmooth.nc.messages import Findings
 from cornersmooth.nc.statement_args import milliseconds, tool_starts, words_of
 
 _MOST_PECKS = 1000  #: more pecks in one hole are a misunderstanding
@@ -211,7 +211,6 @@ class HoleCycles:
 
     program: Program
     findings: Findings
-    skip: bool = False  #: whether cycles that cannot be written are left out with a warning; an error otherwise
     now: Cycle | None = None  #: the cycle in force, None where it is not understood
     line: int = 0  #: of the last CYCLE statement, 0 for none
     _args: tuple[float | str, ...] = ()
@@ -235,12 +234,6 @@ class HoleCycles:
     def read(self, speed: float | None) -> None:
         """Read the last cycle at another speed of the spindle: a dwell may count in revolutions."""
         self.now = read_cycle(self._args, self.program, speed) if self._on else None
-
-    def leave_out(self, why: str, line: int, holes: int) -> None:
-        """Count holes that are not drilled, the first at a line; raises CS342 where they may not be left out."""
-        if not self.skip:
-            raise refused("CS342", self.program, self.line or line, why=why)
-        self.findings.note("CS315", line, holes, why=why)
 
 
 _SIDES: Final = (["LEFT"], ["RIGHT"])  #: sides of the path on which cutter compensation keeps the tool

@@ -25,6 +25,7 @@ from cornersmooth.nc.circles import FIRST_PLANE
 from cornersmooth.nc.control import Blocks
 from cornersmooth.nc.coordinates import BlockRows, Coordinates
 from cornersmooth.nc.hole_cycles import Cycle, hole_feeds, kind_of
+from cornersmooth.nc.messages import refused
 from cornersmooth.nc.motion import NOWHERE, Motion
 from cornersmooth.nc.statement_writer import StatementWriter
 from cornersmooth.smoothing.sampling import Rows
@@ -57,7 +58,9 @@ class Holes:
         heights = travel_height(program, poses, self._approached[poses])
         kind, why = self._cycle_of_control(cycle, poses)
         if cycle is None or (cycle.tap and not kind):
-            self.statements.cycles.leave_out(why, int(program.line[poses[0]]), len(poses))
+            if not self.statements.skip_cycles:
+                raise refused("CS342", program, self.statements.cycles.line or int(program.line[poses[0]]), why=why)
+            motion.findings.note_each("CS315", program.line[poses], why=why)
             self._over_holes(rows, *self._crossings(poses, heights))
             return
         travel = np.maximum(heights, max(cycle.retract, cycle.clearance or 0.0))
@@ -144,11 +147,10 @@ class Holes:
         own = np.repeat(np.arange(len(poses)), 2)
         height = np.column_stack((enter, leave)).reshape(-1, 1)
         ticks = motion.ticks_at(rows, program.tip[poses[own]] + height * program.axis[poses[own]], own)
-        for k, pose in enumerate(poses.tolist()):
-            numbers = (
-                format_number(x, motion.at.decimals[0]) for x in (program.tip[pose] / program.mm_per_unit).tolist()
+        for k, tip in enumerate((program.tip[poses] / program.mm_per_unit).tolist()):
+            place = " ".join(
+                f"{name}{format_number(x, motion.at.decimals[0])}" for name, x in zip("XYZ", tip, strict=True)
             )
-            place = " ".join(map("".join, zip("XYZ", numbers, strict=True)))
             motion.say(self.statements.warning_comment(f"NOT DRILLED: HOLE AT {place}"))
             one = BlockRows.straight(program, ticks[2 * k : 2 * k + 2], poses[[k, k]], rapid=True)
             motion.emit_above(motion.moving(one))
@@ -221,7 +223,9 @@ def hole_moves(
     """
     enter, clearance, leave = above
     moves = [(enter, True), (clearance, True)]  # heights, and whether in rapid
-    for before, depth in pairwise((0.0, *_peck_depths(cycle))):
+    pecks = accumulate(chain(cycle.steps, repeat(cycle.steps[-1]))) if cycle.steps else ()
+    depths = (*takewhile(lambda depth: depth < cycle.depth - LEAST_PECK, pecks), cycle.depth)
+    for before, depth in pairwise((0.0, *depths)):
         if before > 0.0:
             moves += [(clearance, True)] * cycle.full_retract + [(np.minimum(clearance, PECK_GAP - before), True)]
         moves.append((np.full(len(poses), -depth), False))
@@ -261,9 +265,3 @@ def travel_height(program: Program, poses: Ints, approach: Ints) -> Floats:
     usable = (approach >= 0) & (dot(axis, program.axis[known]) > 1.0 - _SAME_AXIS)
     height = dot(program.tip[known] - program.tip[over], axis)
     return np.where(usable, np.maximum(height, 0.0), 0.0)
-
-
-def _peck_depths(cycle: Cycle) -> list[float]:
-    """Depths to which the tool feeds, one after another."""
-    pecks = accumulate(chain(cycle.steps, repeat(cycle.steps[-1]))) if cycle.steps else ()
-    return [*takewhile(lambda depth: depth < cycle.depth - LEAST_PECK, pecks), cycle.depth]

@@ -97,9 +97,8 @@ class Modals:
             case "functions", False:
                 return [*self._extras("off", outside=False), *self._expand(self.mode.within_off)]
             case "high", True:
-                home = self._own_position("home")
                 retract = [block.format(**self.values) for block in table.program.retract]
-                return self._to_position({"Z": home["Z"]}) if "Z" in home else retract
+                return self.to_position("home", z=True) or retract
             case "held", _:
                 return [hold if value else turn for hold, turn in self.clamps]
             case "compensation", _:
@@ -222,11 +221,10 @@ class Modals:
     def end(self, rotary: RotaryBlocks) -> list[str]:
         """Blocks after everything else."""
         blocks = self.set(feed_mode=int(FeedMode.PER_MINUTE), plane=FIRST_PLANE)
-        steps, position = self.form.table.program.end, self._own_position("home")
+        steps = self.form.table.program.end
         blocks += self.end_tool()
-        home = self._to_position({name: value for name, value in position.items() if name != "Z"})
-        zero = rotary.get("rotary_zero", ())
-        if any(name not in LINEAR for name in position):  # they stand there, and are clamped
+        home, zero = self.to_position("home", z=False), rotary.get("rotary_zero", ())
+        if any(name not in LINEAR for name in self._position("home")):  # they stand there, and are clamped
             zero = ()
         elif zero and "{rotary_zero}" in steps:
             zero = (*self.set(held=False), *zero, *self.set(held=True))
@@ -276,31 +274,24 @@ class Modals:
 
     # ------------------------------------------------------------------------------------------------ positions
 
-    def change_position(self) -> list[str]:
-        """Blocks that bring the axes to where tools are changed, after a retract."""
-        position = self._own_position("tool_change")
-        high = {"Z": position.pop("Z")} if "Z" in position else {}
-        return [*self._to_position(position), *self._to_position(high)]
+    def to_position(self, key: str, *, z: bool) -> list[str]:
+        """Block that sends Z, or the other axes, to ``home`` or ``tool_change`` of the machine's file, where it has it.
 
-    def _own_position(self, key: str) -> dict[str, float]:
-        """Position that the machine's file has, where the control has words for it."""
-        machine = self.form.machine
-        return dict(getattr(machine, key)) if machine is not None and self.form.table.program.position else {}
-
-    def _to_position(self, position: Mapping[str, float]) -> list[str]:
-        """Block that sends axes to a position of the machine; rotary ones are let turn, and clamped again."""
-        if not position:
-            return []
-        table, motion = self.form.table, self.form.mode.motion
-        words = []
+        Rotary axes are let turn, and clamped again.
+        """
+        table, motion, words = self.form.table, self.form.mode.motion, []
+        position = {name: value for name, value in self._position(key).items() if (name == "Z") is z}
         for name, value in position.items():
-            linear = name in LINEAR
-            unit = MM_PER_UNIT[self.units] if linear else 1.0
-            decimals = self.form.tip_decimals(self.units) if linear else table.digits.angle
+            unit = MM_PER_UNIT[self.units] if name in LINEAR else 1.0
+            decimals = self.form.tip_decimals(self.units) if name in LINEAR else table.digits.angle
             text = format_number(value / unit, decimals, trim=True)
             text = text if motion.feed_point else text.rstrip(".")
             words.append(f"{name}{'+' if motion.signs and not text.startswith('-') else ''}{text}")
-        block = table.program.position.format(position=" ".join(words))
-        if all(name in LINEAR for name in position):
-            return [block]
-        return [*self.set(held=False), block, *self.set(held=True)]
+        blocks = [table.program.position.format(position=" ".join(words))] if words else []
+        turning = any(name not in LINEAR for name in position)
+        return [*self.set(held=False), *blocks, *self.set(held=True)] if turning else blocks
+
+    def _position(self, key: str) -> dict[str, float]:
+        """Position that the machine's file has, where the control has words for it."""
+        machine = self.form.machine
+        return dict(getattr(machine, key)) if machine is not None and self.form.table.program.position else {}

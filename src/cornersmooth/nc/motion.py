@@ -13,14 +13,14 @@ import numpy as np
 from cornersmooth.arrays import some_rows
 from cornersmooth.arrays.vectors import dot
 from cornersmooth.kinematics.poses import continued, nose_position
-from cornersmooth.model import Bools, Floats, Ints, Move, Program
+from cornersmooth.model import Floats, Ints, Move, Program
 from cornersmooth.nc.blocks import Blocks
 from cornersmooth.nc.control import INVERSE_TIME
 from cornersmooth.nc.coordinates import BlockRows, Coordinates
 from cornersmooth.nc.curves import bezier_points
 from cornersmooth.nc.messages import Findings, refused
 from cornersmooth.nc.modals import Modals
-from cornersmooth.nc.rotary_words import UPRIGHT, check_first_block, retracts_before
+from cornersmooth.nc.rotary_words import UPRIGHT, check_first_block, machine_of, rows_that_swing
 from cornersmooth.smoothing.sampling import Rows
 
 NOWHERE = 1 << 62  #: a pose that no program has
@@ -81,34 +81,34 @@ class Motion:
     def lines(self, rows: Rows) -> None:
         """Write rows of one kind."""
         move, arc, program, at = rows.move, rows.arc, self.program, self.at
+        first, kind, start = int(move[0]), program.kind, None
         ticks = at.ticks(rows.tip, rows.other)
-        self._go_back(int(move[0]), rows.other[:1])
-        elsewhere = self._begins_elsewhere(int(move[0]))
-        circular, curved = arc is not None and arc[0] >= 0, rows.curve[0] == 1 and program.kind[move[0]] == Move.ARC
-        if circular or curved:  # after a tool change, a hole or a FROM the tool is not at its start
-            start = ticks[:1] if curved else at.ticks(program.tip[move[:1] - 1], rows.other[:1])
-            self._go_to(start, move[:1])
-        elif elsewhere and program.kind[move[0] - 1 : move[0] + 1].tolist() == [Move.FROM, Move.ARC]:  # in lines
-            self._go_to(self.ticks_at(rows, program.tip[move[:1] - 1], np.zeros(1, np.int64)), move[:1])
-        self._join(ticks, rows.joined)
+        self._go_back(first, rows.other[:1])
+        # after a tool change, a hole or a FROM the tool is not at the start of rows
+        elsewhere = first not in (0, self._begun) and kind[first - 1] in (Move.FROM, Move.HOLE)
+        self._begun = first if elsewhere else self._begun
+        if rows.curve[0] == 1 and kind[first] == Move.ARC:
+            start = ticks[:1]
+        elif (arc is not None and arc[0] >= 0) or (elsewhere and tuple(kind[first - 1 :][:2]) == (Move.FROM, Move.ARC)):
+            start = self.ticks_at(rows, program.tip[move[:1] - 1], np.zeros(1, np.int64))
+        if start is not None:
+            self.emit(self.moving(BlockRows.straight(program, start, move[:1])))
+        joined = np.flatnonzero(rows.joined)  # they follow without a line, and have the digits of the row before
+        if len(joined) and joined[0] == 0:
+            ticks[0] = ticks[0] if self.position is None else self.position
+            joined = joined[1:]
+        ticks[joined] = ticks[joined - 1]
         feed, mode, bezier = program.feed[move], program.feed_mode[move].astype(np.int64), None
         if rows.rate is not None and at.plane is None:
             timed = ~np.isnan(rows.rate)
             feed, mode = np.where(timed, rows.rate, feed), np.where(timed, INVERSE_TIME, mode)
         if at.form.curve in ("poly", "spl") and rows.spline is not None and (rows.curve > 0).any():
             bezier = bezier_points(at.numbers(rows.tip, rows.other), rows.curve, rows.spline)
-        rapid, rest = program.kind[move] == Move.RAPID, {"spline": rows.spline, "blend": rows.blend, "left": rows.left}
+        rapid, rest = kind[move] == Move.RAPID, {"spline": rows.spline, "blend": rows.blend, "left": rows.left}
         whole = BlockRows(ticks, move, rapid, feed, mode, rows.curve, arc=arc, bezier=bezier, **rest)  # type: ignore[arg-type]
         moving = self.moving(whole.with_programmed_feed(program) if elsewhere else whole)
         self.repeated += len(whole) - len(moving)
         self.emit_above(moving)
-
-    def _begins_elsewhere(self, move: int) -> bool:
-        """Whether rows of a move are the first after a hole or a stated position: the tool is not at its start."""
-        if move in (0, self._begun) or self.program.kind[move - 1] not in (Move.FROM, Move.HOLE):
-            return False
-        self._begun = move
-        return True
 
     def _go_back(self, move: int, near: Floats) -> None:
         """Go to the pose after a tool change even if it repeats the last one before, and so is no row."""
@@ -134,15 +134,6 @@ class Motion:
                 other = continued(form.machine, other, near, np.array([-1]), 0.0)[0]
         return self.at.ticks(self.program.tip[pose], other)
 
-    def _join(self, ticks: Ints, joined: Bools) -> None:
-        """Give first control points that follow without a line the digits of the row before."""
-        places = np.flatnonzero(joined)
-        if len(places) and places[0] == 0:
-            if self.position is not None:
-                ticks[0] = self.position
-            places = places[1:]
-        ticks[places] = ticks[places - 1]
-
     def ticks_at(self, rows: Rows, tips: Floats, own: Ints) -> Ints:
         """Ticks of tips reached with the orientation of rows, which `own` names for each of them."""
         other = rows.other[own]
@@ -155,10 +146,6 @@ class Motion:
         if self.at.plane is not None and self.at.plane.angles is not None:
             ticks = self.tilting.ticks(np.zeros((1, 3)), self.at.plane.angles[None])[0]
         return self.tilting.rotary_blocks(ticks, unwind=unwind)
-
-    def _go_to(self, ticks: Ints, move: Ints) -> None:
-        """Go to a place at the feed of a move, if the tool is elsewhere."""
-        self.emit(self.moving(BlockRows.straight(self.program, ticks, move)))
 
     def moving(self, rows: BlockRows) -> BlockRows:
         """Leave out the rows that do not move the tool in the written digits."""
@@ -233,10 +220,10 @@ class Motion:
         turns = [] if rows.left is None else [(row, True) for row in np.flatnonzero(rows.left).tolist()]
         if self.at.form.rotary and rows.rapid.any():
             before = rows.ticks[:1] if self.position is None else self.position[None]
-            angles, lines = self.at.angles(np.concatenate((before, rows.ticks))), self.program.line[rows.move]
-            possible = self.modals.can_rewind
-            found = retracts_before(self.at.form, angles, rows.rapid, lines, self.findings, possible)
-            turns += [(row, False) for row in found.tolist()]
+            angles, possible = self.at.angles(np.concatenate((before, rows.ticks))), self.modals.can_rewind
+            found = rows_that_swing(machine_of(self.at.form), angles, np.append(False, rows.rapid)) - 1
+            self.findings.note_each("CS341" if possible else "CS340", self.program.line[rows.move[found]])
+            turns += [(row, False) for row in found.tolist() if possible]
         return sorted(turns)
 
     def _leave_cut(self, back: BlockRows) -> None:
@@ -267,9 +254,7 @@ class Motion:
         if form.orientation not in ("angles", "fixed") or axis[2] >= UPRIGHT or not self.modals.can_rewind:
             return
         machine = None if form.machine is None else form.machine.with_tool(self.modals.tool)
-        angles = at.angles(end[None])[0] if form.rotary else None
-        if at.plane is not None:
-            angles = at.plane.angles
+        angles = at.plane.angles if at.plane is not None else at.angles(end[None])[0] if form.rotary else None
         where = self.program.source.name, int(self.program.line[move])
         check_first_block(form, machine, at.tip(end), axis, angles, self._nose(), where, self.findings)
 
@@ -336,9 +321,8 @@ class Motion:
         if "CS346" in self._noted or form.mode.motion.endless_words or form.machine is None:
             return
         axes = form.machine.axes[: len(form.machine.names)]
-        endless = np.array([axis.limits is None and not axis.modulo for axis in axes])
-        angles = self.at.angles(rows.ticks)[:, : len(axes)]
-        beyond = np.flatnonzero(((angles[:, endless] < 0.0) | (angles[:, endless] >= 360.0)).any(axis=1))
+        endless = [k for k, axis in enumerate(axes) if axis.limits is None and not axis.modulo]
+        angles = self.at.angles(rows.ticks)[:, endless]
+        beyond = np.flatnonzero(((angles < 0.0) | (angles >= 360.0)).any(axis=1))
         if len(beyond):
-            names = " and ".join(form.machine.names[axis] for axis in np.flatnonzero(endless).tolist())
-            self._once("CS346", int(rows.move[beyond[0]]), names=names)
+            self._once("CS346", int(rows.move[beyond[0]]), names=" and ".join(form.machine.names[k] for k in endless))

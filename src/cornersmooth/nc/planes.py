@@ -133,10 +133,14 @@ def _plane(axis: Floats, settings: Settings, form: Form) -> tuple[Plane | None, 
         plane = Plane(frame, dict(zip(("first", "second", "third"), angle_words, strict=True)))
     else:
         assert form.machine is not None
-        angles = _rotary_angles(form.machine, axis)
-        if angles is None:
+        machine, (name, sign) = form.machine, form.machine.preferred or (form.machine.names[0], 0)
+        found = [one for one in _angles(machine, axis) if norm(tool_axis(machine, one[None]) - axis)[0] <= _SAME]
+        if not found:
             return None, "no angles of the rotary axes within their limits turn the part so"
-        angles = np.round(angles, digits)
+        # as preferred, else as little as possible
+        disliked = [bool(sign * one[machine.names.index(name)] < 0.0) for one in found]
+        turned = [float(np.abs(one).sum()) for one in found]
+        angles = np.round(found[min(range(len(found)), key=lambda k: (disliked[k], turned[k]))], digits)
         plane = Plane(turned_part(form.machine, angles), angles=angles)
     off = settings.axis_length * float(norm(plane.frame[None, :, 2] - axis)[0])
     if off > form.plane_reserve(settings.axis_point_allowed, settings.axis_length):
@@ -181,17 +185,6 @@ def turned_part(machine: Machine, angles: Floats) -> Floats:
     return moved[:3] - moved[3]
 
 
-def _rotary_angles(machine: Machine, axis: Floats) -> Floats | None:
-    """(2,) degrees within the limits that bring the tool to an axis: as preferred, else as little as possible."""
-
-    def turned(angles: Floats) -> float:
-        name, sign = machine.preferred or (machine.names[0], 0)
-        return float(np.abs(angles).sum()) + 1e6 * (sign * angles[machine.names.index(name)] < 0.0)
-
-    found = [angles for angles in _angles(machine, axis) if norm(tool_axis(machine, angles[None]) - axis)[0] <= _SAME]
-    return min(found, key=turned, default=None)
-
-
 def check_travel_of_words(planes: Planes, program: Program, form: Form, findings: Findings) -> None:
     """Refuse poses in tilted planes, and of machines without rotary axes, beyond the travel (CS374).
 
@@ -207,18 +200,17 @@ def check_travel_of_words(planes: Planes, program: Program, form: Form, findings
         check_tool_travel(program, machine, tip[moving], np.zeros((int(moving.sum()), 2)), pose[moving])
     for number, plane in enumerate(planes.planes):
         rows = np.flatnonzero((planes.of[pose] == number) & moving)
-        fit, refused = [], None
+        fit, refused = list[Floats](), list[InputError]()
         for angles in [plane.angles] if plane.angles is not None else _angles(machine, plane.frame[:, 2]):
             try:
                 check_tool_travel(program, machine, tip[rows], np.tile(angles, (len(rows), 1)), pose[rows])
                 fit.append(angles)
             except InputError as error:
-                refused = refused or error
-        if refused is not None and not fit:
-            raise refused
-        if refused is not None:
-            names = zip(machine.names, fit[0].tolist(), strict=True)
-            angle_words = " ".join(f"{name}{angle:.3f}" for name, angle in names)
+                refused.append(error)
+        if refused and not fit:
+            raise refused[0]
+        if refused:
+            angle_words = " ".join(f"{name}{angle:.3f}" for name, angle in zip(machine.names, fit[0], strict=True))
             findings.note("CS379", int(program.line[pose[rows[0]]]), angles=angle_words)
 
 

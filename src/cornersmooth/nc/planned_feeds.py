@@ -47,35 +47,29 @@ class PlannedFeeds:
         lines = text.split(end)
         word = (" " if motion.spaces else "") + motion.feed
 
-        def said(value: float, decimals: int) -> bytes:
+        def feed_word(value: float, decimals: int) -> bytes:
             number = format_number(value / 10.0**decimals, decimals, trim=True)
             return (word + (number if motion.feed_point else number.rstrip("."))).encode()
 
-        inverse = form.table.words.feed_mode.get(INVERSE_TIME, "").encode() or None
-        others = [block.encode() for key, block in form.table.words.feed_mode.items() if key != INVERSE_TIME]
-        modes = np.array([k for k, block in enumerate(lines) if block in others or block == inverse], np.int64)
-        timed = np.array([lines[k] == inverse for k in modes.tolist()] or [False])
-        mode = np.searchsorted(modes, self.line - 1) - 1
-        under_time = (mode >= 0) & timed[np.maximum(mode, 0)]
-        own = {int(line) - 1 for line in self.line}
-        with_feed = [k for k, block in enumerate(lines) if b"F" in block and k not in own and _FEED.search(block)]
-        unknown = iter(sorted({*with_feed, *modes.tolist()}))
-        upset = next(unknown, len(lines))
-        current: bytes | None = None
-        for k, row in enumerate((self.line - 1).tolist()):
-            while upset < row:  # another feed, or another kind of feed, since the last block
-                current, upset = None, next(unknown, len(lines))
-            last = row
-            while form.table.layout.continuation and lines[last].endswith(form.table.layout.continuation.encode()):
-                last += 1
-            old = _FEED.search(lines[last])
-            bare = lines[last][: old.start()] if old else lines[last]
-            if under_time[k]:
-                known = float(old[1]) * 10.0**INVERSE_TIME_DECIMALS if old else np.inf
-                lines[last] = bare + said(max(min(float(rate[k]), known), 1.0), INVERSE_TIME_DECIMALS)
-                current = None
-                continue
-            new = said(float(ticks[k]), digits.feed)
-            lines[last] = bare if new == current else bare + new
-            current = new
+        modes = {block.encode(): key for key, block in form.table.words.feed_mode.items()}
+        row, goes_on = {int(line) - 1: k for k, line in enumerate(self.line)}, form.table.layout.continuation.encode()
+        timed, current = False, b""
+        for place, block in enumerate(text.split(end)):
+            if block in modes:
+                timed, current = modes[block] == INVERSE_TIME, b""
+            elif place in row:
+                last, k = place, row[place]
+                while goes_on and lines[last].endswith(goes_on):
+                    last += 1
+                old = _FEED.search(lines[last])
+                bare = lines[last][: old.start()] if old else lines[last]
+                if timed:
+                    known = float(old[1]) * 10.0**INVERSE_TIME_DECIMALS if old else np.inf
+                    new = feed_word(max(min(float(rate[k]), known), 1.0), INVERSE_TIME_DECIMALS)
+                else:
+                    new = feed_word(float(ticks[k]), digits.feed)
+                lines[last] = bare if new == current else bare + new
+                current = b"" if timed else new
+            elif b"F" in block and _FEED.search(block):
+                current = b""  # another feed since the last block
         return end.join(lines)

@@ -64,8 +64,10 @@ def rotary_rows(
     machine = machine_of(form).with_longest_tool()
     max_step = largest_turn(settings)
     limits = line_limits(settings, form, max_step)
-    # in long programs as many lines take too long to find
-    placed = has_law(form) and limits.tip_of is None and len(program) <= TIMED_POSES
+    # lines are placed where it is known when the control reaches their ends; in long programs that takes too long
+    known = form.table.lines.rounding and form.table.lines.planner and limits.tip_of is None
+    limited = {axis.name for axis in machine.dynamics}.issuperset((*LINEAR, *machine.names))
+    placed = bool(known) and limited and len(program) <= TIMED_POSES
     timed = _timed_cuts(way.angles, way.move, program) if form.orientation == "machine" else None
     size = LONG_CHUNK if long else _CHUNK
     for begin in range(0, max(len(way.move) - 1, 1), size):
@@ -105,16 +107,10 @@ def rotary_rows(
         tip, angles = filled.tip[own], filled.angles[own]
         seen = slice(None) if in_planes is None else ~in_planes[move[pose]]
         check_tool_travel(program, machine_of(form), tip[seen], angles[seen], move[pose[seen]])
-        yield Rows(
-            tip=tip,
-            other=angles,
-            move=move[pose],
-            curve=np.zeros(len(pose), np.int8),
-            joined=np.zeros(len(pose), np.bool_),
-            rate=None if rate is None else rate[own],
-            blend=None if blend is None else blend[own],
-            left=part.left[pose] & ~inserted if way.left.any() else None,
-        )
+        none = np.zeros(len(pose), np.int8), np.zeros(len(pose), np.bool_)
+        rate, blend = (None if some is None else some[own] for some in (rate, blend))
+        left = part.left[pose] & ~inserted if way.left.any() else None
+        yield Rows(tip, angles, move[pose], *none, rate=rate, blend=blend, left=left)
 
 
 def arc_angles(way: RotaryWay, program: Program, form: Form) -> ArcAngles:
@@ -160,20 +156,17 @@ class _Chunk:
 
     def in_time(self, filled: FilledPath, own: slice, findings: Findings) -> tuple[FilledPath, Floats | None]:
         """The path without rows that are too short to be timed by us, and moves per minute; those of `own` count."""
-        rate, fastest = self._rates(filled), self.form.mode.motion.fastest
+        rate, fastest = self._rates(filled), self.form.mode.motion.fastest or math.inf
         if rate is None:
             return filled, None
-        if fastest:
-            if self.form.orientation == "machine" and (rate > fastest).any():
-                before = len(filled.pose)
-                filled = self._merged(filled, rate, fastest)
-                if len(filled.pose) < before:
-                    findings.note("CS372", 0, before - len(filled.pose))
-                rate = self._rates(filled)
+        if self.form.orientation == "machine" and (rate > fastest).any():
+            before, filled = len(filled.pose), self._merged(filled, rate, fastest)
+            findings.note_each("CS372", np.zeros(before - len(filled.pose), np.int64))
+            rate = self._rates(filled)
             assert rate is not None
-            beyond = filled.pose[own][rate[own] > fastest]
-            findings.note_each("CS371", self.smoothed.program.line[self.way.move[beyond]], fastest=fastest)
-            rate = np.minimum(rate, fastest)
+        beyond = filled.pose[own][rate[own] > fastest]
+        findings.note_each("CS371", self.smoothed.program.line[self.way.move[beyond]], fastest=fastest)
+        rate = np.minimum(rate, fastest)
         return filled, np.round(rate, INVERSE_TIME_DECIMALS)
 
     def _merged(self, filled: FilledPath, rate: Floats, fastest: float) -> FilledPath:
@@ -304,15 +297,6 @@ def line_limits(settings: Settings, form: Form, largest_turn: float = 0.0) -> Li
         if machine is not None and form.orientation == "machine"
         else None,
         rotary=machine is not None,
-    )
-
-
-def has_law(form: Form) -> bool:
-    """Whether it is known when the control, which rounds corners of lines by itself, reaches the end of each."""
-    machine, style = form.machine, form.table.lines
-    known = set() if machine is None else {axis.name for axis in machine.dynamics}
-    return (
-        machine is not None and bool(style.rounding and style.planner) and known.issuperset((*LINEAR, *machine.names))
     )
 
 

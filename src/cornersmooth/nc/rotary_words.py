@@ -17,11 +17,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from cornersmooth.arrays.vectors import dot
+from cornersmooth.arrays.vectors import norm
 from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.geometry.ragged import starts
 from cornersmooth.kinematics import Machine, check_travel, solutions, tool_axis
-from cornersmooth.kinematics.poses import nose_position
+from cornersmooth.kinematics.poses import angle_between, nose_position
 from cornersmooth.model import Bools, Floats, Ints, Move, Program, SmoothProgram
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.messages import Findings, refused
@@ -162,11 +162,11 @@ def swinging(machine: Machine, before: Floats, after: Floats) -> Bools:
     Rotary words (m, 2), degrees in the order of the machine's axes, run evenly from those before to those after.
     """
     ends = [tool_axis(machine, angles) for angles in (before, after)]
-    shortest = _angle(*ends)
+    shortest = angle_between(*ends)
     longest = np.zeros(len(before))
     for place in _PLACES.tolist():
         between = tool_axis(machine, before + place * (after - before))
-        longest = np.maximum(longest, _angle(ends[0], between) + _angle(between, ends[1]))
+        longest = np.maximum(longest, angle_between(ends[0], between) + angle_between(between, ends[1]))
     return longest - shortest > LONGEST_DETOUR
 
 
@@ -175,20 +175,6 @@ def rows_that_swing(machine: Machine, angles: Floats, rapid: Bools) -> Ints:
     turn = np.abs(np.diff(angles, axis=0)).max(axis=1) > LONGEST_DETOUR / 2
     rows = np.flatnonzero(rapid[1:] & turn) + 1
     return rows[swinging(machine, angles[rows - 1], angles[rows])] if len(rows) else rows
-
-
-def retracts_before(form: Form, angles: Floats, rapid: Bools, line: Ints, findings: Findings, possible: bool) -> Ints:
-    """Rows of a run before which the tool goes up, so that rotary axes turn back there; says so.
-
-    `angles` (r + 1, 2), degrees, are those before the run and of its rows; `possible` where the control has a retract.
-    """
-    assert form.machine is not None
-    rows = rows_that_swing(form.machine, angles, np.concatenate(([False], rapid))) - 1
-    if not possible:
-        findings.note_each("CS340", line[rows])
-        return rows[:0]
-    findings.note_each("CS341", line[rows])
-    return rows
 
 
 def from_zero(form: Form, program: Program, axis: Floats, angles: Floats, move: Ints, rapid: Bools) -> None:
@@ -212,24 +198,12 @@ def from_zero(form: Form, program: Program, axis: Floats, angles: Floats, move: 
     # a pose that repeats the one before is no row
     rows = rows[(move[rows] == starts) & rapid[rows] & ~np.isnan(angles[rows]).any(axis=1)]
     for row, end in pairwise([*rows.tolist(), len(move)]):
-        first = angles[row].copy()
-        if len(machine.names) == 2 and _along_pole(machine, axis[row:end], angles[row:end, 0]):
+        first, along = angles[row].copy(), machine.axes[0].unit
+        stands = np.nanmax(angles[row:end, 0]) - np.nanmin(angles[row:end, 0]) <= _PARALLEL
+        if len(machine.names) == 2 and stands and norm(np.cross(axis[row:end], along)).max() <= _PARALLEL:
             angles[row:end, 0] += np.clip(0.0, *machine.limits[0]) - first[0]
             endless = endless & (False, True)
         angles[row:end, endless] += -360.0 * np.round(first[endless] / 360.0)
-
-
-def _along_pole(machine: Machine, axis: Floats, first: Floats) -> bool:
-    """Whether the tool is parallel to the first rotary axis all the while, and that stands."""
-    if np.nanmax(first) - np.nanmin(first) > _PARALLEL:
-        return False
-    across = axis - dot(axis, np.broadcast_to(machine.axes[0].unit, axis.shape))[:, None] * machine.axes[0].unit
-    return bool(np.abs(across).max() <= _PARALLEL)
-
-
-def _angle(a: Floats, b: Floats) -> Floats:
-    """Degrees between unit vectors, row by row."""
-    return np.degrees(np.arccos(np.clip(dot(a, b), -1.0, 1.0)))
 
 
 def check_first_block(
@@ -254,7 +228,11 @@ def check_first_block(
         before = np.clip(0.0, *machine.limits.T)
     places = np.zeros((0, 3)) if machine is None or before is None else _starts(machine, tip, before, place)
     if machine is None or before is None or angles is None or not len(places):
-        if _rise(machine, axis, before) < _FLAT:
+        rise = float(axis[2])  # Z of the part for each mm of Z of the machine, at the least; tables may have turned it
+        if machine is not None:
+            ways = solutions(machine, axis[None]).angles[0] if before is None else before[None]
+            rise = min(float(turned_part(machine, one)[2, 2]) for one in ways)
+        if rise < _FLAT:
             findings.note("CS392", where[1])
         return
     turned = before + _WAY[:, None] * (angles - before)
@@ -287,11 +265,3 @@ def _starts(machine: Machine, tip: Floats, before: Floats, place: Floats | None)
     places = np.vstack((ends, ends.mean(axis=0), over)) if place is None else place[None]
     starts = np.column_stack((places, np.full(len(places), top)))
     return starts[~np.isnan(starts).any(axis=1)]
-
-
-def _rise(machine: Machine | None, axis: Floats, before: Floats | None) -> float:
-    """How far the block comes down along Z of the part for each mm of Z of the machine, at the least."""
-    if machine is None:
-        return float(axis[2])  # tables may have turned the part
-    angles = solutions(machine, axis[None]).angles[0] if before is None else before[None]
-    return min(float(turned_part(machine, one)[2, 2]) for one in angles)

@@ -5,7 +5,6 @@ A statement changes what the control remembers; a stretch of rows asks for it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -32,11 +31,9 @@ class Script:
     holes: Holes
     upright: Bools  #: (n,) `hole_cycles.upright_poses`
     planes: Planes
-    _coordinates: dict[tuple[str, int | None], Coordinates] = field(
-        default_factory=dict
-    )  #: besides those of tip control
+    _coordinates: dict[tuple[bool, int | None], Coordinates] = field(default_factory=dict)  #: besides `Motion.tilting`
     _plane: int = -1  #: tilted plane of the tool at hand
-    _next_statement: int = 0
+    _next: int = 0
     _in_order: tuple[Statement, ...] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -49,8 +46,10 @@ class Script:
 
     def run(self, rows: Rows) -> None:
         """Write a block of rows, and the statements before and between them."""
-        moves, start = rows.move, 0
-        for statement in self._statements_until(int(moves[-1])) if len(moves) else []:
+        moves, start, order = rows.move, 0, self._in_order
+        while len(moves) and self._next < len(order) and order[self._next].pose <= moves[-1]:
+            statement = order[self._next]
+            self._next += 1
             if statement.word == "PAINT":  # thousands of them must not cut the rows to pieces
                 self.statements.blocks(statement)
                 continue
@@ -63,19 +62,13 @@ class Script:
     def finish(self) -> None:
         """Write the statements after the last row, and the blocks that end the program."""
         motion, modals = self.motion, self.motion.modals
-        for statement in self._in_order[self._next_statement :]:
+        for statement in self._in_order[self._next :]:
             self._statement(statement)
         if motion.repeated:
             motion.findings.note("CS312", 0, motion.repeated)
         last = modals.set(compensation=())
         rotary = {} if motion.last is None else motion.rotary_blocks(motion.last, unwind=False)
         motion.say([*last, *modals.end(rotary)])
-
-    def _statements_until(self, pose: int) -> Sequence[Statement]:
-        begin, order = self._next_statement, self._in_order
-        while self._next_statement < len(order) and order[self._next_statement].pose <= pose:
-            self._next_statement += 1
-        return order[begin : self._next_statement]
 
     def _statement(self, statement: Statement) -> None:
         blocks, changed = self.statements.blocks(statement), self.statements.changed
@@ -114,23 +107,19 @@ class Script:
 
     def _coordinates_of(self, pose: int, plane: int) -> Coordinates:
         """Coordinates of a pose: of its plane, of tools along Z, or of the tool at hand where its length counts."""
-        form, tool = self.motion.tilting.form, self.motion.modals.tool
-        if plane >= 0:
-            key: tuple[str, int | None] = ("plane", plane)
-        elif self.upright[pose]:
-            key = ("upright", 0)
-        elif form.machine is not None and form.machine.tool_lengths and form.orientation == "machine":
-            key = ("tool", tool)
-        else:
-            return self.motion.tilting
+        tilting, tool = self.motion.tilting, self.motion.modals.tool
+        form = tilting.form
+        mode = form.plane if plane >= 0 else form.upright if self.upright[pose] else None
+        key = (mode is not None, plane if mode is not None else tool)
+        if mode is None and not (form.machine and form.machine.tool_lengths and form.orientation == "machine"):
+            return tilting
         if key not in self._coordinates:
-            if key[0] == "tool" and form.machine is not None:
-                at = replace(self.motion.tilting, form=replace(form, machine=form.machine.with_tool(tool)))
+            if mode is None:
+                assert form.machine is not None
+                at = replace(tilting, form=replace(form, machine=form.machine.with_tool(tool)))
             else:
-                mode = form.plane if plane >= 0 else form.upright
-                assert mode is not None
                 along = replace(form, orientation="fixed", mode=mode)
                 own = self.planes.planes[plane] if plane >= 0 else None
-                at = replace(self.motion.tilting, form=along, stretch=along.stretch(1.0), plane=own, tip_control=False)
+                at = replace(tilting, form=along, stretch=along.stretch(1.0), plane=own, tip_control=False)
             self._coordinates[key] = at
         return self._coordinates[key]

@@ -131,19 +131,6 @@ def tool_loads(program: Program) -> list[tuple[Statement, tuple[int, int]]]:
     return [(statement, tool) for statement, tool in loads if tool is not None]
 
 
-def until_next_tool(program: Program) -> dict[int, tuple[slice, int | None]]:
-    """For each load, by identity: the statements behind it up to another tool, and its number if there is one."""
-    place = {id(statement): k for k, statement in enumerate(program.statements)}
-    found: dict[int, tuple[slice, int | None]] = {}
-    end, after, following = None, None, None
-    for load, tool in reversed(tool_loads(program)):
-        if following is not None and following[1] != tool:
-            end, after = place[id(following[0])], following[1][0]
-        found[id(load)] = slice(place[id(load)] + 1, end), after
-        following = load, tool
-    return found
-
-
 def ahead_of_tools(program: Program) -> frozenset[int]:
     """Last statements of each word ahead of the first tool, if no motion and no wait comes before it; by identity."""
     found: dict[str, int] = {}

@@ -30,7 +30,6 @@ from cornersmooth.nc.statement_args import (
     spindle_args,
     spindle_speed,
     spoken_text,
-    until_next_tool,
     whole_number,
     words_of,
 )
@@ -40,7 +39,9 @@ from cornersmooth.text import format_number
 #: words whose text is for the machinist: comments without the word
 _TEXT_WORDS = frozenset("$$ PPRINT REMARK TPRINT LETTER DISPLY".split())
 _PLANES = {"XYPLAN": 17, "ZXPLAN": 18, "YZPLAN": 19}  #: words for planes, with the G code of each
-_SILENT = frozenset({"END-OF-PATH", "FINI", "REWIND"})  #: words that say nothing beside what the text shows anyway
+_SILENT = frozenset(
+    {"END-OF-PATH", "FINI", "PAINT", "REWIND"}
+)  #: words that say nothing beside what the text shows anyway
 
 
 @dataclass
@@ -59,46 +60,36 @@ class StatementWriter:
     cycles: HoleCycles = field(init=False)
     words: Words = field(init=False)
     toolno_loads: bool = field(init=False)
-    #: for each load, by identity: the statements up to the next tool, and its number if there is one
-    _until_next_tool: dict[int, tuple[slice, int | None]] = field(init=False)
     _ahead_of_tools: frozenset[int] = field(init=False)
     _unknown: frozenset[int] = field(init=False)  #: statements that are not understood, by identity
 
     def __post_init__(self) -> None:
         self.words = self.form.table.words
-        self.cycles = HoleCycles(self.program, self.findings, skip=self.skip_cycles)
-        written_words = {statement.word for statement in self.program.statements}
-        self.toolno_loads = not TOOL_WORDS & written_words
-        self._until_next_tool = until_next_tool(self.program)
+        self.cycles = HoleCycles(self.program, self.findings)
+        self.toolno_loads = not TOOL_WORDS & {statement.word for statement in self.program.statements}
         self._ahead_of_tools = ahead_of_tools(self.program)
         self._unknown = frozenset(map(id, statements_not_understood(self.program)))
 
     def blocks(self, statement: Statement) -> list[str]:
         """NC blocks of one statement, without line ends."""
-        word = statement.word
+        word, known = statement.word, id(statement) not in self._unknown
         handler = _HANDLERS.get(word)
-        if handler is not None:
-            written = handler(self, statement)
-            if written is None and word == "CUTCOM" and id(statement) not in self._unknown:
-                written = []  # ON before the side
-            if written is not None:
-                return [*written, *(self.comment(statement.text) if self._has_other_words(statement) else ())]
-        elif word in _TEXT_WORDS:
+        written = None if handler is None else handler(self, statement)
+        if word == "PAINT":
+            self.findings.note("CS317", statement.line)
+        if word in _TEXT_WORDS:
             return self.comment(spoken_text(statement))
-        elif word in _SILENT:
+        if word in _SILENT or (word == "CUTCOM" and written is None and known):  # CUTCOM/ON before the side
             return []
-        if handler is not None or id(statement) in self._unknown:
-            self.findings.note("CS310", statement.line, word=word)
-        return self.comment(statement.text or word)
-
-    @staticmethod
-    def _has_other_words(statement: Statement) -> bool:
-        """Whether a statement that is understood has words that no block says: gears, lengths, holders."""
+        if written is None:
+            if handler is not None or not known:
+                self.findings.note("CS310", statement.line, word=word)
+            return self.comment(statement.text or word)
+        # words that no block says: gears, lengths, holders
         words = set(words_of(statement))
-        if statement.word == "SPINDL":
-            return bool(words & GEARS)
-        loads = statement.word in TOOL_WORDS and any(isinstance(value, str) for value in statement.args[1:])
-        return loads and not words <= {"TOOL", "ADJUST", "OSETNO"}
+        rest = word in TOOL_WORDS and any(isinstance(value, str) for value in statement.args[1:])
+        rest = rest and not words <= {"TOOL", "ADJUST", "OSETNO"}
+        return [*written, *(self.comment(statement.text) if rest or (word == "SPINDL" and words & GEARS) else ())]
 
     def comment(self, text: str) -> list[str]:
         """Comments that hold a text."""
@@ -119,7 +110,7 @@ class StatementWriter:
             return self.comment(statement.text)
         blocks = self.modals.end_tool(statement.line, another=self.modals.tool not in (None, number))
         if number != self.modals.tool:
-            blocks += self.modals.change_position()
+            blocks += [block for z in (False, True) for block in self.modals.to_position("tool_change", z=z)]
             blocks += self._tool_change(number, statement)
         self.changed = True
         self.modals.tool, self.modals.offset = number, offset
@@ -127,10 +118,13 @@ class StatementWriter:
 
     def _tool_change(self, number: int, statement: Statement) -> list[str]:
         """Blocks of a tool change; a speed in them is the first that the tool is given, or else what holds."""
-        (gap, after), staged = self._until_next_tool[id(statement)], self.words.tool_select
-        between = self.program.statements[gap]
-        if not self.words.stage_tool or after in (None, number) or any(s.word == "SELECT" for s in between):
-            staged = ()
+        order, words = self.program.statements, {"TOOLNO"} if self.toolno_loads else TOOL_WORDS
+        behind = order[next(k for k, one in enumerate(order) if one is statement) + 1 :]
+        others = (k for k, one in enumerate(behind) if one.word in words and loaded_tool(one))
+        end = next((k for k in others if loaded_tool(behind[k]) != loaded_tool(statement)), len(behind))
+        between, after = behind[:end], (loaded_tool(behind[end]) or (None,))[0] if end < len(behind) else None
+        selected = after in (None, number) or any(one.word == "SELECT" for one in between)
+        staged = self.words.tool_select if self.words.stage_tool and not selected else ()
         speed = None
         if any("{speed}" in block for block in self.words.tool_change):
             speed = self._first_speed(between) or self.modals.speed
@@ -241,11 +235,11 @@ class StatementWriter:
         self.modals.switch("coolant", blocks)
         return [*before, *blocks]
 
-    def halt(self, blocks: Blocks) -> list[str]:
-        """STOP and OPSTOP."""
+    def halt(self, blocks: Blocks) -> list[str] | None:
+        """STOP and OPSTOP; None where the control has no words for it."""
         if blocks:
             self.modals.halt()
-        return list(blocks)
+        return list(blocks) or None
 
     def delay(self, statement: Statement) -> list[str] | None:
         """DELAY/seconds, DELAY/DWELL,seconds (ISO 4343 5.13) and DELAY/n,REV."""
@@ -276,23 +270,19 @@ class StatementWriter:
         register = whole_number(numbers or [float(self.modals.offset)])
         if not side or len(names) > 2 or not set(names[1:]) <= _PLANES.keys() or register is None:
             return None
-        if words.compensation_entry:
-            self._check_entry(statement)
+        if words.compensation_entry:  # the control refuses a first move that is too short
+            pose, tips = statement.pose, self.program.tip
+            length = math.hypot(*(tips[pose] - tips[pose - 1])[:2]) if 0 < pose < len(tips) else math.inf
+            if not length > 0.0:
+                raise refused("CS344", self.program, statement.line)
+            if length <= self._diameter / 2.0:
+                self.findings.note("CS345", statement.line, length=length)
         tip = self.modals.mode is not self.form.upright and self.form.orientation not in ("fixed", "machine")
         also = "it may be used with tool tip control (--cycles native does without, along Z), and that " if tip else ""
         self.findings.note("CS319", statement.line, also=also)
         change = self.modals.set(plane=_PLANES[names[1]] if len(names) > 1 else FIRST_PLANE)
         begun = self.modals.now["compensation"] = tuple(block.format(register=register) for block in side)
         return [*change, *begun]
-
-    def _check_entry(self, statement: Statement) -> None:
-        """Refuse a first move that is too short for cutter compensation to begin on, where the control does."""
-        pose, tip = statement.pose, self.program.tip
-        length = math.hypot(*(tip[pose] - tip[pose - 1])[:2]) if 0 < pose < len(tip) else math.inf
-        if not length > 0.0:
-            raise refused("CS344", self.program, statement.line)
-        if length <= self._diameter / 2.0:
-            self.findings.note("CS345", statement.line, length=length)
 
     def hole_cycle(self, statement: Statement) -> list[str]:
         """CYCLE: kept for the holes that follow."""
@@ -307,7 +297,7 @@ class StatementWriter:
         if not (self.program.kind[statement.pose :] != Move.FROM).any():
             return []
         self.findings.note("CS318", statement.line)
-        return [*self.comment(statement.text), *self.halt(self.words.stop)]
+        return [*self.comment(statement.text), *(self.halt(self.words.stop) or ())]
 
     def insert(self, statement: Statement) -> list[str]:
         """INSERT: text for the NC file; as a comment, since its meaning is not known."""
@@ -334,11 +324,6 @@ class StatementWriter:
         self.modals.switch("coolant", () if blocks in off else blocks)
         return [*(block for block in before if block not in blocks), *blocks]
 
-    def paint(self, statement: Statement) -> list[str]:
-        """PAINT: colours and speeds of the CAM system's screen."""
-        self.findings.note("CS317", statement.line)
-        return []
-
     def start(self, statement: Statement) -> list[str]:
         """FROM: a position that is stated; the tool is not sent there."""
         decimals = self.form.tip_decimals(self.program.units)
@@ -360,12 +345,11 @@ _HANDLERS: dict[str, Handler] = {
     "DELAY": StatementWriter.delay,
     "CUTCOM": StatementWriter.compensation,
     "CYCLE": StatementWriter.hole_cycle,
-    "STOP": lambda writer, statement: writer.halt(writer.words.stop) or None,
-    "OPSTOP": lambda writer, statement: writer.halt(writer.words.optional_stop) or None,
+    "STOP": lambda writer, statement: writer.halt(writer.words.stop),
+    "OPSTOP": lambda writer, statement: writer.halt(writer.words.optional_stop),
     "GOHOME": StatementWriter.go_home,
     "END": StatementWriter.end,
     "INSERT": StatementWriter.insert,
     "AUXFUN": StatementWriter.auxiliary,
-    "PAINT": StatementWriter.paint,
     "FROM": StatementWriter.start,
 }

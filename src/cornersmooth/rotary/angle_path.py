@@ -189,7 +189,10 @@ class _Steady:
     def angles(self, tolerance: float, divide: bool) -> tuple[Floats, Ints]:
         """Angles (s, 2), and poses before which a rapid changes branch."""
         machine, axis, steady, unwrapped, run = self.machine, self.axis, self.steady, self.unwrapped, self.run
-        dislike = _dislike(machine, unwrapped[0])
+        dislike = np.zeros(2)
+        if machine.preferred is not None:
+            name, sign = machine.preferred
+            dislike[sign * unwrapped[0, :, machine.names.index(name)] < 0] = PREFERENCE_COST
         free, first = [np.ones(1, np.bool_)], [np.zeros(1, np.int64)]
         wide = [WideSteps(np.zeros(0, np.int64), *np.zeros((2, 0, 2, 2)))]
         for here in _chunks(len(steady)):
@@ -262,15 +265,6 @@ class _Steady:
         start = int(np.searchsorted(self.run, self.run[pose]))
         both = solutions(self.machine, self.axis[pose : pose + 1]).angles[0]
         return limit_error(self.machine, both, words, int(self.line[pose]), self.file, int(self.line[start]))
-
-
-def _dislike(machine: Machine, start: Floats) -> Floats:
-    """Cost that the preference of the machine puts on either branch at the start of the path, degrees."""
-    if machine.preferred is None:
-        return np.zeros(2)
-    name, sign = machine.preferred
-    wrong = sign * start[:, machine.names.index(name)] < 0
-    return np.where(wrong, PREFERENCE_COST, 0.0)
 
 
 def _fill_cone(

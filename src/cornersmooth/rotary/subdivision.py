@@ -121,21 +121,11 @@ def insertions(
 
 def fill(tip: Floats, axis: Floats, angles: Floats, more: Insertions) -> FilledPath:
     """Path with the points of `more` put in: n + m rows."""
-    n = len(tip)
-    if not len(more):
-        return FilledPath(np.arange(n), np.zeros(n, np.bool_), tip, axis, angles)
-    pose = np.concatenate((np.arange(n), more.segment + 1))
-    position = np.concatenate((np.arange(n, dtype=np.float64), more.segment + more.fraction))
-    inserted = np.arange(len(pose)) >= n
-    order = np.argsort(position, kind="stable")
+    at = more.segment + 1
+    pose, inserted = np.insert(np.arange(len(tip)), at, at), np.insert(np.zeros(len(tip), np.bool_), at, True)
     new_tip, new_axis = ruled(tip, axis, more.segment, more.fraction)
-    return FilledPath(
-        pose[order],
-        inserted[order],
-        np.concatenate((tip, new_tip))[order],
-        np.concatenate((axis, new_axis))[order],
-        np.concatenate((angles, more.angles))[order],
-    )
+    pairs = (tip, new_tip), (axis, new_axis), (angles, more.angles)
+    return FilledPath(pose, inserted, *(np.insert(old, at, new, axis=0) for old, new in pairs))
 
 
 def ruled(tip: Floats, axis: Floats, segment: Ints, fraction: Floats) -> tuple[Floats, Floats]:
@@ -202,7 +192,7 @@ class RuledMotion:
         return np.minimum(parts, PARTS)
 
     def _needed(self, part: Intervals, bends: Floats, number: int) -> Ints:
-        """Into how many parts to divide intervals, by their errors in 4, 8, 16 ... even samples; 1 where they are good."""
+        """Into how many parts to divide intervals, by errors in 4, 8, 16 ... even samples; 1 where they are good."""
         shape = (len(part.segment), number + 1)
         samples = np.tile(np.arange(number + 1) / number, shape[0])
         repeated = some_rows(part, np.repeat(np.arange(shape[0]), number + 1))
