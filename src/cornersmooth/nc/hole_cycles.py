@@ -33,9 +33,8 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.kinematics import machine_position, tool_axis
-from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program, Statement
+from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program
 from cornersmooth.nc.form import Form
-from cornersmooth.nc.messages import Findings
 from cornersmooth.nc.statement_args import milliseconds, tool_starts, words_of
 
 _MOST_PECKS = 1000  #: more pecks in one hole are a misunderstanding
@@ -56,9 +55,13 @@ _FEEDS = {
     "PERREV": (None, FeedMode.PER_REVOLUTION),
 }
 #: words of which a later one takes the place of all the others
-_FAMILIES = ({*_DEPTHS}, {*_RETURNS}, {*_STEPS}, {"RAPTO", "CLEAR"}, {*_FEEDS}, {"DWELL"})
+_FAMILIES = ({*_DEPTHS}, {*_RETURNS}, {*_STEPS}, {"RAPTO", "CLEAR"}, {*_FEEDS}, {"DWELL", "REV"})
 #: dialects in which the fixed order is that of ISO 4343; elsewhere a table of the post-processor says what numbers mean
 _FIXED_ORDER = ("plain", "hsm")
+
+
+#: kinds of a cycle, and its words with their numbers
+Given = tuple[set[str], dict[str, tuple[float, ...]]]
 
 
 @dataclass(frozen=True)
@@ -78,27 +81,19 @@ class Cycle:
     tap: bool = False  #: whether a thread is cut: the spindle turns with the feed
 
 
-def in_force(
-    before: tuple[float | str, ...], stated: tuple[float | str, ...], program: Program
-) -> tuple[float | str, ...]:
-    """Arguments that hold after a CYCLE statement that has `said` its own, every number after its word."""
+def in_force(before: Given | None, stated: tuple[float | str, ...], program: Program) -> Given | None:
+    """Words that hold after a CYCLE statement with the arguments `stated`, every number by its word."""
     own = _without_on(stated)
     if own == ["INIT"]:  # SolidWorks announces a cycle by it
         return before
     if own[:1] != ["ON"]:
         clearance = _unit_place(own) + 2
-        named = (
-            [own[0], "DEPTH", *own[1:clearance], "CLEAR", *own[clearance:]] if has_fixed_order(stated, program) else own
-        )
-        return tuple(named)
-    gone = set().union(*(family for family in _FAMILIES if family.intersection(own)))
-    kept, word = [], ""
-    for value in before:
-        if isinstance(value, str) and value not in ("AUTO", "REV"):
-            word = value
-        if word not in gone:
-            kept.append(value)
-    return (*kept, *own[1:])
+        fixed = has_fixed_order(stated, program)
+        return _pairs([own[0], "DEPTH", *own[1:clearance], "CLEAR", *own[clearance:]] if fixed else own)
+    gone, more = set().union(*(family for family in _FAMILIES if family.intersection(own))), _pairs(own[1:])
+    if before is None or more is None:
+        return None
+    return before[0] | more[0], {word: value for word, value in before[1].items() if word not in gone} | more[1]
 
 
 def has_fixed_order(args: tuple[float | str, ...], program: Program) -> bool:
@@ -122,12 +117,11 @@ def _unit_place(args: Sequence[float | str]) -> int:
     return 4 if args[2:3] and args[2] in _STEPS else 2
 
 
-def read_cycle(args: tuple[float | str, ...], program: Program, speed: float | None) -> Cycle | None:
-    """Read the arguments of a cycle, as `in_force` gives them; None where any of them is not understood.
+def read_cycle(given: Given | None, program: Program, speed: float | None) -> Cycle | None:
+    """Read the words of a cycle, as `in_force` gives them; None where any of them is not understood.
 
     A dwell may count in revolutions of the spindle at a speed, rev/min.
     """
-    given = _pairs(args)
     if given is None:
         return None
     kinds, values = given
@@ -151,12 +145,10 @@ def read_cycle(args: tuple[float | str, ...], program: Program, speed: float | N
         return None
     dwell = 0
     if "DWELL" in values:
-        time = milliseconds(values["DWELL"][0], "REV" in kinds, speed)
+        time = milliseconds(values["DWELL"][0], "REV" in values, speed)
         if time is None:
             return None
         dwell = time
-    elif "REV" in kinds:
-        return None
     if "TAP" in kinds and (len(kinds) > 1 or steps or dwell or not depth > 0.0):
         return None
     cycle = Cycle(
@@ -176,7 +168,7 @@ def read_cycle(args: tuple[float | str, ...], program: Program, speed: float | N
     return cycle
 
 
-def _pairs(args: tuple[float | str, ...]) -> tuple[set[str], dict[str, tuple[float, ...]]] | None:
+def _pairs(args: Sequence[float | str]) -> Given | None:
     """Words that say what kind of cycle it is, and words with their numbers; None for anything else."""
     kinds: set[str] = set()
     values: dict[str, tuple[float, ...]] = {}
@@ -190,7 +182,7 @@ def _pairs(args: tuple[float | str, ...]) -> tuple[set[str], dict[str, tuple[flo
         elif value == "AUTO" and word in _RETURNS and word not in values:
             word = ""  # the control's own height: that of the CL file is the height of travel
         elif value == "REV" and word == "DWELL":
-            kinds.add(value)
+            values[value] = ()
         elif value in _KINDS:
             kinds.add(value)
             word = ""
@@ -203,37 +195,6 @@ def _pairs(args: tuple[float | str, ...]) -> tuple[set[str], dict[str, tuple[flo
     if (word and word not in values) or len(_FEEDS.keys() & values.keys()) > 1:
         return None
     return kinds, values
-
-
-@dataclass
-class HoleCycles:
-    """Remembers the cycle for the holes that follow."""
-
-    program: Program
-    findings: Findings
-    now: Cycle | None = None  #: the cycle in force, None where it is not understood
-    line: int = 0  #: of the last CYCLE statement, 0 for none
-    _args: tuple[float | str, ...] = ()
-    _on: bool = False
-
-    def end(self) -> None:
-        """CYCLE/OFF."""
-        self.now, self._on = None, False
-
-    def begin(self, statement: Statement, speed: float | None) -> None:
-        """CYCLE with the words of a cycle, ON, or INIT, at a speed of the spindle in revolutions per minute."""
-        self.line = statement.line
-        self._on |= words_of(statement) != ["INIT"]
-        self._args = in_force(self._args, statement.args, self.program)
-        self.read(speed)
-        if has_fixed_order(statement.args, self.program):
-            self.findings.note("CS385", statement.line)
-        if self.now is not None and self.now.pecking and not self.now.steps:
-            self.findings.note("CS321", statement.line)
-
-    def read(self, speed: float | None) -> None:
-        """Read the last cycle at another speed of the spindle: a dwell may count in revolutions."""
-        self.now = read_cycle(self._args, self.program, speed) if self._on else None
 
 
 _SIDES: Final = (["LEFT"], ["RIGHT"])  #: sides of the path on which cutter compensation keeps the tool
@@ -272,18 +233,18 @@ def upright_poses(program: Program, form: Form, *, drills: bool) -> Bools:
 
 def has_cycles(program: Program, form: Form, part: slice, *, drills: bool) -> bool:
     """Whether any hole of a part of the poses can be a cycle of the control; `drills` as in `upright_poses`."""
-    args: tuple[float | str, ...] = ()
-    stated, clockwise = list[tuple[int, tuple[float | str, ...], bool]](), False  # a tap turns the spindle clockwise
+    given: Given | None = (set(), {})
+    stated, clockwise = list[tuple[int, Given | None, bool]](), False  # a tap turns the spindle clockwise
     for statement in program.statements if (program.kind[part] == Move.HOLE).any() else ():
         if statement.word == "SPINDL":
             clockwise = not {"OFF", "NOMORE", "CCLW", "LOCK", "ORIENT"} & set(words_of(statement))
         elif statement.word == "CYCLE" and words_of(statement)[:1] not in (["OFF"], ["NOMORE"]):
-            args = in_force(args, statement.args, program)
-            stated.append((statement.pose, args, clockwise))
-    for (first, args, clockwise), (until, _, _) in pairwise([*stated, (len(program), (), False)]):
+            given = in_force(given, statement.args, program)
+            stated.append((statement.pose, given, clockwise))
+    for (first, given, clockwise), (until, _, _) in pairwise([*stated, (len(program), None, False)]):
         poses = np.arange(max(first, part.start), min(until, part.stop))
         poses = poses[program.kind[poses] == Move.HOLE]
-        cycle = read_cycle(args, program, None) if len(poses) else None
+        cycle = read_cycle(given, program, None) if len(poses) else None
         if cycle is not None and (clockwise if cycle.tap else drills) and kind_of(cycle, form, program, poses[:1]):
             return True
     return False

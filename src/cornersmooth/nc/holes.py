@@ -53,13 +53,13 @@ class Holes:
 
     def write(self, rows: Rows) -> None:
         """Write holes of one cycle, of the control or as plain moves; those left out are only approached."""
-        motion, poses, cycle = self.motion, rows.move, self.statements.cycles.now
+        motion, poses, cycle = self.motion, rows.move, self.statements.cycle
         program, motion.return_to = motion.program, NOWHERE
         heights = travel_height(program, poses, self._approached[poses])
         kind, why = self._cycle_of_control(cycle, poses)
         if cycle is None or (cycle.tap and not kind):
             if not self.statements.skip_cycles:
-                raise refused("CS342", program, self.statements.cycles.line or int(program.line[poses[0]]), why=why)
+                raise refused("CS342", program, self.statements.cycle_line or int(program.line[poses[0]]), why=why)
             motion.findings.note_each("CS315", program.line[poses], why=why)
             self._over_holes(rows, *self._crossings(poses, heights))
             return
@@ -77,7 +77,7 @@ class Holes:
         plain = motion.moving(replace(plain, rapid=rapid, dwell=dwell, feed=feed, mode=mode))
         per_turn = bool((plain.mode[~plain.rapid][-1:] == FeedMode.PER_REVOLUTION).all())
         waits = plain.dwell is not None and plain.dwell.any()
-        line = self.statements.cycles.line
+        line = self.statements.cycle_line
         motion.emit_above(plain, self.statements.dwell(cycle.dwell, line, per_turn=per_turn) if waits else ())
 
     def _crossings(self, poses: Ints, travel: Floats) -> tuple[Floats, Floats]:

@@ -15,7 +15,7 @@ from cornersmooth.model import FeedMode, Move, Program, Statement
 from cornersmooth.nc.circles import FIRST_PLANE
 from cornersmooth.nc.control import Blocks, Words
 from cornersmooth.nc.form import Form
-from cornersmooth.nc.hole_cycles import HoleCycles
+from cornersmooth.nc.hole_cycles import Cycle, Given, has_fixed_order, in_force, read_cycle
 from cornersmooth.nc.messages import Findings, refused
 from cornersmooth.nc.modals import Modals
 from cornersmooth.nc.program_frame import comment_lines
@@ -24,12 +24,12 @@ from cornersmooth.nc.statement_args import (
     TOOL_WORDS,
     ahead_of_tools,
     cutting_unit,
-    loaded_tool,
     milliseconds,
     numbers_of,
     spindle_args,
     spindle_speed,
     spoken_text,
+    tool_loads,
     whole_number,
     words_of,
 )
@@ -57,16 +57,18 @@ class StatementWriter:
     changed: bool = False  #: a tool change, or the way home, left the machine elsewhere
     direction: str = "clockwise"  #: field of the words for the way in which the spindle turns, as it was named last
     _diameter: float = 0.0
-    cycles: HoleCycles = field(init=False)
+    cycle: Cycle | None = None  #: the cycle for the holes that follow, None where it is not understood
+    cycle_line: int = 0  #: of the last CYCLE statement, 0 for none
+    _given: Given | None = field(default_factory=lambda: (set(), {}))
+    _drilling: bool = False
     words: Words = field(init=False)
-    toolno_loads: bool = field(init=False)
+    _loads: dict[int, tuple[int, int]] = field(init=False)  #: tool and length register of statements, by identity
     _ahead_of_tools: frozenset[int] = field(init=False)
     _unknown: frozenset[int] = field(init=False)  #: statements that are not understood, by identity
 
     def __post_init__(self) -> None:
         self.words = self.form.table.words
-        self.cycles = HoleCycles(self.program, self.findings)
-        self.toolno_loads = not TOOL_WORDS & {statement.word for statement in self.program.statements}
+        self._loads = {id(statement): tool for statement, tool in tool_loads(self.program)}
         self._ahead_of_tools = ahead_of_tools(self.program)
         self._unknown = frozenset(map(id, statements_not_understood(self.program)))
 
@@ -82,7 +84,7 @@ class StatementWriter:
         if word in _SILENT or (word == "CUTCOM" and written is None and known):  # CUTCOM/ON before the side
             return []
         if written is None:
-            if handler is not None or not known:
+            if (handler is not None and word != "TOOLNO") or not known:  # that describes what another word loads
                 self.findings.note("CS310", statement.line, word=word)
             return self.comment(statement.text or word)
         # words that no block says: gears, lengths, holders
@@ -102,10 +104,9 @@ class StatementWriter:
 
     def load(self, statement: Statement) -> list[str] | None:
         """LOADTL/n, LOAD/TOOL,n[,ADJUST,m], TURRET/n[,OSETNO,m]."""
-        loaded = loaded_tool(statement)
-        if loaded is None:
+        if id(statement) not in self._loads:
             return None
-        number, offset = loaded
+        number, offset = self._loads[id(statement)]
         if (number, offset) == (self.modals.tool, self.modals.offset):  # CATIA loads a tool twice
             return self.comment(statement.text)
         blocks = self.modals.end_tool(statement.line, another=self.modals.tool not in (None, number))
@@ -118,11 +119,11 @@ class StatementWriter:
 
     def _tool_change(self, number: int, statement: Statement) -> list[str]:
         """Blocks of a tool change; a speed in them is the first that the tool is given, or else what holds."""
-        order, words = self.program.statements, {"TOOLNO"} if self.toolno_loads else TOOL_WORDS
+        order, loads = self.program.statements, self._loads
         behind = order[next(k for k, one in enumerate(order) if one is statement) + 1 :]
-        others = (k for k, one in enumerate(behind) if one.word in words and loaded_tool(one))
-        end = next((k for k in others if loaded_tool(behind[k]) != loaded_tool(statement)), len(behind))
-        between, after = behind[:end], (loaded_tool(behind[end]) or (None,))[0] if end < len(behind) else None
+        others = (k for k, one in enumerate(behind) if loads.get(id(one), loads[id(statement)]) != loads[id(statement)])
+        end = next(others, None)
+        between, after = behind[:end], None if end is None else loads[id(behind[end])][0]
         selected = after in (None, number) or any(one.word == "SELECT" for one in between)
         staged = self.words.tool_select if self.words.stage_tool and not selected else ()
         speed = None
@@ -202,7 +203,7 @@ class StatementWriter:
             self.modals.switch("spindle", (direction,))
             return [direction]
         self.modals.speed = self.modals.speed if speed is None else speed
-        self.cycles.read(self.modals.speed)
+        self._read_cycle()
         digits = self._speed_text(self.modals.speed or 0.0)
         turning = tuple(block.format(speed=digits, direction=direction) for block in self.words.spindle_speed)
         if not self.modals["spindle"] and id(statement) in self._ahead_of_tools:
@@ -286,11 +287,22 @@ class StatementWriter:
 
     def hole_cycle(self, statement: Statement) -> list[str]:
         """CYCLE: kept for the holes that follow."""
-        if words_of(statement)[:1] in (["OFF"], ["NOMORE"]):
-            self.cycles.end()
+        words = words_of(statement)
+        if words[:1] in (["OFF"], ["NOMORE"]):
+            self.cycle, self._drilling = None, False
             return []
-        self.cycles.begin(statement, self.modals.speed)
+        self.cycle_line, self._drilling = statement.line, self._drilling or words != ["INIT"]
+        self._given = in_force(self._given, statement.args, self.program)
+        self._read_cycle()
+        if has_fixed_order(statement.args, self.program):
+            self.findings.note("CS385", statement.line)
+        if self.cycle is not None and self.cycle.pecking and not self.cycle.steps:
+            self.findings.note("CS321", statement.line)
         return self.comment(statement.text)
+
+    def _read_cycle(self) -> None:
+        """Read the last cycle at the speed of the spindle: a dwell may count in revolutions."""
+        self.cycle = read_cycle(self._given, self.program, self.modals.speed) if self._drilling else None
 
     def end(self, statement: Statement) -> list[str]:
         """END: the end of the text; in the middle of the path a stop."""
@@ -335,8 +347,7 @@ class StatementWriter:
 Handler = Callable[[StatementWriter, Statement], list[str] | None]
 _HANDLERS: dict[str, Handler] = {
     **dict.fromkeys(TOOL_WORDS, StatementWriter.load),
-    # describes the tool that LOADTL loads; without any such statement it loads itself
-    "TOOLNO": lambda writer, one: writer.load(one) if writer.toolno_loads else writer.comment(one.text),
+    "TOOLNO": StatementWriter.load,
     "SELECT": StatementWriter.select,
     "CUTTER": StatementWriter.cutter,
     "TLDATA": StatementWriter.cutter,
