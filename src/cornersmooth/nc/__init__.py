@@ -9,7 +9,7 @@ import numpy as np
 
 from cornersmooth.errors import Finding, SettingsError
 from cornersmooth.methods import CURVES_METHOD, DEFAULT_METHOD
-from cornersmooth.model import Bools, FeedMode, Move, SmoothProgram, Units
+from cornersmooth.model import FeedMode, Move, SmoothProgram, Units
 from cornersmooth.nc.blocks import Blocks
 from cornersmooth.nc.circles import Circles, plan_circles, with_arcs
 from cornersmooth.nc.control import Control
@@ -24,7 +24,6 @@ from cornersmooth.nc.control_tables import (
 )
 from cornersmooth.nc.coordinates import Coordinates
 from cornersmooth.nc.form import Form, check_program, choose_form
-from cornersmooth.nc.hole_cycles import upright_poses
 from cornersmooth.nc.holes import Holes
 from cornersmooth.nc.messages import Findings
 from cornersmooth.nc.modals import Modals
@@ -181,18 +180,17 @@ def write(
     modals.now["blend"] = usual_blend = round(float(values["blend"]) / BLEND_STEP) if chosen.table.lines.rounding else 0
     comments, skip, native = frame.comments, frame.skip_cycles, frame.cycles == "native"
     statements = StatementWriter(chosen, program, findings, modals, comments=comments, skip_cycles=skip)
-    upright = upright_poses(program, chosen, drills=native)
-    planes = plan_planes(program, smoothed.settings, chosen, upright, findings, drills=native)
+    planes = plan_planes(program, smoothed.settings, chosen, findings, drills=native)
     check_travel_of_words(planes, program, chosen, findings)
     of_rows = Findings()  # rows are made as they are written: their findings come last
-    rows, circles = _rows(smoothed, chosen, planes, upright, of_rows)
-    _add_warnings(chosen, smoothed, circles, upright, findings)
+    rows, circles = _rows(smoothed, chosen, planes, of_rows)
+    _add_warnings(chosen, smoothed, circles, planes, findings)
     stretch = chosen.stretch(smoothed.settings.axis_length)
     tilting = Coordinates(chosen, program.units, stretch, modal=frame.modal)
     blocks = Blocks(program, circles, modals, findings, usual_blend=usual_blend)
     approach = max(frame.approach, POINT_APPROACH) if chosen.orientation == "point" else frame.approach
     motion = Motion(program, tilting, modals, blocks, findings, approach, frame.retract)
-    script = Script(statements, motion, Holes(motion, statements, native), upright, planes)
+    script = Script(statements, motion, Holes(motion, statements, native), planes)
     text = frame.start(stream, chosen)
     motion.say(modals.start())
     for some in rows:
@@ -206,8 +204,8 @@ def write(
     return Written(blocks.written, findings.all())
 
 
-def _add_warnings(form: Form, smoothed: SmoothProgram, circles: Circles, upright: Bools, findings: Findings) -> None:
-    """Note what a user of the form should know of the program; `upright` (n,) are tools without words of the axis."""
+def _add_warnings(form: Form, smoothed: SmoothProgram, circles: Circles, planes: Planes, findings: Findings) -> None:
+    """Note what a user of the form should know of the program."""
     program, style = smoothed.program, form.table.lines
     lines = program.line[program.arcs.pose]
     findings.note_each("CS313", lines[(circles.blocks > 0) & ~circles.curved])
@@ -226,34 +224,35 @@ def _add_warnings(form: Form, smoothed: SmoothProgram, circles: Circles, upright
         findings.note("CS393", 0)
     if style.lag and smoothed.settings.lines == "long" and smoothed.settings.method == CURVES_METHOD:
         findings.note("CS394", 0, control=form.control, method=CURVES_METHOD, default=DEFAULT_METHOD)
-    if form.curve == "g6.2" and form.orientation == "point" and not (upright | (program.kind == Move.FROM)).all():
+    if (
+        form.curve == "g6.2"
+        and form.orientation == "point"
+        and not ((planes.of >= 0) | (program.kind == Move.FROM)).all()
+    ):
         findings.note("CS395", 0)
     if form.curve == "bspline":
         findings.note("CS325", 0)
     rounded = bool(smoothed.corners.smoothed.any()) or smoothed.runs is not None
     if rounded and not form.curves and smoothed.settings.lines == "dense" and not form.extras:
-        for name, extra in form.table.extras.items():
-            if not extra.forms or form.name in extra.forms:
-                findings.note("CS396", 0, name=name)
-                break
+        able = [name for name, extra in form.table.extras.items() if not extra.forms or form.name in extra.forms]
+        for name in able[:1]:
+            findings.note("CS396", 0, name=name)
     for extra in form.extras:
         if extra.warning:
             findings.note("CS339", 0, name=extra.name, warning=extra.warning)
 
 
-def _rows(
-    smoothed: SmoothProgram, form: Form, planes: Planes, upright: Bools, findings: Findings
-) -> tuple[Iterator[Rows], Circles]:
+def _rows(smoothed: SmoothProgram, form: Form, planes: Planes, findings: Findings) -> tuple[Iterator[Rows], Circles]:
     """Rows as they come, and how their arcs are written; findings of rows come later."""
     program, settings = smoothed.program, smoothed.settings
-    circles, long = plan_circles(program, settings, form, planes, upright), settings.lines == "long"
+    circles, long = plan_circles(program, settings, form, planes), settings.lines == "long"
     if form.curves:
         rows = curve_rows(smoothed, circles, divide=form.curve in _TURNING)
     elif form.rotary:
         while True:  # arcs on which rotary axes would turn, or stand where the control wants no circle, become lines
             whole, seen = (coarse_rows if long else all_dense_rows)(smoothed, circles), Findings()
             way = rotary_way(whole, smoothed, form, seen)
-            known = plan_circles(program, settings, form, planes, upright, arc_angles(way, program, form))
+            known = plan_circles(program, settings, form, planes, arc_angles(way, program, form))
             before, circles = circles.blocks, replace(known, blocks=np.minimum(known.blocks, circles.blocks))
             if (circles.blocks == before).all():
                 break

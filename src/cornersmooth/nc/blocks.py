@@ -92,7 +92,7 @@ class Blocks:
     def _changes(self, rows: BlockRows, at: Coordinates) -> list[Part]:
         """Blocks that rows ask for: how far corners are rounded, what feeds count, the plane of arcs."""
         modals, changes = self.modals, []
-        usual = self.usual_blend if at.tip_control else 0
+        usual = self.usual_blend if at.plane is None else 0
         if usual and not modals["compensation"]:  # under which LinuxCNC refuses the block
             blend = np.full(len(rows), usual)
             if rows.blend is not None:

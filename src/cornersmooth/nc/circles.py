@@ -72,18 +72,16 @@ def plan_circles(
     settings: Settings,
     form: Form,
     planes: Planes,
-    upright: Bools,
     rotary: ArcAngles | None = None,
 ) -> Circles:
     """Choose the arcs that a form can write as circles or curves within the tolerance, at the tip and the axis point.
 
-    In a tilted plane arcs are those of its own coordinates, and where X Y Z are axes of the machine, of what these
-    make of the part. `upright` (n,) are poses of tools without tool tip control. Without `rotary` words that a form
-    has, arcs that might be circles are taken for such.
+    In a plane arcs are those of its own coordinates, and where X Y Z are axes of the machine, of what these make of the
+    part. Without `rotary` words that a form has, arcs that might be circles are taken for such.
     """
-    arcs, own = program.arcs, upright[program.arcs.pose]
-    frames, tilted = planes.frames(arcs.pose), planes.of[arcs.pose] >= 0
-    turned = form.rotary & ~own & ~tilted
+    arcs, of = program.arcs, planes.of[program.arcs.pose]
+    frames, inside = planes.frames(arcs.pose), of >= 0
+    turned = form.rotary & ~inside
     unknown = turned & (rotary is None) & (form.orientation == "machine")
     if rotary is not None and form.machine is not None and form.orientation == "machine":
         distinct, which = np.unique(rotary.angles[turned], axis=0, return_inverse=True)
@@ -98,12 +96,10 @@ def plan_circles(
     ticks = to_ticks(np.minimum(radius, _LARGEST_RADIUS) / unit, decimals)
     digits = form.table.digits
     vectors = to_ticks(digits.vector_length * program.axis, digits.vector)
-    flat, circular, in_xy = (np.zeros(len(tilted), np.bool_) for _ in range(3))
-    for here, mode in ((~own & ~tilted, form.mode), (own, form.upright), (tilted, form.plane)):
-        if mode is not None:
-            flat[here], circular[here] = bool(mode.motion.arc_directions), mode.circles
-            in_xy[here] = mode.circles_in_xy
-    keeps = tilted | (vectors[arcs.pose] == vectors[arcs.pose - 1]).all(axis=1)
+    modes = (form.mode, *(form.in_plane(upright=plane.upright) for plane in planes.planes))
+    able = [(bool(mode.motion.arc_directions), mode.circles, mode.circles_in_xy) for mode in modes]
+    flat, circular, in_xy = np.array(able)[of + 1].T
+    keeps = inside | (vectors[arcs.pose] == vectors[arcs.pose - 1]).all(axis=1)
     if rotary is not None:
         keeps &= ~turned | (rotary.stand & _may_turn(form, rotary.angles, plane))
     keeps &= (radius < _LARGEST_RADIUS) & (ticks > 0)

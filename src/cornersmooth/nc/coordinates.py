@@ -29,9 +29,8 @@ class Coordinates:
     form: Form
     units: Units
     stretch: float = 1.0  #: `Form.stretch`
-    plane: Plane | None = None  #: tilted plane in whose coordinates positions are written
+    plane: Plane | None = None  #: in whose coordinates positions are written; None for tools under tool tip control
     modal: bool = False  #: whether words that repeat are left out, where the control keeps them
-    tip_control: bool = True  #: whether the tool is one under tip control, or the machine's axes are written
 
     @property
     def motion(self) -> Motion:

@@ -50,6 +50,12 @@ class Form:
         """Name of the control."""
         return self.table.name
 
+    def in_plane(self, *, upright: bool) -> Mode:
+        """How tools run in a plane: those along Z, or in a tilted one."""
+        mode = self.upright if upright else self.plane
+        assert mode is not None
+        return mode
+
     @property
     def begin(self) -> Blocks:
         """Steps before the first motion of each tool."""

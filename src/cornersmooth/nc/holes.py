@@ -109,7 +109,7 @@ class Holes:
             self.statements.direction == "clockwise" and motion.modals.speed and motion.modals.turning
         ):
             return "", "a tap takes a spindle that turns clockwise at a known speed"
-        if motion.at.tip_control:
+        if motion.at.plane is None:
             where = "the tool does not stay along Z between its changes, or nothing says that the rotary axes do"
             if motion.at.form.orientation == "point":
                 where = "a tool of the program tilts, so all have axis points; lines (-f g1) need none"

@@ -68,8 +68,6 @@ class Modals:
     def __getitem__(self, group: str) -> Any:
         return self.now[group]
 
-    # ------------------------------------------------------------------------------------------------ groups
-
     def set(self, **wanted: Any) -> list[str]:
         """Blocks of the groups that change."""
         blocks = []
@@ -114,8 +112,6 @@ class Modals:
         extras = self.form.extras if side == "on" else self.form.extras[::-1]
         blocks = (block for extra in extras if extra.outside is outside for block in getattr(extra, side))
         return [block.format(**self.values) for block in blocks]
-
-    # ------------------------------------------------------------------------------------------------ steps
 
     def _expand(self, steps: Sequence[str], rotary: RotaryBlocks = _NO_ROTARY) -> list[str]:
         """Blocks of steps; what is no step is a block itself."""
@@ -165,7 +161,7 @@ class Modals:
         self._stopped = {}
         steps = self.form.table.program.begin if self.mode.begin is None else self.mode.begin
         blocks += [*self.set(held=False), *self._expand(steps, rotary if self.now["high"] else _NO_ROTARY)]
-        return blocks + (self.set(held=True) if self.mode in (self.form.upright, self.form.plane) else [])
+        return blocks + (self.set(held=True) if self.mode is not self.form.mode else [])
 
     @property
     def _tool_end(self) -> Blocks:
@@ -232,8 +228,6 @@ class Modals:
             blocks += self.set(held=True)
         return [*blocks, *home, *self._expand(steps, {**rotary, "rotary_zero": zero})]
 
-    # ------------------------------------------------------------------------------------------------ spindle, coolant
-
     @property
     def turning(self) -> bool:
         """Whether the spindle turns at the next motion: it does, or goes on after a tool change."""
@@ -271,8 +265,6 @@ class Modals:
         words, on = self.form.table.words, self.now["coolant"]
         own = {words.coolant.get(kind) for kind in words.coolant_off}
         return self.coolant_end() if on not in ((), blocks) and {on, blocks} & own else ()
-
-    # ------------------------------------------------------------------------------------------------ positions
 
     def to_position(self, key: str, *, z: bool) -> list[str]:
         """Block that sends Z, or the other axes, to ``home`` or ``tool_change`` of the machine's file, where it has it.

@@ -76,8 +76,6 @@ class Motion:
         self.stand(None)
         self._noted.discard("CS335b")  # noted for each tool
 
-    # ------------------------------------------------------------------------------------------------ rows
-
     def lines(self, rows: Rows) -> None:
         """Write rows of one kind."""
         move, arc, program, at = rows.move, rows.arc, self.program, self.at
@@ -128,7 +126,7 @@ class Motion:
         if form.rotary and form.machine is not None:
             if len(last) == len(self.at.words):
                 other = self.at.angles(last[None])
-            elif self.last_at is None or self.last_at.plane is None:
+            elif self.last_at is not None and self.last_at.plane is not None and self.last_at.plane.upright:
                 other = np.zeros((1, 2))  # the tool before stays along Z, so that pose does
             else:
                 other = continued(form.machine, other, near, np.array([-1]), 0.0)[0]
@@ -207,8 +205,6 @@ class Motion:
             if self.retract:
                 self.modals.along = (self.at.rapid(self.at.lifted(ticks, self.retract)),)
 
-    # ------------------------------------------------------------------------------------------------ retracts
-
     def go_home(self) -> None:
         """Go to the height of the retract, first back along the tool."""
         if self.modals.goes_back and self.modals.along and self.position is not None:
@@ -269,8 +265,6 @@ class Motion:
         if at is None or self.last is None or not at.form.rotary or {"X", "Y"} & change.keys():
             return None
         return nose_position(machine, at.tip(self.last)[None], at.angles(self.last[None]))[0, :2]
-
-    # ------------------------------------------------------------------------------------------------ warnings
 
     def _once(self, code: str, pose: int, **values: object) -> None:
         if code not in self._noted:

@@ -22,9 +22,9 @@ from cornersmooth.arrays.vectors import norm
 from cornersmooth.errors import InputError
 from cornersmooth.geometry.arcs import poses_and_arcs
 from cornersmooth.kinematics import Machine, machine_position, solutions, tool_axis
-from cornersmooth.model import Bools, Floats, Ints, Keep, Move, Numbers, Program
+from cornersmooth.model import Floats, Ints, Keep, Move, Numbers, Program
 from cornersmooth.nc.form import Form
-from cornersmooth.nc.hole_cycles import has_cycles
+from cornersmooth.nc.hole_cycles import has_cycles, upright_poses
 from cornersmooth.nc.messages import Findings
 from cornersmooth.nc.statement_args import check_tool_travel, tool_starts
 from cornersmooth.settings import Settings
@@ -48,11 +48,12 @@ class Plane:
     #: numbers of the three rotations, as they are written: ``first``, ``second``, ``third``
     words: Mapping[str, str] = field(default_factory=dict)
     angles: Floats | None = None  #: (2,), degrees; rotary words, where these make the plane
+    upright: bool = False  #: whether it is that of tools along Z without tool tip control: not tilted, axes at zero
 
 
 @dataclass(frozen=True)
 class Planes:
-    """The tilted planes of a program."""
+    """The planes of a program: those of tools along Z without tool tip control, and tilted ones."""
 
     of: Numbers  #: (n,) plane of each pose, -1 for none
     planes: tuple[Plane, ...] = ()
@@ -63,22 +64,20 @@ class Planes:
         return frames[self.of[poses]]
 
 
-def plan_planes(
-    program: Program, settings: Settings, form: Form, upright: Bools, findings: Findings, *, drills: bool
-) -> Planes:
-    """Choose the runs of poses that are written in tilted planes.
+def plan_planes(program: Program, settings: Settings, form: Form, findings: Findings, *, drills: bool) -> Planes:
+    """Choose the runs of poses that are written in planes.
 
     A run has one axis, cuts, and lies between rapids or changes of the tool: there it can go up and be turned. Where a
     new tool begins with a feed move that turns it, the turn is written, outside of any plane. Along Z none is needed
     but for holes that are cycles of the control, which tool tip control does not take: they stand in a plane that is
-    not tilted. Poses of `upright` tools need none. `drills` is as in `upright_poses`.
+    not tilted. Tools of `upright_poses`, where `drills` is explained, have a plane of their own.
     """
-    of = np.full(len(program), -1, np.int32)
-    if form.plane is None:
-        return Planes(of)
+    upright = upright_poses(program, form, drills=drills)
+    of = np.where(upright, np.int32(0), np.int32(-1))
+    zero = np.zeros(2) if form.rotary else None
+    found = [Plane(np.eye(3), angles=zero, upright=True)] if upright.any() else []
     planes: dict[tuple[str, ...], int] = {}
-    found: list[Plane] = []
-    for first, stop in _runs(program):
+    for first, stop in _runs(program) if form.plane is not None else []:
         along_z = bool(norm(program.axis[first] - _UNIT["z"]) <= _SAME)
         if upright[first] or (along_z and not has_cycles(program, form, slice(first, stop), drills=drills)):
             continue
@@ -198,6 +197,7 @@ def check_travel_of_words(planes: Planes, program: Program, form: Form, findings
     moving = program.kind[pose] != Move.FROM
     if not form.rotary:
         check_tool_travel(program, machine, tip[moving], np.zeros((int(moving.sum()), 2)), pose[moving])
+        return
     for number, plane in enumerate(planes.planes):
         rows = np.flatnonzero((planes.of[pose] == number) & moving)
         fit, refused = list[Floats](), list[InputError]()

@@ -11,12 +11,13 @@ from itertools import pairwise
 import numpy as np
 
 from cornersmooth.arrays import some_rows
-from cornersmooth.model import Bools, Move, Statement
+from cornersmooth.model import Move, Statement
 from cornersmooth.nc.coordinates import Coordinates
 from cornersmooth.nc.holes import Holes
 from cornersmooth.nc.motion import Motion
 from cornersmooth.nc.planes import Planes
 from cornersmooth.nc.program_frame import Stream
+from cornersmooth.nc.rotary_words import machine_of
 from cornersmooth.nc.statement_args import with_starts
 from cornersmooth.nc.statement_writer import StatementWriter
 from cornersmooth.smoothing.sampling import Rows
@@ -29,10 +30,9 @@ class Script:
     statements: StatementWriter
     motion: Motion
     holes: Holes
-    upright: Bools  #: (n,) `hole_cycles.upright_poses`
     planes: Planes
     _coordinates: dict[tuple[bool, int | None], Coordinates] = field(default_factory=dict)  #: besides `Motion.tilting`
-    _plane: int = -1  #: tilted plane of the tool at hand
+    _tilted: int = -1  #: tilted plane of the tool at hand
     _next: int = 0
     _in_order: tuple[Statement, ...] = field(init=False)
 
@@ -97,29 +97,27 @@ class Script:
     def _take_coordinates(self, pose: int) -> None:
         """Take the coordinates of a pose; between tilted planes, and beside them, the tool goes up."""
         plane, modals = int(self.planes.of[pose]), self.motion.modals
-        if modals.begun and plane == self._plane:
+        tilted = -1 if plane >= 0 and self.planes.planes[plane].upright else plane
+        if modals.begun and tilted == self._tilted:
             return
-        at = self._coordinates_of(pose, plane)
-        beside, self._plane = self._plane != plane, plane
+        at = self._coordinates_of(plane)
+        beside, self._tilted = self._tilted != tilted, tilted
         if modals.begun or (beside and not modals["high"]):
             self.motion.go_home()
         self.motion.take(at)
 
-    def _coordinates_of(self, pose: int, plane: int) -> Coordinates:
-        """Coordinates of a pose: of its plane, of tools along Z, or of the tool at hand where its length counts."""
+    def _coordinates_of(self, plane: int) -> Coordinates:
+        """Coordinates of a pose: of its plane, or of the tool at hand where its length counts."""
         tilting, tool = self.motion.tilting, self.motion.modals.tool
-        form = tilting.form
-        mode = form.plane if plane >= 0 else form.upright if self.upright[pose] else None
-        key = (mode is not None, plane if mode is not None else tool)
-        if mode is None and not (form.machine and form.machine.tool_lengths and form.orientation == "machine"):
+        form, key = tilting.form, (plane >= 0, plane if plane >= 0 else tool)
+        if plane < 0 and not (form.machine and form.machine.tool_lengths and form.orientation == "machine"):
             return tilting
         if key not in self._coordinates:
-            if mode is None:
-                assert form.machine is not None
-                at = replace(tilting, form=replace(form, machine=form.machine.with_tool(tool)))
+            if plane >= 0:
+                own = self.planes.planes[plane]
+                along = replace(form, orientation="fixed", mode=form.in_plane(upright=own.upright))
+                at = replace(tilting, form=along, stretch=along.stretch(1.0), plane=own)
             else:
-                along = replace(form, orientation="fixed", mode=mode)
-                own = self.planes.planes[plane] if plane >= 0 else None
-                at = replace(tilting, form=along, stretch=along.stretch(1.0), plane=own, tip_control=False)
+                at = replace(tilting, form=replace(form, machine=machine_of(form).with_tool(tool)))
             self._coordinates[key] = at
         return self._coordinates[key]
