@@ -231,28 +231,29 @@ def _mode(table: Control, form: FormTable, machine: Machine | None, tcp: bool) -
         if orientation in form.modes:
             return orientation, form.modes[orientation]
     hint = _instead(table, lambda one: any(orientation in one.modes for orientation in wanted))
-    if not tcp:
-        curves = ": its curves are refused at inverse time feed (G93)" if form.curve else ""
-        what, lines = f"{here} cannot run without tool tip control{curves}", _instead(table, lambda one: not one.curve)
-        if hint and machine is None:
-            hint += " and name your machine with --machine"
-        elif not hint:
-            hint = f"{lines} and leave out --no-tcp" if form.curve and lines else "leave out --no-tcp"
-    elif machine is not None:
-        what, hint = f"{here} has no rotary words", hint or "leave out --machine"
-    else:
-        what, hint = f"{here} has no tool vectors, only rotary words", hint or "name your machine with --machine"
-    raise SettingsError("CS215", what, hint)
+    if machine is not None and tcp:
+        raise SettingsError("CS215", f"{here} has no rotary words", hint or "leave out --machine")
+    if tcp:
+        what = f"{here} has no tool vectors, only rotary words"
+        raise SettingsError("CS215", what, hint or "name your machine with --machine")
+    curves = ": its curves are refused at inverse time feed (G93)" if form.curve else ""
+    if hint and machine is None:
+        hint += " and name your machine with --machine"
+    elif not hint:
+        lines = _instead(table, lambda one: not one.curve) if form.curve else ""
+        hint = f"{lines} and leave out --no-tcp" if lines else "leave out --no-tcp"
+    raise SettingsError("CS215", f"{here} cannot run without tool tip control{curves}", hint)
 
 
 def _check_rewind(form: Form) -> None:
     """Refuse to leave cuts where there is nothing above which rotary axes could turn."""
     if not form.rewind >= LEAST_REWIND:
         raise SettingsError("CS202", f"rewind is {form.rewind:g} mm", f"give {LEAST_REWIND:g} mm or more")
-    what = f"the table of {form.control} has no retract above which rotary axes could turn back"
     if not form.rotary:
         what = f"{form.control} form {form.name} has no rotary axes here that could turn back"
-    if not (form.rotary and form.table.program.retract):
+        raise SettingsError("CS215", what, "leave out --rewind")
+    if not form.table.program.retract:
+        what = f"the table of {form.control} has no retract above which rotary axes could turn back"
         raise SettingsError("CS215", what, "leave out --rewind")
 
 
@@ -283,14 +284,14 @@ def check_program(form: Form, program: Program, settings: Settings) -> None:
     if form.orientation == "fixed":
         tilt = norm(program.axis - (0.0, 0.0, 1.0))
         tilt[program.kind == Move.FROM] = 0.0
-        what = f"{form.control} form {form.name} has no words for its axis"
+        words = f"{form.control} form {form.name} has no words for its axis"
         hint = _instead(form.table, lambda one: "vector" in one.modes) or "name your machine with --machine"
         if form.machine is not None:
-            what = f"{form.machine.name} has no rotary axis"
+            words = f"{form.machine.name} has no rotary axis"
             hint = "turn the part for an operation of its own, or use a machine that reaches it"
         tilted = np.flatnonzero(settings.axis_scale * tilt > ROTARY_SHARE * settings.tolerance)
         if len(tilted):  # by more than a rounding error at the axis point
-            what, line = f"the tool is not parallel to Z, and {what}", int(program.line[tilted[0]])
+            what, line = f"the tool is not parallel to Z, and {words}", int(program.line[tilted[0]])
             raise SettingsError("CS219", what, hint, file=program.source.name, line=line)
     if form.orientation == "machine" and form.machine is not None and form.machine.swings_the_tool:
         _check_lengths(form.machine, program)
@@ -300,11 +301,12 @@ def _check_lengths(machine: Machine, program: Program) -> None:
     """Refuse a program with tools whose lengths are not known, where these go into every position."""
     loads, known = tool_loads(program), dict(machine.tool_lengths)
     wrong = [one for one, (number, _) in loads if (number not in known if known else number != loads[0][1][0])]
-    if wrong:
+    where = {"file": program.source.name, "line": wrong[0].line if wrong else 0}
+    if wrong and known:
         what = f"a tool that [tool_lengths] of {machine.name} does not have, and whose length goes into every position"
-        hint = "write its length into the machine file"
-        if not known:
-            tools = len({number for _, (number, _) in loads})
-            what = f"{tools} tools, and {machine.name} has one tool_length that goes into every position"
-            hint = "write [tool_lengths] into the machine file, or let the control keep the tool tip"
-        raise SettingsError("CS219", what, hint, file=program.source.name, line=wrong[0].line)
+        raise SettingsError("CS219", what, "write its length into the machine file", **where)
+    if wrong:
+        tools = len({number for _, (number, _) in loads})
+        what = f"{tools} tools, and {machine.name} has one tool_length that goes into every position"
+        hint = "write [tool_lengths] into the machine file, or let the control keep the tool tip"
+        raise SettingsError("CS219", what, hint, **where)
