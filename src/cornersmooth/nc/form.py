@@ -301,12 +301,12 @@ def _check_lengths(machine: Machine, program: Program) -> None:
     """Refuse a program with tools whose lengths are not known, where these go into every position."""
     loads, known = tool_loads(program), dict(machine.tool_lengths)
     wrong = [one for one, (number, _) in loads if (number not in known if known else number != loads[0][1][0])]
-    where = {"file": program.source.name, "line": wrong[0].line if wrong else 0}
+    file, line = program.source.name, wrong[0].line if wrong else 0
     if wrong and known:
         what = f"a tool that [tool_lengths] of {machine.name} does not have, and whose length goes into every position"
-        raise SettingsError("CS219", what, "write its length into the machine file", **where)
+        raise SettingsError("CS219", what, "write its length into the machine file", file=file, line=line)
     if wrong:
         tools = len({number for _, (number, _) in loads})
         what = f"{tools} tools, and {machine.name} has one tool_length that goes into every position"
         hint = "write [tool_lengths] into the machine file, or let the control keep the tool tip"
-        raise SettingsError("CS219", what, hint, **where)
+        raise SettingsError("CS219", what, hint, file=file, line=line)
