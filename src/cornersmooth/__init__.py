@@ -57,8 +57,8 @@ if TYPE_CHECKING:
     from cornersmooth.report import report as report
     from cornersmooth.report.corners import corner_table as corner_table
     from cornersmooth.settings import Settings as Settings
-    from cornersmooth.smoothing.path_points import PathPoints as PathPoints
-    from cornersmooth.smoothing.path_points import sample as sample
+    from cornersmooth.smoothing.sampling import PathPoints as PathPoints
+    from cornersmooth.smoothing.sampling import sample as sample
     from cornersmooth.times.laws import compare as compare
     from cornersmooth.verify import Verification as Verification
     from cornersmooth.verify import verify as verify
@@ -78,7 +78,7 @@ _HOME = {
         "kinematics": "load_machine",
         "model": "Corners Program SmoothProgram Statement from_poses",
         "nc": "Frame choose_form fit_settings load_control write",
-        "smoothing.path_points": "PathPoints sample",
+        "smoothing.sampling": "PathPoints sample",
         "pipeline": "Result postprocess smooth",
         "report": "report",
         "report.corners": "corner_table",

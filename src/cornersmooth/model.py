@@ -228,33 +228,21 @@ class Program:
         )
 
     def with_feed(self, feed: float | None) -> Program:
-        """Return the program with a feed, mm/min, for moves that have none; as it is where none is given.
-
-        Returns
-        -------
-        Program
-            The same arrays but for `feed` (n,), mm/min.
-        """
+        """Return the program with a feed (n,), mm/min, for moves that have none; as it is where none is given."""
         return self if feed is None else replace(self, feed=np.where(np.isnan(self.feed), feed, self.feed))
 
     def feed_at(self, pose: Ints) -> Floats:
-        """Feeds of the moves into some poses, mm/min; NaN for none, and per revolution.
-
-        Returns
-        -------
-        Floats
-            (k,) mm/min for k poses.
-        """
+        """Feeds (k,) of the moves into some poses, mm/min; NaN for none, and per revolution."""
         return np.where(self.feed_mode[pose] == FeedMode.PER_MINUTE, self.feed[pose], np.nan)
 
-    def axis_steps(self, moves: Bools, limit: float) -> tuple[Ints, Floats]:
-        """Poses (k,) where those of `moves` (n,) end that turn the tool axis beyond a limit, and the turns; degrees.
+    def feed_changes(self, one: Ints, other: Ints) -> Bools:
+        """(k,) whether the moves into some poses have another feed than those into others, or another unit of it."""
+        feed, next_feed = self.feed[one], self.feed[other]
+        same = (feed == next_feed) | (np.isnan(feed) & np.isnan(next_feed))
+        return ~same | (self.feed_mode[one] != self.feed_mode[other])
 
-        Returns
-        -------
-        tuple of arrays
-            Poses (k,) ascending, and turns (k,) in degrees.
-        """
+    def axis_steps(self, moves: Bools, limit: float) -> tuple[Ints, Floats]:
+        """Poses (k,), ascending, where `moves` (n,) end that turn the axis beyond a limit, and turns (k,); degrees."""
         axis, stated = self.axis, self.kind == Move.FROM
         far = moves[1:] & ~stated[1:] & ~stated[:-1]
         # a first look: the cosine is coarse

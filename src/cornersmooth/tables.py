@@ -157,16 +157,9 @@ class Shelf:
     ) -> Record:
         """Dataclass whose fields are the keys of a table, which must have those without a default.
 
-        Parameters
-        ----------
-        where : str
-            Name of the table, for messages.
-        given : mapping, optional
-            Fields that are no keys, and their values.
-        **checks
-            How some values are read; the others are by the type of their field.
-
-        Raises SettingsError: `table` is no table, has an unknown key, or lacks one, or a value is wrong.
+        `where` is the name of the table, for messages, `given` are fields that are no keys. Values are read by the type
+        of their field, or by one of the `checks`. Raises SettingsError: `table` is no table, has an unknown key, or
+        lacks one, or a value is wrong.
         """
         given, dot = given or {}, f"{where}." if where else ""
         keys = {item.name: item for item in fields(kind) if item.name not in given}  # type: ignore[arg-type]

@@ -36,7 +36,7 @@ MUTANTS = (
     Mutant('(26): the joint has the axis of v(1)', PAPER, (('        tops[:, -1] = axis_curve[:, -1]', '        tops[:, -1] = tops[:, -1]'),), '26'),
     Mutant('(27): linear in place of the great circle', PAPER, (('turned = np.sin((1.0 - share) * angle) * one + np.sin(share * angle) * other', 'turned = (1.0 - share) * one + share * other'),), '24'),
     Mutant('(21): the grid alone', ROOTS, (('_NEAR, _NEAR_STEPS, _SHORT = 1.0 / 16.0, 4, 1e-7', '_NEAR, _NEAR_STEPS, _SHORT = -1.0, 4, 1e-7'), ('near = ~turns & (', 'near = turns & ('), ('found = _zero(ends, start, wanted)', 'found = np.clip(start, *ends)'),), '20'),
-    Mutant('(4): another basis', CURVES, (('            0.25 * s**3,\n', '            0.2 * s**3,\n'),), '3_and_4'),
+    Mutant('(4): another basis', CURVES, (('[-4, 7, -4, 1, 0]', '[-4, 7, -4, 0.8, 0]'),), '3_and_4'),
     Mutant('(3): weights left out', CURVES, (('np.stack((one, w1, w2, w1, one)', 'np.stack((one, one, w2, one, one)'),), '3_and_4'),
     Mutant('(9): second control point', CURVES, (('points[:, 1] -= RATIO', 'points[:, 1] -= 0.6'),), '5_to_9'),
     Mutant('(10): error', PAPER, (('factor = 2.0 * float(nurbs', 'factor = 1.9 * float(nurbs'),), '10'),
@@ -55,7 +55,7 @@ MUTANTS = (
     Mutant('least residual in place of the largest', PAPER, (('most, report = residual.max(axis=1)', 'most, report = residual.min(axis=1)'),), '23'),
     Mutant('the motion is not measured', PAPER, (('over = share > 1.0 + EXACT', 'over = share > 1e9'),), 'keeps_the_tolerance'),
     Mutant('0.99 of the size in place of what just keeps ε', PAPER, (('keeping = (1.0 - _JUST) / share', 'keeping = 0.97 * (1.0 - _JUST) / share'),), 'eq_16 or construction'),
-    Mutant('the rest of segments is not looked at', PAPER, (('found.append(here[share.max(axis=1) > 1.0])', 'found.append(here[:0])'),), 'left_of'),
+    Mutant('the rest of segments is not looked at', PAPER, (('found.append(part[share.max(axis=1) > 1.0])', 'found.append(part[:0])'),), 'left_of'),
 )
 # fmt: on
 

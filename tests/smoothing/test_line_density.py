@@ -8,8 +8,7 @@ import pytest
 import cornersmooth
 from cornersmooth.model import Program
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing.line_density import FINEST_CHORD
-from cornersmooth.smoothing.segments import lines_per_half
+from cornersmooth.smoothing.segments import FINEST_CHORD, lines_per_half
 
 
 def halves(feed: float, **more: float) -> tuple[int, float]:

@@ -23,7 +23,7 @@ from cornersmooth.cli import run
 from cornersmooth.geometry import nurbs
 from cornersmooth.model import LimitedBy, Program, SmoothProgram, Status
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing import self_check, smooth, zhang2016
+from cornersmooth.smoothing import self_check, smooth
 from cornersmooth.smoothing.construction import Construction
 from cornersmooth.smoothing.segments import segments_of
 from cornersmooth.smoothing.synchronise import matching_parameters
@@ -367,7 +367,6 @@ def test_bounds_let_nothing_pass_that_is_measured(curves: bool, monkeypatch: pyt
         return own, np.full_like(share, np.inf)
 
     monkeypatch.setattr(self_check, "bounded", none)
-    monkeypatch.setattr(zhang2016, "bounded", none)
     measured = CONSTRUCTION.smooth(program, settings).corners
     assert (found.status == measured.status).all()
     rows = found.smoothed

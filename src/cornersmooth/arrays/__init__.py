@@ -38,11 +38,7 @@ def joined_rows(parts: Iterable[Columns]) -> Columns:
 def some_poses(program: Program, first: int, stop: int) -> Program:
     """Poses from `first` to before `stop`, with the arcs, curves and statements between them.
 
-    Parameters
-    ----------
-    first, stop : int
-        An arc that ends at the first pose is left out: it begins outside. Earlier statements come
-        before the first pose.
+    An arc that ends at the first pose is left out: it begins outside. Earlier statements come before the first pose.
     """
     arcs = some_rows(program.arcs, (program.arcs.pose > first) & (program.arcs.pose < stop))
     return replace(

@@ -57,6 +57,11 @@ class Splines:
         """(controls,) run of every control point."""
         return spread(self.count + 2)[0]
 
+    @property
+    def ends(self) -> Floats:
+        """(2, spans) knots at which each span begins and ends."""
+        return np.stack((self.knot[self.span_knot], self.knot[self.span_knot + 1]))
+
     @cached_property
     def width(self) -> Floats:
         """(spans,) steps."""

@@ -21,28 +21,22 @@ from cornersmooth.model import Bools, Corners, Floats, Ints, Program
 RATIO: Final = 2.0 / 3.0  #: distance of the second control point from the corner over that of the first
 
 
+#: control points (5,) in the points of the first half by powers of s = 2u: equation (4)
+POWERS: Final = np.array([[4.0, 0, 0, 0, 0], [-12, 12, 0, 0, 0], [12, -18, 6, 0, 0], [-4, 7, -4, 1, 0]]) / 4.0
+
+
 def deviation_factor(weights: Floats) -> Floats:
     """(...,) the factor c of weights (..., 2): equations (10) to (12) without the sine."""
     return RATIO * weights[..., 0] / (2.0 * (weights[..., 0] + weights[..., 1]))
 
 
-def basis(u: Floats) -> Floats:
-    """Polynomial basis (m, 5) at parameters (m,) in [0, 1]: equation (4)."""
-    u = np.asarray(u, np.float64)
-    second = u > 0.5
+def basis(u: Floats, order: int = 0) -> Floats:
+    """Polynomial basis (m, 5) at parameters (m,) in [0, 1], equation (4), or its first or second derivative."""
+    second = np.asarray(u, np.float64) > 0.5
+    factors = np.array([[1, 1, 1, 1], [0, 1, 2, 3], [0, 0, 2, 6]])[order, order:] * 2.0**order
     s = 2.0 * np.where(second, 1.0 - u, u)
-    r = 1.0 - s
-    values = np.stack(
-        (
-            r**3,
-            s * (3.0 * r * r + s * (1.5 * r + 0.25 * s)),
-            s * s * (1.5 * r + 0.5 * s),
-            0.25 * s**3,
-            np.zeros_like(s),
-        ),
-        axis=-1,
-    )
-    return np.where(second[..., None], values[..., ::-1], values)
+    values = (s[..., None] ** np.arange(4 - order) * factors) @ POWERS[order:]
+    return np.where(second[..., None], (-1.0) ** order * values[..., ::-1], values)
 
 
 def rational_basis(u: Floats, weights: Floats) -> Floats:
@@ -81,22 +75,13 @@ def control_points(
 
     Those of corners that are not smoothed are all at the corner.
     """
-    pose, before, after = corners.pose[rows], corners.before[rows], corners.after[rows]
-    tip, axis = program.tip, program.axis
-    corner = tip[pose]
-    turned = axis_length * axis[pose]
-    step_in, step_out = corner - tip[before], tip[after] - corner
-    axis_in = step_in + turned - axis_length * axis[before]
-    axis_out = step_out + axis_length * axis[after] - turned
-    tip_curve = five_points(
-        corner, step_in * corners.trim_in[rows][:, None], step_out * corners.trim_out[rows][:, None]
-    )
-    axis_curve = five_points(
-        corner + turned,
-        axis_in * corners.axis_trim_in[rows][:, None],
-        axis_out * corners.axis_trim_out[rows][:, None],
-    )
-    return tip_curve, axis_curve
+    poses = [column[rows] for column in (corners.pose, corners.before, corners.after)]
+    curves, trims = [], (corners.trim_in, corners.trim_out, corners.axis_trim_in, corners.axis_trim_out)
+    for height, (trim_in, trim_out) in ((0.0, trims[:2]), (axis_length, trims[2:])):
+        corner, before, after = (program.tip[at] + height * program.axis[at] for at in poses)
+        legs = (corner - before) * trim_in[rows][:, None], (after - corner) * trim_out[rows][:, None]
+        curves.append(five_points(corner, *legs))
+    return curves[0], curves[1]
 
 
 def five_points(corner: Floats, leg_in: Floats, leg_out: Floats) -> Floats:
@@ -122,16 +107,7 @@ def derivatives(points: Floats, weights: Floats, u: Floats) -> tuple[Floats, Flo
 
     At the knot u = ½ the left derivatives are returned; the curve is C² there.
     """
-    second = u > 0.5
-    s = 2.0 * np.where(second, 1.0 - u, u)
-    r = 1.0 - s
-    zero = np.zeros_like(s)
-    n0 = basis(u)
-    n1 = np.stack((-3 * r * r, 3 * r * r - 3 * r * s - 0.75 * s * s, 3 * r * s, 0.75 * s * s, zero), axis=-1)
-    n2 = np.stack((6 * r, -9 * r + 1.5 * s, 3 * r - 3 * s, 1.5 * s, zero), axis=-1)
-    mirrored = second[:, None]
-    n1 = 2.0 * np.where(mirrored, -n1[:, ::-1], n1)
-    n2 = 4.0 * np.where(mirrored, n2[:, ::-1], n2)
+    n0, n1, n2 = (basis(u, order) for order in range(3))
     w = full_weights(weights)[:, None, :]
     d0, d1, d2 = ((n * w).sum(axis=-1, keepdims=True) for n in (n0, n1, n2))
     p0 = ((n0 * w) @ points) / d0

@@ -31,6 +31,12 @@ def batches(counts: Ints, size: int) -> Ints:
     return np.append(np.flatnonzero(np.diff(np.cumsum(counts) // size, prepend=-1)), len(counts))
 
 
+def split(rows: Ints, counts: Ints, size: int) -> list[Ints]:
+    """Some rows in parts of about `size` elements each, of which a row has its count."""
+    gone = np.cumsum(counts)
+    return [part for part in np.split(rows, np.searchsorted(gone, np.arange(size, gone[-1:].sum(), size))) if len(part)]
+
+
 def search(values: Floats, counts: Ints, row: Ints, place: Floats, side: Literal["left", "right"] = "left") -> Ints:
     """`np.searchsorted` within rows: indices (m,) into values (n,), which are from 0 on and ascending in each row."""
     last = values[starts(counts)[1:] - 1]

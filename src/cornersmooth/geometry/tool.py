@@ -42,21 +42,15 @@ class Tool:
 
     @classmethod
     def of(
-        cls,
-        diameter: float,
-        corner_radius: float = 0.0,
-        taper: float = 0.0,
-        length: float = 0.0,
-        tip_angle: float = 0.0,
+        cls, diameter: float, corner_radius: float = 0.0, taper: float = 0.0, length: float = 0.0, tip_angle: float = 0
     ) -> Tool:
         """Tool of a diameter, measured where side and bottom line would meet; a ball where the radius is half of it.
 
         CS270: such a tool cannot be.
         """
         if corner_radius > 0.5 * diameter * (1.0 + 1e-9):
-            raise SettingsError(
-                "CS270", f"corner radius {corner_radius:g} mm is more than half of {diameter:g} mm", "give D,r"
-            )
+            what = f"corner radius {corner_radius:g} mm is more than half of {diameter:g} mm"
+            raise SettingsError("CS270", what, "give D,r")
         tip, side = math.radians(tip_angle), math.radians(taper)
         if corner_radius >= 0.5 * diameter * (1.0 - 1e-9):
             return cls(diameter, corner_radius, 0.0, corner_radius / math.cos(tip), tip_angle, taper, length)
@@ -109,18 +103,14 @@ class Tool:
         along_side = x * math.sin(side) + y * math.cos(side)
         below = x * math.sin(tip) - y * math.cos(tip)
         along_bottom = -x * math.cos(tip) - y * math.sin(tip)
-        found: Floats = np.maximum(beside, below)
-        outside = found > 0.0
-        corner = outside & ~((beside > 0.0) & (along_side >= 0.0)) & ~((below > 0.0) & (along_bottom >= 0.0))
-        found = np.where(corner, np.hypot(x, y), found)
-        on_side = outside & (beside > 0.0) & (along_side >= 0.0)
-        found = np.where(on_side, beside, found)
-        on_bottom = outside & ~on_side & ~corner
-        found = np.where(on_bottom, below, found)
+        on_side = (beside > 0.0) & (along_side >= 0.0)
+        on_bottom = ~on_side & (below > 0.0) & (along_bottom >= 0.0)
+        inside = np.maximum(beside, below) <= 0.0
+        nearest = np.select((inside, on_side, on_bottom), (np.maximum(beside, below), beside, below), np.hypot(x, y))
         reach = self.centre_out / math.cos(tip)
         over_the_axis = on_bottom & (along_bottom > reach)  # nearest to the apex
         apex = self.centre_up - self.centre_out * math.tan(tip)
-        return np.where(over_the_axis, np.hypot(out, up - apex), found) - self.corner_radius
+        return np.where(over_the_axis, np.hypot(out, up - apex), nearest) - self.corner_radius
 
 
 def parse_tool(text: str) -> Tool:
@@ -130,9 +120,8 @@ def parse_tool(text: str) -> Tool:
     except ValueError:
         numbers = []
     if not 1 <= len(numbers) <= 4:
-        raise SettingsError(
-            "CS270", f"--tool {text!r} is not a tool", "write D,r or D,r,taper,length: --tool 10,5,0,40"
-        )
+        hint = "write D,r or D,r,taper,length: --tool 10,5,0,40"
+        raise SettingsError("CS270", f"--tool {text!r} is not a tool", hint)
     return Tool.of(*numbers)
 
 

@@ -86,11 +86,7 @@ def _with_one_axis(machine: Machine, axis: Floats) -> Solutions:
 
 def pole_distance(machine: Machine, axis: Floats) -> Floats:
     """Angle between tool axes and the nearest pole, as in `Solutions`: (n, 3) -> (n,) degrees."""
-    if len(machine.names) < 2:
-        return np.full(len(axis), np.inf)
-    frame = _Frame(machine)
-    x, y, z = (axis @ frame.first).T
-    return frame.pole_distance(np.arctan2(np.hypot(x, y), z))
+    return solutions(machine, axis).pole_distance
 
 
 def _solve(frame: _Frame, axis: Floats, angles: Floats) -> Floats:
@@ -232,12 +228,8 @@ class _Frame:
 
     def pole_distance(self, rho1: Floats) -> Floats:
         """Degrees to the nearest pole; infinite without one."""
-        distance = np.full(rho1.shape, np.inf)
-        if self.pole_ahead:
-            distance = np.minimum(distance, rho1)
-        if self.pole_behind:
-            distance = np.minimum(distance, np.pi - rho1)
-        return np.degrees(distance)
+        ahead, behind = np.where(self.pole_ahead, rho1, np.inf), np.where(self.pole_behind, np.pi - rho1, np.inf)
+        return np.degrees(np.minimum(ahead, behind))
 
     def beyond(self, rho1: Floats) -> Floats:
         """Degrees outside of the reach of the machine."""
@@ -266,21 +258,14 @@ def machine_position(machine: Machine, tip: Floats, angles: Floats) -> Floats:
     They count from the zero of the part, with the length of the tool compensated: with both rotary axes at zero they
     are the tip itself. LinuxCNC's trtfuncs.c computes the same joints (its offsets are the points here).
     """
-    turned = tip + machine.part_zero
-    for index, axis in enumerate(machine.axes):
-        if axis.carrier == "table":
-            turned = _about(axis.unit, axis.point, -axis.sign * radians(angles[:, index]), turned)
+    turned = _turned(machine, "table", angles, tip + machine.part_zero, -1.0)
     return turned - machine.part_zero - _swing(machine, angles)
 
 
 def tip_position(machine: Machine, position: Floats, angles: Floats) -> Floats:
     """Tool tip in part coordinates for words of the linear and rotary axes: the inverse of `machine_position`."""
-    turned: Floats = position + machine.part_zero + _swing(machine, angles)
-    for index in (1, 0):
-        axis = machine.axes[index]
-        if axis.carrier == "table":
-            turned = _about(axis.unit, axis.point, axis.sign * radians(angles[:, index]), turned)
-    return turned - machine.part_zero
+    turned = position + machine.part_zero + _swing(machine, angles)
+    return _turned(machine, "table", angles, turned) - machine.part_zero
 
 
 def nose_position(machine: Machine, tip: Floats, angles: Floats) -> Floats:
@@ -334,15 +319,15 @@ def inverse_time(length: Floats, feed: Floats, turn: Floats, rotary_feed: float)
 
 def _swing(machine: Machine, angles: Floats) -> Floats:
     """Way of the tip when the heads turn and the linear axes stand: (n, 3) mm."""
-    tip = np.zeros((len(angles), 3))
-    for index in (1, 0):
+    return _turned(machine, "head", angles, np.zeros((len(angles), 3)))
+
+
+def _turned(machine: Machine, carrier: str, angles: Floats, points: Floats, sign: float = 1.0) -> Floats:
+    """Points that the rotary axes of a carrier turn; with a sign of -1 they turn back, the other one first."""
+    arm = machine.tool_length * machine.tool if carrier == "head" else np.zeros(3)
+    for index in (1, 0) if sign > 0.0 else (0, 1):
         axis = machine.axes[index]
-        if axis.carrier == "head":
-            point = machine.tool_length * machine.tool + np.array(axis.point)
-            tip = _about(axis.unit, point, axis.sign * radians(angles[:, index]), tip)
-    return tip
-
-
-def _about(direction: Floats, point: Floats | tuple[float, float, float], angle: Floats, points: Floats) -> Floats:
-    centre = np.asarray(point)
-    return centre + rotate(direction, angle, points - centre)
+        if axis.carrier == carrier:
+            centre = arm + np.array(axis.point)
+            points = centre + rotate(axis.unit, sign * axis.sign * radians(angles[:, index]), points - centre)
+    return points

@@ -8,7 +8,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
@@ -214,11 +214,9 @@ def _surroundings(program: Program, settings: Settings, pose: Ints, after: Ints)
     """Status of every corner as far as its surroundings decide it, geometry apart."""
     status = np.full(len(pose), Status.SMOOTHED, np.uint8)
     after = np.maximum(after, 0)
-    feed_in, feed_out = program.feed[pose], program.feed[after]
-    same = (feed_in == feed_out) | (np.isnan(feed_in) & np.isnan(feed_out))
-    same_mode = program.feed_mode[pose] == program.feed_mode[after]
-    status[~same_mode | (~same & (not settings.round_feed_changes))] = Status.FEED_CHANGE
+    status[program.feed_mode[pose] != program.feed_mode[after]] = Status.FEED_CHANGE
     if not settings.round_feed_changes:
+        status[program.feed_changes(pose, after)] = Status.FEED_CHANGE
         status[program.feed_mode[pose] == FeedMode.PER_REVOLUTION] = Status.FEED_PER_REVOLUTION
     acts = np.cumsum(program.acted)
     status[acts[after] > acts[pose]] = Status.STATEMENT
@@ -226,21 +224,6 @@ def _surroundings(program: Program, settings: Settings, pose: Ints, after: Ints)
     status[program.kind[pose - 1] == Move.HOLE] = Status.KEPT  # the tool comes from above the hole, not out of its pose
     status[after == 0] = Status.TOO_SHORT
     return status
-
-
-def with_rows(corners: Corners, others: Corners, rows: Ints) -> Corners:
-    """Corners with some rows of others; extra columns that those lack are NaN there."""
-
-    def taken(values: NDArray[Any], other: NDArray[Any]) -> NDArray[Any]:
-        values = values.copy()
-        values[rows] = other[rows]
-        return values
-
-    missing = np.full(len(corners), np.nan)
-    extra = {name: taken(values, others.extra.get(name, missing)) for name, values in corners.extra.items()}
-    names = (item.name for item in fields(Corners) if item.name != "extra")
-    columns: dict[str, Any] = {name: taken(getattr(corners, name), getattr(others, name)) for name in names}
-    return Corners(**columns, extra=extra)
 
 
 @dataclass(frozen=True)
@@ -253,10 +236,10 @@ class Neighbours:
     duplicate: Bools  # repeats the pose before it in the same chain, but for a hole
 
 
-def find_neighbours(program: Program, axis_length: float, distance: float) -> Neighbours:
-    """Distinct neighbours of all poses; poses within `distance` (mm, tip and axis point) of each other are one.
+def find_neighbours(program: Program, axis_length: float, near: float) -> Neighbours:
+    """Distinct neighbours of all poses; poses as `near` (mm, tip and axis point) to each other are one.
 
-    A run of poses that creep on by less than `distance` each but by more in total is not merged.
+    A run of poses that creep on by less than `near` each but by more in total is not merged.
     """
     n, own = len(program), np.arange(len(program))
     chains = program.chains
@@ -267,11 +250,11 @@ def find_neighbours(program: Program, axis_length: float, distance: float) -> Ne
     inner = (first >= 0) & (own != last)
 
     duplicate = first >= 0
-    duplicate[1:] &= _closer(program, own[1:], own[:-1], axis_length, distance)
+    duplicate[1:] &= distance(program, own[1:], own[:-1], axis_length) <= near
     duplicate[1:] &= program.kind[:-1] != Move.HOLE  # the tool has left the hole, and comes back to its pose
     representative = np.maximum.accumulate(np.where(duplicate, 0, own))
     repeats = np.flatnonzero(duplicate)
-    away = repeats[~_closer(program, repeats, representative[repeats], axis_length, distance)]
+    away = repeats[distance(program, repeats, representative[repeats], axis_length) > near]
     duplicate[repeats[np.isin(representative[repeats], representative[away])]] = False  # those creep
     representative = np.maximum.accumulate(np.where(duplicate, 0, own))
 
@@ -283,7 +266,7 @@ def find_neighbours(program: Program, axis_length: float, distance: float) -> Ne
     return Neighbours(previous, following, inner, duplicate)
 
 
-def _closer(program: Program, one: Ints, other: Ints, axis_length: float, distance: float) -> Bools:
+def distance(program: Program, one: Ints, other: Ints, axis_length: float) -> Floats:
+    """(k,) mm between some poses and others: the larger of tip and axis point."""
     step = program.tip[one] - program.tip[other]
-    turn = axis_length * (program.axis[one] - program.axis[other])
-    return (norm(step) <= distance) & (norm(step + turn) <= distance)
+    return np.maximum(norm(step), norm(step + axis_length * (program.axis[one] - program.axis[other])))

@@ -14,6 +14,7 @@ from cornersmooth.arrays.vectors import norm, unit
 from cornersmooth.geometry.ragged import ranges, starts
 from cornersmooth.model import Bools, Floats, Program
 from cornersmooth.settings import Settings
+from cornersmooth.smoothing.construction import distance
 
 #: part of the tolerance within which poses may be one corner, and how much farther away all other poses must be
 _SHARE: Final = 0.5
@@ -76,10 +77,8 @@ def _steps(program: Program, axis_length: float) -> Floats:
     """(n,) mm: how far tip or axis point go in the move into each pose; infinite where it is in no chain."""
     chains = program.chains
     pose = ranges(chains[:, 0] + 1, chains[:, 1] - chains[:, 0])
-    step = program.tip[pose] - program.tip[pose - 1]
-    turn = axis_length * (program.axis[pose] - program.axis[pose - 1])
     size = np.full(len(program), np.inf)
-    size[pose] = np.maximum(norm(step), norm(step + turn))
+    size[pose] = distance(program, pose, pose - 1, axis_length)
     return size
 
 
@@ -89,6 +88,5 @@ def _pinned(program: Program) -> Bools:
     if program.curves is not None:
         pinned[program.curves.pose] = pinned[program.curves.pose - 1] = True
     pinned[program.chains.ravel()] = True
-    other = (program.feed_mode[1:] != program.feed_mode[:-1]) | (program.feed[1:] != program.feed[:-1])
-    pinned[:-1] |= other & ~(np.isnan(program.feed[1:]) & np.isnan(program.feed[:-1]))
+    pinned[:-1] |= program.feed_changes(np.arange(1, len(program)), np.arange(len(program) - 1))
     return pinned

@@ -22,7 +22,7 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.arrays.vectors import dot, norm, unit
-from cornersmooth.geometry.ragged import spread, starts
+from cornersmooth.geometry.ragged import split, spread, starts
 from cornersmooth.model import Bools, Floats, Ints
 
 #: rad; by how much pieces may turn where they meet and the polyline does not
@@ -196,10 +196,8 @@ class _Search:
         found = _Found.none(len(at))
         for which, attempt in ((_LINE, self._lines), (_ARC, self._arcs)):
             rows = np.flatnonzero(kind == which)
-            size = np.cumsum(end[rows] - at[rows])
-            for part in np.split(rows, np.searchsorted(size, np.arange(_TOGETHER, size[-1:].sum(), _TOGETHER))):
-                if len(part):
-                    found.put(part, attempt(at[part], end[part], enters[part]))
+            for part in split(rows, (end - at)[rows], _TOGETHER):
+                found.put(part, attempt(at[part], end[part], enters[part]))
         return found
 
     def _lines(self, at: Ints, end: Ints, enters: Floats) -> _Found:

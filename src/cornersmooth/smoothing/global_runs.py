@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +13,7 @@ from cornersmooth.errors import Finding
 from cornersmooth.geometry.ragged import batches, ranges, spread, starts
 from cornersmooth.model import Bools, Corners, Floats, Ints, LimitedBy, Program, Runs, SmoothProgram, Status, Trait
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing.construction import RUN_CURVATURE, Progress, find_neighbours, place_corners, with_rows
+from cornersmooth.smoothing.construction import RUN_CURVATURE, Progress, find_neighbours, place_corners
 from cornersmooth.smoothing.proportional import Proportional
 from cornersmooth.smoothing.runs.polylines import Polylines
 from cornersmooth.smoothing.runs.rows import TURNING
@@ -78,12 +79,7 @@ class _Solved:
 
 
 def _solve(
-    program: Program,
-    settings: Settings,
-    pose: Ints,
-    count: Ints,
-    progress: Progress | None,
-    processes: int,
+    program: Program, settings: Settings, pose: Ints, count: Ints, progress: Progress | None, processes: int
 ) -> _Solved:
     point = np.hstack((program.tip[pose], program.tip[pose] + settings.axis_length * program.axis[pose]))
     # what turning the axis inside a line is worth at the axis point is left free
@@ -123,19 +119,19 @@ def _mark(corners: Corners, solved: _Solved) -> None:
 
 def corner_by_corner(smoothed: SmoothProgram, runs: Bools) -> SmoothProgram:
     """Take back the curves of some runs, which a machine cannot follow: (r,) of `SmoothProgram.runs`."""
-    program, whole, corners = smoothed.program, smoothed.runs, smoothed.corners
+    program, whole, corners = smoothed.program, smoothed.runs, deepcopy(smoothed.corners)
     assert whole is not None
-    own = place_corners(program, smoothed.settings, CONSTRUCTION)
+    alone = place_corners(program, smoothed.settings, CONSTRUCTION)
     run, place = spread(whole.count)
     rows = np.searchsorted(corners.pose, whole.pose[runs[run] & (place > 0) & (place < whole.count[run] - 1)])
+    for name in vars(corners).keys() - {"extra"}:
+        getattr(corners, name)[rows] = getattr(alone, name)[rows]
+    for column in corners.extra.values():
+        column[rows] = np.nan
     text = "corner rounded by itself: the curves of its run would leave the limits of a rotary axis"
     finding = Finding("CS239", "note", int(program.line[corners.pose[rows[0]]]), text, len(rows))
-    return replace(
-        smoothed,
-        corners=with_rows(corners, own, rows),
-        findings=(*smoothed.findings, finding),
-        runs=None if runs.all() else some_runs(whole, ~runs),
-    )
+    left = None if runs.all() else some_runs(whole, ~runs)
+    return replace(smoothed, corners=corners, findings=(*smoothed.findings, finding), runs=left)
 
 
 def _backwards(point: Floats, count: Ints) -> Bools:

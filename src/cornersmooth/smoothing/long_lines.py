@@ -17,7 +17,7 @@ from functools import partial
 import numpy as np
 
 from cornersmooth.arrays.vectors import dot, norm, square
-from cornersmooth.geometry.ragged import spread, starts
+from cornersmooth.geometry.ragged import split, spread, starts
 from cornersmooth.model import Bools, Floats, Ints, Move, SmoothProgram, Status, Trait
 
 #: rows after which a line ends in any case; so many parts are worked on side by side
@@ -84,13 +84,7 @@ def segments_of_rows(move: Ints, begin: int, end: int) -> tuple[Ints, Bools]:
 
 
 def vertices(
-    smoothed: SmoothProgram,
-    tip: Floats,
-    axis: Floats,
-    words: Floats,
-    move: Ints,
-    start: Ints,
-    at_pose: Bools,
+    smoothed: SmoothProgram, tip: Floats, axis: Floats, words: Floats, move: Ints, start: Ints, at_pose: Bools
 ) -> Vertices:
     """Find where the original motion is at the rows of the smoothed one, which are as in `Rows` and `Vertices`.
 
@@ -130,10 +124,8 @@ def _fixed(smoothed: SmoothProgram, move: Ints, at_pose: Bools) -> Bools:
     statements_before = np.concatenate(([0], np.cumsum(spoken)))  # row i + 1: those before pose i
     after = np.append(move[1:], move[-1:])
     fixed = (program.kind[move] != Move.LINEAR) | (program.kind[after] != Move.LINEAR)
-    feed, next_feed = program.feed[move], program.feed[after]
-    changed = (feed != next_feed) & ~(np.isnan(feed) & np.isnan(next_feed))
-    changed |= program.feed_mode[move] != program.feed_mode[after]
-    fixed |= changed | (at_pose & (exact[move] | (statements_before[after + 1] > statements_before[move + 1])))
+    fixed |= program.feed_changes(move, after)
+    fixed |= at_pose & (exact[move] | (statements_before[after + 1] > statements_before[move + 1]))
     fixed[:1] = fixed[-1:] = True
     return fixed
 
@@ -211,10 +203,8 @@ def _reaches(rows: Vertices, limits: LineLimits, start: Ints, end: Ints) -> Bool
     good = np.abs(rows.words[end] - rows.words[start]).max(axis=1) <= limits.turn
     good |= end == start + 1
     long_enough = np.flatnonzero(good & (end > start + 1))
-    between = np.cumsum(end[long_enough] - start[long_enough] - 1)
-    for part in np.split(long_enough, np.searchsorted(between, np.arange(_TOGETHER, between[-1:].sum(), _TOGETHER))):
-        if len(part):
-            good[part] = _keeps(rows, limits, start[part], end[part])
+    for part in split(long_enough, (end - start - 1)[long_enough], _TOGETHER):
+        good[part] = _keeps(rows, limits, start[part], end[part])
     return good
 
 

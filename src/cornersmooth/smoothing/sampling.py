@@ -7,7 +7,7 @@ from its leg is convex, and a chord of it lies no farther from the leg than its 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from cornersmooth.geometry.ragged import ranges, starts
 from cornersmooth.model import Bools, Floats, Ints, Numbers, SmoothProgram
 from cornersmooth.smoothing.construction import construction_of
 from cornersmooth.smoothing.runs.rows import NO_ROWS, SectionRows, run_lines, section_rows, some_at_once
-from cornersmooth.smoothing.segments import Segments, inner_points, lines_per_half, segments_of
+from cornersmooth.smoothing.segments import Segments, lines_per_half, segments_of
 
 
 @dataclass(frozen=True)
@@ -79,17 +79,15 @@ _POINTS = 4
 
 def dense_rows(smoothed: SmoothProgram, arcs: ArcBlocks | None = None, poses: int = 16384) -> Iterator[Rows]:
     """Rows of the smoothed motion as lines with tool vectors, in batches of about `poses` poses."""
-    layout = _Layout.of(smoothed, divide=True, arcs=arcs)
-    return (layout.filled(own, layout.rows(own)) for own in layout.batches(poses))
+    return _Layout.of(smoothed, divide=True, arcs=arcs).parts(poses)
 
 
 def all_dense_rows(smoothed: SmoothProgram, arcs: ArcBlocks | None = None) -> Rows:
     """All rows of `dense_rows` at once, made in the place where they stay."""
     layout = _Layout.of(smoothed, divide=True, arcs=arcs)
-    whole, stop = layout.rows(slice(None)), 0
-    for own in layout.batches():
-        begin, stop = stop, stop + int(layout.counts[own].sum())
-        layout.filled(own, some_rows(whole, slice(begin, stop)))
+    whole = layout.rows(slice(None))
+    for _ in layout.parts(16384, whole):
+        pass
     return whole
 
 
@@ -100,8 +98,7 @@ def curve_rows(
 
     `divide` says whether lines in which the axis turns much are divided: not all controls run the axis point straight.
     """
-    layout = _Layout.of(smoothed, curves=True, divide=divide, arcs=arcs)
-    return (layout.filled(own, layout.rows(own)) for own in layout.batches(poses))
+    return _Layout.of(smoothed, curves=True, divide=divide, arcs=arcs).parts(poses)
 
 
 @dataclass(frozen=True)
@@ -119,14 +116,7 @@ class _Layout:
     arcs: ArcBlocks
 
     @classmethod
-    def of(
-        cls,
-        smoothed: SmoothProgram,
-        *,
-        curves: bool = False,
-        divide: bool,
-        arcs: ArcBlocks | None = None,
-    ) -> _Layout:
+    def of(cls, smoothed: SmoothProgram, *, curves: bool = False, divide: bool, arcs: ArcBlocks | None) -> _Layout:
         program = smoothed.program
         segments = segments_of(smoothed, dense=divide, curves=curves)
         halves = np.zeros(0, np.int32) if curves else lines_per_half(smoothed)
@@ -145,9 +135,12 @@ class _Layout:
             counts[program.arcs.pose] = np.where(arcs.blocks > 0, several * arcs.blocks, lines)
         return cls(smoothed, segments, halves, counts, runs, replaced, curves, divide, arcs)
 
-    def batches(self, poses: int = 16384) -> Iterator[slice]:
-        """Parts of the poses."""
-        return (slice(begin, begin + poses) for begin in range(0, len(self.counts), poses))
+    def parts(self, poses: int, whole: Rows | None = None) -> Iterator[Rows]:
+        """Rows of so many poses after those of so many others, which are those of the whole where it is given."""
+        stop = 0
+        for own in (slice(begin, begin + poses) for begin in range(0, len(self.counts), poses)):
+            begin, stop = stop, stop + int(self.counts[own].sum())
+            yield self.filled(own, self.rows(own) if whole is None else some_rows(whole, slice(begin, stop)))
 
     def rows(self, own: slice) -> Rows:
         """Rows of some poses, to be filled."""
@@ -282,10 +275,51 @@ def _fill_transitions(smoothed: SmoothProgram, segments: Segments, batch: _Batch
 
 def _fill_divided(smoothed: SmoothProgram, segments: Segments, batch: _Batch) -> None:
     """Inner points of the straight remainders that are written as several lines."""
+    construction, tip = construction_of(smoothed.settings.method), smoothed.program.tip
     lines = np.where(segments.has_line[batch.poses] & (batch.last > batch.first), segments.lines[batch.poses], 1)
     for number in np.unique(lines):
         if number < 2:
             continue
         pose, first = batch.poses[lines == number], batch.first[lines == number]
-        rows = first[:, None] + np.arange(number - 1)
-        batch.rows.tip[rows], batch.rows.other[rows] = inner_points(smoothed, segments, pose, int(number))
+        rows, start = first[:, None] + np.arange(number - 1), segments.start[pose]
+        fraction, batch.rows.other[rows] = construction.divide(smoothed, segments, pose, int(number))
+        batch.rows.tip[rows] = tip[start][:, None] + fraction[..., None] * (tip[pose] - tip[start])[:, None]
+
+
+@dataclass(frozen=True)
+class PathPoints:
+    """Points in path order, m rows; between them the tool moves straight within the chord tolerance."""
+
+    tip: Floats  #: (m, 3), mm
+    axis: Floats  #: (m, 3): Unit tool axis vectors
+    pose: Ints  #: (m,): Pose of the program whose move the point belongs to
+    kind: NDArray[np.uint8]  #: (m,): `Move`: how the point is reached
+
+    def __len__(self) -> int:
+        return len(self.tip)
+
+
+def sample(smoothed: SmoothProgram, *, chord: float | None = None) -> PathPoints:
+    """Points on the smoothed path, as near to one another as the chord tolerance asks for.
+
+    Parameters
+    ----------
+    chord : float, mm, optional
+        Largest distance between the curves and the lines through the points; that of the settings by default.
+
+    Returns
+    -------
+    PathPoints
+        m points in path order: tips (m, 3) in mm, unit axes (m, 3), and the pose (m,) each belongs to.
+
+    Raises
+    ------
+    SettingsError
+        CS202 for a chord tolerance out of bounds.
+    """
+    if chord is not None:
+        smoothed = replace(smoothed, settings=smoothed.settings.but(chord_tolerance=chord))
+    kind = smoothed.program.kind
+    none = PathPoints(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, np.int64), kind[:0])
+    some = (PathPoints(rows.tip, rows.other, rows.move, kind[rows.move]) for rows in dense_rows(smoothed))
+    return joined_rows((none, *some))

@@ -17,8 +17,7 @@ from cornersmooth.geometry import nurbs
 from cornersmooth.methods import METHODS
 from cornersmooth.model import Bools, Floats, Ints, Move, Numbers, SmoothProgram, Status
 from cornersmooth.settings import FLIP_ANGLE, STANDING, Settings
-from cornersmooth.smoothing.construction import construction_of, legs_at
-from cornersmooth.smoothing.line_density import lines_for_feed
+from cornersmooth.smoothing.construction import legs_at
 
 #: exponent of the graded nodes s = (j/n)^(2/3)
 GRADED = 2.0 / 3.0
@@ -45,8 +44,16 @@ _SHORT = 0.5
 #: poses or corners measured at once: their intermediate arrays fit the processor's cache
 _BATCH = 16384
 
-#: most lines in one half of a transition and in one straight remainder
-_MOST_LINES = 20_000
+#: Chord error below which lines are not divided for their feed, mm: half of a step of 0.0001 mm, the last digit of most
+#: controls. Finer lines follow the digits.
+FINEST_CHORD = 5e-5
+
+#: Jumps in speed between two lines for which no line is divided, of the tip in mm/s and of the tool axis in deg/s: what
+#: 1000 mm/s² and 150 deg/s² make in 2 ms, the limits of ``cornersmooth time``.
+SMALL_JUMPS = (2.0, 0.3)
+
+#: most lines in one half of a transition, in one straight remainder, and in one segment of a run
+MOST_LINES = 20_000
 
 
 @dataclass(frozen=True)
@@ -62,6 +69,24 @@ class Segments:
     axis_exit: Floats
     has_line: Bools  # the straight remainder has a length
     lines: Numbers  # lines it is written in
+
+
+def lines_for_feed(
+    settings: Settings, by_chord: Floats, length: Floats, feed: Floats, kinks: tuple[Floats, Floats]
+) -> Floats:
+    """(n,) lines that stretches of curves are written in, so that the axes jump little in speed where lines meet.
+
+    `by_chord` is what the chord tolerance asks for; their chord error goes with the square of their number. `length` is
+    the way of the tip, mm, `feed` is in mm/min, NaN for none: then the chord tolerance alone counts. `kinks` are the
+    change of the direction of the tip, rad, and of the turning of the tool axis on its way, rad/mm, in the stretch.
+    """
+    if not settings.block_time or settings.lines == "long" or settings.chord <= FINEST_CHORD:
+        return by_chord
+    finest = by_chord * math.sqrt(settings.chord / FINEST_CHORD)
+    speed = feed / 60.0
+    jump = np.maximum(speed * kinks[0] / SMALL_JUMPS[0], np.degrees(speed * kinks[1]) / SMALL_JUMPS[1])
+    most = np.minimum(length / (speed * settings.block_time), jump)
+    return np.maximum(by_chord, np.minimum(finest, np.nan_to_num(most, nan=0.0, posinf=0.0)))
 
 
 def segments_of(smoothed: SmoothProgram, *, dense: bool, curves: bool = False) -> Segments:
@@ -142,13 +167,6 @@ def _measure_remainders(smoothed: SmoothProgram, segments: Segments, poses: Ints
         _divide(settings, segments, poses[divided], chord[divided])
 
 
-def inner_points(smoothed: SmoothProgram, segments: Segments, pose: Ints, number: int) -> tuple[Floats, Floats]:
-    """Tips and unit axes (g, number - 1, 3) inside straight remainders that are written as `number` lines."""
-    tip, start = smoothed.program.tip, segments.start[pose]
-    fraction, axis = construction_of(smoothed.settings.method).divide(smoothed, segments, pose, number)
-    return tip[start][:, None] + fraction[..., None] * (tip[pose] - tip[start])[:, None], axis
-
-
 def turn_limit(settings: Settings, half_turn: Floats, tolerance: float) -> Floats:
     """Largest change of axis in one line inside a segment whose axis turns by twice `half_turn`, rad.
 
@@ -191,7 +209,7 @@ def _divide(settings: Settings, segments: Segments, poses: Ints, chord: Floats) 
     lines = np.ceil(turn / turn_limit(settings, np.maximum(np.abs(low), np.abs(high)), allowed) - 1e-9)
     if settings.axis_step is None:
         lines[as_one <= share] = 1
-    segments.lines[pose] = np.clip(lines, 1, _MOST_LINES)
+    segments.lines[pose] = np.clip(lines, 1, MOST_LINES)
 
 
 def lines_per_half(smoothed: SmoothProgram) -> Numbers:
@@ -235,7 +253,7 @@ def lines_of(smoothed: SmoothProgram, rows: Ints) -> Ints:
     graded = np.maximum(number, np.ceil(by_turn**1.5 - 1e-9))
     even = np.maximum(np.ceil(1.5 * by_chord), np.ceil(by_turn - 1e-9))
     chosen = np.where(even < graded, -np.maximum(even, 1.0), np.maximum(graded, 1.0))
-    return np.clip(chosen, -_MOST_LINES, _MOST_LINES).astype(np.int64)
+    return np.clip(chosen, -MOST_LINES, MOST_LINES).astype(np.int64)
 
 
 @cache

@@ -30,10 +30,6 @@ _NEAR, _NEAR_STEPS, _SHORT = 1.0 / 16.0, 4, 1e-7
 #: shares of the control points in weight, σ and β of the first half
 _OF_SHARES = np.array([[1.0, 1, 1, 1, 1], [1, nurbs.RATIO, 0, -nurbs.RATIO, 0], [0, 0, 0, nurbs.RATIO, 0]])
 
-#: Bézier points of the first half of the five-point curve, and the powers of their cubic
-_HALF = np.array([[4.0, 0, 0, 0, 0], [0, 4, 0, 0, 0], [0, 2, 2, 0, 0], [0, 1, 2, 1, 0]]) / 4.0
-_POWERS = np.array([[1.0, 0, 0, 0], [-3, 3, 0, 0], [3, -6, 3, 0], [-1, 3, -3, 1]]) @ _HALF
-
 
 @dataclass(frozen=True)
 class _Excess:
@@ -122,7 +118,7 @@ def synchronised(legs: Floats, lever: Floats, weights: Floats, u: Floats, axis_l
     first, other = np.triu_indices(3)
     pairs = _dot(away[first], away[other]) * np.where(first == other, 1.0, 2.0)[:, None]
     pairs[0] -= axis_length**2
-    powers = (nurbs.full_weights(weights) * _OF_SHARES) @ _POWERS.T
+    powers = (nurbs.full_weights(weights) * _OF_SHARES) @ nurbs.POWERS.T
     # products of weight, σ and β, each times weight: as they go with the terms below
     products = np.array([np.convolve(powers[i], powers[j]) for i, j in zip(first, other, strict=True)]).T
     halves = []

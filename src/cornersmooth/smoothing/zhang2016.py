@@ -33,7 +33,6 @@ from cornersmooth.smoothing.self_check import (
     Original,
     Parameters,
     Transitions,
-    bounded,
     most_taken,
     taken,
 )
@@ -303,20 +302,13 @@ def straying_remainders(smoothed: SmoothProgram, rows: Ints | slice = slice(None
         step = program.tip[part] - program.tip[start]
         lever = settings.axis_length * program.axis[start]
         turn = settings.axis_length * program.axis[part] - lever
-        none = np.zeros((len(part), 2))
-        original = Original(np.stack((step, step), axis=1), np.stack((turn, turn), axis=1), lever, none[:, 0])
-        # at one pose |Q − P| is H but for the chord of the turn; the tip is `apart` from that of the axis point
-        apart = np.maximum(*(np.abs(ends[part, :1] - ends[part, 1:]) for ends in (low, high)))
-        missing = original.chord_sag(settings.axis_length) + apart[:, 0] * norm(step)
-        _, share = bounded((apart, 0.0 * apart), missing, original, none + np.array((0.0, reserve)), settings)
-        doubtful = np.flatnonzero(share > 1.0)
-
-        here, original = part[doubtful], some_rows(original, doubtful)
-        tip_at, axis_at = (low[here, k, None] + _PARTS * (high - low)[here, k, None] for k in range(2))
+        spare = np.zeros(len(part))
+        original = Original(np.stack((step, step), axis=1), np.stack((turn, turn), axis=1), lever, spare)
+        tip_at, axis_at = (low[part, k, None] + _PARTS * (high - low)[part, k, None] for k in range(2))
         tip = original.at(tip_at)[0]
         motion = Motion(tip, sum(original.at(axis_at)) - tip, tip_at, axis_at)
         share = taken(motion, original, settings, reserve=reserve)
-        found.append(here[share.max(axis=1) > 1.0])
+        found.append(part[share.max(axis=1) > 1.0])
     pose = np.concatenate(found)
     rows = np.unique(segments.row[np.concatenate((segments.start[pose], pose))])
     return rows[rows >= 0]

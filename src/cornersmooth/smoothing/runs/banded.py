@@ -58,6 +58,14 @@ class Windows:
         return cls.of(splines, begin[able], count[able])
 
 
+def near_spans(splines: Splines, run: Ints, span: Ints, before: int, behind: int) -> Bools:
+    """(spans,) those from so many before some spans of runs to before so many behind them, in the same runs."""
+    step = np.zeros(len(splines.span_run) + 1, np.int64)
+    np.add.at(step, np.maximum(span - before, splines.span_first[run]), 1)
+    np.add.at(step, np.minimum(span + behind, splines.span_first[run + 1]), -1)
+    return np.cumsum(step[:-1]) > 0
+
+
 #: control points that a span, and so a sample, belongs to
 TAPS = 4
 

@@ -8,7 +8,7 @@ from cornersmooth.arrays import some_rows
 from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.geometry.ragged import ranges, spread
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.smoothing.runs.banded import Gather, Windows, applied, solve_scalar
+from cornersmooth.smoothing.runs.banded import Gather, Windows, applied, near_spans, solve_scalar
 from cornersmooth.smoothing.runs.polylines import Pieces, Polylines, Samples
 
 #: share of the tolerances that the fit may use. Less in spans that hold poses: the knots of neighbouring passes differ,
@@ -62,8 +62,7 @@ def fit(lines: Polylines, tolerances: tuple[float, float]) -> tuple[Splines, Flo
 
 def holding_poses(splines: Splines, lines: Polylines) -> Bools:
     """(spans,) bool: poses lie inside the span."""
-    low, high = splines.knot[splines.span_knot], splines.knot[splines.span_knot + 1]
-    before, after = lines.poses_around(splines.span_run, low, high)
+    before, after = lines.poses_around(splines.span_run, *splines.ends)
     return np.asarray(after - before > 1)
 
 
@@ -155,11 +154,7 @@ def _refine(
     lines: Polylines, splines: Splines, control: Floats, off: Floats, bad: Ints, corner: Floats
 ) -> tuple[Splines, Floats, Bools, Floats]:
     """Split the bad spans; return what is known of all others, and which spans have to be fitted anew."""
-    run, low, high = (
-        splines.span_run[bad],
-        splines.knot[splines.span_knot[bad]],
-        splines.knot[splines.span_knot[bad] + 1],
-    )
+    run, (low, high) = splines.span_run[bad], splines.ends[:, bad]
     before, after = lines.poses_around(run, low, high)
     holds = after - before > 1
     # at the pose in the middle; inside one segment beside a sharp corner, else in the middle: not while the deviation
@@ -188,14 +183,8 @@ def _insert(
     order = np.lexsort((all_knot, all_run))
     new = order >= len(splines.knot)
     finer = Splines(all_knot[order], splines.count + np.bincount(run, minlength=len(splines.count)))
-    # spans near new knots
-    changed = np.zeros(len(finer.span_run) + 1, np.int64)
-    at = np.flatnonzero(new) - all_run[order][new]  # span that starts at the new knot
-    begin = np.maximum(at - REACH, finer.span_first[all_run[order][new]])
-    end = np.minimum(at + REACH, finer.span_first[all_run[order][new] + 1])
-    np.add.at(changed, begin, 1)
-    np.add.at(changed, end, -1)
-    active = np.cumsum(changed[:-1]) > 0
+    owner = all_run[order][new]
+    active = near_spans(finer, owner, np.flatnonzero(new) - owner, REACH, REACH)  # spans that start at the new knots
     # number of new knots up to each: old spans and control points by their distance from the start of the run
     added = np.cumsum(new)
     old_span = np.clip(np.arange(len(finer.span_run)) - added[finer.span_knot], 0, len(off) - 1)

@@ -9,7 +9,6 @@ begins outside is led inside.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -47,42 +46,6 @@ class Task:
     radius: Floats  # r, (m,)
     normal: Floats | None = None  # control points do not move along it, (c, 3); 0 where they move as they like
 
-    @cached_property
-    def columns(self) -> Floats:
-        """(3, m) O at the samples."""
-        return np.ascontiguousarray(self.axis.T)
-
-    @cached_property
-    def coupled(self) -> Floats:
-        """(c, 4) which control points are free together with their neighbours."""
-        return couplings(self.windows.free)
-
-    @cached_property
-    def sample_first(self) -> Ints:
-        """(windows,) where the samples of each window begin; every window has some."""
-        return np.searchsorted(self.sample_window, np.arange(len(self.windows.count)))
-
-    @cached_property
-    def span_first(self) -> Ints:
-        """(windows,) where the spans of each window begin."""
-        return np.searchsorted(self.windows.span_window, np.arange(len(self.windows.count)))
-
-    def pull(self, off: Floats) -> Floats:
-        """M·x of deviations (3, m)."""
-        return off + self.stretch * product(self.columns, off) * self.columns
-
-    def total(self, values: Floats) -> Floats:
-        """(windows,) sums of values at the samples (m,)."""
-        return np.add.reduceat(values, self.sample_first)
-
-    def roughness(self, weight: Floats, jerk: Floats) -> Floats:
-        """(windows,) the first part of the objective, from third derivatives (3, spans)."""
-        return np.add.reduceat(weight * product(jerk, jerk), self.span_first)
-
-    def cost(self, weight: Floats, jerk: Floats, penalty: Floats, off: Floats) -> Floats:
-        """(windows,) the objective, from third derivatives (3, spans) and deviations (3, m)."""
-        return self.roughness(weight, jerk) + self.total(penalty * product(off, off))
-
 
 def smoothest(task: Task, off: Floats, jerk: Floats, enough: float, begin: float) -> Floats:
     """Change of the control points (c, 3) that makes the windows as smooth as their bounds allow.
@@ -91,60 +54,75 @@ def smoothest(task: Task, off: Floats, jerk: Floats, enough: float, begin: float
     over the objective, is `begin` at the beginning, as far as it is known (`COLD` or `WARM`), and ends the steps at
     `enough`.
     """
-    off, jerk = np.ascontiguousarray(off.T), np.ascontiguousarray(jerk.T)
-    change = np.zeros((3, len(task.windows.free)))
-    first = task.roughness(task.weight, jerk)
-    weight = task.weight / np.where(first > 0.0, first, 1.0)[task.windows.span_window]
+    windows, axis = task.windows, np.ascontiguousarray(task.axis.T)
+    off, jerk, coupled = np.ascontiguousarray(off.T), np.ascontiguousarray(jerk.T), couplings(windows.free)
+    each = np.arange(len(windows.count))  # every window has samples
+    first, first_span = (np.searchsorted(of, each) for of in (task.sample_window, windows.span_window))
+
+    def metric(off: Floats) -> Floats:
+        """M·x of deviations (3, m)."""
+        return off + task.stretch * product(axis, off) * axis
+
+    def total(values: Floats) -> Floats:
+        """(windows,) sums of values at the samples (m,)."""
+        return np.add.reduceat(values, first)
+
+    def roughness(weight: Floats) -> Floats:
+        """(windows,) the first part of the objective."""
+        return np.add.reduceat(weight * product(jerk, jerk), first_span)
+
+    change = np.zeros((3, len(windows.free)))
+    begun = roughness(task.weight)
+    weight = task.weight / np.where(begun > 0.0, begun, 1.0)[windows.span_window]
     stiff = task.smooth.bands(weight)
-    many = task.total(np.ones(len(task.radius)))
-    pull = task.pull(off)
+    many = total(np.ones(len(task.radius)))
+    pull = metric(off)
     slack = (task.radius**2 - product(off, pull)) / 2.0
     inside = slack >= _LEAST_SLACK * task.radius
     room = np.where(inside, slack, _LEAST_SLACK * task.radius)
-    penalty = np.where(first > 0.0, 1.0, 0.0)[task.sample_window] * task.penalty
-    cost = task.cost(weight, jerk, penalty, off)
+    penalty = np.where(begun > 0.0, 1.0, 0.0)[task.sample_window] * task.penalty
+    cost = roughness(weight) + total(penalty * product(off, off))
     force = np.maximum(begin * cost / many, 1e-12)[task.sample_window] / room  # the multipliers
-    ahead: Floats = np.ones(len(task.windows.count))  # part of the slope at the beginning that no multipliers hold yet
+    ahead: Floats = np.ones(len(each))  # part of the slope at the beginning that no multipliers hold yet
     for _ in range(STEPS):
-        gap = task.total(room * force)
+        gap = total(room * force)
         bent = force / room
         barrier = (_CENTRE * gap / many)[task.sample_window] / room + bent * (room - slack)
         right = -task.smooth.sum_rows(weight * jerk) - task.near.sum_rows(barrier * pull + penalty * off)
-        bands = task.near.bands(_bend(task, force, penalty, bent, pull))
+        bands = task.near.bands(_bend(axis, force * task.stretch, force + penalty, bent, pull))
         bands[..., :3] += stiff
         if task.normal is not None:
             keep_in_planes(bands, right, task.normal)
-        step = solve_blocks(bands, right, task.coupled)
+        step = solve_blocks(bands, right, coupled)
         step_off, step_jerk = task.near.apply_rows(step), task.smooth.apply_rows(step)
-        step_pull = task.pull(step_off)
+        step_pull = metric(step_off)
         along = product(pull, step_off)
         step_force = barrier - force + bent * along
         step_room = slack - room - along
         square = product(step_off, step_pull)
-        reach = _reach(task, (inside, slack, room, force), (along, square, step_room, step_force))
-        outside = task.total((slack < -1e-3).astype(np.float64)) > 0
+        reach = np.minimum.reduceat(_reach((inside, slack, room, force), (along, square, step_room, step_force)), first)
+        reach = np.minimum(1.0, BACK_OFF * reach)
+        outside = total((slack < -1e-3).astype(np.float64)) > 0
         done = (gap <= enough * cost) & (ahead <= SETTLED) & ~outside
         reach[done] = 0.0
         ahead = ahead * (1.0 - reach)
-        change += reach[task.windows.window] * step
+        change += reach[windows.window] * step
         by_sample = reach[task.sample_window]
         off += by_sample * step_off
         pull += by_sample * step_pull
-        jerk += reach[task.windows.span_window] * step_jerk
+        jerk += reach[windows.span_window] * step_jerk
         force = force + by_sample * step_force
         slack = slack - by_sample * (along + 0.5 * by_sample * square)
         room = np.where(inside, slack, np.maximum(room + by_sample * step_room, slack))
         inside = inside | (slack >= room)
-        cost = task.cost(weight, jerk, penalty, off)
+        cost = roughness(weight) + total(penalty * product(off, off))
         if done.all():
             break
     return np.ascontiguousarray(change.T)
 
 
-def _reach(
-    task: Task, now: tuple[Bools, Floats, Floats, Floats], step: tuple[Floats, Floats, Floats, Floats]
-) -> Floats:
-    """(windows,) share of the step that keeps the bounds of all samples."""
+def _reach(now: tuple[Bools, Floats, Floats, Floats], step: tuple[Floats, Floats, Floats, Floats]) -> Floats:
+    """(m,) share of the step that keeps the bounds of each sample."""
     inside, slack, room, force = now
     along, square, step_room, step_force = step
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -154,24 +132,20 @@ def _reach(
         primal = np.where(square > 0.0, primal, np.inf)
         linear = np.where(step_room < 0.0, -room / step_room, np.inf)
         dual = np.where(step_force < 0.0, -force / step_force, np.inf)
-    bound = np.minimum(np.where(inside, primal, linear), dual)
-    return np.minimum(1.0, BACK_OFF * np.minimum.reduceat(bound, task.sample_first))
+    return np.minimum(np.where(inside, primal, linear), dual)
 
 
-def _bend(task: Task, force: Floats, penalty: Floats, bent: Floats, pull: Floats) -> Floats:
+def _bend(axis: Floats, lean: Floats, even: Floats, bent: Floats, pull: Floats) -> Floats:
     """(m, 6) second derivatives of the bounds and of the penalty: xx, yy, zz, xy, xz, yz."""
-    x, y, z = pull
-    own = task.columns
-    lean = force * task.stretch
-    bx, by, bz, lx, ly = bent * x, bent * y, bent * z, lean * own[0], lean * own[1]
-    out = np.empty((len(force), 6))
-    round_ = force + penalty
-    out[:, 0] = round_ + bx * x + lx * own[0]
-    out[:, 1] = round_ + by * y + ly * own[1]
-    out[:, 2] = round_ + bz * z + lean * own[2] * own[2]
-    out[:, 3] = bx * y + lx * own[1]
-    out[:, 4] = bx * z + lx * own[2]
-    out[:, 5] = by * z + ly * own[2]
+    (x, y, z), (a, b, c) = pull, axis
+    bx, by, bz, la, lb = bent * x, bent * y, bent * z, lean * a, lean * b
+    out = np.empty((len(bent), 6))
+    out[:, 0] = even + bx * x + la * a
+    out[:, 1] = even + by * y + lb * b
+    out[:, 2] = even + bz * z + lean * c * c
+    out[:, 3] = bx * y + la * b
+    out[:, 4] = bx * z + la * c
+    out[:, 5] = by * z + lb * c
     return out
 
 

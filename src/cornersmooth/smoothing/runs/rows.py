@@ -22,9 +22,8 @@ from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.geometry.ragged import batches, search, spread, starts
 from cornersmooth.model import Floats, Ints, Numbers, Program, Runs
 from cornersmooth.settings import STANDING, Settings
-from cornersmooth.smoothing.line_density import lines_for_feed
 from cornersmooth.smoothing.runs.polylines import Pieces, Polylines
-from cornersmooth.smoothing.segments import turn_limit
+from cornersmooth.smoothing.segments import MOST_LINES, lines_for_feed, turn_limit
 
 #: share of ε that turning the axis inside a line may take; `global_runs` leaves it free
 TURNING = 0.02
@@ -37,9 +36,6 @@ _TOGETHER = 8192
 
 #: poses of runs made to rows together, about
 _POSES = 20_000
-
-#: most lines for one segment
-_MOST_LINES = 20_000
 
 #: knot intervals of a section, whose control points `Rows.curve` counts to 127, and its longest parameter in steps
 SPANS, LONGEST = 120, 5e6
@@ -108,39 +104,13 @@ class SectionRows:
 NO_ROWS = SectionRows(np.zeros(0, np.int32), np.zeros(0, np.int8), np.zeros((0, 6)), np.zeros(0), np.zeros(0))
 
 
-@dataclass(frozen=True)
-class LinePlaces:
-    """Where the lines that runs are written as end: m places in path order."""
-
-    pose: Ints  # pose that the segment of each line ends in
-    span: Ints
-    s: Floats  # steps
-    end: Ints  # row of the polylines that a place at the end of a run is, -1 for the others
-
-
 def run_lines(runs: Runs, program: Program, settings: Settings) -> SectionRows:
     """Ends of the lines that runs are written as; with the share of the run's parameter there for a knot."""
-    lines = polylines_of(runs, program, settings.axis_length)
-    found = line_places(runs, lines, program, settings)
-    splines = Splines(runs.knot, runs.knot_count)
-    tip, axis = points_at(runs.control, splines, found.span, found.s)
-    place = found.s / splines.knot[splines.first[1:] - 1][splines.span_run[found.span]]
-    at = np.flatnonzero(found.end >= 0)
-    ends = lines.point[found.end[at]]  # which are passed exactly
-    tip[at], axis[at] = ends[:, :3], unit(ends[:, 3:] - ends[:, :3])
-    place[at] = 1.0
-    nothing = np.zeros(len(tip))
-    number = np.zeros(len(tip), np.int8)
-    return SectionRows(found.pose.astype(np.int32), number, np.hstack((tip, axis)), place, nothing)
-
-
-def line_places(runs: Runs, lines: Polylines, program: Program, settings: Settings) -> LinePlaces:
-    """Places on the curves where the lines end that runs are written as."""
-    splines = Splines(runs.knot, runs.knot_count)
+    lines, splines = polylines_of(runs, program, settings.axis_length), Splines(runs.knot, runs.knot_count)
     pieces = Pieces.of(splines, lines)
     segment, first = np.unique(pieces.segment, return_index=True)  # one piece or more for every segment
     effort = _effort(runs, splines, lines, pieces, program, settings)
-    number = np.clip(np.ceil(np.add.reduceat(effort, first) - 1e-9), 1, _MOST_LINES).astype(np.int64)
+    number = np.clip(np.ceil(np.add.reduceat(effort, first) - 1e-9), 1, MOST_LINES).astype(np.int64)
     row, place = spread(number)
     last = place == number[row] - 1
     # equal shares of the effort; a little is added so that it grows everywhere
@@ -153,9 +123,17 @@ def line_places(runs: Runs, lines: Polylines, program: Program, settings: Settin
     share = (target - reached[piece]) / grown[piece]
     s = pieces.low[piece] + np.clip(share, 0.0, 1.0) * width[piece]
     s[last], piece[last] = pieces.high[beyond - 1], beyond - 1
-    pose_row = segment[row] + 1
-    end = np.where(last & np.isin(pose_row, lines.first[1:] - 1), pose_row, -1)
-    return LinePlaces(runs.pose[pose_row], pieces.span[piece], s, end)
+
+    pose, span = segment[row] + 1, pieces.span[piece]
+    tip, axis = points_at(runs.control, splines, span, s)
+    along = s / splines.knot[splines.first[1:] - 1][splines.span_run[span]]
+    ends = last & np.isin(pose, lines.first[1:] - 1)  # of runs, which are passed exactly
+    point = lines.point[pose[ends]]
+    tip[ends], axis[ends], along[ends] = point[:, :3], unit(point[:, 3:] - point[:, :3]), 1.0
+    nothing = np.zeros(len(tip))
+    return SectionRows(
+        runs.pose[pose].astype(np.int32), nothing.astype(np.int8), np.hstack((tip, axis)), along, nothing
+    )
 
 
 def _effort(
@@ -185,7 +163,8 @@ def section_rows(runs: Runs, program: Program) -> SectionRows:
     owner, number, knot, points = clamped(splines, runs.control, run, begin, end)
     last = np.append(number[1:] == 1, True)
     return SectionRows(
-        move=moves_at(runs, run, end).astype(np.int32)[owner],
+        # a pose is in the segment that leads to it
+        move=runs.pose[search(runs.s, runs.count, run, end)].astype(np.int32)[owner],
         number=number.astype(np.int8),
         points=points,
         knot=knot / STEPS_PER_UNIT,
@@ -250,8 +229,3 @@ def section_ends(runs: Runs, splines: Splines, program: Program) -> tuple[Ints, 
     pairs = np.unique(np.stack((all_run, all_s.astype(np.int64)), axis=1), axis=0)
     same = np.flatnonzero(pairs[1:, 0] == pairs[:-1, 0])
     return pairs[same, 0], pairs[same, 1].astype(np.float64), pairs[same + 1, 1].astype(np.float64)
-
-
-def moves_at(runs: Runs, run: Ints, s: Floats) -> Ints:
-    """Pose in whose segment each place lies; a pose is in the segment that leads to it."""
-    return runs.pose[search(runs.s, runs.count, run, s)]

@@ -21,7 +21,7 @@ from cornersmooth.arrays.vectors import angle_between, norm
 from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.geometry.ragged import batches, spread, starts
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.smoothing.runs.banded import Windows
+from cornersmooth.smoothing.runs.banded import Windows, near_spans
 from cornersmooth.smoothing.runs.batches import Problem, solve_windows
 from cornersmooth.smoothing.runs.fitting import fit
 from cornersmooth.smoothing.runs.polylines import Pieces, Polylines
@@ -105,7 +105,8 @@ def solve_runs(
         if number:  # the axis point at constant H hangs on both
             factor[:, 0] = factor.min(axis=1)
         tight[failed] = np.maximum(tight[failed] * factor, LEAST_SHARE)
-        windows = _around(splines, pieces.span[failed])
+        span = pieces.span[failed]
+        windows = Windows.where(splines, near_spans(splines, splines.span_run[span], span, MENDED, MENDED + 1))
         _solve(problem, windows, windows.free, control, tight, MENDING_GAPS, None, 1)
         changed = _touched(splines, pieces, windows.control[windows.free])
     run = splines.span_run[pieces.span]
@@ -148,15 +149,6 @@ def _own(splines: Splines, windows: Windows) -> Bools:
     return (place >= low) & (place < high) & windows.free
 
 
-def _around(splines: Splines, spans: Ints) -> Windows:
-    """Windows of the spans and `MENDED` more on either side."""
-    step = np.zeros(len(splines.span_run) + 1, np.int64)
-    run = splines.span_run[spans]
-    np.add.at(step, np.maximum(spans - MENDED, splines.span_first[run]), 1)
-    np.add.at(step, np.minimum(spans + MENDED + 1, splines.span_first[run + 1]), -1)
-    return Windows.where(splines, np.cumsum(step[:-1]) > 0)
-
-
 def _solve(
     problem: Problem,
     windows: Windows,
@@ -193,14 +185,11 @@ def _solve(
 def _fade(splines: Splines, spans: Ints, part: float) -> Floats:
     """(c,) `part` at the control points of the spans, rising to 1 over the `FADE` next ones."""
     distance = np.full(len(splines.control_run), FADE, np.int64)
-    near = splines.span_control[np.unique(spans)]
-    first = splines.control_first[splines.span_run[np.unique(spans)]]
-    end = splines.control_first[splines.span_run[np.unique(spans)] + 1]
+    near, run = splines.span_control[spans], splines.span_run[spans]
+    first, end = splines.control_first[run], splines.control_first[run + 1]
     for shift in range(1 - FADE, FADE + 4):
-        at = near + shift
-        inside = (at >= first) & (at < end)
-        away = max(0, -shift, shift - 3)
-        np.minimum.at(distance, at[inside], away)
+        inside = (near + shift >= first) & (near + shift < end)
+        np.minimum.at(distance, (near + shift)[inside], max(0, -shift, shift - 3))
     return part + (1.0 - part) * distance / FADE
 
 
