@@ -133,16 +133,19 @@ def new_command(
     help: str,
     *,
     settings: str = "",
-    epilog: str = EXIT_CODES,
+    epilog: str = "",
     module: str = "",
     **changes: str | Mapping[str, Any],
 ) -> click.Command:
     """Make a command, whose work is `run_NAME` in a module of the name or another.
 
     Arguments are as the usage line has them, and options fields of `Options` in the order of the help; settings are
-    fields that no command line has. Changes are the helps of some options in this command, or all that is different of
-    them there.
+    fields that no command line has, that of large files with all commands that read CL files. Changes are the helps of
+    some options in this command, or all that is different of them there.
     """
+    reads_cl = "dialect" in options.split()
+    settings += " no_size_limit" * reads_cl
+    epilog = epilog or (EXIT_CODES_OF_READERS if reads_cl else EXIT_CODES)
     params: list[click.Parameter] = []
     for metavar in arguments.split():
         field, more = _ARGUMENTS[metavar]

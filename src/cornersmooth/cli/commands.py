@@ -92,7 +92,6 @@ VERIFY = new_command(
       cornersmooth verify part.cls part.ngc -e 0.04 --control linuxcnc
       cornersmooth verify part.cls part.nc -e 0.04 --report found.html
     """,
-    settings="no_size_limit",
     epilog="Exit codes: 0 PASSED or INCOMPLETE; 1 FAILED or NOT VERIFIED, and INCOMPLETE under --strict; "
     "2 wrong usage or configuration; 3 an input cannot be read or is not valid; 4 output cannot be written.",
     strict="Take no verdict but PASSED: else 1 is returned.",
@@ -123,7 +122,6 @@ SURFACE = new_command(
       cornersmooth surface part.cls part.nc --tool 10,5 --report map.html
       cornersmooth surface part.cls part.nc --tool 12,0,3 --report points.csv
     """,
-    settings="no_size_limit",
     epilog="Exit codes: 0 the surface is within the tolerance; 1 it is not; 2 wrong usage or configuration; 3 an input "
     "cannot be read or is not valid; 4 output cannot be written.",
     reports="Write what was found: .json, .csv for a row per point, .html for a page to look at. May be repeated.",
@@ -150,8 +148,6 @@ COMPARE = new_command(
       cornersmooth compare part.cls --control linuxcnc --machine xyzac-trt -v
       cornersmooth compare part.ngc --control linuxcnc --machine xyzac-trt
     """,
-    settings="no_size_limit",
-    epilog=EXIT_CODES_OF_READERS,
 )
 
 TIME = new_command(
@@ -177,8 +173,6 @@ TIME = new_command(
       cornersmooth time part.cls --text part.nc --block-time 1ms --look-ahead 200
       cornersmooth time part.ngc --control linuxcnc --machine xyzac-trt
     """,
-    settings="no_size_limit",
-    epilog=EXIT_CODES_OF_READERS,
     feed=FEED_OF_ALL,
     block_time="Shortest time that the control takes for one block, of lines to write and in the plan. [default: that "
     "of the control's table for lines, none in the plan]",
@@ -203,8 +197,6 @@ SETUP = new_command(
       cornersmooth setup part.cls --limits mill.toml --control siemens
       cornersmooth setup part.cls --limits table-ac --tilt 20 --json
     """,
-    settings="no_size_limit",
-    epilog=EXIT_CODES_OF_READERS,
     feed=FEED_OF_ALL,
     limits={
         "heading": "Everyday",
@@ -231,8 +223,6 @@ INFO = new_command(
       cornersmooth info part.ncl -e 0.05 -H 25
       cornersmooth info part.cls --json > part.json
     """,
-    settings="no_size_limit",
-    epilog=EXIT_CODES_OF_READERS,
 )
 
 CONTROLS = new_command(
