@@ -14,8 +14,9 @@ from cornersmooth.nc.form import Form
 from cornersmooth.nc.rotary_rows import INVERSE_TIME_DECIMALS
 from cornersmooth.text import format_number
 
-_FIGURES: Final = 4  #: figures of a planned feed, and the part of the programmed one from which on it is that
-_ALL_BUT: Final = 0.999
+#: figures of a planned feed: the fifth changes the time of a block by less than 0.1 %
+_FIGURES: Final = 4
+_ALL_BUT: Final = 0.999  #: part of the programmed feed from which on it is that one: fewer words, 0.1 % of the time
 _FEED: Final = re.compile(rb" ?F(\d+\.?\d*|\.\d+)$")  #: feed word at the end of a line, with its number
 
 

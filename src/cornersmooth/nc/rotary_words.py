@@ -59,9 +59,6 @@ def rotary_way(rows: Rows, smoothed: SmoothProgram, form: Form, findings: Findin
     program, settings, machine = smoothed.program, smoothed.settings, machine_of(form).with_longest_tool()
     tip, axis, move = rows.tip, rows.other, rows.move
     tolerance = form.rotary_tolerance(settings.tolerance, settings.axis_scale)
-    if not len(move):
-        none = np.zeros(0, np.bool_)
-        return RotaryWay(tip, axis, move, np.zeros((0, 2)), none, none, tolerance)
     rapid, file = rapid_moves(program.kind)[move], program.source.name
     _check_reach(machine, program, axis, move, tolerance)
     how: dict[str, Any] = {"tolerance": tolerance, "rapid": rapid, "line": program.line[move], "file": file}

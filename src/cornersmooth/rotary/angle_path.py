@@ -218,7 +218,7 @@ class _Steady:
         try:
             branch, turns = choose(stretches, machine.limits)
         except NoChoiceError as stuck:
-            if divide and len(left := self._left(stretches, stuck.stretch, begins, way)):
+            if divide and (left := self._left(stretches, stuck, begins, way)):
                 raise CutTooFarError(steady[left]) from None
             raise self._error(stuck, stretch, way) from stuck
         angles = np.empty((len(steady), 2))
@@ -236,18 +236,17 @@ class _Steady:
         low[row], high[row] = np.minimum(low[row], way.low[own]), np.maximum(high[row], way.high[own])
         return low, high
 
-    def _left(self, stretches: Stretches, stuck: int, begins: Ints, way: WideSteps) -> Ints:
-        """Rows after which cuts are left: in stretches that fit in no turn, else ahead of the pole before one."""
-        ends, left = np.append(begins[1:], len(self.unwrapped)), list[int]()
-        for number in too_far(stretches, self.machine.limits).tolist():
+    def _left(self, stretches: Stretches, stuck: NoChoiceError, begins: Ints, way: WideSteps) -> list[int]:
+        """Rows after which cuts are left: in the one that is stuck, and in all that fit in no turn; none if no use."""
+        ends, limits, left = np.append(begins[1:], len(self.unwrapped)), self.machine.limits, list[int]()
+        for number in np.union1d(too_far(stretches, limits), stuck.stretch).tolist():
             members = np.arange(begins[number], ends[number])
-            rows = parts_of_cut(self.unwrapped[members], *self._extremes(members, way), self.machine.limits)
-            if not rows:
-                return members[:0]
+            states = stuck.states if number == stuck.stretch else None
+            rows = parts_of_cut(self.unwrapped[members], *self._extremes(members, way), limits, states)
+            if rows is None:
+                return []
             left += members[rows].tolist()
-        if not left and not (stretches.free[stuck - 1] and begins[stuck] - begins[stuck - 1] == 1):  # left already
-            left.append(begins[stuck] - 1)
-        return np.array(left, np.int64)
+        return left
 
     def _error(self, stuck: NoChoiceError, stretch: NDArray[np.int32], way: WideSteps) -> InputError:
         """Message for the pose that no choice gets beyond."""

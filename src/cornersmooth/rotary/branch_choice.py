@@ -195,19 +195,32 @@ def too_far(stretches: Stretches, limits: Floats) -> Ints:
     return np.flatnonzero((fewest > most).any(axis=2).min(axis=1))
 
 
-def parts_of_cut(angles: Floats, low: Floats, high: Floats, limits: Floats) -> list[int]:
-    """Rows of a stretch after which the cut is left, so that all parts of it are inside the limits: as few as can be.
+def parts_of_cut(angles: Floats, low: Floats, high: Floats, limits: Floats, states: Ints | None = None) -> Ints | None:
+    """Rows (k,) of a stretch after which the cut is left, so that all parts are inside the limits: as few as can be.
 
-    None where a single move leaves the limits. Angles (m, 2, 2) are ``[row, branch, axis]`` in degrees, unwrapped: at
-    each row, and extremes on the way into it.
+    None where a single move, or the way in, leaves the limits. Angles (m, 2, 2) are ``[row, branch, axis]`` in degrees,
+    unwrapped: at each row, and extremes on the way into it. The stretch is entered in some `states` of `NoChoiceError`.
     """
     begin, left = 0, list[int]()
-    while begin + (reached := _farthest(angles[begin:], low[begin:], high[begin:], limits)) < len(angles):
+    while True:
+        reached = _farthest(angles[begin:], low[begin:], high[begin:], limits)
+        if states is not None and not left:
+            reached = max(
+                _first_outside(low[:, own] + 360 * turns, high[:, own] + 360 * turns, limits)
+                for own, turns in zip(states[:, 0], states[:, 1:], strict=True)
+            )
+        if begin + reached == len(angles):
+            return np.array(left, np.int64)
         if reached < 1 + bool(left):
-            return []
+            return None
         begin += reached - 1
         left.append(begin)
-    return left
+
+
+def _first_outside(low: Floats, high: Floats, limits: Floats) -> int:
+    """First row (m, 2) outside of the limits; the number of rows where none is."""
+    beyond = np.maximum(limits[:, 0] - low, high - limits[:, 1]).max(axis=1) > LIMIT_SLACK
+    return int(np.argmax(beyond)) if beyond.any() else len(low)
 
 
 def _farthest(angles: Floats, low: Floats, high: Floats, limits: Floats) -> int:
