@@ -14,7 +14,7 @@ import pytest
 
 import cornersmooth as cs
 from cornersmooth.control.program import Text
-from cornersmooth.control.rows import Rows
+from cornersmooth.control.state import Rows
 from cornersmooth.filter.runs import ProgramReader
 from cornersmooth.nc_reader import read_nc
 

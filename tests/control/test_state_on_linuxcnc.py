@@ -13,8 +13,7 @@ import pytest
 
 import cornersmooth as cs
 from cornersmooth.control.program import Text
-from cornersmooth.control.rows import Rows
-from cornersmooth.control.state import State
+from cornersmooth.control.state import Rows, State
 from cornersmooth.filter.runs import ProgramReader
 from filter.foreign import CANON, PYTHON
 from filter.test_filter_by_foreign_readers import THREE_AXES, seeded

@@ -12,11 +12,9 @@ import pytest
 import cornersmooth as cs
 from cornersmooth.control import word_tables
 from cornersmooth.control.listing import listing
-from cornersmooth.control.program import Act, Text
-from cornersmooth.control.rows import Rows
-from cornersmooth.control.state import State
+from cornersmooth.control.program import Act, Text, execute
+from cornersmooth.control.state import Rows, State
 from cornersmooth.control.table import UNKNOWN, UNLISTED, Row, table_of
-from cornersmooth.control.unread import execute
 from cornersmooth.control.word_tables import CONTROLS
 from cornersmooth.errors import InputError
 from cornersmooth.filter.runs import ProgramReader

@@ -11,8 +11,7 @@ from collections.abc import Iterator, Mapping
 from typing import Final
 
 from cornersmooth.control.program import Act, Stream
-from cornersmooth.control.rows import Rows
-from cornersmooth.control.state import State
+from cornersmooth.control.state import Rows, State
 from cornersmooth.control.table import FRAME
 
 #: columns of a block

@@ -1,7 +1,11 @@
-"""A whole program as a stream: runs of motion blocks, and other lines one by one, each with the state around it."""
+"""A whole program as a stream: runs of motion blocks, and other lines one by one, each with the state around it.
+
+Lines that no lexer knows have variables, jumps, or paths of a kind that is not known.
+"""
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -12,11 +16,11 @@ import numpy as np
 
 from cornersmooth.control.lexer import Lexer
 from cornersmooth.control.line_patterns import LinePatterns, Lines
-from cornersmooth.control.rows import Rows, execute_rows
 from cornersmooth.control.source import CHUNK
-from cornersmooth.control.state import State
-from cornersmooth.control.table import FRAME
-from cornersmooth.control.unread import execute
+from cornersmooth.control.state import CUTS, Rows, State, execute_rows
+from cornersmooth.control.table import FRAME, UNKNOWN
+from cornersmooth.control.words import Line, Word
+from cornersmooth.errors import InputError
 from cornersmooth.model import Bools, Ints
 
 #: lines before the first block: they name the program
@@ -35,6 +39,27 @@ _COMPUTED: Final = re.compile(rb"(?i)GOTO[BFCS]?\s*[^\d\s]|M[ \t]*0*9[6-9][^\n]*
 
 #: the end of a program, or a block with a G word; words of a language are no block
 _BLOCK: Final = re.compile(rb"(?im)\bM(?:0?2|30)\b|^[ \t]*(?:N\d+[ \t]*)?G\d(?![^\n(;]*[A-Z]{2,} [A-Z]{2,})")
+
+
+#: a value for a variable, which is no axis and no word of its own
+_ASSIGNMENT: Final = re.compile(r"(#|Q[LRS]?\d+\s*=|(R\d*|[A-Z_]{2,}\w*)(\[[^]]*\])?\s*=(?!=)|DEF\s|FN ?[0-8] ?:)")
+#: what a value is made of, and a word that stands beside it
+_IN_VALUE: Final = re.compile(r"\[[^][]*\]|\([^()]*\)|\"[^\"]*\"|<[^>]*>|[RQ][LRS]?\d+|[A-Z_]{2,}\w*")
+_WORD_BESIDE: Final = re.compile(r"[A-Z]\s*[-+.\d#\[=]")
+#: a word whose number is worked out by the control
+_WORKED_OUT: Final = re.compile(
+    r"([A-Z]+\d*)\s*=?\s*[-+]?(?:#(?:<[^>]*>|\d+|\[[^]]*\])|\[[^]]*\]|Q[LRS]?\d+|"
+    r"(?<==)\"[^\"]*\"|(?<==)(?:AC|IC|DC|ACP|ACN)\([^()]*\)|(?<==)[A-Z_$][^\s]*)"
+)
+#: a chamfer or a round corner at the end of a block: it changes neither groups nor the end of the next block
+_CORNER: Final = re.compile(r",\s*[RC]\s*[\d.]+")
+#: words that change no group, whatever their number
+_NUMBERS: Final = frozenset("XYZABCFSQRP")
+#: jumps, loops and labels, which are no words
+_FLOW: Final = re.compile(r"(IF|ELSE|WHILE|DO|END|GOTO|FOR|LOOP|REPEAT|UNTIL|CASE|O\s*[\d<])|[A-Z_]\w*:")
+_HEAD: Final = re.compile(r"/?\d?\s*(N?\d+\s+|N\d+)?\s*")
+_KLARTEXT_PATH: Final = re.compile(r"LN? ")
+_KLARTEXT_WORDS: Final = re.compile(r"\b(?:M\d+|R[0LR])\b")
 
 
 @dataclass
@@ -165,3 +190,60 @@ def _begin(text: Text) -> int:
             return int(np.searchsorted(text.start, match.start(), side="right")) - 1
         break
     return 0
+
+
+def execute(state: State, text: bytes, lexer: Lexer) -> str:
+    """Execute a line that is no plain motion block; say why it is left as it is where it cuts, else nothing."""
+    line = _line_of(text, lexer)
+    if line is None or (line.words and line.words[0].name == "DEF"):  # a variable of Siemens, with its name as a word
+        plain, before = lexer.comment.sub(" ", text.upper().decode("latin-1")).strip(), state.copy()
+        why = _execute_unread(state, _HEAD.sub("", plain, count=1), lexer)
+        if plain.startswith("/"):  # the operator chooses
+            state.or_not(before)
+        return why
+    cuts = state.execute(line)
+    state.lose_place(word.name for word in line.words if lexer.without_point(word))  # in which unit is not known
+    if not cuts:
+        return ""
+    return "the operator may skip the block" if line.skipped else "other words in the block"
+
+
+def _line_of(text: bytes, lexer: Lexer) -> Line | None:
+    """Words of a line; None where the lexer does not know them."""
+    try:
+        return lexer.line(text, 0, None)
+    except InputError:
+        return None
+
+
+def _execute_unread(state: State, plain: str, lexer: Lexer) -> str:
+    """Execute a line that the lexer does not know; say why it cuts in a way that is not known, else nothing."""
+    if _ASSIGNMENT.match(plain) and "FRAME" not in plain and not _word_beside(plain):
+        state.lose_place()
+        return ""
+    lost, bare = {match[1] for match in _WORKED_OUT.finditer(plain)}, _CORNER.sub(" ", _WORKED_OUT.sub(" ", plain))
+    line = _line_of(bare.encode("latin-1"), lexer) if bare != plain else None
+    if line is None and state.table.row(plain) is not UNKNOWN:
+        line = Line(0, (Word("block", 0.0, plain),))
+    elif line is None and _KLARTEXT_PATH.match(plain) and "RAPID" in state.table.named:
+        for word in _KLARTEXT_WORDS.findall(plain):
+            state.execute(lexer.line(f"L {word}".encode(), 0, None))
+        state.lose_place()
+        state.groups["motion"], state.feed = None, math.nan
+        return "words that are not known"
+    if line is None or {"G", "M"} & lost or (lost and line.words and line.words[0].name == "block"):
+        state.lose_all(frames=not _FLOW.match(plain))
+        return ""
+    state.execute(line)
+    state.lose_place(None if lost - _NUMBERS - {*state.axes} else lost)
+    if "F" in lost:
+        state.feed = math.nan
+    return "words that the control works out" if state.groups["motion"] in CUTS else ""
+
+
+def _word_beside(plain: str) -> bool:
+    """Whether beside a value for a variable there are words of a block."""
+    rest, count = plain.partition("=")[2], 1
+    while count:
+        rest, count = _IN_VALUE.subn("", rest)
+    return _WORD_BESIDE.search(rest) is not None

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from cornersmooth.arrays import joined_rows
 from cornersmooth.control.program import Act, Stream, Text
-from cornersmooth.control.rows import Rows
-from cornersmooth.control.state import State
+from cornersmooth.control.state import Rows, State
 from cornersmooth.control.table import FRAME, PRESET, table_of
 from cornersmooth.control.word_tables import CONTROLS
 from cornersmooth.kinematics import Machine
