@@ -16,12 +16,11 @@ import numpy as np
 
 from cornersmooth.control.lexer import Lexer
 from cornersmooth.control.line_patterns import LinePatterns, Lines
-from cornersmooth.control.source import CHUNK
 from cornersmooth.control.state import CUTS, Rows, State, execute_rows
 from cornersmooth.control.table import FRAME, UNKNOWN
 from cornersmooth.control.words import Line, Word
 from cornersmooth.errors import InputError
-from cornersmooth.model import Bools, Ints
+from cornersmooth.model import Ints
 
 #: lines before the first block: they name the program
 _TITLE: Final = re.compile(r"(?i)(%.*|[O:]\s*(\d+|<[^>]*>|[A-Z][^#\[(]*))")
@@ -108,63 +107,49 @@ class Stream:
 
     def __init__(self, text: Text, lexer: Lexer, state: State, *, weak_feed: bool = False) -> None:
         self.text, self._lexer, self._weak_feed = text, lexer, weak_feed
-        self._chunks = list(self._read())
+        self._first = first = _begin(text)
+        written = text.lines(first, len(text)).removeprefix(_MARK if first == 0 else b"")
+        written += b"" if written.endswith(b"\n") else b"\n"
+        #: lines from the first on, and which of them are plain motion blocks: these have no words of other kinds
+        self._lines = lines = Lines.of(lexer.unfolded(written), LinePatterns(lexer))
+        self._plain = lines.bulk().copy()
+        if b"~" in written:
+            self._plain[[k for k, line in enumerate(written.split(b"\n")) if b"~" in line]] = False
         #: lines that are no plain motion blocks, with their numbers from 0
-        self.others = [
-            (first + k, lines.line(k)) for first, lines, bulk in self._chunks for k in np.flatnonzero(~bulk).tolist()
-        ]
+        self.others = [(first + k, lines.line(k)) for k in np.flatnonzero(~self._plain).tolist()]
         self._targets = _targets(text, [line for _, line in self.others])
-        lines = b"\n".join(line for _, line in self.others).decode("latin-1").upper()
-        named = {group for group, words in state.table.frame_words.items() if words.search(lines)}
+        self._plain[[number - first for number in self._targets if number >= first]] = False
+        words = b"\n".join(line for _, line in self.others).decode("latin-1").upper()
+        named = {group for group, pattern in state.table.frame_words.items() if pattern.search(words)}
         self._state = replace(
             state, unnamed=frozenset(group for group in state.groups if group.startswith(FRAME)) - named
         )
 
     def __iter__(self) -> Iterator[Rows | Act]:
         """Execute the program; each item has the state before it, and after it. Nothing changes them any more."""
-        state, started = self._state, False
-        for first, lines, bulk in self._chunks:
-            plain = bulk.copy()
-            plain[[number - first for number in self._targets if first <= number < first + len(bulk)]] = False
-            columns = lines.columns(np.flatnonzero(plain)) if plain.any() else {}
-            count = np.concatenate(([0], np.cumsum(plain)))
-            for a, b in pairwise(np.flatnonzero(np.diff(plain, prepend=~plain[0], append=~plain[-1])).tolist()):
-                if plain[a]:
-                    own = {key: one[count[a] : count[b]] for key, one in columns.items()}
-                    rows = execute_rows(state, first + a, own, weak_feed=self._weak(state, first + a, first + b))
-                    started, state = True, rows.after(b - a)
-                    yield rows
-                    continue
-                for k in range(a, b):
-                    block = self._lexer.comment.sub("", lines.line(k).decode("latin-1")).strip()
-                    if block and (started or not _TITLE.fullmatch(block)):
-                        started, before, state = True, state, state.copy()
-                        if first + k in self._targets:  # who jumps here may come from anywhere
-                            state.lose_all()
-                        cuts = execute(state, lines.line(k), self._lexer)
-                        yield Act(first + k, lines.line(k), before, state, cuts)
+        state, started, lines, plain, first = self._state, False, self._lines, self._plain, self._first
+        columns = lines.columns(np.flatnonzero(plain)) if plain.any() else {}
+        count = np.concatenate(([0], np.cumsum(plain)))
+        for a, b in pairwise(np.flatnonzero(np.diff(plain, prepend=~plain[0], append=~plain[-1])).tolist()):
+            if plain[a]:
+                own = {key: one[count[a] : count[b]] for key, one in columns.items()}
+                rows = execute_rows(state, first + a, own, weak_feed=self._weak(state, first + a, first + b))
+                started, state = True, rows.after(b - a)
+                yield rows
+                continue
+            for k in range(a, b):
+                block = self._lexer.comment.sub("", lines.line(k).decode("latin-1")).strip()
+                if block and (started or not _TITLE.fullmatch(block)):
+                    started, before, state = True, state, state.copy()
+                    if first + k in self._targets:  # who jumps here may come from anywhere
+                        state.lose_all()
+                    cuts = execute(state, lines.line(k), self._lexer)
+                    yield Act(first + k, lines.line(k), before, state, cuts)
 
     def _weak(self, state: State, first: int, stop: int) -> bool:
         """Whether feeds of some lines are written so that the control may count them in another unit."""
         inch = self._weak_feed and state.unit != 1.0
         return inch and _WEAK_FEED.search(self.text.lines(first, stop)) is not None
-
-    def _read(self) -> Iterator[tuple[int, Lines, Bools]]:
-        """Lines from a number on, and which of them are plain motion blocks: these have no words of other kinds."""
-        text, patterns, first = self.text, LinePatterns(self._lexer), _begin(self.text)
-        while first < len(text):
-            stop = int(np.searchsorted(text.start, text.start[first] + CHUNK))
-            stop = min(max(stop, first + 1), len(text))
-            while stop < len(text) and text.lines(stop - 1, stop).rstrip().endswith(b"~"):
-                stop += 1
-            chunk = text.lines(first, stop).removeprefix(_MARK if first == 0 else b"")
-            chunk = chunk if chunk.endswith(b"\n") else chunk + b"\n"
-            lines = Lines.of(self._lexer.unfolded(chunk), patterns)
-            bulk = lines.bulk().copy()
-            if b"~" in chunk:
-                bulk[[k for k in range(stop - first) if b"~" in text.lines(first + k, first + k + 1)]] = False
-            yield first, lines, bulk
-            first = stop
 
 
 def _targets(text: Text, others: Sequence[bytes]) -> set[int]:

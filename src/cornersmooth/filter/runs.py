@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.arrays import joined_rows
-from cornersmooth.control.program import Act, Stream, Text
+from cornersmooth.control.program import Stream, Text
 from cornersmooth.control.state import Rows, State
 from cornersmooth.control.table import FRAME, PRESET, table_of
 from cornersmooth.control.word_tables import CONTROLS
@@ -192,7 +191,7 @@ class ProgramReader:
         still: dict[str, float] = dict.fromkeys(found.absent if self.wanted == ANY else (), 0.0)
         stream, stops_left, last, cause = self.stream(found), sorted(set(stops), reverse=True), self._first, ""
         corners = _near([number for number, line in stream.others if _CORNER_WORDS.search(line)], len(found))
-        for item in _joined(stream):
+        for item in stream:
             first, count = (item.first, len(item)) if isinstance(item, Rows) else (item.line, 1)
             if isinstance(item, Rows):
                 self._take_rows(found, _with_places(item, still) if still else item, corners, cause)
@@ -289,27 +288,6 @@ class ProgramReader:
         if groups["compensation"] != "OFF":
             return "the radius of the cutter is taken account of"
         return "feed per revolution (G95)" if groups["feed"] == "revolution" else ""
-
-
-def _joined(stream: Iterable[Rows | Act]) -> Iterator[Rows | Act]:
-    """Items of a stream, which is read in chunks; motion blocks on neighbouring lines are one item."""
-    near: list[Rows] = []
-    for item in stream:
-        if near and not (isinstance(item, Rows) and item.first == near[-1].first + len(near[-1])):
-            yield _one(near)
-            near = []
-        if isinstance(item, Rows):
-            near.append(item)
-        else:
-            yield item
-    if near:
-        yield _one(near)
-
-
-def _one(rows: Sequence[Rows]) -> Rows:
-    """Motion blocks that follow one another as one item."""
-    place = np.concatenate([rows[0].place[:1], *(one.place[1:] for one in rows)])
-    return replace(joined_rows(rows), place=place)
 
 
 def _with_places(rows: Rows, still: dict[str, float]) -> Rows:
