@@ -250,16 +250,8 @@ class Row:
         return self.compared and (self.high or self.after is not None)
 
 
-#: names of rules
-_RULES: Final = frozenset(one.name for one in fields(Row)) - {
-    "effects",
-    "sets",
-    "does",
-    "beside",
-    "more",
-    "pattern",
-    "says",
-}
+#: names of rules: the fields behind those of effects
+_RULES: Final = frozenset(one.name for one in fields(Row)[5:]) - {"pattern", "says"}
 
 
 #: what a word without a row does
@@ -273,7 +265,6 @@ UNLISTED: Final = Row()
 class Table:
     """The rows of a control."""
 
-    control: str
     named: Mapping[str, Row]  #: of words by their names
     patterns: tuple[tuple[re.Pattern[str], Row], ...]  #: of words by a pattern, in order
     listed: tuple[Row, ...]  #: of words that verification accepts; what is the control's own comes first
@@ -330,11 +321,8 @@ def _sign(name: str) -> str:
 @cache
 def table_of(control: str) -> Table:
     """The table of a control, one of `CONTROLS`."""
-    listed: dict[tuple[str, re.Pattern[str] | None], Row] = {}
-    named: dict[str, Row] = {}
-    patterns: list[tuple[re.Pattern[str], Row]] = []
-    blocks: list[Row] = []
-    positions: list[Row] = []
+    named, patterns = dict[str, Row](), list[tuple[re.Pattern[str], Row]]()
+    listed, blocks, positions = list[Row](), list[Row](), list[Row]()
     for word, text in word_table(control)["words"].items():
         if not text:
             continue
@@ -343,8 +331,7 @@ def table_of(control: str) -> Table:
             (positions if row.positions else blocks).append(row)
             continue
         is_listed = row.pattern is not UNLISTED.pattern
-        for one in (row, *letters) if is_listed else ():
-            listed.setdefault((one.pattern.pattern, one.needs), one)
+        listed += [row, *letters] if is_listed else []
         if not row.sets and not row.does:
             continue
         if word[0] == "/":
@@ -360,8 +347,8 @@ def table_of(control: str) -> Table:
             if group == "motion" and value is not None:
                 arguments[value] = arguments.get(value, frozenset()) | row.beside
     groups = sorted({group for row in rows for group, _ in row.sets})
-    lists = tuple(listed.values()), tuple(blocks), tuple(positions)
-    return Table(control, named, tuple(patterns), *lists, tuple(groups), arguments)
+    lists = tuple(listed), tuple(blocks), tuple(positions), tuple(groups)
+    return Table(named, tuple(patterns), *lists, arguments)
 
 
 def any_of(pattern: re.Pattern[str], words: Iterable[str]) -> bool:
