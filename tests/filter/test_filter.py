@@ -184,8 +184,7 @@ def test_what_is_jumped_to_is_left(jump: str) -> None:
     assert "".join(lines[11:]).encode() in found.data
 
 
-def test_a_jump_back_into_a_piece_that_was_read_before_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cornersmooth.control.program.CHUNK", 200)
+def test_a_jump_back_is_seen_before_its_line() -> None:
     lines = [f"N{k} {line}\n" for k, line in enumerate(RUN.splitlines(), start=1)]
     text = ISO.format(on="G43.4 H1", start="A20. C30.", cuts="".join(lines)).replace("M30", "IF [#1 EQ 1] GOTO 5\nM30")
     reading = ProgramReader("fanuc", cs.load_machine("table-ac")).read(text.encode())

@@ -191,16 +191,10 @@ class Parts:
             return ""
         first = _alike(found, wanted)
         behind = len(found) - _alike(found[first:][::-1], wanted[first:][::-1])
-        if len(found) == len(wanted):
-            return _changed(parts[first].first, parts[behind - 1].last)
-        # parts are gone, or new
         low = parts[first - 1].last if first else 1
-        high = parts[behind].first if behind < len(parts) else parts[-1].last if parts else low
-        return _changed(low, high)
-
-
-def _changed(low: int, high: int) -> str:
-    return f"lines {low} to {high}, which were changed since the program was written"
+        gone = len(found) < len(wanted) and behind < len(found)
+        high = parts[behind].first if gone else parts[behind - 1].last if parts else low
+        return f"lines {low} to {high}, which were changed since the program was written"
 
 
 def _alike(digests: Sequence[str], others: Sequence[str]) -> int:
