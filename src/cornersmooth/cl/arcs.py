@@ -97,28 +97,37 @@ def read_arc(record: Record, file: str, rule: ArcRule | None, decimals: int) -> 
     if not fits:
         raise error("CS120", file, record.line, word=record.word, count=count, s="s"[: count != 1], want=wanted)
     length = math.hypot(*values[3:6])
-    if not abs(length - 1) <= NORMAL_TOLERANCE:
-        raise error("CS124", file, record.line, word=record.word, length=length)
+    check_normal(length, record, file)
     radius = values[6] if count > 6 else math.nan
     if radius <= 0:
         raise error("CS125", file, record.line, word=record.word, radius=radius)
     if not (1 <= turns <= MOST_TURNS and turns == int(turns)):
         raise error("CS127", file, record.line, word="CIRCLE", value=turns, limit=MOST_TURNS)
-    if not math.isnan(sweep) and not 0 < sweep <= 2 * math.pi * MOST_TURNS:
-        raise error("CS127", file, record.line, word="MOVARC", value=sweep / (2 * math.pi), limit=MOST_TURNS)
+    check_sweep(sweep, record, file)
     left = rule == "left" if rule in ("left", "right") else count >= 11
     sign = -1 / length if left else 1 / length
-    printed = max(len(number.partition(".")[2].strip()) for number in record.text.partition("/")[2].split(",")[:3])
-    return Arc(
-        record.line,
-        record.word,
-        (values[0], values[1], values[2]),
-        (sign * values[3], sign * values[4], sign * values[5]),
-        radius,
-        int(turns),
-        sweep,
-        10.0 ** -max(printed, decimals, LEAST_DECIMALS),
-    )
+    x, y, z, i, j, k = values[:6]
+    normal = sign * i, sign * j, sign * k
+    resolution = resolution_of(record.text.partition("/")[2], decimals)
+    return Arc(record.line, record.word, (x, y, z), normal, radius, int(turns), sweep, resolution)
+
+
+def check_normal(length: float, record: Record, file: str) -> None:
+    """Refuse a normal that is no unit vector (InputError CS124)."""
+    if not abs(length - 1) <= NORMAL_TOLERANCE:
+        raise error("CS124", file, record.line, word=record.word, length=length)
+
+
+def check_sweep(sweep: float, record: Record, file: str) -> None:
+    """Refuse a stated sweep, rad, that no arc has (InputError CS127); NaN is none."""
+    if not math.isnan(sweep) and not 0 < sweep <= 2 * math.pi * MOST_TURNS:
+        raise error("CS127", file, record.line, word=record.word, value=sweep / (2 * math.pi), limit=MOST_TURNS)
+
+
+def resolution_of(text: str, decimals: int) -> float:
+    """Step of the coordinates that a statement begins with; the dialect prints so many decimals at most."""
+    printed = max(len(token.partition(".")[2].strip()) for token in text.split(",")[:3])
+    return float(10.0 ** -max(printed, decimals, LEAST_DECIMALS))
 
 
 def resolve(

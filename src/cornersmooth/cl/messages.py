@@ -17,6 +17,7 @@ ERRORS: Final[dict[str, tuple[str, str]]] = {
     "CS102": ("is a binary file", "write the CL data in readable form: NX .cls, CATIA .aptsource, Creo .ncl, ..."),
     "CS103": ("is not a complete gzip file: {why}", "compress it again"),
     "CS206": ("not read: {what}", "{hint}"),
+    "CS169": ("operation {name} begins {how}", "write it together with the operation before it"),
     "CS199": ("holds more than {limit}", "divide it; CORNERSMOOTH_NO_SIZE_LIMIT=1 reads it all the same"),
     # statements
     "CS104": ("{word} ends in a continuation sign but {next} follows", "complete the statement or remove the $"),
@@ -136,6 +137,7 @@ FINDINGS: Final[dict[str, tuple[Severity, str]]] = {
     "CS195": ("note", "lines of numbers alone are further points of the GOTO before them"),
     "CS194": ("warning", "RETRCT beyond the clearance plane: ignored"),
     "CS180": ("warning", "the feeds are in {feeds} per minute, the positions are read in {units} as asked for"),
+    "CS178": ("warning", "not in this program: {words} of the operations before, which may hold on"),
     # tables of points
     "CS170": ("note", "no columns for the tool axis: +Z is used"),
     "CS171": ("note", "second points are {mean:.6g} mm from the tips: only their direction is used"),

@@ -19,7 +19,6 @@ from cornersmooth.cl.reader_state import ReaderState
 from cornersmooth.cl.state_statements import Handler
 from cornersmooth.cl.surfaces import read_drive_arc, read_helix
 from cornersmooth.cl.words import GOTO_WORDS
-from cornersmooth.errors import InputError
 from cornersmooth.model import MM_PER_UNIT, Floats, Ints, Move
 
 #: X1,Y2,Z3 or X1,Y2,Z3,I0,J0,K1, separated by commas or blanks
@@ -82,20 +81,22 @@ def _gohome(state: ReaderState, record: Record) -> None:
 
 def _retract(state: ReaderState, record: Record) -> None:
     """RETRCT: along the tool axis until the tip rests on the clearance surface (ICAM, The RETRCT Command)."""
-    if record.args:
-        raise _no_retract(state, record, f"its option {joined(record.args)} is not understood", "write RETRCT alone")
     if state.hole:
         raise state.fail("CS181", record)
-    if not state.n:
-        raise _no_retract(state, record, "it is before the first position", "put a GOTO before it")
-    if state.clearance is None:
-        raise _no_retract(state, record, "no clearance plane is known", "put CLEARP/XYPLAN,z before it")
+    for refused, why, want in (
+        (record.args, f"its option {joined(record.args)} is not understood", "write RETRCT alone"),
+        (not state.n, "it is before the first position", "put a GOTO before it"),
+        (state.clearance is None, "no clearance plane is known", "put CLEARP/XYPLAN,z before it"),
+    ):
+        if refused:
+            raise state.fail("CS193", record, why=why, want=want)
+    assert state.clearance is not None
     tip, axis = state.last_tip(), state.last_axis
     normal, point = state.clearance
     normal = normal or axis
     slope = sum(a * b for a, b in zip(normal, axis, strict=True))
     if not abs(slope) > _PARALLEL:
-        raise _no_retract(state, record, "the tool axis never meets the clearance plane", "write it as GOTO")
+        raise state.fail("CS193", record, why="the tool axis never meets the clearance plane", want="write it as GOTO")
     way = sum(n * (p - t) for n, p, t in zip(normal, point, tip, strict=True)) / slope
     if way < 0:
         state.note("CS194", record.line)
@@ -103,10 +104,6 @@ def _retract(state: ReaderState, record: Record) -> None:
         return
     x, y, z = (t + way * a for t, a in zip(tip, axis, strict=True))
     state.add((x, y, z), state.held_axis(), record.line)
-
-
-def _no_retract(state: ReaderState, record: Record, why: str, want: str) -> InputError:
-    return state.fail("CS193", record, why=why, want=want)
 
 
 def _godlta(state: ReaderState, record: Record) -> None:
@@ -128,23 +125,21 @@ def _godlta(state: ReaderState, record: Record) -> None:
 
 def _check_curve(state: ReaderState, record: Record) -> None:
     """Refuse a curve from nowhere, and one among holes."""
-    if not state.n:
-        raise state.fail("CS122", record)
-    if state.hole:
-        raise state.fail("CS181", record)
+    if not state.n or state.hole:
+        raise state.fail("CS181" if state.n else "CS122", record)
+
+
+def _begin_arc(state: ReaderState, record: Record, arc: Arc) -> None:
+    """Let an arc wait for its end, in the first coordinate system."""
+    system = state.system
+    state.arc = replace(arc, centre=system.point(arc.centre), normal=system.vector(arc.normal))
+    _at_feed(state, record)
 
 
 def _circle(state: ReaderState, record: Record) -> None:
     _check_curve(state, record)
     decimals = state.dialect.decimals if state.dialect.strips_zeros else 0
-    state.arc = _placed(state, read_arc(record, state.file, state.arc_rule, decimals))
-    _at_feed(state, record)
-
-
-def _placed(state: ReaderState, arc: Arc) -> Arc:
-    """Return the same arc in the first coordinate system."""
-    system = state.system
-    return replace(arc, centre=system.point(arc.centre), normal=system.vector(arc.normal))
+    _begin_arc(state, record, read_arc(record, state.file, state.arc_rule, decimals))
 
 
 def _direction(state: ReaderState, record: Record) -> None:
@@ -157,13 +152,9 @@ def _drive(state: ReaderState, record: Record) -> None:
     _check_curve(state, record)
     read = read_helix if record.word == "HELICAL" else read_drive_arc
     arc, end = read(record, state.last_tip(), state.direction, state.file)
-    state.arc, state.direction = _placed(state, arc), None
-    _at_feed(state, record)
+    _begin_arc(state, record, arc)
+    state.direction = None
     state.add(end, state.held_axis(), record.line)
-
-
-def _nothing(state: ReaderState, record: Record) -> None:
-    """AUTOPS and PSIS name the plane of the arc after them, which follows from the arc itself."""
 
 
 def _nurbs(state: ReaderState, record: Record) -> None:
@@ -291,14 +282,11 @@ HANDLERS: Final[dict[str, Handler]] = {
     "FROM": _from,
     "GOHOME": _gohome,
     "GODLTA": _godlta,
-    "CIRCLE": _circle,
-    "MOVARC": _circle,
-    "HELICAL": _drive,
-    "TLON,GOFWD": _drive,
-    "INDIRV": _direction,
-    "INDIRP": _direction,
-    "AUTOPS": _nothing,
-    "PSIS": _nothing,
+    **dict.fromkeys(("CIRCLE", "MOVARC"), _circle),
+    **dict.fromkeys(("HELICAL", "TLON,GOFWD"), _drive),
+    **dict.fromkeys(("INDIRV", "INDIRP"), _direction),
+    # the plane of the arc after them, which follows from the arc itself
+    **dict.fromkeys(("AUTOPS", "PSIS"), lambda state, record: None),
     "NURBS": _nurbs,
     "MOVNRB": _movnrb,
     "KNOT": _knot,

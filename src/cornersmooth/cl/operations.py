@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cornersmooth.arrays import some_poses
-from cornersmooth.errors import Finding, InputError, SettingsError
+from cornersmooth.cl.messages import error, finding
+from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.model import Move, Program, Statement
 from cornersmooth.statements.asked import Asking
 
@@ -42,20 +43,17 @@ _PASSING = frozenset(
 
 @dataclass(frozen=True)
 class Operation:
-    """A stretch of a CL file."""
+    """A stretch of a CL file: its lines, poses and statements."""
 
     number: int  #: from 1
     name: str  #: empty where the file gives none
     tool: int | None  #: Number of the tool that it begins with; None where none is loaded.
-    #: of its statements and poses
     first_line: int
-    last_line: int
-    #: its poses are those from `first` to before `stop`
+    last_line: int  #: included
     first: int
     stop: int
-    #: its statements, the latter not included
     first_statement: int
-    last_statement: int
+    last_statement: int  #: not included
 
     @property
     def called(self) -> str:
@@ -69,11 +67,12 @@ def find_operations(program: Program) -> tuple[Operation, ...]:
     moved = np.concatenate(([0], np.cumsum(program.kind != Move.FROM)))
     begins, names = zip(*_begins(program, moved.tolist()), strict=True)
     found: list[Operation] = []
+    poses = [*(statement.pose for statement in statements), len(program)]
     start, name, asking, taken = 0, "", Asking(program), 0
     for called, end in zip(names, (*begins[1:], len(statements)), strict=True):
         name = called or name
-        first = _pose(program, start) if start else 0
-        stop = _pose(program, end)
+        first = poses[start] if start else 0
+        stop = poses[end]
         if moved[stop] == moved[first]:
             continue
         first_move = int(np.searchsorted(moved, moved[first] + 1)) - 1
@@ -104,26 +103,14 @@ def one_operation(program: Program, which: str) -> Program:
     at_once = [statement for statement in statements if statement.pose <= first_move]
     lasting, unknown = _held(program.statements[: own.first_statement], at_once)
     if any(statement.word == "CUTCOM" for statement in lasting):
-        raise InputError(
-            "CS169",
-            f"operation {own.called} begins under cutter compensation",
-            "write it together with the operation before it",
-            file=program.source.name,
-            line=own.first_line,
-        )
+        raise error("CS169", program.source.name, own.first_line, name=own.called, how="under cutter compensation")
     if own.first and program.kind[own.first] == Move.ARC:
-        raise InputError(
-            "CS169",
-            f"operation {own.called} begins with an arc from the end of the operation before it",
-            "write both together",
-            file=program.source.name,
-            line=int(program.line[own.first]),
-        )
+        how = "with an arc from the end of the operation before it"
+        raise error("CS169", program.source.name, int(program.line[own.first]), name=own.called, how=how)
     findings = [one for one in program.findings if not one.line or own.first_line <= one.line <= own.last_line]
     if unknown:
         words = ", ".join(dict.fromkeys(statement.word for statement in unknown))
-        text = f"not in this program: {words} of the operations before, which may hold on"
-        findings.append(Finding("CS178", "warning", unknown[0].line, text, len(unknown)))
+        findings.append(finding("CS178", unknown[0].line, len(unknown), words=words))
     return replace(
         some_poses(program, own.first, own.stop),
         statements=tuple(
@@ -184,11 +171,6 @@ def _name(statement: Statement, several_parts: bool) -> str:
         if named := _NAMED_TEXT.match(text):
             return named[1]
     return ""
-
-
-def _pose(program: Program, statement: int) -> int:
-    """First pose after a statement."""
-    return program.statements[statement].pose if statement < len(program.statements) else len(program)
 
 
 def _chosen(program: Program, operations: Sequence[Operation], which: str) -> Operation:

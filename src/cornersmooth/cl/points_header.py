@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
 from cornersmooth.cl.messages import error
+from cornersmooth.errors import InputError
 from cornersmooth.model import Units
 
 #: what the second three columns hold; "values" leaves it to the numbers
@@ -116,17 +118,66 @@ def from_header(text: str, file: str, line: int, rotary: tuple[str, ...] = ()) -
 
     Raises InputError CS156 where the names leave tip or axis open, CS162 for unknown units, CS165 for a quaternion.
     """
+
+    def refuse(why: str) -> InputError:
+        return error("CS156", file, line, why=why)
+
     names = _split(text, r"[,;\t]") if re.search(r"[,;\t]", text) else _split(text, r"\s+")
     if len(names) < 3 or not _find(_TIPS, _plain(names)):
         names = _split(text, r"[,;\s]+")
     plain = _plain(names)
-    twice = sorted({name for name in plain if name and plain.count(name) > 1})
-    if twice:
-        raise error("CS156", file, line, why=f"{twice[0]!r} stands there twice")
+    if twice := sorted({name for name in plain if name and plain.count(name) > 1}):
+        raise refuse(f"{twice[0]!r} stands there twice")
     tip = _find(_TIPS, plain)
     if tip is None:
-        raise error("CS156", file, line, why=f"no x, y and z in {text.strip()[:60]!r}")
+        raise refuse(f"no x, y and z in {text.strip()[:60]!r}")
     left = [name if column not in tip else "" for column, name in enumerate(plain)]
+    second, meaning = _second(names, left, refuse)
+    feed = next((left.index(name) for name in _FEEDS if name in left), None)
+    rapid = next((left.index(name) for name in _RAPIDS if name in left), None)
+    angles = tuple(left.index(name.lower()) for name in rotary if name.lower() in left) if second is None else ()
+    angles = angles if len(angles) == len(rotary) else ()
+    degrees = tuple(_ANGLES[unit] for column in angles if (unit := _unit(names[column])) in _ANGLES)
+    if len(degrees) < len(angles):
+        raise refuse(f"{', '.join(sorted(rotary))} are angles without [deg] or [rad] behind their names")
+    used = {*tip, *(second or ()), *angles, feed, rapid}
+    rest = {c: name for c, name in enumerate(left) if name and c not in used and name not in _COUNTERS}
+    others = {*rest.values()}
+    unused = tuple(names[c].strip() for c in rest)
+    if second is None and not angles and not others <= _PASSES:
+        # an axis in a spelling we do not know must not become +Z in silence
+        more = "; angles of its rotary axes need --machine" if len(others & {"a", "b", "c"}) > 1 else ""
+        raise refuse(f"no tool axis in {', '.join(unused)}{more}")
+    axis = [left[c] for c in second or ()]
+    if scalar := _scalar(list(rest.values()), set(axis)):
+        raise error("CS165", file, line, names=", ".join((*axis, scalar)))
+    lengths = {*tip, *(second if second and meaning == "points" else ())}
+    found: dict[bool, set[tuple[Units, float]]] = {False: set(), True: set()}
+    for column in sorted(lengths) + ([] if feed is None else [feed]):
+        unit = _unit(names[column])
+        known = (_FEED_UNITS if column == feed else _LENGTHS).get(unit)
+        if unit and known is None:
+            raise error("CS162", file, line, column=names[column].strip(), unit=unit)
+        found[column == feed] |= {known} if known else set()
+    both = {units for units, _ in found[False] | found[True]}
+    if len(both) > 1 or len(found[False]) > 1:
+        raise refuse(f"{'mm and inch' if len(both) > 1 else 'two units'} in one header")
+    return Columns(
+        *(len(names), tip, second, meaning, feed, rapid),
+        rapid_as="word" if rapid is None else _RAPIDS[left[rapid]],
+        rapid_name="" if rapid is None else names[rapid].strip(),
+        passes=next((c for c, name in rest.items() if name in _PASSES), None),
+        unused=unused,
+        units=next(iter(both), None),
+        factor=next((factor for _, factor in found[False]), 1.0),
+        angles=angles,
+        degrees=degrees,
+        feed_factor=next((factor for _, factor in found[True]), None),
+    )
+
+
+def _second(names: list[str], left: list[str], refuse: Callable[[str], InputError]) -> tuple[Triple | None, Meaning]:
+    """Columns of the tool axis or of second points, and which of both they are."""
     spelled: dict[str, tuple[Triple, Meaning]] = {
         spelling: (found, meaning)
         for meaning, spellings in _SECOND.items()
@@ -137,58 +188,14 @@ def from_header(text: str, file: str, line: int, rotary: tuple[str, ...] = ()) -
     named = [found for spelling, found in spelled.items() if len(surely) != 1 or spelling not in _NORMALS]
     if len({found for found, _ in named}) > 1:  # a surface normal is no tool axis
         which = " and ".join(",".join(names[c].strip() for c in found) for found, _ in named)
-        raise error("CS156", file, line, why=f"{which} may each be the tool axis")
-    second: Triple | None = named[0][0] if named else None
-    meaning: Meaning = named[0][1] if named else "none"
-    feed = next((left.index(name) for name in _FEEDS if name in left), None)
-    rapid = next((left.index(name) for name in _RAPIDS if name in left), None)
-    angles, degrees = _rotary(names, left, rotary if second is None else (), file, line)
-    used = {*tip, *(second or ()), *angles, feed, rapid}
-    rest = [c for c, name in enumerate(left) if name and c not in used and name not in _COUNTERS]
-    unused = tuple(names[c].strip() for c in rest)
-    if (
-        second is None and not angles and not {left[c] for c in rest} <= _PASSES
-    ):  # an axis in a spelling we do not know must not become +Z in silence
-        raise error(
-            "CS156", file, line, why=f"no tool axis in {', '.join(unused)}{_of_a_machine({left[c] for c in rest})}"
-        )
-    axis = [left[c] for c in second or ()]
-    if scalar := _scalar([left[c] for c in rest], set(axis)):
-        raise error("CS165", file, line, names=", ".join((*axis, scalar)))
-    lengths = (*tip, *(second if second and meaning == "points" else ()))
-    units, factor, feed_factor = _units(names, lengths, feed, file, line)
-    says: Rapid = "word" if rapid is None else _RAPIDS[left[rapid]]
-    name = "" if rapid is None else names[rapid].strip()
-    passes = next((c for c in rest if left[c] in _PASSES), None)
-    return Columns(
-        *(len(names), tip, second, meaning, feed, rapid, says, name, passes, unused),
-        units=units,
-        factor=factor,
-        angles=angles,
-        degrees=degrees,
-        feed_factor=feed_factor,
-    )
+        raise refuse(f"{which} may each be the tool axis")
+    return named[0] if named else (None, "none")
 
 
-def _rotary(
-    names: list[str], left: list[str], rotary: tuple[str, ...], file: str, line: int
-) -> tuple[tuple[int, ...], tuple[float, ...]]:
-    """Columns of all rotary axes of a machine, and the degrees in their units; nothing where one has no column."""
-    columns = tuple(left.index(name.lower()) for name in rotary if name.lower() in left)
-    if not columns or len(columns) < len(rotary):
-        return (), ()
-    units = [_UNIT.search(names[column].lower().strip(" \"'")) for column in columns]
-    found = [_ANGLES.get((unit[1] or unit[2] or "").strip()) if unit else None for unit in units]
-    degrees = tuple(value for value in found if value is not None)
-    if len(degrees) < len(columns):
-        raise error(
-            "CS156", file, line, why=f"{', '.join(sorted(rotary))} are angles without [deg] or [rad] behind their names"
-        )
-    return columns, degrees
-
-
-def _of_a_machine(names: set[str]) -> str:
-    return "; angles of its rotary axes need --machine" if len(names & {"a", "b", "c"}) > 1 else ""
+def _unit(name: str) -> str:
+    """Unit that a name of a column states; empty for none."""
+    found = _UNIT.search(name.lower().strip(" \"'"))
+    return (found[1] or found[2] or "").replace(" ", "").replace('"', "in") if found else ""
 
 
 def is_header(text: str) -> bool:
@@ -221,24 +228,3 @@ def _find(spellings: tuple[str, ...], names: list[str]) -> Triple | None:
                 continue  # then it is the axis
             return names.index(x), names.index(y), names.index(z)
     return None
-
-
-def _units(
-    names: list[str], lengths: tuple[int, ...], feed: int | None, file: str, line: int
-) -> tuple[Units | None, float, float | None]:
-    """Units that names of columns have, and their factors: of lengths, and of feeds."""
-    found: dict[bool, set[tuple[Units, float]]] = {False: set(), True: set()}
-    for column in (*lengths, *(() if feed is None else (feed,))):
-        match = _UNIT.search(names[column].lower().strip(" \"'"))
-        if match is None or not (match[1] or match[2]):
-            continue
-        unit = (match[1] or match[2]).replace(" ", "").replace('"', "in")
-        known = (_FEED_UNITS if column == feed else _LENGTHS).get(unit)
-        if known is None:
-            raise error("CS162", file, line, column=names[column].strip(), unit=unit)
-        found[column == feed].add(known)
-    both = {units for some in found.values() for units, _ in some}
-    if len(both) > 1 or len(found[False]) > 1:
-        raise error("CS156", file, line, why=f"{'mm and inch' if len(both) > 1 else 'two units'} in one header")
-    factor, of_feed = (next((factor for _, factor in found[feeds]), None) for feeds in (False, True))
-    return next(iter(both), None), 1.0 if factor is None else factor, of_feed

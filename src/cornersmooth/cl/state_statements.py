@@ -11,7 +11,7 @@ import numpy as np
 
 from cornersmooth.cl.bulk import FARTHEST
 from cornersmooth.cl.cycles import plain_cycle
-from cornersmooth.cl.grammar import Record, joined, number
+from cornersmooth.cl.grammar import Argument, Record, joined, number
 from cornersmooth.cl.poses import IDENTITY, UNIT_TOLERANCE, UP, System, Vector, system_of
 from cornersmooth.cl.reader_state import ReaderState
 from cornersmooth.cl.words import MOTION_WORDS, REFUSED_WORDS, TURNS
@@ -181,9 +181,8 @@ def _clearance(state: ReaderState, record: Record) -> None:
 
 def _offset(state: ReaderState, record: Record) -> None:
     """FIXTURE/n, FIXTUR/n, WCS/n: another work offset of the machine, which the text does not select."""
-    if state.n and record.args != state.offsets.get(record.word):
+    if _changes(state, record.word, record.args, None):
         _frame(state, record)
-    state.offsets[record.word] = record.args
 
 
 def _mcs(state: ReaderState, record: Record) -> None:
@@ -225,13 +224,11 @@ def _origin(state: ReaderState, record: Record) -> None:
 def _zero(state: ReaderState, record: Record) -> None:
     """ZERO/n of CAMplete: the work offset, one for the whole program, where that of no ZERO is the first."""
     number = number_of(Statement(state.n, record.line, record.word, record.args))
-    before = state.offsets.get("ZERO", (1.0,) if state.n else record.args)
     if state.dialect.name != "hsm" or number is None:
         _turn(state, record)
         return
-    if record.args != before:
+    if _changes(state, "ZERO", record.args, (1.0,)):
         _other_system(state, record, f"ZERO/{number}")
-    state.offsets["ZERO"] = record.args
     state.keep(record)
 
 
@@ -267,10 +264,15 @@ def _camera(state: ReaderState, record: Record) -> None:
 
 def _same_system(state: ReaderState, record: Record, word: str, given: list[str]) -> None:
     matrix = tuple(value for value in map(number, given) if value is not None)
-    before = state.offsets.get(word, matrix)
-    state.offsets[word] = matrix
-    if state.n and matrix != before:
+    if _changes(state, word, matrix, matrix):
         _other_system(state, record, word)
+
+
+def _changes(state: ReaderState, word: str, value: tuple[Argument, ...], unstated: tuple[Argument, ...] | None) -> bool:
+    """Whether a coordinate system is another one than that of the positions before it, where they stated one or not."""
+    before = state.offsets.get(word, unstated)
+    state.offsets[word] = value
+    return state.n > 0 and value != before
 
 
 def _cutcom(state: ReaderState, record: Record) -> None:
@@ -332,10 +334,6 @@ def _syn(state: ReaderState, record: Record) -> None:
         state.renamed[words[0]] = "$$" if words[1].startswith("$$") else words[1]
 
 
-def _fini(state: ReaderState, record: Record) -> None:
-    state.finished = True
-
-
 Handler = Callable[[ReaderState, Record], None]
 
 #: of statements that become a part of the motion, or are kept by what they do
@@ -364,7 +362,7 @@ KEPT: Final[dict[str, Handler]] = {
     "SET": _set,
     "TRNTYP": _trntyp,
     "SYN": _syn,
-    "FINI": _fini,
+    "FINI": lambda state, _: setattr(state, "finished", True),
     "SYS": _msys,
     "$$": _comment,
     "REMARK": _comment,

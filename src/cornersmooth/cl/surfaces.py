@@ -18,10 +18,10 @@ from typing import Final
 
 import numpy as np
 
-from cornersmooth.cl.arcs import LEAST_DECIMALS, MOST_TURNS, NORMAL_TOLERANCE, RADIUS_DIGITS, RADIUS_SHARE, Arc
+from cornersmooth.cl.arcs import RADIUS_DIGITS, RADIUS_SHARE, Arc, check_normal, check_sweep, resolution_of
 from cornersmooth.cl.grammar import Record, number
 from cornersmooth.cl.messages import error
-from cornersmooth.cl.poses import Vector, check_range
+from cornersmooth.cl.poses import Vector, check_range, triple
 from cornersmooth.errors import InputError
 from cornersmooth.model import Floats
 
@@ -42,8 +42,7 @@ def read_drive_arc(record: Record, start: Vector, direction: Direction, file: st
 
     The tool stands at `start`; INDIRV or INDIRP before it gave the direction.
     """
-    text = "".join(record.text.split())
-    surface, _, check = text.partition(",ON,")
+    surface, _, check = "".join(record.text.split()).partition(",ON,")
     found = _SURFACE.search(surface)
     if found is None or not check:
         raise _refuse(record, file, "only CIRCLE and CYLNDR with a check surface behind ON are understood")
@@ -54,20 +53,16 @@ def read_drive_arc(record: Record, start: Vector, direction: Direction, file: st
     if direction is None:
         raise _refuse(record, file, "no INDIRV or INDIRP says which way round")
     word, vector = direction
-    centre, radius = np.array(values[:3]), values[-1]
-    spoke = np.array(start) - centre
-    tangent = np.array(vector) - (start if word == "INDIRP" else 0.0)
-    if plain:
-        normal = np.cross(spoke, tangent)
-    else:
+    centre = np.array(values[:3])
+    normal = np.cross(np.array(start) - centre, np.array(vector) - (start if word == "INDIRP" else 0.0))
+    if not plain:
         axis = np.array(values[3:6])
-        if not abs(np.linalg.norm(axis) - 1) <= NORMAL_TOLERANCE:
-            raise error("CS124", file, record.line, word=record.word, length=float(np.linalg.norm(axis)))
-        normal = math.copysign(1.0, float(np.dot(np.cross(spoke, tangent), axis))) * axis
+        check_normal(float(np.linalg.norm(axis)), record, file)
+        normal = math.copysign(1.0, float(np.dot(normal, axis))) * axis
     size = float(np.linalg.norm(normal))
     if not 0 < size < math.inf:
         raise _refuse(record, file, "its direction points through the centre")
-    arc = _arc(record, centre, normal / size, radius, found[3], file)
+    arc = _arc(record, centre, normal / size, values[-1], found[3], file)
     return arc, _end(record, arc, np.array(start), f",{check}", file)
 
 
@@ -85,17 +80,15 @@ def read_helix(record: Record, start: Vector, direction: Direction, file: str) -
     pitch, radius = values[9:11]
     end = np.array(values[-3:])
     length = float(np.linalg.norm(axis))
-    if not abs(length - 1) <= NORMAL_TOLERANCE:
-        raise error("CS124", file, record.line, word="HELICAL", length=length)
+    check_normal(length, record, file)
     axis = axis / length
     side = float(np.dot(np.cross(np.array(start) - centre, tangent), axis))
     if not (side != 0 and math.isfinite(side) and pitch > 0):
         raise _refuse(record, file, "it has no direction or no pitch")
     sweep = 2 * math.pi * abs(float(np.dot(end - np.array(start), axis))) / pitch
-    if not 0 < sweep <= 2 * math.pi * MOST_TURNS:
-        raise error("CS127", file, record.line, word="HELICAL", value=sweep / (2 * math.pi), limit=MOST_TURNS)
+    check_sweep(sweep, record, file)
     arc = _arc(record, centre, math.copysign(1.0, side) * axis, radius, record.text.partition("/")[2], file, sweep)
-    return arc, _vector(end)
+    return arc, triple(end)
 
 
 def _arc(
@@ -103,9 +96,8 @@ def _arc(
 ) -> Arc:
     if not 0 < radius < math.inf:
         raise error("CS125", file, record.line, word=record.word, radius=radius)
-    printed = max(len(token.partition(".")[2].strip()) for token in text.split(",")[:3])
-    resolution = 10.0 ** -max(printed, LEAST_DECIMALS)
-    return Arc(record.line, record.word, _vector(centre), _vector(normal), radius, 1, sweep, resolution, certain=True)
+    at = triple(centre), triple(normal)
+    return Arc(record.line, record.word, *at, radius, 1, sweep, resolution_of(text, 0), certain=True)
 
 
 def _end(record: Record, arc: Arc, start: Floats, check: str, file: str) -> Vector:
@@ -133,7 +125,7 @@ def _end(record: Record, arc: Arc, start: Floats, check: str, file: str) -> Vect
         out = last - centre
         height = float(np.dot(out, normal))
         if abs(float(np.linalg.norm(out - height * normal)) - arc.radius) <= near:
-            return _vector(last)
+            return triple(last)
     # the plane of the check surface cuts the circle where a·cos + b·sin = c
     spoke = spoke - float(np.dot(spoke, normal)) * normal
     a, b = float(np.dot(spoke, plane)), float(np.dot(np.cross(normal, spoke), plane))
@@ -148,7 +140,7 @@ def _end(record: Record, arc: Arc, start: Floats, check: str, file: str) -> Vect
     angle = angles[wanted - 1]
     height = float(np.dot(start - centre, normal))
     turned = math.cos(angle) * spoke + math.sin(angle) * np.cross(normal, spoke)
-    return _vector(centre + turned + height * normal)
+    return triple(centre + turned + height * normal)
 
 
 def _values(text: str, record: Record, file: str) -> list[float]:
@@ -160,11 +152,6 @@ def _values(text: str, record: Record, file: str) -> list[float]:
         values.append(value)
     check_range(values, file, record.line)
     return values
-
-
-def _vector(array: Floats) -> Vector:
-    x, y, z = array.tolist()
-    return x, y, z
 
 
 def _refuse(record: Record, file: str, why: str) -> InputError:
