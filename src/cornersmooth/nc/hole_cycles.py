@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
 
@@ -129,32 +129,29 @@ def read_cycle(given: Given | None, program: Program, speed: float | None) -> Cy
     depths = [values[word][0] for word in _DEPTHS if word in values]
     if not kinds or len(depths) != 1:
         return None
-    depth = depths[0]
-    depth = -depth if program.source.dialect == "nx" else abs(depth)
+    depth = -depths[0] if program.source.dialect == "nx" else abs(depths[0])
     returns = [values[word][0] for word in _RETURNS if word in values]
     hsm = program.source.dialect == "hsm"
     clearances = [values["RAPTO"][0]] if "RAPTO" in values else []
     clearances += returns if hsm else values.get("CLEAR", ())[:1] or returns
     if depth < 0.0 or any(height < 0.0 for height in (*clearances, *returns)):
         return None
-    first, rest = values.get("1STPECK", ()), values.get("SUBPECK", ())
-    steps = tuple(scale * step for step in (*values.get("STEP", ()), *values.get("INCR", ()), *first, *rest))
+    steps = tuple(scale * step for word in _STEPS for step in values.get(word, ()))
     if any(step <= 0.0 for step in steps) or (steps and depth * scale / min(steps) > _MOST_PECKS):
         return None
     if steps and not _PECKING & kinds:  # whether pecks come out of the hole nobody says
         return None
-    dwell = 0
-    if "DWELL" in values:
-        time = milliseconds(values["DWELL"][0], "REV" in values, speed)
-        if time is None:
-            return None
-        dwell = time
-    if "TAP" in kinds and (len(kinds) > 1 or steps or dwell or not depth > 0.0):
+    dwell = milliseconds(values["DWELL"][0], "REV" in values, speed) if "DWELL" in values else 0
+    if dwell is None or ("TAP" in kinds and (len(kinds) > 1 or steps or dwell or not depth > 0.0)):
         return None
-    cycle = Cycle(
+    unit = next((word for word in _FEEDS if word in values), "")
+    per_unit, mode = _FEEDS.get(unit, (None, FeedMode.PER_MINUTE))
+    return Cycle(
         depth=depth * scale,
         clearance=clearances[0] * scale if clearances else None,
         retract=max(returns, default=0.0) * scale,
+        feed=values[unit][0] * (per_unit or scale) if unit else math.nan,
+        feed_mode=mode,
         dwell=dwell,
         steps=steps,
         full_retract="BRKCHP" not in kinds,
@@ -162,10 +159,6 @@ def read_cycle(given: Given | None, program: Program, speed: float | None) -> Cy
         pecking=bool(_PECKING & kinds),
         tap="TAP" in kinds,
     )
-    for word, (per_unit, mode) in _FEEDS.items():
-        if word in values:
-            cycle = replace(cycle, feed=values[word][0] * (per_unit or scale), feed_mode=mode)
-    return cycle
 
 
 def _pairs(args: Sequence[float | str]) -> Given | None:

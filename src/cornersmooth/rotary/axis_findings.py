@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from cornersmooth.arrays.vectors import norm
 from cornersmooth.errors import Finding, InputError
 from cornersmooth.kinematics.machine import Machine
 from cornersmooth.kinematics.poses import pole_distance
@@ -62,18 +63,17 @@ def pole_finding(
     """Cuts near the pole, where the first rotary axis turns fast: where, how close, how fast."""
     if len(machine.names) < 2:
         return ()
-    found = []
+    found = [np.zeros(0, np.int64)]
     for begin in range(0, len(axis) - 1, CHUNK):
         here = slice(begin, begin + CHUNK + 1)
-        turn = np.abs(np.diff(angles[here, 0]))
-        tilt = np.linalg.norm(np.diff(axis[here], axis=0), axis=1)
+        turn, tilt = np.abs(np.diff(angles[here, 0])), norm(np.diff(axis[here], axis=0))
         fast = (turn > NO_TURN) & (turn > NEAR_POLE * np.degrees(tilt)) & ~rapid[here][1:]
         found.append(begin + np.flatnonzero(fast))
-    edges = np.concatenate(found) if found else np.zeros(0, np.int64)
+    edges = np.concatenate(found)
     if not len(edges):
         return ()
     turns = np.abs(angles[edges + 1, 0] - angles[edges, 0])
-    lengths = np.linalg.norm(tip[edges + 1] - tip[edges], axis=1)
+    lengths = norm(tip[edges + 1] - tip[edges])
     rates = np.where(lengths > 0, turns / np.where(lengths > 0, lengths, 1.0), np.inf)
     worst = int(np.argmax(rates))
     closest = float(min(pole_distance(machine, axis[edges]).min(), pole_distance(machine, axis[edges + 1]).min()))
@@ -90,13 +90,11 @@ def pole_finding(
 def rewind_finding(machine: Machine, angles: Floats, rapid: Bools, line: Ints) -> tuple[Finding, ...]:
     """Rapids in which an axis turns back by whole turns to stay inside its limits."""
     rapids = np.flatnonzero(rapid[1:])
-    step = angles[rapids + 1] - angles[rapids]
-    turned = np.abs(step) > 180 + NO_TURN
-    findings = []
+    step, findings = np.abs(angles[rapids + 1] - angles[rapids]), list[Finding]()
     for axis, name in enumerate(machine.names):
-        moves = np.flatnonzero(turned[:, axis])
+        moves = np.flatnonzero(step[:, axis] > 180 + NO_TURN)
         if len(moves):
-            text = f"{name} turns back by {abs(step[moves[0], axis]):.4g} deg in a rapid, to stay inside its limits"
+            text = f"{name} turns back by {step[moves[0], axis]:.4g} deg in a rapid, to stay inside its limits"
             findings.append(Finding("CS364", "warning", int(line[rapids[moves[0]] + 1]), text, len(moves)))
     return tuple(findings)
 
