@@ -325,7 +325,7 @@ def _with_planned_feeds(text: bytes, program: Program, settings: Settings, form:
     """The text with the feeds of its own plan."""
     from cornersmooth.feedrate import block_feeds, plan_text
     from cornersmooth.kinematics import with_dynamics
-    from cornersmooth.nc.planned_feeds import PlannedFeeds
+    from cornersmooth.nc.planned_feeds import with_planned_feeds
 
     written = read_back(text, form, settings, program.source.name)
     machine = with_dynamics(form.machine)
@@ -336,9 +336,7 @@ def _with_planned_feeds(text: bytes, program: Program, settings: Settings, form:
     line, feed, minutes = line[own], feed[own], minutes[own]
     # of several elements of a block, which have one feed, the first
     element = np.searchsorted(written.line, line)
-    return PlannedFeeds(line, feed, minutes, written.feed[element]).write(
-        text, form, program.units, program.mm_per_unit
-    )
+    return with_planned_feeds(text, form, program, line, feed, minutes, written.feed[element])
 
 
 def _put_parts(output: Output, digests: str) -> None:

@@ -119,17 +119,15 @@ class Motion:
 
     def _again(self, last: Ints, pose: Ints, near: Floats) -> Ints:
         """Ticks (1, c) of what was written last, a pose (1,), in the coordinates at hand."""
-        form = self.at.form
         if self.last_at is self.at:
             return last[None]
-        other = self.program.axis[pose]
-        if form.rotary and form.machine is not None:
-            if len(last) == len(self.at.words):
-                other = self.at.angles(last[None])
-            elif self.last_at is not None and self.last_at.plane is not None and self.last_at.plane.upright:
-                other = np.zeros((1, 2))  # the tool before stays along Z, so that pose does
-            else:
-                other = continued(form.machine, other, near, np.array([-1]), 0.0)[0]
+        other, plane = self.program.axis[pose], None if self.last_at is None else self.last_at.plane
+        if self.at.form.rotary and plane is None:
+            other = self.at.angles(last[None])
+        elif self.at.form.rotary and plane is not None and plane.angles is not None:
+            other = plane.angles[None]
+        elif self.at.form.rotary:
+            other = continued(machine_of(self.at.form), other, near, np.array([-1]), 0.0)[0]
         return self.at.ticks(self.program.tip[pose], other)
 
     def ticks_at(self, rows: Rows, tips: Floats, own: Ints) -> Ints:
