@@ -6,7 +6,7 @@ them make up nearly all of a file and are read together; every other line is tak
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
@@ -130,7 +130,7 @@ def refused(line: Line, what: str, hint: str) -> InputError:
     return InputError("CS503", what, hint, line=line.number)
 
 
-def table_of(rows: list[tuple[int, dict[str, float]]]) -> Table:
+def table_of(rows: Sequence[tuple[int, Mapping[str, float]]]) -> Table:
     """Motion blocks that were read one by one, as a table."""
     letters = sorted({letter for _, row in rows for letter in row})
     return Table(

@@ -8,7 +8,9 @@ from cornersmooth.control.words import Table
 from cornersmooth.model import Bools, Floats
 from cornersmooth.nc_reader.elements import Problem
 
+#: of circles in G17, G18, G19
 _PLANE_NORMAL = {17: (0.0, 0.0, 1.0), 18: (0.0, 1.0, 0.0), 19: (1.0, 0.0, 0.0)}
+#: rad: an arc about a centre that ends where it begins goes round once
 _FULL_TURN = 2 * np.pi
 
 #: how much the distances of both ends from the centre may differ: more is an alarm on most controls

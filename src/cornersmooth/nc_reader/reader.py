@@ -63,7 +63,8 @@ class Reader:
         self.state = ModalState(Modal(rotary="" if rotary is None else rotary.names), rotary, clamped=clamped)
         self._tool = -1.0  # that has been chosen
         self._left_at: Floats | None = None  # where a tool of another length has left
-        self.waiting: list[Table] = []
+        self._waiting: list[Table] = []
+        self._single: list[tuple[int, Mapping[str, float]]] = []  # single blocks that wait behind these
         self.ready: list[Elements] = []
         self.events: list[Event] = []
         self.late: list[Event] = []
@@ -115,24 +116,34 @@ class Reader:
     def _rows(self, table: Table) -> None:
         """Take a run of motion blocks."""
         # the first block that moves Z behind a retract is looked at with what it leads to
-        leads = self.retracts.open and len(self.waiting) > 0 and len(self.waiting[-1]) == 1
-        if not leads and len(table) + len(self.waiting) > FEW_ROWS and (table.closed or self._code in MOTION_CODES[:4]):
+        leads, count = self.retracts.open and len(self._single) > 0, len(self._waiting) + len(self._single)
+        if not leads and len(table) + count > FEW_ROWS and (table.closed or self._code in MOTION_CODES[:4]):
             self._flush()
-        self.waiting.append(table)
+        self._gather()
+        self._waiting.append(table)
         self.blocks += len(table)
+
+    def _gather(self) -> None:
+        """Put single blocks that wait into a table."""
+        if self._single:
+            self._waiting.append(table_of(self._single))
+            self._single = []
 
     @property
     def _code(self) -> float:
         """G word of group 01 behind what waits."""
-        codes = np.concatenate(([self.state.modal.code], *(table.column("G") for table in self.waiting)))
-        known = codes[~np.isnan(codes)]
-        return float(known[-1]) if len(known) else math.nan
+        self._gather()
+        for table in reversed(self._waiting):
+            codes = table.column("G")
+            if len(known := codes[~np.isnan(codes)]):
+                return float(known[-1])
+        return self.state.modal.code
 
     def _line(self, line: Line) -> None:
         """Take a line that is not part of a run."""
         self.blocks += 1
         if (row := self.dialect.row(line)) is not None:
-            self.waiting.append(table_of([(line.number, row)]))
+            self._single.append((line.number, row))
             return
         self._flush()
         inch, elements = self.state.modal.inch, self.elements
@@ -163,7 +174,7 @@ class Reader:
     def _move(self, line: Line, row: Mapping[str, float], *, later: bool) -> None:
         """Execute a single motion block, `later` with those behind it; one without position only changes what holds."""
         if row.keys() & self.dialect.lexer.places or row.keys() & set("XYZIJKUVW"):
-            self.waiting.append(table_of([(line.number, dict(row))]))
+            self._single.append((line.number, row))
             if not later:
                 self._flush()
         else:
@@ -264,10 +275,11 @@ class Reader:
 
     def _flush(self) -> None:
         """Execute the motion blocks that wait."""
-        if self.waiting:
-            for table in joined_tables(self.waiting, sys.maxsize if self.retracts.open else FEW_ROWS):
+        self._gather()
+        if self._waiting:
+            for table in joined_tables(self._waiting, sys.maxsize if self.retracts.open else FEW_ROWS):
                 self._execute(table)
-            self.waiting = []
+            self._waiting = []
 
     def _execute(self, table: Table) -> None:
         state, before = self.state, self.state.modal

@@ -46,10 +46,7 @@ _SIDES = {"R0": 40.0, "RL": 41.0, "RR": 42.0}
 
 
 class Heidenhain(Dialect):
-    """Blocks that say in words what they are.
-
-    Parameters are those of `Dialect`.
-    """
+    """Blocks that say in words what they are."""
 
     lexer: _KlartextLexer
     beside = frozenset(("M", "S", "side"))

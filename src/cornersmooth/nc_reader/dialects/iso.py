@@ -27,14 +27,12 @@ _PLANE_WORDS: Mapping[str, frozenset[float]] = {
     "G68.2": frozenset((_TILTED, 53.1, 69.0)),
     "G254": frozenset((254.0, 255.0)),
 }
+#: ends hole cycles
 _NO_CYCLE = 80.0
 
 
 class Iso(Dialect):
-    """Words of one letter and a number; what differs between these controls is in `[grammar]` of their tables.
-
-    Parameters are those of `Dialect`.
-    """
+    """Words of one letter and a number; what differs between these controls is in `[grammar]` of their tables."""
 
     lexer: _IsoLexer
     #: milliseconds that ``G4 P`` counts in

@@ -31,6 +31,7 @@ _NAMES: Final = {
 _POLYNOMIALS: Final = {"X": "X", "Y": "Y", "Z": "Z", "XH": "U", "YH": "V", "ZH": "W"}
 _NUMBER_ONLY: Final = re.compile(NUMBER)
 
+#: G words of group 01 that are read
 _CODES = (0.0, 1.0, 2.0, 3.0)
 #: units of lengths, not of feeds
 _LENGTHS_ALONE = (70.0, 71.0)
@@ -68,10 +69,7 @@ _KINDS: Final = {"POLY": POLY, "BSPLINE": BSPLINE, "SD": None}
 
 
 class Siemens(Dialect):
-    """Words of letters, words with ``=``, and keywords.
-
-    Parameters are those of `Dialect`.
-    """
+    """Words of letters, words with ``=``, and keywords."""
 
     beside = frozenset(("M", "T", "S", "SPOS"))
     others = ("D", "N", "%")
