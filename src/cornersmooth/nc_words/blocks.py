@@ -21,9 +21,6 @@ NOT_LISTED: Final = "CS571"
 #: blocks, and words, whose rows are remembered
 _REMEMBERED: Final = 4096
 
-#: words of which a block may have one
-_MOTION: Final = frozenset(("G0", "G1", "G2", "G3", "G6.2", "L", "LN", "SPL", "BSPLINE", "POLY"))
-
 
 @dataclass(frozen=True)
 class Block:
@@ -108,9 +105,7 @@ class WordRules:
         functions = [row.group for word, row in ruled if word[:1] == "M"]
         if len(functions) > (self._m_words if set(functions) <= {"spindle", "coolant"} else 1):
             yield wrong("two M words in one block")
-        if sum(word in _MOTION for word in words) > 1:
-            yield wrong("two motions in one block")
-        groups = [row.group for _, row in ruled if row.group]
+        groups = [row.sets[0][0] for _, row in ruled if row.sets and not row.changes_tool]
         if len(set(groups)) < len(groups):
             yield wrong("two words of one group in one block")
         for k, (word, row) in enumerate(ruled):

@@ -191,9 +191,11 @@ class Parts:
             return ""
         first = _alike(found, wanted)
         behind = len(found) - _alike(found[first:][::-1], wanted[first:][::-1])
-        low = parts[first - 1].last if first else 1
-        gone = len(found) < len(wanted) and behind < len(found)
-        high = parts[behind].first if gone else parts[behind - 1].last if parts else low
+        if len(found) < len(wanted):  # some are gone, between two that are not changed
+            low = parts[first - 1].last if first else 1
+            high = parts[behind].first if behind < len(parts) else parts[-1].last if parts else low
+        else:
+            low, high = parts[first].first, parts[behind - 1].last
         return f"lines {low} to {high}, which were changed since the program was written"
 
 
