@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import Final
 
 from cornersmooth.control.word_tables import CONTROLS, word_table
 from cornersmooth.errors import SettingsError
 from cornersmooth.nc_reader.dialects.base import Dialect
-from cornersmooth.nc_reader.dialects.heidenhain import Heidenhain
-from cornersmooth.nc_reader.dialects.iso import Iso
-from cornersmooth.nc_reader.dialects.siemens import Siemens
 
 __all__ = ["CONTROLS", "Dialect", "dialect_of"]
 
-_SPELLINGS: Final[dict[str, type[Dialect]]] = {"iso": Iso, "siemens": Siemens, "heidenhain": Heidenhain}
+#: classes of the modules of these names, each of which is loaded when a program in its words is read
+_SPELLINGS: Final = {"iso": "Iso", "siemens": "Siemens", "heidenhain": "Heidenhain"}
 
 
 def dialect_of(control: str, rotary: str = "") -> Dialect:
@@ -31,4 +30,7 @@ def dialect_of(control: str, rotary: str = "") -> Dialect:
     """
     if control not in CONTROLS:
         raise SettingsError("CS204", f"unknown control {control!r}", f"use one of {', '.join(CONTROLS)}")
-    return _SPELLINGS[word_table(control).get("spelling", "iso")](control, rotary)
+    spelling = word_table(control).get("spelling", "iso")
+    module = import_module(f"{__name__}.{spelling}")
+    found: Dialect = getattr(module, _SPELLINGS[spelling])(control, rotary)
+    return found
