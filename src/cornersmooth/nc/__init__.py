@@ -30,7 +30,6 @@ from cornersmooth.nc.modals import Modals
 from cornersmooth.nc.motion import Motion
 from cornersmooth.nc.planes import Planes, check_travel_of_words, plan_planes
 from cornersmooth.nc.program_frame import BLEND_STEP, POINT_APPROACH, Frame, Stream
-from cornersmooth.nc.rotary_rows import arc_angles, coarse_rows, long_rows, rotary_rows
 from cornersmooth.nc.rotary_words import rotary_way, within_reach
 from cornersmooth.nc.script import Script
 from cornersmooth.nc.statement_writer import StatementWriter
@@ -249,6 +248,8 @@ def _rows(smoothed: SmoothProgram, form: Form, planes: Planes, findings: Finding
     if form.curves:
         rows = curve_rows(smoothed, circles, divide=form.curve in _TURNING)
     elif form.rotary:
+        from cornersmooth.nc.rotary_rows import arc_angles, coarse_rows, rotary_rows  # long to load, and for few forms
+
         while True:  # arcs on which rotary axes would turn, or stand where the control wants no circle, become lines
             whole, seen = (coarse_rows if long else all_dense_rows)(smoothed, circles), Findings()
             way = rotary_way(whole, smoothed, form, seen)
@@ -260,6 +261,8 @@ def _rows(smoothed: SmoothProgram, form: Form, planes: Planes, findings: Finding
         inside = planes.of >= 0 if planes.planes else None
         rows = rotary_rows(way, smoothed, form, findings, long=long, in_planes=inside)
     elif long:
+        from cornersmooth.nc.rotary_rows import coarse_rows, long_rows
+
         rows = long_rows(coarse_rows(smoothed, circles), smoothed, form)
     else:
         rows = dense_rows(smoothed, circles)
