@@ -62,7 +62,8 @@ def page_of(result: Result, **more: object) -> str:
     saving = None
     if result.verdict == "PASSED":
         saving = planned_saving(result.program, result.smoothed.settings, result.form, axes=more.get("axes"))
-    return smoothed_page(result, source=b"part", saving=saving, **more)  # type: ignore[arg-type]
+    contents = result.report(saving=saving, limits=more.get("axes"))
+    return smoothed_page(result, contents, saving=saving, **more)  # type: ignore[arg-type]
 
 
 def values_of(page: str) -> tuple[dict[str, object], dict[str, np.ndarray]]:

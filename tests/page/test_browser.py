@@ -350,7 +350,7 @@ def test_surface_on_a_page(look):
     nc = read_written(result)
     tool = tools_of(result.program)[0][1]
     surface = measure_surface(result.program, nc, tool, tolerance=0.02, stations=300)
-    looked = look(verified_page(result.program, nc, result.verification, surface=surface))
+    looked = look(verified_page(result.program, nc, result.verification, result.report(), surface=surface))
     with_surface = looked.canvas()
     looked.keep("surface")
     assert "overcut" in looked.page.inner_text("#legend")

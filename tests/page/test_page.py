@@ -53,7 +53,9 @@ def test_the_verdict_names_the_sharp_corner(page, result):
     assert " time on " not in meta["verdict"]  # no limits of axes are known
     assert meta["badge"] == "PASSED"
     facts = dict(meta["facts"])
-    assert facts["SHA-256 of the CL file"] == hashlib.sha256(b"part").hexdigest()
+    assert (
+        facts["SHA-256 of the CL file"] == hashlib.sha256(PATH.format(name="PART", comment="none").encode()).hexdigest()
+    )
     assert cornersmooth.__version__ in facts["made by"]
     kinds = [meta["corners"]["kinds"][kind] for kind in arrays["c_kind"]]
     assert kinds[0] == "sharp"

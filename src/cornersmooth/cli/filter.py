@@ -135,7 +135,6 @@ def _filter(job: files.Input, given: Options) -> Verdict:
         found,
         _judgement(found, old.settings.tolerance),
         NcFile.of(path, output.stream.digest, old.form),
-        os.path.basename(job.target),
         job.reports,
         saving,
         summary={
@@ -170,7 +169,7 @@ def verify_with_program(data: bytes, name: str, given: Options) -> int:
     judgement = Judgement(found.verdict, _to_check(found), 0, "", _problems(wrong) or _measured(found, tolerance))
     path = None if given.text == files.STANDARD else given.text
     program = replace(NcFile.of(path, sha256_of(new), old.form), form=None)
-    contents = _reported("verify", old, found, judgement, program, new_name, given.reports)
+    contents = _reported("verify", old, found, judgement, program, given.reports)
     show_wrong(new_name, wrong)
     if given.as_json:
         show.say_json(contents)
@@ -185,12 +184,11 @@ def _reported(
     found: Filtered,
     judgement: Judgement,
     program: NcFile,
-    name: str,
     reports: Iterable[str],
     saving: Saving | None = None,
     **more: Any,
 ) -> dict[str, Any]:
-    """Make the report of two programs, the new one of a name; write it to paths, or a page of their runs."""
+    """Make the report of two programs, write it to paths, or a page of their runs."""
     axes, form, motions = old.given.load_limits(), old.form, found.motions
     contents = record(
         kind,
@@ -217,13 +215,9 @@ def _reported(
         assert motions is not None
         return verified_page(
             *measure(*motions, old.settings, os.path.basename(old.name)),
-            name=name,
-            control=form.table.name,
-            form=form.name,
-            source=old.data,
+            contents,
             machine=axes or form.machine,
             planner=form.table.lines.planner,
-            judgement=judgement,
             origin="old program",
             runs=found.changed,
             left=[asdict(one) for one in found.left],

@@ -220,7 +220,7 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> None:
     def page() -> str:
         from cornersmooth.page import smoothed_page
 
-        return smoothed_page(result, source=source, axes=job.axes, saving=outcome.saving, tool=given.tool)
+        return smoothed_page(result, contents, axes=job.axes, saving=outcome.saving, tool=given.tool)
 
     contents = result.report(command=job.command, loosened=job.loosened, saving=outcome.saving, limits=job.axes)
     outcome.contents = contents

@@ -12,7 +12,10 @@ from cornersmooth.errors import SettingsError, Verdict
 from cornersmooth.geometry.tool import Tool, tools_of
 from cornersmooth.model import Program
 from cornersmooth.nc_reader import read_nc
+from cornersmooth.report import NcFile
+from cornersmooth.report.record import cl_file, record
 from cornersmooth.report.tables import surface_csv, surface_lines
+from cornersmooth.report.verdict import judge, trusted_blocks
 from cornersmooth.surface import measure_surface
 from cornersmooth.verify import verify
 
@@ -41,8 +44,11 @@ def run_surface(given: Options) -> int:
         from cornersmooth.page import verified_page
 
         checked = verify(program, written, tolerance=given.tolerance, axis_length=given.axis_length, **how)
-        name, control = written if isinstance(written, str) else "", given.load_control().name
-        return verified_page(program, nc, checked, name=name, control=control, source=data, surface=found)
+        findings = (*program.findings, *trusted_blocks(checked))
+        file = NcFile(written if isinstance(written, str) else None, None, given.load_control().name, None, None, True)
+        judged = judge(checked, findings)
+        contents = record("verify", judged, source=cl_file(program), program=file, settings={}, findings=findings)
+        return verified_page(program, nc, checked, contents, surface=found)
 
     write_reports(dict.fromkeys(given.reports, True), found.as_dict(), table=partial(surface_csv, found), page=page)
     first = f"{Verdict.of(problems=not found.kept)}: the surface is {'' if found.kept else 'not '}within the tolerance"

@@ -5,7 +5,6 @@ There are pages of a run of `postprocess`, and of a text that was verified, with
 
 from __future__ import annotations
 
-import hashlib
 import io
 import json
 import os
@@ -14,7 +13,7 @@ from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 from cornersmooth import __version__
-from cornersmooth.errors import Finding, Verdict
+from cornersmooth.errors import Verdict
 from cornersmooth.geometry.tool import Tool
 from cornersmooth.kinematics import Machine, with_dynamics
 from cornersmooth.model import Program
@@ -23,15 +22,7 @@ from cornersmooth.nc_reader import NcProgram
 from cornersmooth.page.scene import Story, Subject, page
 from cornersmooth.pipeline import Result, read_back
 from cornersmooth.report.tables import passes_text
-from cornersmooth.report.verdict import (
-    LIMITS_TOLD,
-    Judgement,
-    Saving,
-    judge,
-    sharp_line,
-    time_text,
-    trusted_blocks,
-)
+from cornersmooth.report.verdict import LIMITS_TOLD, Saving, sharp_line, time_text
 from cornersmooth.settings import Limits, Settings
 from cornersmooth.verify import Verification
 
@@ -41,18 +32,17 @@ if TYPE_CHECKING:
 
 def smoothed_page(
     result: Result,
+    contents: Mapping[str, Any],
     *,
-    source: bytes = b"",
     axes: Machine | None = None,
     saving: Saving | None = None,
     tool: Tool | None = None,
 ) -> str:
-    """Page of a file that was smoothed, written and verified, with the times that its verdict tells.
+    """Page of a file that was smoothed, written and verified: what its report says, with the times of its verdict.
 
     Speeds are planned within the limits of `axes`, or of the machine of the form. `tool` replaces that of the file.
     """
     form, settings = result.form, result.smoothed.settings
-    contents = result.report(saving=saving, limits=axes)
     text = "; ".join((contents["verdict_text"], sharp_line(contents)))
     if saving is not None:
         text += "; " + time_text(saving, contents["times"]["limits"])
@@ -67,17 +57,9 @@ def smoothed_page(
         planner=form.table.lines.planner,
         tool=tool,
     )
-    return _told(
-        subject,
-        _name(result.path) or result.program.source.name,
-        text,
-        result.verdict,
-        (form.table.name, form.name, form.machine),
-        findings=result.findings,
-        facts=[("method", settings.method), ("reversals", f"sharp above {settings.reversal_angle:g}°")],
-        source=source,
-        limited_by=() if saving is None else [name for name, _ in saving.limits[:LIMITS_TOLD]],
-    )
+    facts = [("method", settings.method), ("reversals", f"sharp above {settings.reversal_angle:g}°")]
+    limited_by = () if saving is None else [name for name, _ in saving.limits[:LIMITS_TOLD]]
+    return _page(subject, contents, text, form.machine, facts, limited_by=limited_by)
 
 
 def read_written(result: Result) -> NcProgram:
@@ -96,26 +78,21 @@ def verified_page(
     program: Program,
     nc: NcProgram,
     found: Verification,
+    contents: Mapping[str, Any],
     *,
-    name: str = "",
-    control: str = "",
-    form: str = "",
-    source: bytes = b"",
     machine: Machine | None = None,
     planner: str = "",
     tool: Tool | None = None,
     surface: SurfaceMap | None = None,
-    judgement: Judgement | None = None,
     origin: str = "CL file",
     runs: Sequence[tuple[int, int, int, int]] | None = None,
     left: Sequence[Mapping[str, Any]] = (),
     saving: Saving | None = None,
 ) -> str:
-    """Page of a program that somebody wrote, measured against its CL file; with a map of the surface if there is one.
+    """Page of a program that somebody wrote: what its report says, with a map of the surface if there is one.
 
-    `name`, `control` and `form` are those of the program, as far as they are known. What was filtered has a `judgement`
-    of its own, an old program as its `origin`, its `runs` (first and last line in the old program and in the new one),
-    the cuts that are `left` as they were (count, line, reason), and the time that it saves.
+    What was filtered has an old program as its `origin`, its `runs` (first and last line in the old program and in the
+    new one), the cuts that are `left` as they were (count, line, reason), and the time that it saves.
     """
     settings = Settings(tolerance=found.tolerance, axis_tolerance=found.axis_tolerance)
     settings = settings if found.axis_tolerance is not None else settings.but(axis_length=found.axis_length)
@@ -130,17 +107,13 @@ def verified_page(
         surface=surface,
         runs=runs,
     )
-    findings = (*program.findings, *trusted_blocks(found))
-    judgement = judge(found, findings) if judgement is None else judgement
-    facts, text = _measured_facts(found, origin.split()[0]), judgement.text
+    facts, text = _measured_facts(found, origin.split()[0]), contents["verdict_text"]
     if saving is not None:
         text += "; " + time_text(saving, None if machine is None else machine.name)
     if surface is not None:
         text += "; " + _surface_text(surface)
         facts += [("tool", surface.tool.describe()), ("cutting edge", f"{surface.edge:g} mm")]
-    title = _name(name) or program.source.name
-    written = control, form, machine
-    return _told(subject, title, text, judgement.verdict, written, findings, facts, source, origin, left=left)
+    return _page(subject, contents, text, machine, facts, origin, left=left)
 
 
 #: problems and findings that a page lists
@@ -157,49 +130,57 @@ def _surface_text(surface: SurfaceMap) -> str:
     return f"the surface is overcut by up to {over:.4f} mm and undercut by up to {under:.4f} mm{share}{rows}"
 
 
-def _name(path: str | None) -> str:
-    return os.path.basename(path or "")
-
-
-def _told(
+def _page(
     subject: Subject,
-    title: str,
+    contents: Mapping[str, Any],
     text: str,
-    badge: Verdict,
-    written: tuple[str, str, Machine | None],
-    findings: Iterable[Finding],
+    machine: Machine | None,
     facts: Iterable[tuple[str, str]],
-    source: bytes,
     origin: str = "CL file",
     *,
     limited_by: Sequence[str] = (),
     left: Sequence[Mapping[str, Any]] = (),
 ) -> str:
-    """Page of a subject, for a control, form and machine; what is not known is left out of what is always in sight."""
-    settings, own, given = subject.settings, subject.settings.axis_tolerance, subject.program.source
-    control, form, machine = written
+    """Page of a subject and its report; what is not known is left out of what is always in sight."""
+    settings, program, source = subject.settings, subject.program, subject.program.source
+    written, sha256 = contents["program"] or {}, contents["input"]["sha256"]
     head = [
-        (origin, given.name),
-        ("control", control),
-        ("form", form),
-        ("machine", machine.name if machine else ""),
+        (origin, source.name),
+        ("control", written.get("control")),
+        ("form", written.get("form")),
+        ("machine", machine and machine.name),
         ("tolerance", f"{settings.tolerance:g} mm"),
-        ("axis length", f"{settings.axis_length:g} mm") if own is None else ("axis tolerance", f"{own:g}°"),
+        ("axis length", f"{settings.axis_length:g} mm")
+        if settings.axis_tolerance is None
+        else ("axis tolerance", f"{settings.axis_tolerance:g}°"),
     ]
-    head = [(label, value) for label, value in head if value]
-    inputs = [(origin, f"{given.name}: {given.dialect}, {len(subject.program):,} poses, {subject.program.units}")]
-    inputs += [(f"SHA-256 of the {origin}", hashlib.sha256(source).hexdigest())] if source else []
-    every, findings = [*inputs, *facts, *_limit_facts(subject.machine)], tuple(findings)
-    problems = _problems(subject.verification, findings)
-    notes, whose = _notes(findings), origin.split()[0]
-    return page(subject, Story(title, text, badge, head, problems, every, notes, whose, limited_by, left))
+    inputs = [(origin, f"{source.name}: {source.dialect}, {len(program):,} poses, {program.units}")]
+    inputs += [(f"SHA-256 of the {origin}", sha256)] if sha256 else []
+    found, findings = subject.verification, contents["findings"]
+    story = Story(
+        title=os.path.basename(written.get("name") or "") or source.name,
+        verdict=text,
+        badge=Verdict(contents["verdict"]),
+        head=[(label, value) for label, value in head if value],
+        problems=_problems(found, [one for one in findings if one["severity"] != "note"]),
+        facts=[*inputs, *facts, *_limit_facts(subject.machine)],
+        notes=[
+            (f"CL line {one['line']}: " if one["line"] else "") + _text(one)
+            for one in findings
+            if one["severity"] == "note"
+        ],
+        origin=origin.split()[0],
+        limited_by=limited_by,
+        left=left,
+    )
+    return page(subject, story)
 
 
-def _problems(found: Verification | None, findings: Iterable[Finding]) -> list[dict[str, Any]]:
+def _problems(found: Verification | None, warnings: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Problems in the order of the program, then warnings: those to check first."""
     rows = [] if found is None else [("error", one.nc_line, one.cl_line, one.text, one.code) for one in found.problems]
-    shown = sorted((one for one in findings if one.severity != "note"), key=lambda one: not one.to_check)
-    rows += [(one.severity, 0, one.line, _text(one), one.code) for one in shown]
+    shown = sorted(warnings, key=lambda one: not one["to_check"])
+    rows += [(one["severity"], 0, one["line"], _text(one), one["code"]) for one in shown]
     count = len(shown) + (0 if found is None else found.problem_count)
     if count > _MOST_PROBLEMS:
         rows[_MOST_PROBLEMS:] = [("note", 0, 0, f"{count - _MOST_PROBLEMS:,} more; a JSON report lists them", "")]
@@ -207,13 +188,8 @@ def _problems(found: Verification | None, findings: Iterable[Finding]) -> list[d
     return [dict(zip(keys, row, strict=True)) for row in rows]
 
 
-def _notes(findings: Iterable[Finding]) -> list[str]:
-    notes = (one for one in findings if one.severity == "note")
-    return [f"{f'CL line {one.line}: ' if one.line else ''}{_text(one)}" for one in notes]
-
-
-def _text(finding: Finding) -> str:
-    return finding.text + (f" ({finding.count:,} times)" if finding.count > 1 else "")
+def _text(finding: Mapping[str, Any]) -> str:
+    return str(finding["text"]) + (f" ({finding['count']:,} times)" if finding["count"] > 1 else "")
 
 
 def _measured_facts(found: Verification, whose: str) -> list[tuple[str, str]]:
