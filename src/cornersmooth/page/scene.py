@@ -94,56 +94,56 @@ def page(subject: Subject, story: Story) -> str:
     return document(*scene(subject, story))
 
 
+@dataclass(frozen=True)
+class _View:
+    """What is drawn: both paths with their corners and times, from a point in the middle."""
+
+    subject: Subject
+    original: OriginalPath
+    written: WrittenPath
+    planned: Planned
+    corners: CornerList
+    seconds: Floats  #: (m,) s: of the points of the written path, planned or as programmed
+    places: Ints  #: (n,): the point of the written path that is the last on the move into each pose
+    centre: Floats
+
+    @classmethod
+    def of(cls, subject: Subject) -> _View:
+        """Both paths of a subject, planned; deviations at poses are those that were measured there."""
+        program, settings, found = subject.program, subject.settings, subject.verification
+        original = original_path(program)
+        task = {name: getattr(settings, name) for name in ("tolerance", "axis_length", "axis_tolerance")}
+        written = written_path(program, subject.nc, original, **task)
+        planned = Planned({}, {}, None, (NOT_PLANNED,))
+        if not subject.planner:
+            machine = subject.machine
+            planned = plan_all(program, original, written, subject.nc, machine=machine, settings=settings)
+        if subject.smoothed is not None:
+            corners = smoothed_corners(subject.smoothed, found, dense=subject.dense)
+        else:
+            assert found is not None
+            corners = measured_corners(program, found)
+        if subject.runs is not None:
+            corners = replace(some_rows(corners, np.zeros(0, np.int64)), counts={})
+        centre = 0.5 * (program.tip.min(axis=0) + program.tip.max(axis=0)) if len(program) else np.zeros(3)
+        seconds = feed_seconds(written, Limits.rapid) if planned.seconds is None else planned.seconds
+        reached = np.maximum.accumulate(written.pose)
+        places = np.maximum(np.searchsorted(reached, np.arange(len(program)), side="right") - 1, 0)
+        if found is not None:
+            for off, of_poses in ((written.tip_off, found.pose_tip), (written.axis_off, found.pose_axis_point)):
+                poses = np.flatnonzero(np.isfinite(of_poses) & np.isfinite(off[places]))
+                np.maximum.at(off, places[poses], of_poses[poses])
+        return cls(subject, original, written, planned, corners, seconds, places, centre)
+
+
 def scene(subject: Subject, story: Story) -> tuple[dict[str, Any], Pack]:
     """Plain values and arrays of a page."""
-    program, settings = subject.program, subject.settings
-    original = original_path(program)
-    written = written_path(
-        program,
-        subject.nc,
-        original,
-        tolerance=settings.tolerance,
-        axis_length=settings.axis_length,
-        axis_tolerance=settings.axis_tolerance,
-    )
-    planned = (
-        Planned({}, {}, None, (NOT_PLANNED,))
-        if subject.planner
-        else plan_all(
-            program,
-            original,
-            written,
-            subject.nc,
-            machine=subject.machine,
-            settings=settings,
-        )
-    )
-    if subject.smoothed is not None:
-        corners = smoothed_corners(subject.smoothed, subject.verification, dense=subject.dense)
-    else:
-        assert subject.verification is not None
-        corners = measured_corners(program, subject.verification)
-    if subject.runs is not None:
-        corners = replace(some_rows(corners, np.zeros(0, np.int64)), counts={})
-    centre = 0.5 * (program.tip.min(axis=0) + program.tip.max(axis=0)) if len(program) else np.zeros(3)
-    pack = Pack()
-    seconds = planned.seconds
-    timed = seconds is not None
-    if seconds is None:
-        seconds = feed_seconds(written, Limits.rapid)
-    # the point of the written path that is the last on the move into each pose
-    reached = np.maximum.accumulate(written.pose)
-    places = np.maximum(np.searchsorted(reached, np.arange(len(program)), side="right") - 1, 0)
-    if subject.verification is not None:
-        # what is measured from the original poses belongs to the points that are reached there
-        found = subject.verification
-        for off, of_poses in ((written.tip_off, found.pose_tip), (written.axis_off, found.pose_axis_point)):
-            poses = np.flatnonzero(np.isfinite(of_poses) & np.isfinite(off[places]))
-            np.maximum.at(off, places[poses], of_poses[poses])
-    _add_original(pack, original, program, corners, centre)
-    _add_written(pack, written, planned, seconds, corners, places, settings, centre)
-    charts = _add_charts(pack, original, written, planned, seconds, story.limited_by)
-    _add_corners(pack, corners, program, original, centre)
+    view, pack = _View.of(subject), Pack()
+    original, planned, seconds, corners = view.original, view.planned, view.seconds, view.corners
+    _add_original(pack, view)
+    _add_written(pack, view)
+    charts = _add_charts(pack, view, story.limited_by)
+    _add_corners(pack, view)
     meta: dict[str, Any] = {
         "schema": SCHEMA,
         "title": story.title,
@@ -153,72 +153,65 @@ def scene(subject: Subject, story: Story) -> tuple[dict[str, Any], Pack]:
         "head": [list(fact) for fact in story.head],
         "problems": [dict(problem) for problem in story.problems],
         "facts": [list(fact) for fact in story.facts],
-        "notes": [*story.notes, *planned.left_out, *_thinning_note(len(written), original)],
-        "tolerance": settings.tolerance,
-        "axis_length": settings.axis_length,
-        "centre": centre.tolist(),
+        "notes": [*story.notes, *planned.left_out, *_thinning_note(len(view.written), original)],
+        "tolerance": subject.settings.tolerance,
+        "axis_length": subject.settings.axis_length,
+        "centre": view.centre.tolist(),
         "seconds": float(seconds[-1]) if len(seconds) else 0.0,
-        "timed": timed,
+        "timed": planned.seconds is not None,
         "way": float(original.way[-1]) if len(original.way) else 0.0,
         "totals": {name: law.total for name, law in planned.laws.items()},
         "corners": None
         if subject.runs is not None
         else {"kinds": list(KINDS), "reasons": list(corners.reasons), "counts": corners.counts},
         "charts": charts,
-        "tools": _tools(subject, seconds, written),
+        "tools": _tools(view),
     }
     if subject.runs is not None:
-        meta["runs"] = _runs(subject.runs, written, planned)
+        meta["runs"] = _runs(subject.runs, view.written, planned)
         meta["left"] = [dict(one) for one in story.left]
     if subject.surface is not None:
-        meta["surface"] = _add_surface(pack, subject.surface, centre)
+        meta["surface"] = _add_surface(pack, subject.surface, view.centre)
     return meta, pack
 
 
-def _add_original(pack: Pack, original: OriginalPath, program: Program, corners: CornerList, centre: Floats) -> None:
+def _add_original(pack: Pack, view: _View) -> None:
+    original, program = view.original, view.subject.program
     must = original.breaks | original.rapid
     must[:-1] |= original.rapid[1:] | original.breaks[1:]
     if len(must) > MOST_POINTS and must.sum() > MOST_POINTS:
         must = original.breaks.copy()
-    must |= _seen(corners, np.arange(len(program)), len(program))[original.pose]
+    must |= _seen(view.corners, np.arange(len(program)), len(program))[original.pose]
     rows = thinned(original.tip, np.zeros(len(must)), must, MOST_POINTS)
-    pack.add("o_tip", original.tip[rows] - centre, "f4")
+    pack.add("o_tip", original.tip[rows] - view.centre, "f4")
     pack.add("o_axis", original.axis[rows], "f4", _FINE)
     pack.add("o_way", original.way[original.pose[rows]], "f4")
     pack.add("o_line", program.line[original.pose[rows]], "i4")
     pack.add("o_move", np.where(original.breaks, 0, np.where(original.rapid, 1, 2))[rows], "u1")
 
 
-def _add_written(
-    pack: Pack,
-    written: WrittenPath,
-    planned: Planned,
-    seconds: Floats,
-    corners: CornerList,
-    places: Ints,
-    settings: Settings,
-    centre: Floats,
-) -> None:
+def _add_written(pack: Pack, view: _View) -> None:
+    written, planned = view.written, view.planned
     larger, most = np.fmax(written.tip_off, written.axis_off), MOST_POINTS
     must = written.rapid.copy()
     must[:-1] |= written.rapid[1:]
     if must.sum() > MOST_POINTS:
         must[:] = False
-    seen, kind = _seen(corners, places, len(written)), _kinds(written, corners, places)
-    must |= (larger > settings.tolerance) | seen
+    seen, kind = _seen(view.corners, view.places, len(written)), _kinds(written, view.corners, view.places)
+    must |= (larger > view.subject.settings.tolerance) | seen
     most -= min(int(seen.sum()), most // 2) if len(written) > most else 0
     rows = thinned(written.tip, larger, must, most)
     speed = np.full(len(written), np.nan)
     if planned.seconds is not None:
         speed = speeds_over(planned.laws["written"], planned.seconds)
-    pack.add("w_tip", written.tip[rows] - centre, "f4")
+    pack.add("w_tip", written.tip[rows] - view.centre, "f4")
     pack.add("w_axis", written.axis[rows], "f4", _FINE)
     pack.add("w_kind", kind[rows], "u1")
     pack.add("w_rapid", written.rapid[rows], "u1")
     pack.add("w_angle", written.angle_off[rows], "f4", _FINE)
     for name, values in (
         ("w_way", written.way),
-        ("w_time", seconds),
+        ("w_time", view.seconds),
         ("w_off", written.tip_off),
         ("w_axis_off", written.axis_off),
         ("w_feed", written.feed),
@@ -257,33 +250,22 @@ def _kinds(written: WrittenPath, corners: CornerList, places: Ints) -> Ints:
     return kind
 
 
-def _add_corners(pack: Pack, corners: CornerList, program: Program, original: OriginalPath, centre: Floats) -> None:
-    pack.add("c_tip", program.tip[corners.pose] - centre, "f4")
+def _add_corners(pack: Pack, view: _View) -> None:
+    corners, program = view.corners, view.subject.program
+    pack.add("c_tip", program.tip[corners.pose] - view.centre, "f4")
     pack.add("c_axis", program.axis[corners.pose], "f4", _FINE)
     pack.add("c_kind", corners.kind, "u1")
     pack.add("c_reason", corners.reason, "u1")
-    pack.add("c_way", original.way[corners.pose], "f4")
-    for name, values in (
-        ("c_turn", corners.turn),
-        ("c_axis_turn", corners.axis_turn),
-        ("c_length", corners.length),
-        ("c_off", corners.tip_off),
-        ("c_axis_off", corners.axis_off),
-    ):
-        pack.add(name, values, "f4")
+    pack.add("c_way", view.original.way[corners.pose], "f4")
+    for name in ("turn", "axis_turn", "length", "tip_off", "axis_off"):
+        pack.add(f"c_{name.removeprefix('tip_')}", getattr(corners, name), "f4")
     pack.add("c_line", corners.cl_line, "i4")
     pack.add("c_nc", corners.nc_line, "i4")
 
 
-def _add_charts(
-    pack: Pack,
-    original: OriginalPath,
-    written: WrittenPath,
-    planned: Planned,
-    seconds: Floats,
-    limited_by: Sequence[str],
-) -> dict[str, Any]:
+def _add_charts(pack: Pack, view: _View, limited_by: Sequence[str]) -> dict[str, Any]:
     """Series of the charts along the way and over time; values come in pairs, so that no peak is lost."""
+    original, written, planned, seconds = view.original, view.written, view.planned, view.seconds
     count = int(np.clip(_STEPS_PER_POSE * len(original.way), _STEPS, _MOST_STEPS))
     charts: dict[str, Any] = {}
     end = max(float(original.way[-1]) if len(original.way) else 0.0, _NO_WAY)
@@ -362,10 +344,11 @@ def _highest(values: Floats, where: Floats, steps: Floats) -> Floats:
     return np.where(top < 0.0, np.nan, top)
 
 
-def _tools(subject: Subject, seconds: Floats, written: WrittenPath) -> list[dict[str, Any]]:
+def _tools(view: _View) -> list[dict[str, Any]]:
     """Tools with the time from which each is used, and their outline for drawing."""
+    subject, seconds = view.subject, view.seconds
     found = [(0, subject.tool, 0)] if subject.tool is not None else tools_of(subject.program)
-    reached = np.maximum.accumulate(written.pose)
+    reached = np.maximum.accumulate(view.written.pose)
     tools = []
     for pose, tool, line in found:
         place = min(int(np.searchsorted(reached, pose)), max(len(seconds) - 1, 0))

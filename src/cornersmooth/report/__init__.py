@@ -12,9 +12,9 @@ from cornersmooth.errors import Finding, InputError
 from cornersmooth.geometry.arcs import arc_radii
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import Floats, Ints, Move, Program, SmoothProgram, Status
-from cornersmooth.report.corners import Column, corner_table, counts_of, worst_corners
+from cornersmooth.report.corners import corner_table, counts_of, worst_corners
 from cornersmooth.report.record import SCHEMA, NcFile, cl_file, findings_table, record, report_json
-from cornersmooth.report.tables import csv_text
+from cornersmooth.report.tables import Columns, csv_text
 from cornersmooth.report.verdict import judge, sharp_corners
 from cornersmooth.rotary import rapid_moves, rotary_angles
 from cornersmooth.smoothing.construction import construction_of
@@ -113,11 +113,11 @@ def corners_csv(smoothed: SmoothProgram, *, dense: bool = True) -> Iterator[str]
     """The table of corners as CSV text, a block of rows at a time; `dense` as for `report`."""
     count = len(smoothed.corners)
 
-    def table(part: slice) -> dict[str, Column]:
-        return corner_table(smoothed, np.arange(*part.indices(count)), dense=dense)
+    def columns(part: slice) -> Columns:
+        table = corner_table(smoothed, np.arange(*part.indices(count)), dense=dense)
+        return {name: ("%.10g" if one.dtype.kind == "f" else "%s", one) for name, one in table.items()}
 
-    forms = {name: "%.10g" if column.dtype.kind == "f" else "%s" for name, column in table(slice(0)).items()}
-    return csv_text(forms, count, lambda part: table(part).values())
+    return csv_text(count, columns)
 
 
 def _records(smoothed: SmoothProgram, rows: Ints, *, dense: bool) -> list[dict[str, Any]]:

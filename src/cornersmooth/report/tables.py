@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,54 +21,53 @@ if TYPE_CHECKING:  # they take long to load
 _BLOCK = 10_000
 
 
-def csv_text(forms: Mapping[str, str], count: int, columns: Callable[[slice], Iterable[NDArray[Any]]]) -> Iterator[str]:
-    """Header, then the rows: `columns` gives those of a slice, `forms` say how each is written (``{"x": "%.6f"}``)."""
+#: columns by name: how values are written (``"%.6f"``), and the values
+Columns = dict[str, tuple[str, NDArray[Any]]]
+
+
+def csv_text(count: int, columns: Callable[[slice], Columns]) -> Iterator[str]:
+    """Header, then `count` rows: the function gives the columns of a slice."""
+    forms = {name: form for name, (form, _) in columns(slice(0)).items()}
     yield ",".join(forms) + "\n"
     form = ",".join(forms.values()) + "\n"
     for begin in range(0, count, _BLOCK):
-        block = (column.tolist() for column in columns(slice(begin, min(begin + _BLOCK, count))))
-        yield "".join(map(form.__mod__, zip(*block, strict=True)))
+        block = columns(slice(begin, min(begin + _BLOCK, count))).values()
+        yield "".join(map(form.__mod__, zip(*(values.tolist() for _, values in block), strict=True)))
 
 
-#: digits that third differences over a period of 1 ms still need
-_NUMBER = "%.14g"
-
-#: columns: way, speed, acceleration and jerk are in rad where the tip stands still and only the axis turns
-_LAW_COLUMNS = {
-    **dict.fromkeys("t_s s_mm v_mm_per_s a_mm_per_s2 j_mm_per_s3 centripetal_mm_per_s2".split(), _NUMBER),
-    **dict.fromkeys("x_mm y_mm z_mm i j k".split(), _NUMBER),
-    **dict.fromkeys(("turning", "line"), "%d"),
-}
+def _written(form: str, names: str, *values: NDArray[Any]) -> Columns:
+    """Columns that are written in one way."""
+    return {name: (form, column) for name, column in zip(names.split(), values, strict=True)}
 
 
 def timelaw_csv(law: TimeLaw) -> Iterator[str]:
     """The law at all multiples of its period and at its end as CSV text, a block of rows at a time.
 
-    For a law that was planned for a machine the positions of its axes follow: linear ones as without tool centre point
-    control (`cornersmooth.kinematics.machine_position`), rotary ones unwrapped.
+    Way, speed, acceleration and jerk are in rad where the tip stands still and only the axis turns. For a law that was
+    planned for a machine the positions of its axes follow: linear ones as without tool centre point control
+    (`cornersmooth.kinematics.machine_position`), rotary ones unwrapped.
     """
     names = () if law.machine_axes is None else law.machine_axes.names
-    own = {f"machine_{name.lower()}_{'mm' if name in LINEAR else 'deg'}": _NUMBER for name in names}
+    own = " ".join(f"machine_{name.lower()}_{'mm' if name in LINEAR else 'deg'}" for name in names)
     times = law.every_period()
 
-    def columns(part: slice) -> Iterable[NDArray[Any]]:
+    def columns(part: slice) -> Columns:
         now = law.at(times[part])
-        # adding 0.0 turns -0.0 into 0.0
-        for one in (now.t, now.s, now.v, now.a, now.j, now.centripetal, *now.tip.T, *now.axis.T):
-            yield one + 0.0
-        yield from (now.turning, now.line)
-        if own:
-            yield from (law.axes_at(times[part])[0] + 0.0).T
+        found = (now.t, now.s, now.v, now.a, now.j, now.centripetal, *now.tip.T, *now.axis.T)
+        axes = law.axes_at(times[part])[0].T if names else ()
+        # digits that third differences over a period of 1 ms still need; adding 0.0 turns -0.0 into 0.0
+        return (
+            _written(
+                "%.14g",
+                "t_s s_mm v_mm_per_s a_mm_per_s2 j_mm_per_s3 centripetal_mm_per_s2 x_mm y_mm z_mm i j k",
+                *(one + 0.0 for one in found),
+            )
+            | _written("%d", "turning line", now.turning, now.line)
+            | _written("%.14g", own, *(one + 0.0 for one in axes))
+        )
 
-    return csv_text(_LAW_COLUMNS | own, len(times), columns)
+    return csv_text(len(times), columns)
 
-
-#: columns of the table, and how they are written; lengths are mm
-CSV_COLUMNS = {
-    **dict.fromkeys(("pose", "cl_line", "nc_line"), "%d"),
-    **dict.fromkeys(("x", "y", "z"), "%.6f"),
-    **dict.fromkeys(("tip_deviation_mm", "axis_point_deviation_mm", "orientation_deviation_deg"), "%.7f"),
-}
 
 #: width of the longest bar of a histogram, and classes: parts of the tolerance, and of the span of the surface
 _BAR, _PARTS, _CLASSES = 40, 10, 20
@@ -78,15 +77,19 @@ _ROWS = 20
 
 
 def verification_csv(program: Program, found: Verification) -> Iterator[str]:
-    """Header, then a row for every pose that is passed at feed, in blocks of text."""
+    """Header, then a row for every pose that is passed at feed, in blocks of text; lengths are mm."""
     poses = np.flatnonzero(np.isfinite(found.pose_tip))
 
-    def columns(part: slice) -> Iterable[NDArray[Any]]:
+    def columns(part: slice) -> Columns:
         rows = poses[part]
-        yield from (rows, program.line[rows], found.pose_nc_line[rows], *program.tip[rows].T)
-        yield from (found.pose_tip[rows], found.pose_axis_point[rows], found.pose_angle[rows])
+        off = found.pose_tip[rows], found.pose_axis_point[rows], found.pose_angle[rows]
+        return (
+            _written("%d", "pose cl_line nc_line", rows, program.line[rows], found.pose_nc_line[rows])
+            | _written("%.6f", "x y z", *program.tip[rows].T)
+            | _written("%.7f", "tip_deviation_mm axis_point_deviation_mm orientation_deviation_deg", *off)
+        )
 
-    return csv_text(CSV_COLUMNS, len(poses), columns)
+    return csv_text(len(poses), columns)
 
 
 def histogram_lines(found: Verification) -> list[str]:
@@ -130,27 +133,22 @@ def along_lines(found: Distribution, tolerance: float) -> list[str]:
     return lines
 
 
-#: columns of the table, and how they are written; lengths are mm
-_SURFACE_COLUMNS = {
-    **dict.fromkeys(("cl_line", "station", "level"), "%d"),
-    "side": "%s",
-    **dict.fromkeys(("x", "y", "z"), "%.6f"),
-    **dict.fromkeys(("nx", "ny", "nz"), "%.7f"),
-    "off_mm": "%s",
-}
-
-
 def surface_csv(surface: SurfaceMap) -> Iterator[str]:
-    """Header, then a row for every point, in blocks of text; overcut is negative, unknown is empty."""
+    """Header, then a row for every point, in blocks of text; lengths are mm, overcut is negative, unknown is empty."""
     points = surface.points
 
-    def columns(part: slice) -> Iterable[NDArray[Any]]:
-        off = np.array(["" if value != value else f"{value:.7f}" for value in surface.off[part].tolist()])
+    def columns(part: slice) -> Columns:
+        off = np.array(["" if value != value else f"{value:.7f}" for value in surface.off[part].tolist()], np.str_)
         side = np.where(points.side[part] == 0, "left", "right")
-        yield from (points.line[part], points.station[part], points.level[part], side)
-        yield from (*points.point[part].T, *points.normal[part].T, off)
+        return (
+            _written("%d", "cl_line station level", points.line[part], points.station[part], points.level[part])
+            | _written("%s", "side", side)
+            | _written("%.6f", "x y z", *points.point[part].T)
+            | _written("%.7f", "nx ny nz", *points.normal[part].T)
+            | _written("%s", "off_mm", off)
+        )
 
-    return csv_text(_SURFACE_COLUMNS, len(surface), columns)
+    return csv_text(len(surface), columns)
 
 
 def surface_lines(surface: SurfaceMap) -> Iterator[str]:
