@@ -17,7 +17,7 @@ import cornersmooth
 from cornersmooth import Program, Settings
 from cornersmooth.feedrate import Limits, TimeLaw, plan, plan_text
 from cornersmooth.kinematics import Machine, load_machine
-from cornersmooth.kinematics.machine_tables import machine_table, parse_machine
+from cornersmooth.kinematics.machine import machine_table, parse_machine
 from cornersmooth.nc import choose_form
 from cornersmooth.nc_reader import read_nc
 from cornersmooth.times.laws import compare

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cornersmooth.kinematics import load_machine
-from cornersmooth.kinematics.machine_tables import machine_names
+from cornersmooth.kinematics.machine import machine_names
 from cornersmooth.nc_reader.rotary import Rotary, tool_vectors
 
 

@@ -15,7 +15,7 @@ from cornersmooth.model import Keep, Program, Statement, Status
 from cornersmooth.nc import choose_form
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
-from cornersmooth.smoothing.doubled import one_corner_each
+from cornersmooth.smoothing.construction import one_corner_each
 from oracle.nc_text import Line, parse
 
 TOLERANCE = 0.01

@@ -137,18 +137,9 @@ class Splines:
 
         Each is the blossom at (low, low, low), (low, low, high), (low, high, high), (high, high, high).
         """
-        k = self.around(span)
-        ends = np.stack((low, high), axis=1)
-        rows = []
-        for row in range(4):
-            values = np.broadcast_to(np.eye(4), (len(k), 4, 4))
-            for level in range(3):
-                at = ends[:, 1 if level < row else 0]
-                begin, end = k[:, level:3], k[:, 3 : 6 - level]
-                share = ((at[:, None] - begin) / (end - begin))[:, :, None]
-                values = (1.0 - share) * values[:, :-1] + share * values[:, 1:]
-            rows.append(values[:, 0])
-        return np.stack(rows, axis=1)
+        knots, eye = self.around(span), np.broadcast_to(np.eye(4), (len(span), 4, 4))
+        rows = [np.stack([high if level < row else low for level in range(3)], axis=1) for row in range(4)]
+        return np.stack([_blossom(knots, arguments, eye) for arguments in rows], axis=1)
 
     def bezier(self, control: Floats, span: Ints, low: Floats, high: Floats) -> Floats:
         """(m, 4, d) Bézier points of the parts low..high of spans, from control points (controls, d)."""
@@ -156,10 +147,13 @@ class Splines:
 
     def blossom(self, span: Ints, arguments: Floats, control: Floats) -> Floats:
         """(m, d) blossoms of the spans' cubics at three arguments (m, 3) each, from control points (controls, d)."""
-        k = self.around(span)
-        values = control[self.taps(span)]
-        for level in range(3):
-            begin, end = k[:, level:3], k[:, 3 : 6 - level]
-            share = ((arguments[:, level, None] - begin) / (end - begin))[:, :, None]
-            values = (1.0 - share) * values[:, :-1] + share * values[:, 1:]
-        return values[:, 0]
+        return _blossom(self.around(span), arguments, control[self.taps(span)])
+
+
+def _blossom(knots: Floats, arguments: Floats, values: Floats) -> Floats:
+    """(m, d) blossoms at three arguments (m, 3), from control points (m, 4, d) and the knots around them (m, 6)."""
+    for level in range(3):
+        begin, end = knots[:, level:3], knots[:, 3 : 6 - level]
+        share = ((arguments[:, level, None] - begin) / (end - begin))[:, :, None]
+        values = (1.0 - share) * values[:, :-1] + share * values[:, 1:]
+    return values[:, 0]

@@ -1,7 +1,17 @@
 """Machines: their axes and limits, the tool axis that rotary angles give and the angles that give it, positions."""
 
-from cornersmooth.kinematics.machine import Dynamics, Machine, RotaryAxis, Travel, endless, with_dynamics
-from cornersmooth.kinematics.machine_tables import load_machine, machine_names, machine_table, parse_machine
+from cornersmooth.kinematics.machine import (
+    Dynamics,
+    Machine,
+    RotaryAxis,
+    Travel,
+    endless,
+    load_machine,
+    machine_names,
+    machine_table,
+    parse_machine,
+    with_dynamics,
+)
 from cornersmooth.kinematics.poses import (
     Solutions,
     check_travel,

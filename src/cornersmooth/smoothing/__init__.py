@@ -10,8 +10,7 @@ import numpy as np
 from cornersmooth.errors import Finding, InputError
 from cornersmooth.model import Bools, Move, Program, SmoothProgram
 from cornersmooth.settings import FLIP_ANGLE, Settings
-from cornersmooth.smoothing.construction import construction_of
-from cornersmooth.smoothing.doubled import one_corner_each
+from cornersmooth.smoothing.construction import construction_of, one_corner_each
 from cornersmooth.smoothing.given_curves import beside_chords, given_runs, with_runs, without
 
 

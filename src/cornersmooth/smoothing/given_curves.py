@@ -27,7 +27,7 @@ _FEWEST = 4
 
 
 def beside_chords(program: Program, settings: Settings) -> tuple[Program, Settings]:
-    """Take what the moves are off the curves of the file off ε, as `doubled` does with what it moves."""
+    """Take what the moves are off the curves of the file off ε, as `one_corner_each` does with what it moves."""
     curves = program.curves
     if curves is None:
         return program, settings
