@@ -100,7 +100,7 @@ class Stream:
     Parameters
     ----------
     lexer : Lexer
-        Of the control; numbers of feeds may stand without a point.
+        Of the control; numbers of feeds may be without a point.
     state : State
         Where the program begins.
     """
@@ -153,7 +153,7 @@ class Stream:
 
 
 def _targets(text: Text, others: Sequence[bytes]) -> set[int]:
-    """Lines to which the program may jump: those of all numbers that stand beside jumps in some lines."""
+    """Lines to which the program may jump: those of all numbers beside jumps in some lines."""
     jumps = [match[0] for match in map(_JUMPS.search, others) if match]
     if not jumps:
         return set()

@@ -139,15 +139,15 @@ class Row:
     pattern: re.Pattern[str] = re.compile("(?!)")  #: of its text, where verification accepts it
     says: str = field(default="", compare=False)  #: what it means, for the documentation
 
-    # the block: words that must stand beside it (`needs` finds the row, and may say more of that word)
+    # the block: words that must be beside it (`needs` finds the row, and may say more of that word)
     needs: re.Pattern[str] | None = None
     must: re.Pattern[str] | None = None
     block: bool = False  #: it is a whole block
     positions: bool = False  #: accepted only where the machine's file has positions, which are compared
-    alone: bool = False  #: no other words may stand beside it
+    alone: bool = False  #: no other words may be beside it
     #: what the numbers in its groups may be of the tolerance: ``length`` of ε, ``angle`` of that of the tool axis
     share: float | None = None
-    extra: re.Pattern[str] | None = None  #: words of its block that switch on what somebody must have asked for
+    extra: re.Pattern[str] | None = None  #: words of its block that switch on what somebody must have wanted
 
     # blocks before and after
     after: re.Pattern[str] | None = None  #: a word that must have come since the last time
@@ -164,10 +164,10 @@ class Row:
     preset: str = ""  #: the usual one of these
     drops: str = ""  #: a group that the control forgets with it, and that must come after it
     off: bool = False  #: it switches the group off, which must hold at the end
-    outside: bool = False  #: it may not stand under tool tip control
+    outside: bool = False  #: it may not be under tool tip control
 
     # where the tool is
-    #: the tool goes away, and none but an approach may follow, in which work offset or tool length are said again
+    #: the tool goes away, and none but an approach may follow, in which work offset or tool length come again
     retract: bool = False
     high: bool = False  #: only after a retract; a control with such a word wants the tool high at the end, too
     #: the rotary axes must have been sent to zero before: where a parameter says so, the part program turns with the

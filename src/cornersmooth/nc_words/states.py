@@ -96,7 +96,7 @@ class StateRules:
             self.wrong(code, line, *texts)
 
     def _around_retracts(self, line: int, *texts: str, others: list[tuple[int, str]] | None = None) -> None:
-        """Complain of what a program of ours never does around a retract; of another post it is put to `others`."""
+        """Complain of what no program with our head does around a retract; of another post it is put to `others`."""
         if self.made:
             self.unframed(NOT_LISTED, line, *texts)
         elif others is not None:
