@@ -32,7 +32,7 @@ KINK: Final = math.radians(1.9)
 CORNER: Final = math.radians(8.0)
 
 #: rows after which a piece ends in any case; so many parts are worked on side by side
-LANE: Final = 512
+LANE: Final = 256
 
 #: points that are measured at once: intermediate arrays fit the processor's cache
 _TOGETHER: Final = 1 << 16
