@@ -11,6 +11,7 @@ import pytest
 
 from cornersmooth.cl import read
 from cornersmooth.feedrate import BlockLimits, Limits, TimeLaw, direct, limiting, plan, plan_text
+from cornersmooth.feedrate.path import Kind
 from cornersmooth.kinematics import load_machine
 from cornersmooth.model import Program, SmoothProgram
 from cornersmooth.nc import choose_form, fit_settings, load_control, write
@@ -241,3 +242,13 @@ def test_command_shows_the_text_beside_the_paths(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert "as written" in done.stdout.decode()
     assert "curves" not in done.stdout.decode()
+
+
+@pytest.mark.parametrize(("control", "share"), [("fanuc", 1.0), ("linuxcnc", np.sqrt(2.0))])
+def test_an_arc_that_rises_is_as_fast_as_its_control_counts(control: str, share: float) -> None:
+    """F in the plane of the arc alone, or along the helix: at 45 degrees one takes √2 of the time of the other."""
+    rise = 10.0 * np.pi
+    text = f"G21 G90 G94 G17\nG0 X20. Y0. Z0.\nG1 X20. Y0. Z0.001 F100.\nG3 X0. Y20. Z{rise:.3f} R20. F100.\nM30\n"
+    law = plan_text(read_nc(text.encode(), control=control), Limits(accel=1e5, jerk=1e8))
+    seconds = np.diff(law.times_at(law.edge))[law.path.kind == Kind.ARC].sum()
+    assert seconds == pytest.approx(share * 60.0 * rise / 100.0, rel=2e-3)

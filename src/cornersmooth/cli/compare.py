@@ -57,7 +57,7 @@ def run_compare(given: Options) -> int:
             table = compare_filtered(data, tried, axes, **how_read(given), watch=watch)
         else:
             blocks = BlockLimits(look_ahead=given.look_ahead)
-            table = compare_programs(program, tried, axes, blocks, wider=bool(given.verbose), watch=watch)
+            table = compare_programs(program, tried, axes, blocks, watch=watch)
     machine_named = named or given.limits
     made_by = ("filter", os.path.splitext(source)[1]) if is_program else ("smooth", control.layout.suffix)
     commands = [_command(given, row, machine_named, *made_by) for row in table.rows]
@@ -125,11 +125,6 @@ def _end(table: Table, commands: list[str]) -> Iterator[str]:
             yield f"  {commands[number]}"
             if reached := limits_text(row.limits):
                 yield f"  {reached.removeprefix('; ')}"
-    if table.wider is not None:
-        gain = table.wider_gain
-        yield (
-            f"twice the tolerance would save {100.0 * gain:.0f} %" if gain else "twice the tolerance would gain nothing"
-        )
 
 
 def _words(row: Row) -> str:

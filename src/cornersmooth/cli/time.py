@@ -13,10 +13,8 @@ from cornersmooth.cli.files import check_inputs, check_path, read_head, write_re
 from cornersmooth.cli.options import Options
 from cornersmooth.cli.show import print_message, progress_bar, say
 from cornersmooth.errors import message
-from cornersmooth.feedrate import BlockLimits, axis_peaks, limiting, plan_text
-from cornersmooth.feedrate.reached import peaks
+from cornersmooth.feedrate import BlockLimits, limiting, plan_text
 from cornersmooth.kinematics import machine_names
-from cornersmooth.kinematics.machine import LINEAR
 from cornersmooth.methods import METHODS
 from cornersmooth.model import Move, Program
 from cornersmooth.nc import fit_settings
@@ -148,17 +146,6 @@ def _tables(compared: Comparison, verbose: bool) -> Iterator[str]:
     yield f"{'at constant feed':<22}{compared.constant_feed_seconds:>10.3f}"
     if not verbose:
         return
-    yield ""
-    yield f"{'reached':<22}{'mm/s':>12}{'mm/s2':>12}{'across':>12}{'mm/s3':>14}"
-    for name, law in compared.laws.items():
-        top = peaks(law)
-        yield (
-            f"{_TITLES[name]:<22}{top.speed_mm_per_s:>12.3f}{top.accel_mm_per_s2:>12.1f}"
-            f"{top.centripetal_mm_per_s2:>12.1f}{top.jerk_mm_per_s3:>14.1f}"
-        )
-    if compared.machine is not None:
-        yield ""
-        yield from _axis_table(compared)
     for name in ("direct_velocity_jump", "as_written"):
         yield ""
         yield f"where the time goes ({_TITLES[name]})"
@@ -168,18 +155,3 @@ def _tables(compared: Comparison, verbose: bool) -> Iterator[str]:
                 f"{place.line:>8}{place.x:>12.3f}{place.y:>12.3f}{place.z:>12.3f}"
                 f"{place.seconds:>10.3f}{place.lost_seconds:>10.3f}{place.slowest_mm_per_s:>12.2f}"
             )
-
-
-def _axis_table(compared: Comparison) -> Iterator[str]:
-    """What each axis of the machine reaches of its speed, acceleration and jerk."""
-    machine = "" if compared.machine is None else compared.machine.name
-    found = {name: axis_peaks(law) for name, law in compared.laws.items()}
-    first = next(iter(found.values()))
-    yield f"reached of the limits of {machine}, %: speed, acceleration, jerk"
-    yield f"{'':<20}" + "".join(f"{peak.name:>12}" for peak in first)
-    for name, axes in found.items():
-        shown = (" ".join(f"{100.0 * used:.0f}" for used in peak.used) for peak in axes)
-        yield f"{_TITLES[name].replace(',', ''):<20}" + "".join(f"{text:>12}" for text in shown)
-    for order, per in enumerate(("s", "s2", "s3")):
-        units = (f"{peak.limits[order]:g} {'mm' if peak.name in LINEAR else 'deg'}/{per}" for peak in first)
-        yield f"{('limits' if not order else ''):<20}" + "".join(f"{text:>12}" for text in units)

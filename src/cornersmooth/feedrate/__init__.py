@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from cornersmooth.feedrate.planner import direct, plan
-from cornersmooth.feedrate.reached import AxisPeaks, axis_peaks, limiting
+from cornersmooth.feedrate.reached import limiting
 from cornersmooth.feedrate.timelaw import States, TimeLaw
 from cornersmooth.feedrate.written import BlockLimits, block_feeds, plan_text
 from cornersmooth.settings import Limits
 
 __all__ = [
-    "AxisPeaks",
     "BlockLimits",
     "Limits",
     "States",
     "TimeLaw",
-    "axis_peaks",
     "block_feeds",
     "direct",
     "limiting",

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cornersmooth.arrays.vectors import norm, unit
+from cornersmooth.arrays.vectors import dot, norm, unit
 from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate import scurve
 from cornersmooth.feedrate.curves import Curves
@@ -91,7 +91,12 @@ def written_motion(nc: NcProgram, name: str, axis_length: float = 10.0) -> Writt
     move = np.array([_MOVES[Element(kind)] for kind in sorted(Element)], np.uint8)[nc.kind]
     arcs = nc.arcs
     proper = arcs.element > 0
-    feed, turning = np.where(nc.kind == Element.RAPID, np.nan, _said(nc)), nc.per_revolution
+    feed, turning = np.where(nc.kind == Element.RAPID, np.nan, _known_feeds(nc)), nc.per_revolution
+    if nc.feed_in_plane:  # an arc that rises is so much faster
+        own = arcs.element[proper]
+        way = nc.tip[own] - nc.tip[own - 1]
+        flat = np.abs(arcs.sweep[proper]) * norm(np.cross(arcs.normal[proper], nc.tip[own] - arcs.centre[proper]))
+        feed[own] *= np.hypot(flat, dot(way, arcs.normal[proper])) / flat
     if turning.any():  # with the speed of the spindle it is a feed per minute
         speed = np.full(len(nc), np.nan)
         for event in nc.events:
@@ -149,7 +154,7 @@ def _curve_pieces(nc: NcProgram, axis_length: float) -> tuple[Any, ...]:
     return (element[order], *(column[order] for column in others))
 
 
-def _said(nc: NcProgram) -> Floats:
+def _known_feeds(nc: NcProgram) -> Floats:
     """(m,) feeds; of blocks of the largest F of inverse time, whose way the digits do not show, the one before.
 
     What is read for them is only a feed that they are not below.

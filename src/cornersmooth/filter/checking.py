@@ -64,18 +64,15 @@ class Checked:
 def places(old: Reading, new: Reading, reader: ProgramReader) -> tuple[list[Place], list[Problem]]:
     """Find the runs of a program in another one, between lines that must say the same; within them all is motion."""
     meanings = Meanings.of(reader, old)
-    head, tail = (old.runs[0].first, old.runs[-1].stop) if old.runs else (len(old), len(old))
-    begin, at, wrong = _at_begin(old, new, meanings, head)
-    if wrong or not old.runs:
-        left = [line for line in range(at, len(new)) if meanings.of_line(new.lines(line, line + 1))]
-        return [], wrong or [_changed(line, "there is more than in the old program") for line in left[:1]]
+    firsts, stops = [run.first for run in old.runs], [run.stop for run in old.runs]
     found: list[Place] = []
-    for run, following in zip(old.runs, [*(run.first for run in old.runs[1:]), len(old)], strict=True):
-        begin, stop, wrong = _found(old, new, meanings, range(run.stop, following), at, last=run.stop == tail)
-        if wrong:
-            return found, wrong
-        if new.lines(at, begin) != old.lines(run.first, run.stop):
-            found.append(Place(run, at, begin))
+    at = 0
+    for k, lines in enumerate(map(range, [0, *stops], [*firsts, len(old)])):
+        begin, stop, wrong = _found(old, new, meanings, lines, at, last=k == len(firsts))
+        if wrong is not None:
+            return found, [wrong]
+        if k and new.lines(at, begin) != old.lines(firsts[k - 1], stops[k - 1]):
+            found.append(Place(old.runs[k - 1], at, begin))
             others = np.flatnonzero(new.why[at:begin] != PLAIN_CUT) + at
             texts = ((line, new.lines(line, line + 1)) for line in others.tolist())
             more = [line for line, text in texts if not (meanings.is_motion(text) or _BOUNDED.fullmatch(text))]
@@ -85,56 +82,39 @@ def places(old: Reading, new: Reading, reader: ProgramReader) -> tuple[list[Plac
     return found, []
 
 
-def _at_begin(old: Reading, new: Reading, meanings: Meanings, stop: int) -> tuple[int, int, list[Problem]]:
-    """Lines of the new program up to which it says what the old one says before a line; and what is another."""
-    if new.data.startswith(old.lines(0, stop)) and len(new) >= stop:
-        return 0, stop, []
-    at = 0
-    for line in range(stop):
-        if not (wanted := meanings.of_line(old.lines(line, line + 1))):
-            continue
-        while at < len(new) and not meanings.of_line(new.lines(at, at + 1)):
-            at += 1
-        if at == len(new) or meanings.of_line(new.lines(at, at + 1)) != wanted:
-            return 0, 0, [_changed(at, f"line {line + 1} of the old program, outside of runs, is another one")]
-        at += 1
-    return 0, at, []
-
-
 def _found(
     old: Reading, new: Reading, meanings: Meanings, lines: range, at: int, *, last: bool
-) -> tuple[int, int, list[Problem]]:
-    """Where the new program says, from a line on, what lines of the old one say; those at its end must end it."""
-    text = old.lines(lines.start, lines.stop)
-    begin = len(new.data) - len(text) if last else new.data.find(text, int(new.start[at]))
+) -> tuple[int, int, Problem | None]:
+    """Where the new program says, from a line on, what lines of the old one say: at its begin, its end, or between."""
+    text, first = old.lines(lines.start, lines.stop), lines.start == 0
+    begin = len(new.data) - len(text) if last else 0 if first else new.data.find(text, int(new.start[at]))
     while not last and begin > 0 and new.data[begin - 1 : begin] != b"\n":
         begin = new.data.find(text, begin + 1)
-    if begin >= new.start[at] and new.data.startswith(text, begin) and (text or last):
+    if begin >= new.start[at] and new.data.startswith(text, begin) and (text or first or last):
         line = int(np.searchsorted(new.start, begin))
-        if new.start[line] == begin:
-            return line, line + len(lines), []
+        if new.start[line] == begin and (line == 0 or not first):
+            return line, line + len(lines), None
     wanted = [(line, stated) for line in lines if (stated := meanings.of_line(old.lines(line, line + 1)))]
     # plain cuts are looked at only where the first line is one
-    first = [line for line in lines if wanted and line == wanted[0][0] and old.why[line] == PLAIN_CUT]
-    there = [k for k in range(at, len(new)) if first or new.why[k] != PLAIN_CUT]
-    best = (-1, at, 0)
-    for k in there:
-        if not wanted or meanings.of_line(new.lines(k, k + 1)) != wanted[0][1]:
-            continue
+    cut = bool(wanted) and old.why[wanted[0][0]] == PLAIN_CUT
+    best = (0, at)
+    for k in [0] if first else [k for k in range(at, len(new)) if wanted and (cut or new.why[k] != PLAIN_CUT)]:
         stop, count = k, 0
         while stop < len(new) and count < len(wanted):
             stated = meanings.of_line(new.lines(stop, stop + 1))
-            if stated and stated != wanted[count][1]:
+            if (stated or not (first or count)) and stated != wanted[count][1]:
                 break
             count, stop = count + bool(stated), stop + 1
-        ends = not last or not any(meanings.of_line(new.lines(j, j + 1)) for j in range(stop, len(new)))
-        if count == len(wanted) and ends:
-            return k, stop, []
-        best = max(best, (count, stop, k))
-    if 0 < best[0] < len(wanted):
+        more = (j for j in range(stop, len(new)) if last and meanings.of_line(new.lines(j, j + 1)))
+        if count == len(wanted) and (left := next(more, None)) is None:
+            return k, stop, None
+        if count == len(wanted) and first:
+            return 0, 0, _changed(left or 0, "there is more than in the old program")
+        best = max(best, (count, stop))
+    if first or 0 < best[0] < len(wanted):
         what = f"line {wanted[best[0]][0] + 1} of the old program, outside of runs, is another one"
-        return 0, 0, [_changed(best[1], what)]
-    return 0, 0, [_changed(at, f"the lines after line {lines.start} of the old program are not there")]
+        return 0, 0, _changed(best[1], what)
+    return 0, 0, _changed(at, f"the lines after line {lines.start} of the old program are not there")
 
 
 def _changed(line: int, text: str) -> Problem:

@@ -19,7 +19,7 @@ from cornersmooth.methods import CURVES_METHOD, DEFAULT_METHOD, PAPERS_METHOD
 from cornersmooth.model import Move, Program
 from cornersmooth.nc import Control, Form, choose_form
 from cornersmooth.pipeline import postprocess
-from cornersmooth.settings import BOUNDS, Settings
+from cornersmooth.settings import Settings
 from cornersmooth.system.processes import can_fork, map_in_processes, useful_processes
 from cornersmooth.times.saving import Timing, without_holes
 
@@ -96,7 +96,6 @@ class Table:
     share: float  #: Part of the poses that was looked at
     law: str  #: By which lines are planned
     rows: tuple[Row, ...]
-    wider: Row | None = None  #: The best row with twice the tolerance, if it was planned
 
     @property
     def best(self) -> int | None:
@@ -122,14 +121,6 @@ class Table:
         best = None if self.best is None else self.rows[self.best].seconds
         return best is not None and round(best, 1) < round(self.unsmoothed, 1)
 
-    @property
-    def wider_gain(self) -> float:
-        """Part of the time of the best row that twice the tolerance would save; 0 where no plan can tell."""
-        best, wider = None if self.best is None else self.rows[self.best].seconds, self.wider
-        if not best or wider is None or not wider.usable or wider.seconds is None or best < EQUAL * wider.seconds:
-            return 0.0
-        return 1.0 - wider.seconds / best
-
     def as_dict(self) -> dict[str, Any]:
         """Plain values."""
         rows = [row.as_dict() | {"best": number == self.best} for number, row in enumerate(self.rows)]
@@ -141,7 +132,7 @@ class Table:
             "law": self.law,
             "gains": self.gains,
             "rows": rows,
-        } | ({} if self.wider is None else {"twice_tolerance": self.wider.as_dict()})
+        }
 
 
 def candidates(control: Control, settings: Settings, machine: Machine | None) -> list[Candidate]:
@@ -185,7 +176,6 @@ def compare_programs(
     axes: Machine | None = None,
     blocks: BlockLimits | None = None,
     *,
-    wider: bool = False,
     processes: int | None = None,
     watch: Callable[[Table], None] | None = None,
 ) -> Table:
@@ -195,8 +185,6 @@ def compare_programs(
     ----------
     axes : Machine, optional
         Whose limits, in place of those of the machines of the forms.
-    wider : bool
-        Whether the best row is made with twice its tolerance as well.
     processes : int, optional
         As many as are useful by default; the rows do not depend on it.
     watch : callable, optional
@@ -224,12 +212,7 @@ def compare_programs(
     table = with_rows(begun, tried, work, processes, watch)
     leading = _leading(table.rows)
     rows = dict(zip(leading, map_in_processes(closely, leading, _processes(processes)), strict=True))
-    table = replace(table, rows=tuple(rows.get(number, row) for number, row in enumerate(table.rows)))
-    if not wider or table.best is None or tried[table.best].settings.tolerance > BOUNDS["tolerance"][1] / 2.0:
-        return table
-    best = tried[table.best]
-    looser = replace(best, settings=best.settings.but(tolerance=2.0 * best.settings.tolerance))
-    return replace(table, wider=_row(part, looser, unsmoothed, axes, blocks, roughly=False))
+    return replace(table, rows=tuple(rows.get(number, row) for number, row in enumerate(table.rows)))
 
 
 def _leading(rows: Sequence[Row]) -> list[int]:
@@ -291,8 +274,6 @@ def _row(
     unsmoothed: float,
     axes: Machine | None,
     blocks: BlockLimits | None,
-    *,
-    roughly: bool = True,
 ) -> Row:
     settings, row = candidate.settings, Row.of(candidate)
     try:
@@ -309,7 +290,7 @@ def _row(
             tip=found.max_tip_deviation_mm,
             axis_point=None if settings.axis_tolerance is not None else found.max_axis_point_deviation_mm,
         )
-        return _planned(row, timing, stream.getvalue(), program, unsmoothed, ROUGHLY if roughly else None)
+        return _planned(row, timing, stream.getvalue(), program, unsmoothed, ROUGHLY)
     except CornersmoothError as failure:
         return replace(Row.of(candidate), verdict=getattr(failure, "what", str(failure)))
 

@@ -9,8 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cornersmooth.feedrate import TimeLaw, axis_peaks, direct, plan
-from cornersmooth.feedrate.reached import peaks
+from cornersmooth.feedrate import TimeLaw, direct, plan
 from cornersmooth.kinematics import Machine
 from cornersmooth.methods import METHODS
 from cornersmooth.model import Program
@@ -94,14 +93,10 @@ class Comparison:
             "length_mm": {name: law.length for name, law in self.laws.items()},
             "stops": {name: stops(law) for name, law in self.laws.items()},
             "turning_seconds": {name: turning_seconds(law) for name, law in self.laws.items()},
-            "peaks": {name: peaks(law)._asdict() for name, law in self.laws.items()},
             "slowest": {name: [move._asdict() for move in slowest(law, slow_moves)] for name, law in self.laws.items()},
         }
         if self.machine is not None:
             contents["machine"] = self.machine.name
-            contents["axis_peaks"] = {
-                name: {peak.name: peak.as_dict() for peak in axis_peaks(law)} for name, law in self.laws.items()
-            }
         return contents
 
 
