@@ -314,3 +314,11 @@ def test_a_run_goes_on_where_the_text_is_divided() -> None:
     assert len(text) > CHUNK
     (run,) = ProgramReader("linuxcnc", THREE_AXES).read(text).runs
     assert len(run) == 400 * 120 - 1
+
+
+def test_long_lines_without_tip_control_are_the_fewest_lines() -> None:
+    form = cs.choose_form("fanuc", "g1", machine=THREE_AXES)
+    found = cs.filter_program(PROGRAMS["relief"].encode(), form, cs.Settings(tolerance=EPS, lines="long"))
+    assert found.verdict is Verdict.PASSED
+    assert found.new_lines < 0.9 * found.lines
+    assert not re.search(rb"\n(G1[78] )?G0?[23] ", found.data)

@@ -130,12 +130,15 @@ def filter_program(
         has no time.
     """
     settings = Settings() if settings is None else settings
+    alone = settings.lines == "long" and not form.long_lines  # without tip control: from vertex to vertex
+    settings = settings.but(lines=None) if alone else settings
     job, old = read_program(data, form, settings, tip_from_start=tip_from_start, inch=inch, processes=processes)
     if most is not None:
         left_all_but(old, most)
-    texts, why = (fewest if settings.lines is None else smoothed)(job, old, old.runs)
+    few = settings.lines is None
+    texts, why = fewest(job, old, old.runs, arcs=not alone) if few else smoothed(job, old, old.runs)
     times = None if axes is None else Times(job, old, axes)
-    if settings.lines is None and times is not None and old.runs and not old.absent:
+    if few and not alone and times is not None and old.runs and not old.absent:
         texts, why = _fastest(job, old, texts, why, times)
     return _result(job, old, _way(job, old, texts, why, verify=verify), times, paths=paths)
 
