@@ -167,21 +167,24 @@ def _continued(source: _Lines, text: str, fits: Callable[[str], bool]) -> str:
     return " ".join(parts)
 
 
-def _statements(source: _Lines, line: int, text: str) -> Iterator[Record]:
-    """Yield the statements of a line, joined with its continuation lines, and the comment after them."""
+def _joined(source: _Lines, line: int, text: str, begin: str, fits: Callable[[str], bool]) -> tuple[str, str, bool]:
+    """Return a line with those that continue it, the comment after them, and whether the file ends before its end."""
     part, goes_on, comment = _cut(text)
     parts = [part]
-    cut_short = False
     while goes_on:
         more = source.peek()
-        if more is None or _begins_statement(more):
+        if more is None or not fits(more):
             if more is None or _name(parts[0]) != "GOTO" or _name(more) not in _CLOSING:
-                raise source.incomplete(line, parts[0])
-            cut_short = True
+                raise source.incomplete(line, begin or parts[0])
             break
         part, goes_on, comment = _cut(source.take()[1])
         parts.append(part)
-    text = " ".join(filter(None, parts))
+    return " ".join(filter(None, parts)), comment, goes_on
+
+
+def _statements(source: _Lines, line: int, text: str) -> Iterator[Record]:
+    """Yield the statements of a line, joined with its continuation lines, and the comment after them."""
+    text, comment, cut_short = _joined(source, line, text, "", lambda more: not _begins_statement(more))
     statements = [part for part in map(str.strip, _split(text, ";")) if part]
     for part in statements[:-1]:
         yield _parse(part, line)
@@ -196,23 +199,16 @@ def _with_points(source: _Lines, line: int, text: str) -> Record:
 
     A comma at the end of a line continues the statement even without a `$`.
     """
-    parts = [text]
+    statement = text
     points: list[tuple[int, tuple[Argument, ...]]] = []
     while (more := source.peek()) is not None and _NUMERIC_LINE.match(more):
         point_line, more = source.take()
-        part, goes_on, _ = _cut(more)
-        numbers = [part]
-        while goes_on:
-            more = source.peek()
-            if more is None or not _NUMERIC_LINE.match(more):
-                raise source.incomplete(line, text)
-            part, goes_on, _ = _cut(source.take()[1])
-            numbers.append(part)
-        if not points and parts[-1].endswith(","):
-            parts += numbers
+        numbers, _, _ = _joined(source, line, more, text, lambda more: _NUMERIC_LINE.match(more) is not None)
+        if not points and statement.endswith(","):
+            statement += f" {numbers}"
         else:
-            points.append((point_line, arguments(" ".join(numbers))))
-    record = _parse(" ".join(parts), line)
+            points.append((point_line, arguments(numbers)))
+    record = _parse(statement, line)
     return replace(record, points=tuple(points)) if points else record
 
 

@@ -9,15 +9,13 @@ from typing import Final
 
 import numpy as np
 
-from cornersmooth.cl.arcs import Arc, read_arc
+from cornersmooth.cl.arcs import Arc, read_arc, read_drive_arc, read_helix
 from cornersmooth.cl.grammar import NUMBER, Argument, Record, joined, number
 from cornersmooth.cl.messages import error
-from cornersmooth.cl.movnrb import Spline
-from cornersmooth.cl.nurbs import DEGREE, Cubic, Curve
+from cornersmooth.cl.nurbs import DEGREE, Cubic, Curve, Spline
 from cornersmooth.cl.poses import Vector, check_range
 from cornersmooth.cl.reader_state import ReaderState
 from cornersmooth.cl.state_statements import Handler
-from cornersmooth.cl.surfaces import read_drive_arc, read_helix
 from cornersmooth.cl.words import GOTO_WORDS
 from cornersmooth.model import MM_PER_UNIT, Floats, Ints, Move
 

@@ -11,8 +11,7 @@ from dataclasses import dataclass, field, replace
 from cornersmooth.cl.arcs import Arc, ArcRule
 from cornersmooth.cl.grammar import Argument, Record, joined, number
 from cornersmooth.cl.messages import error, finding
-from cornersmooth.cl.movnrb import Spline
-from cornersmooth.cl.nurbs import Cubic, Curve
+from cornersmooth.cl.nurbs import Cubic, Curve, Spline
 from cornersmooth.cl.poses import Poses, System, Vector
 from cornersmooth.errors import Finding, InputError
 from cornersmooth.model import Move, Statement, Units
