@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-import io
 import re
-from functools import cache
 
 import pytest
 
-from cornersmooth.cl import read
 from cornersmooth.errors import Verdict
-from cornersmooth.model import Program
-from cornersmooth.nc import Frame, choose_form
-from cornersmooth.pipeline import postprocess
-from cornersmooth.settings import Settings
-from cornersmooth.verify import Verification, verify
+
+from .small import codes, found, right
 
 RUN = """LOADTL/3
 SPINDL/RPM,3000,CLW
@@ -50,28 +44,6 @@ FINI
 """
 
 
-@cache
-def program(text: str) -> Program:
-    """A CL file."""
-    return read(text.encode(), name="part.cls")
-
-
-@cache
-def right(text: str, control: str = "fanuc") -> tuple[str, ...]:
-    """The lines of a right program."""
-    stream = io.BytesIO()
-    frame = Frame(cycles="moves")
-    postprocess(program(text), stream, Settings(tolerance=0.02), form=choose_form(control), frame=frame, verify=False)
-    lines = tuple(stream.getvalue().decode().splitlines())
-    assert found(text, lines, control).passed
-    return lines
-
-
-def found(text: str, lines: tuple[str, ...], control: str = "fanuc") -> Verification:
-    """What is found in a program."""
-    return verify(program(text), ("\n".join(lines) + "\n").encode(), tolerance=0.02, control=control)
-
-
 def moved(lines: tuple[str, ...], word: str, by: int) -> tuple[str, ...]:
     """A program in which a word stands some lines farther on."""
     k = next(k for k, line in enumerate(lines) if re.fullmatch(rf"(\d+ )?{word}", line))
@@ -85,7 +57,7 @@ def test_a_word_within_a_run_stands_at_its_pose_alone(control: str, word: str) -
     """One block before or behind is another place, though it is within ε of the pose, too."""
     lines = right(RUN, control)
     for by in (-2, -1, 1, 2):
-        assert {one.code for one in found(RUN, moved(lines, word, by), control).problems} == {"CS553"}, by
+        assert codes(RUN, moved(lines, word, by), control) == {"CS553"}, by
 
 
 def test_a_pose_met_twice_counts_once() -> None:
@@ -94,7 +66,7 @@ def test_a_pose_met_twice_counts_once() -> None:
     again = lines.index("M1")
     late = (*lines[:k], *lines[k + 1 : again + 1], "M8", *lines[again + 1 :])
     assert lines[again - 1] == lines[k - 1].removesuffix(" F500.")
-    assert "CS553" in {one.code for one in found(TWICE, late).problems}
+    assert "CS553" in codes(TWICE, late)
 
 
 def test_nothing_but_a_dwell_and_a_tap_is_said_in_a_hole() -> None:
@@ -104,7 +76,7 @@ def test_nothing_but_a_dwell_and_a_tap_is_said_in_a_hole() -> None:
     first = next(k for k, line in enumerate(lines) if re.search(r"Z-20", line))
     rest = (*lines[:off], *lines[off + 1 :])
     for at in (first, first + 1):
-        assert "CS552" in {one.code for one in found(HOLES, (*rest[:at], "M5", *rest[at:])).problems}
+        assert "CS552" in codes(HOLES, (*rest[:at], "M5", *rest[at:]))
     for word in ("M1", "M8", "S2000", "M4"):
         assert found(HOLES, (*lines[: first + 1], word, *lines[first + 1 :])).problems, word
     assert found(HOLES, (*lines[: first + 1], "M3", *lines[first + 1 :])).passed  # it turns already
@@ -171,7 +143,7 @@ def test_a_rapid_that_ends_where_a_hole_is_left_is_the_way_up_or_leads_nowhere(t
         words = {coolant: ["M8"]}
         words.setdefault(speed, []).append(lines[s])
         new = [one for k, line in enumerate(rest) for one in (*words.get(k, ()), line)]
-        return {one.code for one in found(text, tuple(new)).problems}
+        return codes(text, tuple(new))
 
     assert said(up + 1, up + 1) == said(up, up + 1) == set()
     assert said(up, up) == {"CS552"}  # the speed is that behind the rapid
@@ -188,6 +160,6 @@ def test_a_rapid_higher_than_the_way_up_from_a_hole_is_no_way_up() -> None:
     k = lines.index("M8")
     assert "Z50." in lines[k - 1]
     assert "Z70." in lines[k + 1]
-    assert {one.code for one in found(text, moved(lines, "M8", 1)).problems} == {"CS553"}
+    assert codes(text, moved(lines, "M8", 1)) == {"CS553"}
     assert not found(text, moved(lines, "M8", -1)).problems  # the hole ends at its clearance, as in the test above
-    assert {one.code for one in found(text, moved(lines, "M8", -2)).problems} == {"CS553"}  # the tool is in the hole
+    assert codes(text, moved(lines, "M8", -2)) == {"CS553"}  # the tool is in the hole

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import io
 import re
-from pathlib import Path
+from collections.abc import Sequence
 
 import pytest
 
 from cornersmooth.cl import read
 from cornersmooth.errors import Verdict
-from cornersmooth.kinematics import load_machine
-from cornersmooth.model import Program
 from cornersmooth.nc import choose_form
 from cornersmooth.pipeline import postprocess
 from cornersmooth.settings import Settings
-from cornersmooth.verify import Verification, verify
 
-SAMPLES = Path(__file__).parents[2] / "samples"
+from .small import found, right
+
 CL = """LOADTL/3
 SPINDL/RPM,3000,CLW
 RAPID
@@ -38,28 +36,10 @@ RAPID
 GOTO/50,30,50
 FINI
 """
-MACHINES = {"haas": "table-ac", "linuxcnc": SAMPLES / "machines" / "three-axis.toml"}
 CONTROLS = ("fanuc", "generic", "haas", "linuxcnc", "mitsubishi", "siemens")
-PROGRAM = read(CL.encode(), name="part.cls")
 
 
-def lines_of(control: str, program: Program = PROGRAM) -> list[str]:
-    """The right program."""
-    machine = load_machine(MACHINES[control]) if control in MACHINES else None
-    stream = io.BytesIO()
-    form = choose_form(control, "g1", machine=machine)
-    postprocess(program, stream, Settings(tolerance=0.02), form=form, verify=False)
-    return stream.getvalue().decode().splitlines()
-
-
-def found(control: str, lines: list[str], program: Program = PROGRAM) -> Verification:
-    """What is found in a program."""
-    machine = load_machine(MACHINES[control]) if control in MACHINES else None
-    text = ("\n".join(lines) + "\n").encode()
-    return verify(program, text, tolerance=0.02, control=control, machine=machine)
-
-
-def divided(lines: list[str], block: int, axis: str, value: float) -> list[str]:
+def divided(lines: Sequence[str], block: int, axis: str, value: float) -> list[str]:
     """The same with a block in two: the first to another value of an axis."""
     first = re.sub(rf"\b{axis}[-+]?[\d.]+", lambda old: f"{axis}{value:.{len(old[0].split('.')[1])}f}", lines[block])
     rest = re.sub(r" F[\d.]+", "", lines[block])
@@ -78,31 +58,31 @@ def divided(lines: list[str], block: int, axis: str, value: float) -> list[str]:
     ],
 )
 def test_a_divided_block_is_not_verified(control: str, word: str, behind: int, axis: str, value: float) -> None:
-    lines = lines_of(control)
-    assert found(control, lines).verdict == Verdict.PASSED
+    lines = right(CL, control)
+    assert found(CL, lines, control).verdict == Verdict.PASSED
     block = [k for k, line in enumerate(lines) if word in line.split()][-1] + behind
-    wrong = found(control, divided(lines, block, axis, value))
+    wrong = found(CL, divided(lines, block, axis, value), control)
     assert wrong.verdict == Verdict.NOT_VERIFIED
     assert f"NC line {block + 1}" in wrong.unverified
 
 
 @pytest.mark.parametrize("control", CONTROLS)
 def test_blocks_before_compensation_may_be_divided(control: str) -> None:
-    lines = lines_of(control)
+    lines = right(CL, control)
     block = next(k for k, line in enumerate(lines) if "G41" in line) - 1
-    assert found(control, divided(lines, block, "Z", 1.0)).verdict == Verdict.PASSED
+    assert found(CL, divided(lines, block, "Z", 1.0), control).verdict == Verdict.PASSED
     block = next(k for k in range(len(lines) - 1, 0, -1) if re.match("G1 X50", lines[k]))
-    assert found(control, divided(lines, block, "X", 40.0)).verdict == Verdict.PASSED
+    assert found(CL, divided(lines, block, "X", 40.0), control).verdict == Verdict.PASSED
 
 
 @pytest.mark.parametrize("control", CONTROLS)
 def test_arcs_within_may_be_written_in_parts(control: str) -> None:
     arc = "GOTO/10,0,0\nCIRCLE/10,10,0,0,0,1,10\nGOTO/20,10,0\nCIRCLE/10,10,0,0,0,1,10\nGOTO/20,10,0\n"
-    program = read(CL.replace("GOTO/10,0,0\n", arc).encode(), name="part.cls")
-    lines = lines_of(control, program)
-    assert found(control, lines, program).verdict == Verdict.PASSED
+    text = CL.replace("GOTO/10,0,0\n", arc)
+    lines = right(text, control)
+    assert found(text, lines, control).verdict == Verdict.PASSED
     block = next(k for k in range(len(lines) - 1, 0, -1) if "G40" in lines[k]) - 1
-    wrong = found(control, divided(lines, block, "X", 25.0), program)
+    wrong = found(text, divided(lines, block, "X", 25.0), control)
     assert wrong.verdict == Verdict.NOT_VERIFIED
 
 
@@ -114,9 +94,9 @@ def test_blocks_of_klartext() -> None:
     first, last = (next(k for k, line in enumerate(lines) if re.search(end, line)) for end in ("X.10.* Y.0", "Y.30"))
     for block, side in ((first, "RL"), (last - 1, "R0")):
         lines[block] = re.sub(r"(TZ\S+)", rf"\1 {side}", lines[block])
-    assert found("heidenhain", lines).verdict == Verdict.PASSED
+    assert found(CL, lines, "heidenhain").verdict == Verdict.PASSED
     for block, axis, value in ((first, "X", 0.01), (last, "Y", 20.01)):
         number, rest = lines[block].split(" ", 1)
         new = re.sub(rf"\b{axis}[-+]?[\d.]+", f"{axis}{value:+.4f}", f"{number} {rest}")
-        wrong = found("heidenhain", [*lines[:block], new, *lines[block:]])
+        wrong = found(CL, [*lines[:block], new, *lines[block:]], "heidenhain")
         assert wrong.verdict == Verdict.NOT_VERIFIED, wrong.problems

@@ -2,18 +2,11 @@
 
 from __future__ import annotations
 
-import io
 import re
 
 import pytest
 
-from cornersmooth.cl import read
-from cornersmooth.model import Program
-from cornersmooth.nc import Frame
-from cornersmooth.pipeline import postprocess
-from cornersmooth.settings import Settings
-from cornersmooth.verify import verify
-from nc.cases import Case
+from .small import codes, right
 
 CL = """LOADTL/3
 SPINDL/RPM,3000,CLW
@@ -31,36 +24,19 @@ FINI
 CASES = [(control, cycles) for control in ("fanuc", "siemens") for cycles in ("moves", "native")]
 
 
-def written(program: Program, case: Case, cycles: str) -> list[str]:
-    """The lines of a right program."""
-    stream = io.BytesIO()
-    made = postprocess(program, stream, Settings(tolerance=0.02), form=case.choose(), frame=Frame(cycles=cycles))
-    assert made.verification is not None
-    assert made.verification.passed, made.verification.problems
-    return stream.getvalue().decode().splitlines()
-
-
-def codes(program: Program, case: Case, lines: list[str]) -> set[str]:
-    """Codes of what is found in a program."""
-    text = ("\n".join(lines) + "\n").encode()
-    return {problem.code for problem in verify(program, text, tolerance=0.02, control=case.control).problems}
-
-
 @pytest.mark.parametrize(("control", "cycles"), CASES)
 def test_the_spindle_stops_after_the_last_hole(control: str, cycles: str) -> None:
-    program, case = read(CL.encode(), name="part.cls"), Case(control, "g1")
-    lines = written(program, case, cycles)
+    lines = right(CL, control, cycles)
     off = next(k for k, line in enumerate(lines) if line == "M5")
     drills = [k for k in range(off) if re.search(r"CYCLE81\(|G81|G1 .*Z-15", lines[k])]
     rest = [line for line in lines if line != "M5"]
     for place in {drills[-1], drills[-1] + (cycles == "moves")}:  # before it goes down, and at the bottom
-        assert codes(program, case, [*rest[:place], "M5", *rest[place:]]) == {"CS552"}, place
+        assert codes(CL, [*rest[:place], "M5", *rest[place:]], control) == {"CS552"}, place
 
 
 @pytest.mark.parametrize(("control", "cycles"), CASES)
 def test_no_rapid_goes_back_into_a_hole(control: str, cycles: str) -> None:
-    program, case = read(CL.encode(), name="part.cls"), Case(control, "g1")
-    lines = written(program, case, cycles)
+    lines = right(CL, control, cycles)
     up = next(k for k, line in enumerate(lines) if re.match(r"G0 .*Z80", line))
     dip = [re.sub(r"Z80", f"Z{height}", lines[up]) for height in (-10, 50)]
-    assert "CS563" in codes(program, case, [*lines[:up], *dip, *lines[up:]])
+    assert "CS563" in codes(CL, [*lines[:up], *dip, *lines[up:]], control)

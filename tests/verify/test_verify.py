@@ -304,7 +304,7 @@ def test_a_circle_in_a_hole(block: str) -> None:
     head = "%\nO1\nG21 G90 G94 G17 G40 G49 G80\nG91 G28 Z0.\nG90\nT1 M6\nS1000 M3\nG54\nG43 H1\nG0 X0. Y0.\nG0 Z25.\n"
     text = f"{head}G0 Z3.\nG1 Z-8. F100.\n{block}\nG0 Z25.\nG0 X80. Z50.\nM5\nG91 G28 Z0.\nG90\nG49\nM30\n%\n"
     found = verify(read(cl.encode(), name="part.cls"), text.encode(), tolerance=0.01, words=False)
-    assert [problem.code for problem in found.problems] == ["CS536"] * ("I5" in block)
+    assert ("CS536" in codes(found)) == bool(found.problems) == ("I5" in block)
 
 
 @pytest.mark.parametrize("options", [(), ("--form", "g6.2")], ids=["lines", "curves"])

@@ -4,25 +4,21 @@ from __future__ import annotations
 
 import io
 import re
-from functools import cache
 from itertools import pairwise
-from pathlib import Path
 
 import pytest
 
-from cornersmooth.cl import read
 from cornersmooth.errors import InputError, Verdict
 from cornersmooth.kinematics import load_machine
-from cornersmooth.model import Program
 from cornersmooth.nc import Frame, choose_form
 from cornersmooth.pipeline import postprocess
 from cornersmooth.settings import Settings
-from cornersmooth.verify import Verification, verify
+from cornersmooth.verify import verify
 
-SAMPLES = Path(__file__).parents[2] / "samples"
+from .small import found, program, right
+
 ISO = ("fanuc", "haas", "linuxcnc", "mitsubishi")
 CONTROLS = (*ISO, "generic", "heidenhain", "siemens")
-MACHINES = {"haas": "table-ac", "linuxcnc": str(SAMPLES / "machines" / "three-axis.toml")}
 
 TWO_TOOLS = """LOADTL/3
 SPINDL/RPM,3000,CLW
@@ -63,34 +59,10 @@ FINI
 """
 
 
-@cache
-def program(text: str) -> Program:
-    """A CL file."""
-    return read(text.encode(), name="part.cls")
-
-
-@cache
-def right(text: str, control: str, cycles: str = "moves") -> tuple[str, ...]:
-    """The lines of a right program."""
-    machine = load_machine(MACHINES[control]) if control in MACHINES else None
-    form, stream = choose_form(control, "g1", machine=machine), io.BytesIO()
-    postprocess(program(text), stream, Settings(tolerance=0.02), form=form, frame=Frame(cycles=cycles), verify=False)
-    lines = tuple(stream.getvalue().decode().splitlines())
-    assert judged(text, control, lines).verdict == Verdict.PASSED
-    return lines
-
-
-def judged(text: str, control: str, lines: tuple[str, ...]) -> Verification:
-    """What is found in a program."""
-    machine = load_machine(MACHINES[control]) if control in MACHINES else None
-    written = ("\n".join(lines) + "\n").encode()
-    return verify(program(text), written, tolerance=0.02, control=control, machine=machine)
-
-
 def passes(text: str, control: str, lines: tuple[str, ...]) -> bool:
     """Whether a program passes."""
     try:
-        return judged(text, control, lines).verdict == Verdict.PASSED
+        return found(text, lines, control).verdict == Verdict.PASSED
     except InputError:
         return False
 
@@ -321,9 +293,9 @@ def test_states_over_holes_that_are_left_out_are_not_verified() -> None:
     postprocess(program(LEFT_OUT), stream, Settings(tolerance=0.02), form=form, frame=frame, verify=False)
     text = stream.getvalue()
     for some in (text, text.replace(b"M8\n", b"")):
-        found = verify(program(LEFT_OUT), some, tolerance=0.02, skip_cycles=True)
-        assert found.verdict is Verdict.NOT_VERIFIED
-        assert found.unverified.endswith("only over holes that are left out: coolant FLOOD of CL line 7")
+        one = verify(program(LEFT_OUT), some, tolerance=0.02, skip_cycles=True)
+        assert one.verdict is Verdict.NOT_VERIFIED
+        assert one.unverified.endswith("only over holes that are left out: coolant FLOOD of CL line 7")
 
 
 @pytest.mark.parametrize("control", ["fanuc", "mitsubishi", "siemens", "heidenhain"])
@@ -349,18 +321,18 @@ def test_tip_control_that_holds_at_the_retract_is_not_verified(control: str) -> 
     lines = another_post(right(TWO_TOOLS, control))
     off = where(lines, "TRAFOOF|FUNCTION RESET TCPM", -2)
     assert passes(TWO_TOOLS, control, lines)
-    found = judged(TWO_TOOLS, control, (*lines[:off], lines[off + 1], lines[off], *lines[off + 2 :]))
-    assert found.verdict is Verdict.NOT_VERIFIED
-    assert " under " in found.unverified
+    one = found(TWO_TOOLS, (*lines[:off], lines[off + 1], lines[off], *lines[off + 2 :]), control)
+    assert one.verdict is Verdict.NOT_VERIFIED
+    assert " under " in one.unverified
 
 
 @pytest.mark.parametrize("control", ["fanuc", "haas", "mitsubishi"])
 def test_a_length_that_ends_before_the_retract_is_not_verified(control: str) -> None:
     lines = another_post(right(TWO_TOOLS, control))
     up = where(lines, r"G91 G28 Z0\.|G53 G0 Z0", 1)
-    found = judged(TWO_TOOLS, control, put(lines, up, "G49", control))
-    assert found.verdict is Verdict.NOT_VERIFIED
-    assert "G49 before the retract" in found.unverified
+    one = found(TWO_TOOLS, put(lines, up, "G49", control), control)
+    assert one.verdict is Verdict.NOT_VERIFIED
+    assert "G49 before the retract" in one.unverified
 
 
 @pytest.mark.parametrize("control", CONTROLS)
@@ -369,9 +341,9 @@ def test_one_block_from_the_retract_to_the_first_pose_is_to_check(control: str) 
     if not any(re.search(r"G28|G53|SUPA|M91", line) for line in lines):
         pytest.skip("it has no retracts")
     over = where(lines, r"^(\d+ )?(G0|LN?) X")
-    assert not judged(TWO_TOOLS, control, lines).trusted
-    found = judged(TWO_TOOLS, control, (*lines[:over], *lines[over + 1 :]))
-    assert [text for _, text in found.trusted] == ["the tool comes down from a retract before it is over its place"]
+    assert not found(TWO_TOOLS, lines, control).trusted
+    one = found(TWO_TOOLS, (*lines[:over], *lines[over + 1 :]), control)
+    assert [text for _, text in one.trusted] == ["the tool comes down from a retract before it is over its place"]
 
 
 def test_the_length_of_a_tool_that_a_position_of_the_machine_drops() -> None:
@@ -385,7 +357,7 @@ def test_a_program_of_a_version_without_digests_is_not_verified(control: str) ->
     lines = right(TWO_TOOLS, control)
     old = tuple(re.sub(r"(CORNERSMOOTH) \S+:", r"\1 0.2.0:", line) for line in lines)
     assert old != lines
-    assert judged(TWO_TOOLS, control, old).verdict is Verdict.NOT_VERIFIED
+    assert found(TWO_TOOLS, old, control).verdict is Verdict.NOT_VERIFIED
 
 
 @pytest.mark.parametrize("control", ["siemens", "linuxcnc", "mitsubishi", "heidenhain"])
@@ -447,8 +419,8 @@ def test_rotary_axes_stay_turned_where_nothing_keeps_the_tip(control: str) -> No
     half = re.sub(r"(C[-+]?)0\.0", r"\g<1>0.5", lines[turns])
     assert half != lines[turns]
     for block in ((), (half,)):
-        found = verify(program(TURNED), "\n".join((*lines[:turns], *block, *lines[turns + 1 :])).encode(), **how)
-        assert "no tool tip control where rotary axes are away from zero" in [one.text for one in found.problems]
+        one = verify(program(TURNED), "\n".join((*lines[:turns], *block, *lines[turns + 1 :])).encode(), **how)
+        assert "no tool tip control where rotary axes are away from zero" in [some.text for some in one.problems]
 
 
 def test_the_length_of_the_first_tool_needs_its_word() -> None:

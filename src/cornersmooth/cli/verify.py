@@ -174,8 +174,6 @@ def _summary(found: Verification) -> Iterator[str]:
         if found.apart:
             yield f"{'':<18}tip and axis point each keep the tolerance, but not at common poses"
     yield f"{'tangent jump':<18}{_place(found.tangent_jump, 'deg')}"
-    if found.curves:
-        yield f"{'curvature jump':<18}{_place(found.curvature_jump, '1/mm')}"
     for out, back in found.rewinds[:_REWINDS_SHOWN]:
         yield f"{'rewind':<18}the cut is left at NC line {out}, and gone on with at NC line {back}"
     if len(found.rewinds) > _REWINDS_SHOWN:

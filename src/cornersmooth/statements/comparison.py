@@ -174,33 +174,31 @@ class Comparison:
                 code, name = _NAMES[one.kind]
                 self.problems.append(Problem(code, line, one.line, f"{name.format(one.value)} is said within a hole"))
 
-    def _same(
-        self,
-        requested: list[_Done],
-        done: list[_Done],
-    ) -> None:
+    def _same(self, requested: list[_Done], done: list[_Done]) -> None:
         """Actions of one kind must be the same in their order, and at pauses the states."""
-        missing, surplus, spare, first = [], list[Token](), list[Token](), 0
+        missing, surplus, rest = list[Token](), list[Token](), done
         for wanted, cl_values in requested:
-            alike = [k for k in range(first, len(done)) if done[k][0].value == wanted.value]
-            if not alike:
+            others = {
+                k: _others(wanted.kind, cl_values, values)
+                for k, (one, values) in enumerate(rest)
+                if one.value == wanted.value
+            }
+            if not others:
                 missing.append(wanted)
                 continue
-            others = {k: _others(wanted.kind, cl_values, done[k][1]) for k in alike}
-            # a stop of the post before a tool change may stand beside one of the CL file; the first way home counts
-            best = min(alike, key=lambda k: (wanted.kind != "home" and len(others[k]) > 0, done[k][0].optional, k))
-            for one, _ in done[first:best]:
-                (spare if one.optional else surplus).append(one)
-            first, token = best + 1, done[best][0]
+            # a stop of the post before a tool change may be beside one of the CL file; the first way home counts
+            best = min(others, key=lambda k: (wanted.kind != "home" and len(others[k]) > 0, rest[k][0].optional, k))
+            surplus += [one for one, _ in rest[:best]]
+            token, rest = rest[best][0], rest[best + 1 :]
             at_home = wanted.kind == "home" and not self._moved  # before the first motion the tool is at home
             for state, here, value in () if at_home else others[best]:
                 (code, name), pause = _NAMES[state], _NAMES[token.kind][1].format(token.value)
                 text = f"{name.format(here)} holds at {pause}, where the CL file has {name.format(value)}"
                 self.problems.append(Problem(code, wanted.line, token.line, text))
-        for token, _ in done[first:]:
-            (spare if token.optional else surplus).append(token)
-        surplus += spare[: max(len(missing) - len(surplus), 0)]  # what may be left over may be the wrong one
-        for pair in zip_longest(missing, surplus):
+        surplus = sorted([*surplus, *(one for one, _ in rest)], key=lambda one: one.optional)
+        needed = [one for one in surplus if not one.optional]
+        needed = surplus[: max(len(missing), len(needed))]  # what may be left over may be the wrong one
+        for pair in zip_longest(missing, needed):
             self._say(*pair)
 
     def _other(self, kind: str) -> None:

@@ -15,7 +15,7 @@ what is decided     where
 =================== ===================================================================================================
 both as polylines   `cl_motion`, `motions`; how far they leave their chords, proved: `bending`
 run beside another  `passage`: by a `chain` of nearest places, where that fails exactly (`free_space`)
-stretch by stretch  `parse`: which elements do the acts; `batches` cuts long stretches; `decision`, `match`: its places
+stretch by stretch  `parse`: which elements do the acts; `batches` cuts long stretches; `match`: its places
 retracts            `along_tool`: rapids beside them that posts add, and cuts that are left for them
 holes               `holes`; poses that are named by their digits: `motions`; tool changes: `parse`
 what parts          `deviation`: the lines and the distances; poses that must be exact

@@ -17,8 +17,8 @@ from cornersmooth.nc_reader.elements import Ahead, Element, Elements, Event, Pro
 from cornersmooth.nc_reader.tool import directions
 from cornersmooth.verify.acts import Acts
 from cornersmooth.verify.along_tool import AlongTool
-from cornersmooth.verify.decision import Batch
 from cornersmooth.verify.feeds import feed_at, out_of_hole
+from cornersmooth.verify.match import Batch
 from cornersmooth.verify.motions import written_motion
 from cornersmooth.verify.nearest import COLUMNS, largest_square, nearest_places
 from cornersmooth.verify.parse import BEFORE, Parse, Part

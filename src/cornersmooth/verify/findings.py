@@ -42,7 +42,6 @@ class Where:
 _NOTHING: Final = {
     **dict.fromkeys(("tip", "axis_point", "together_tip", "together_axis_point", "orientation"), Where(0.0)),
     "tangent_jump": Where(-1.0),
-    "curvature_jump": Where(0.0),
     "shortest": Where(-np.inf),
 }
 

@@ -206,18 +206,18 @@ class Parse:
         while self._over(stop, end) or (end > element and self._ahead.has(end) and lines.stands(end)):
             end += 1
         late = -1 if self._hole[stop + 1] and not self._fed[stop] else 1
-        ends = [(True, True, end, end)]
+        ends = [(2, True, end, end)]
         for one in range(element, end + 1):
             if one > element and lines.feeds(one - 1):
                 lowest = min(lowest, lines.height(move, one - 1))
             done = lowest <= lines.room - cycle.depth or (math.isinf(lowest) and self._may_be_left_out(stop))
             if (done or one == end) and self._begins(stop, one):
                 found, left = lines.check(move, range(element, self._end_of(stop, element, one)), cycle)
-                ends.append((bool(found), left, late * one, one))
+                wrong = 2 if any(one.code != "CS541" for one in found) else int(bool(found))
+                ends.append((wrong, left, late * one, one))
         wrong, *_, best = min(ends)
-        if not wrong or (doubt := self._doubt(stop, element)) is None:
-            return self._leave(stop, element, best)
-        return doubt
+        doubt = self._doubt(stop, element) if wrong == 2 else None  # a wrong feed leaves none
+        return doubt or self._leave(stop, element, best)
 
     def _end_of(self, stop: int, element: int, end: int) -> int:
         """First element that does not belong to a hole: the way up is the hole's, wherever else it leads."""
@@ -254,14 +254,18 @@ class Parse:
         return True
 
     def _doubt(self, stop: int, element: int) -> tuple[int, int] | None:
-        """Of holes above one another in one line nobody can tell which a move belongs to: NOT VERIFIED, not wrong."""
+        """Of holes above one another in one line nobody can tell which a move belongs to: NOT VERIFIED, not wrong.
+
+        None where there is no doubt: a hole that is alone in its line, or a cycle of the control, which is one block.
+        """
         lines, move, acts, first, last = self.lines, self._move, self.acts, stop, stop
         while self._hole[last + 1] and self._are_alike(last, last + 1):
             last += 1
         while first > 0 and self._hole[first - 1] and self._are_alike(first - 1, first):
             first -= 1
         alike = range(first, last + 1)
-        if len(alike) == 1 or not self._over(stop, element):
+        fed = next((one for one in range(element, self._ahead.count) if lines.feeds(one)), element)
+        if len(alike) == 1 or not self._over(stop, element) or len(lines.block(fed)) > 1:
             return None
         acts.unlooked.append((lines.nc_line(element), "holes above one another in one line"))
         self._begin_hole(move[stop], element)

@@ -45,10 +45,8 @@ class Verification:
     poses: int
     #: mm: shortest feed element that moves (the longer of the ways of tip and axis point); inf without one
     shortest: Where
-    #: degrees, 1/mm: largest change of direction of the tip path from one element to the next, and of curvature at an
-    #: end of a curve or an arc
+    #: degrees: largest change of direction of the tip path from one element to the next
     tangent_jump: Where
-    curvature_jump: Where
     #: (n,) mm: distance of every original pose from the written motion, NaN where the tool does not pass at feed; with
     #: an axis tolerance the latter is what the axis is off, so that its tolerance shows as ε
     pose_tip: Floats = field(repr=False)
@@ -136,7 +134,6 @@ class Verification:
             "max_orientation_deviation_deg": self.orientation,
             "shortest_block_mm": self.shortest,
             "max_tangent_jump_deg": self.tangent_jump,
-            "max_curvature_jump_per_mm": self.curvature_jump,
         }
         return {
             "schema": "cornersmooth-verification/1",

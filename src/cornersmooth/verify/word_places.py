@@ -7,7 +7,7 @@ moves a word stands at a pose that is passed exactly.
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterable, Sequence, Set
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import replace
 
 import numpy as np
@@ -87,53 +87,62 @@ class WordPlaces:
         nc_tokens = sorted(said(events, means), key=lambda one: one.place)
         homes = {leading[place] for place, one in zip(places, program.statements, strict=True) if one.word == "GOHOME"}
         # that of those no element names is written
-        missed = {int(original.trail.owner[int(one.place)]) for one in found.violations if one.code == "CS524"}
-
-        begins = [(self._moving(one.first), one) for one in batches.acts.holes]
-        holes = {first: (one, _within(nc_tokens, first, one.leaves)) for first, one in begins}
-        inside = {id(one) for _, some in holes.values() for one in some if one.kind in ("dwell", "tap")}
+        missed = [int(original.trail.owner[int(one.place)]) for one in found.violations if one.code == "CS524"]
+        holes = {self._moving(one.first): one for one in batches.acts.holes}
+        within = {first: _within(nc_tokens, first, one.leaves) for first, one in holes.items()}
+        inside = {id(one) for some in within.values() for one in some if one.kind in ("dwell", "tap")}
         comparison = Comparison(cl_tokens, [one for one in nc_tokens if id(one) not in inside], means, own)
-        acts = np.frombuffer(batches.acts.begins, np.int64).reshape(-1, 2)
-        # what leads nowhere in the program is no act: a rapid to where the tool is, or the same element again
-        rapid = program.kind[original.pose[acts[:, 0]]] == Move.RAPID
-        first = np.array([self._moving(one) for one in acts[:, 1].tolist()], np.int64)
-        kept = (~rapid | (first == acts[:, 1])) & (np.diff(first, prepend=-1) > 0)
-        acts = np.column_stack((acts[:, 0], first))[kept]
-        pairs = zip(batches.acts.cuts[::2], batches.acts.cuts[1::2], strict=True)
-        cuts = [(leading[move], self._moving(one)) for move, one in pairs]
-        begun = {*first.tolist()}
-        rows = [*acts.tolist(), *(one for one in cuts if one[1] not in begun), (moves, batches.elements)]
-        acts = np.maximum.accumulate(np.array(sorted(rows, key=lambda row: row[1]), np.int64))
+        acts = self._acts(leading)
         cl_places = np.array(sorted({one.place for one in cl_tokens} | homes), np.int64)
         nc_places = np.array(sorted({one.place for one in nc_tokens}), np.int64)
-        cl_act, nc_act = np.searchsorted(acts[:, 0], cl_places), np.searchsorted(acts[:, 1], nc_places)
-        # words in runs for which the other file has none at that pose
+        # both are compared at acts that words are in front of, and where one of them has words within a run alone
+        in_cycles = [first for first, one in holes.items() if one.cycle and (within[first] or one.cycle.says)]
+        numbers = np.searchsorted(acts[:, 1], np.array(in_cycles, np.int64)).tolist()
+        rows = {(act, 2, *acts[act].tolist()) for act in numbers}
+        uncertain = set(np.searchsorted(acts[:, 0], missed, side="right").tolist())
         runs = np.frombuffer(batches.acts.runs, np.int64).reshape(-1, 4)
-        cl_in, nc_in = (
-            _within_runs(some, runs[:, k], runs[:, 2 + k]) & (some < acts[act_of, k])
-            for k, (some, act_of) in enumerate(((cl_places, cl_act), (nc_places, nc_act)))
-        )
-        cl_alone, cl_at, nc_alone, nc_at = cl_places[cl_in], cl_act[cl_in], nc_places[nc_in], nc_act[nc_in]
-        of_cycles = [first for first, (one, some) in holes.items() if one.cycle and (some or one.cycle.says)]
-        wanted = {*cl_act.tolist(), *nc_act.tolist(), *np.searchsorted(acts[:, 1], of_cycles).tolist()}
+        for k, places_of in enumerate((cl_places, nc_places)):
+            act_of = np.searchsorted(acts[:, k], places_of)
+            alone = _within_runs(places_of, runs[:, k], runs[:, 2 + k]) & ~np.isin(act_of, list(uncertain))
+            for act, place, in_run in zip(act_of.tolist(), places_of.tolist(), alone.tolist(), strict=True):
+                if act == len(acts):
+                    continue
+                rows.add((act, 2, *acts[act].tolist()))
+                if in_run and place < acts[act, k]:
+                    rows.add((act, k, -1 if k else place, place if k else -1))
+        met = sorted(rows)
+        meetings = np.maximum.accumulate(np.array([row[2:] for row in met], np.int64).reshape(-1, 2)).tolist()
         at_home: set[int] = set()
         before = -1, -1
-        for act in sorted(one for one in wanted if one < len(acts)):
-            end = int(acts[act, 0]), int(acts[act, 1])
-            alone = [some[act_of == act].tolist() for some, act_of in ((cl_alone, cl_at), (nc_alone, nc_at))]
-            meetings = [] if missed & {*range(before[0], end[0])} else _apart(before, *alone)
-            for move, element in [*(one for one in meetings if one[0] < end[0] and one[1] < end[1]), end]:
-                comparison.meet(move, element, moves=(move, element) != (moves, batches.elements))
-                if not homes.isdisjoint(range(before[0] + 1, move + 1)):
-                    at_home |= {one.line for one in events if before[1] < one.element <= element}
-                before = move, element
-            hole, some = holes.get(end[1], (None, []))
-            if hole is not None and hole.cycle is not None and act + 1 < len(acts):
-                line = int(program.line[original.pose[hole.move]])
-                comparison.in_hole(line, some, hole.cycle.dwell, tap=hole.cycle.tap)
+        for (act, kind, *_), (move, element) in zip(met, meetings, strict=True):
+            comparison.meet(move, element, moves=act + 1 < len(acts) or kind != 2)
+            if not homes.isdisjoint(range(before[0] + 1, move + 1)):
+                at_home |= {one.line for one in events if before[1] < one.element <= element}
+            before = move, element
+            if kind == 2 and element in holes and (cycle := holes[element].cycle) is not None and act + 1 < len(acts):
+                line = int(program.line[original.pose[holes[element].move]])
+                comparison.in_hole(line, within[element], cycle.dwell, tap=cycle.tap)
         hidden = changed_unseen(requested, leading, beyond) if batches.acts.moves_left_out else ""
         unsaid = "; ".join(filter(None, (without_word(cl_tokens, nc_tokens, means, own), hidden)))
         return comparison.problems, at_home, unsaid
+
+    def _acts(self, leading: Mapping[int, int]) -> Ints:
+        """(a, 2) moves and elements that lead anywhere and begin acts, or where both files have words; and the end."""
+        program, pose, found = self._task.original.program, self._task.original.pose, self._batches.acts
+        acts = np.frombuffer(found.begins, np.int64).reshape(-1, 2)
+        # what leads nowhere in the program is no act: a rapid to where the tool is, or the same element again
+        rapid = program.kind[pose[acts[:, 0]]] == Move.RAPID
+        first = np.array([self._moving(one) for one in acts[:, 1].tolist()], np.int64)
+        kept = (~rapid | (first == acts[:, 1])) & (np.diff(first, prepend=-1) > 0)
+        pairs = zip(found.cuts[::2], found.cuts[1::2], strict=True)
+        cuts = [(leading[move], self._moving(one)) for move, one in pairs]
+        begun = {*first.tolist()}
+        rows = [
+            *np.column_stack((acts[:, 0], first))[kept].tolist(),
+            *(one for one in cuts if one[1] not in begun),
+            (len(pose), self._batches.elements),
+        ]
+        return np.maximum.accumulate(np.array(sorted(rows, key=lambda row: row[1]), np.int64))
 
     def _leading(self, places: Ints, left_out: Set[int]) -> dict[int, int]:
         """The first moves from some on that lead anywhere, and are none that are left out."""
@@ -164,12 +173,6 @@ def _within_runs(places: Ints, first: Ints, end: Ints) -> Bools:
     run = np.searchsorted(first, places) - 1
     inside: Bools = (run >= 0) & (places < end[run]) if len(first) else np.zeros(len(places), np.bool_)
     return inside
-
-
-def _apart(before: tuple[int, int], cl_places: list[int], nc_places: list[int]) -> list[tuple[int, int]]:
-    """Places of both files, behind some, where only one of them has words."""
-    last = cl_places[-1] if cl_places else before[0]
-    return [*((one, before[1]) for one in cl_places), *((last, one) for one in nc_places)]
 
 
 def _within(tokens: Sequence[Token], begins: int, leaves: int) -> list[Token]:

@@ -1,0 +1,53 @@
+"""Small programs: the right one for a CL file and a control, and what is found in another."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+
+from cornersmooth.cl import read
+from cornersmooth.errors import Verdict
+from cornersmooth.kinematics import Machine, load_machine
+from cornersmooth.model import Program
+from cornersmooth.nc import Frame, choose_form
+from cornersmooth.pipeline import postprocess
+from cornersmooth.settings import Settings
+from cornersmooth.verify import Verification, verify
+
+SAMPLES = Path(__file__).parents[2] / "samples"
+
+#: of controls that need one
+MACHINES = {"haas": "table-ac", "linuxcnc": str(SAMPLES / "machines" / "three-axis.toml")}
+
+
+@cache
+def program(text: str) -> Program:
+    """A CL file."""
+    return read(text.encode(), name="part.cls")
+
+
+@cache
+def right(text: str, control: str = "fanuc", cycles: str = "moves") -> tuple[str, ...]:
+    """The lines of a right program."""
+    form, stream = choose_form(control, "g1", machine=_machine(control)), io.BytesIO()
+    postprocess(program(text), stream, Settings(tolerance=0.02), form=form, frame=Frame(cycles=cycles), verify=False)
+    lines = tuple(stream.getvalue().decode().splitlines())
+    assert found(text, lines, control).verdict == Verdict.PASSED
+    return lines
+
+
+def found(text: str, lines: Sequence[str], control: str = "fanuc") -> Verification:
+    """What is found in a program."""
+    written = ("\n".join(lines) + "\n").encode()
+    return verify(program(text), written, tolerance=0.02, control=control, machine=_machine(control))
+
+
+def codes(text: str, lines: Sequence[str], control: str = "fanuc") -> set[str]:
+    """Codes of what is found."""
+    return {one.code for one in found(text, lines, control).problems}
+
+
+def _machine(control: str) -> Machine | None:
+    return load_machine(MACHINES[control]) if control in MACHINES else None
