@@ -211,7 +211,8 @@ class Parse:
             if one > element and lines.feeds(one - 1):
                 lowest = min(lowest, lines.height(move, one - 1))
             done = lowest <= lines.room - cycle.depth or (math.isinf(lowest) and self._may_be_left_out(stop))
-            if (done or one == end) and self._begins(stop, one):
+            whole = one == end or lines.block(one).start == one  # a cycle of the control is one block
+            if (done or one == end) and whole and self._begins(stop, one):
                 found, left = lines.check(move, range(element, self._end_of(stop, element, one)), cycle)
                 wrong = 2 if any(one.code != "CS541" for one in found) else int(bool(found))
                 ends.append((wrong, left, late * one, one))
