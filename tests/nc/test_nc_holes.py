@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cornersmooth.errors import InputError
+from cornersmooth.errors import InputError, Verdict
 from cornersmooth.kinematics import load_machine
 from cornersmooth.nc import Frame, choose_form
 from cornersmooth.pipeline import postprocess
@@ -278,7 +278,7 @@ def test_other_spellings_are_understood(name: str) -> None:
     assert result.verification is not None
     assert result.verification.problems == ()
     deeper = re.sub(rb"Z(-\d+\.\d)", rb"Z\g<1>9", out.getvalue())
-    assert not verify(result.program, deeper, tolerance=0.01, axis_length=10.0).passed
+    assert verify(result.program, deeper, tolerance=0.01, axis_length=10.0).verdict is not Verdict.PASSED
 
 
 def test_the_feed_of_on_takes_the_place_of_the_first() -> None:
