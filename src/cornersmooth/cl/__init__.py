@@ -10,7 +10,7 @@ from typing import Final
 from cornersmooth.cl.arcs import RULES, ArcRule
 from cornersmooth.cl.cycles import order_of
 from cornersmooth.cl.dialects import NAMES as DIALECTS
-from cornersmooth.cl.foreign import apt_of_simulation_cld, is_simulation_cld, refuse_foreign
+from cornersmooth.cl.dialects import apt_of_simulation_cld, is_simulation_cld, refuse_foreign
 from cornersmooth.cl.grammar import joined
 from cornersmooth.cl.messages import error
 from cornersmooth.cl.source import clean, load

@@ -84,7 +84,7 @@ def read_apt(
     )
     decode = _decoder(data)
     for part in parts(data):
-        if state.stopped:
+        if state.finished and lenient:
             break
         if part.poses is not None:
             _plain(state, part.poses, part.first)

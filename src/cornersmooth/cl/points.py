@@ -104,15 +104,16 @@ def read_points(
     units = units or columns.units or "mm"
     scale = MM_PER_UNIT[units] * factor
     if rules.machine is not None and columns.angles:
-        angles = rows.take(columns.angles) * np.array(columns.degrees)
-        axis, axis_findings = tool_axis(rules.machine, angles), list[Finding]()
+        axis = tool_axis(rules.machine, rows.take(columns.angles) * np.array(columns.degrees))
     else:
-        axis, axis_findings = _axis(rows, scale, lenient)
-    kind, rapid_findings = _kind(rows)
-    feed, feed_findings = _feed(rows, kind, lenient)
+        axis = _axis(rows, scale, lenient, findings)
     axis = -axis if rules.flip_axis else axis
+    kind = np.full(len(values), Move.LINEAR, np.uint8)
+    kind[[0] if columns.rapid is None else values[:, columns.rapid] == table.RAPID] = Move.RAPID
+    feed = _feed(rows, kind, lenient, findings)
+    if columns.rapid is None:
+        findings.append(finding("CS177", 0))
     parted = _parted(rows, kind)
-    findings += [*axis_findings, *feed_findings, *rapid_findings]
     size = float(np.ptp(rows.take(columns.tip), axis=0).max())
     if 0.0 < size * scale < SMALLEST and not columns.units and factor == 1.0:
         findings.append(finding("CS209", 0, size=size, units=units))
@@ -153,10 +154,11 @@ def _find_columns(text: table.PointText, name: str, machine: Machine | None) -> 
     return points_header.from_width(text.width, name, text.row_line)
 
 
-def _axis(rows: _Rows, scale: float, lenient: bool) -> tuple[Floats, list[Finding]]:
-    """Axis vectors of any length, and findings about them."""
+def _axis(rows: _Rows, scale: float, lenient: bool, findings: list[Finding]) -> Floats:
+    """Axis vectors of any length; adds findings about them."""
     if rows.columns.second is None:
-        return np.tile((0.0, 0.0, 1.0), (len(rows.values), 1)), [finding("CS170", 0)]
+        findings.append(finding("CS170", 0))
+        return np.tile((0.0, 0.0, 1.0), (len(rows.values), 1))
     tip, second = rows.take(rows.columns.tip), rows.take(rows.columns.second)
     meaning = rows.columns.meaning
     if meaning == "values":
@@ -166,15 +168,20 @@ def _axis(rows: _Rows, scale: float, lenient: bool) -> tuple[Floats, list[Findin
     zero = length == 0
     if zero.any():
         raise error("CS154", rows.file, rows.at(zero))
-    if meaning == "points":
-        return vector, _distances(rows, length * scale)
     off = np.abs(length - 1) > UNIT_TOLERANCE
-    if not off.any():
-        return vector, []
-    values = {"length": float(length[off.argmax()])}
-    if not lenient:
-        raise error("CS155", rows.file, rows.at(off), **values)
-    return vector, [finding("CS174", rows.at(off), int(off.sum()), **values)]
+    if meaning == "points":
+        distance = length * scale
+        mean, low, high = float(distance.mean()), float(distance.min()), float(distance.max())
+        findings.append(finding("CS171", 0, mean=mean))
+        if high - low > DISTANCE_SPREAD * mean:
+            farthest = np.abs(distance - mean)
+            findings.append(finding("CS172", rows.at(farthest == farthest.max()), low=low, high=high))
+    elif off.any():
+        values = {"length": float(length[off.argmax()])}
+        if not lenient:
+            raise error("CS155", rows.file, rows.at(off), **values)
+        findings.append(finding("CS174", rows.at(off), int(off.sum()), **values))
+    return vector
 
 
 def _second_points(rows: _Rows, tip: Floats, second: Floats) -> bool:
@@ -195,16 +202,6 @@ def _second_points(rows: _Rows, tip: Floats, second: Floats) -> bool:
     if steady and (distance.mean() > LEAST_DISTANCE or np.median(length) > LEAST_DISTANCE):
         return True
     raise error("CS157", rows.file, int(rows.line[0]))
-
-
-def _kind(rows: _Rows) -> tuple[NDArray[np.uint8], list[Finding]]:
-    """`Move` of every row."""
-    kind = np.full(len(rows.values), Move.LINEAR, np.uint8)
-    if rows.columns.rapid is None:
-        kind[0] = Move.RAPID
-        return kind, [finding("CS177", 0)]
-    kind[rows.values[:, rows.columns.rapid] == table.RAPID] = Move.RAPID
-    return kind, []
 
 
 def _parted(rows: _Rows, kind: NDArray[np.uint8]) -> dict[str, Ints]:
@@ -237,24 +234,14 @@ def _over(
     )
 
 
-def _distances(rows: _Rows, distance: Floats) -> list[Finding]:
-    mean, low, high = float(distance.mean()), float(distance.min()), float(distance.max())
-    findings = [finding("CS171", 0, mean=mean)]
-    if high - low > DISTANCE_SPREAD * mean:
-        farthest = np.abs(distance - mean)
-        findings.append(finding("CS172", rows.at(farthest == farthest.max()), low=low, high=high))
-    return findings
-
-
-def _feed(rows: _Rows, kind: NDArray[np.uint8], lenient: bool) -> tuple[Floats, list[Finding]]:
+def _feed(rows: _Rows, kind: NDArray[np.uint8], lenient: bool, findings: list[Finding]) -> Floats:
     """Feed of every move in units of the file; an empty cell and a rapid keep the feed before it, as in CL files."""
     if rows.columns.feed is None:
-        return np.full(len(rows.values), np.nan), []
+        return np.full(len(rows.values), np.nan)
     feed = rows.values[:, rows.columns.feed].copy()
     if rows.columns.rapid is not None:
         feed[kind == Move.RAPID] = np.nan
     wrong = feed <= 0
-    findings = []
     if wrong.any():
         value = float(feed[wrong.argmax()])
         if not lenient:
@@ -262,4 +249,4 @@ def _feed(rows: _Rows, kind: NDArray[np.uint8], lenient: bool) -> tuple[Floats, 
         findings.append(finding("CS175", rows.at(wrong), int(wrong.sum()), feed=value))
     given = np.where(np.isnan(feed) | wrong, -1, np.arange(len(feed)))
     last = np.maximum.accumulate(given)
-    return np.where(last >= 0, feed[last], np.nan), findings
+    return np.where(last >= 0, feed[last], np.nan)

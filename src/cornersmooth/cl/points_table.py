@@ -13,6 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cornersmooth.cl.grammar import NUMBER
+from cornersmooth.cl.grammar import number as plain_number
 from cornersmooth.cl.messages import error
 from cornersmooth.cl.points_header import Columns, is_header
 from cornersmooth.cl.source import UTF8_BOM, UTF16_BOMS
@@ -22,7 +24,6 @@ from cornersmooth.text import parse_numbers
 
 _COMMENT = re.compile(rb"(?:#|%|//)[^\n]*")
 _COMMENT_MARK = re.compile(r"\s*(?:#|%|//)+(.*)")
-_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][+-]?\d+)?", re.ASCII)
 _NOT_FINITE = re.compile(r"[+-]?(?:nan|inf(?:inity)?)", re.IGNORECASE)
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+(?:,\d+)?(?:[Ee][+-]?\d+)?", re.ASCII)
 _SEPARATOR = re.compile(r"\s*,\s*|\s+")
@@ -113,7 +114,7 @@ def careful(chunk: bytes, columns: Columns, first_line: int, file: str) -> tuple
         for column in used:
             if not math.isfinite(row[column]) and (cells[column] or column in columns.wanted):
                 cell = cells[column]
-                known = _NUMBER.fullmatch(cell) or _NOT_FINITE.fullmatch(cell)
+                known = NUMBER.fullmatch(cell) or _NOT_FINITE.fullmatch(cell)
                 raise error("CS153" if known else "CS152" if cell else "CS164", file, first_line + offset, cell=cell)
         table.append(row)
         offsets.append(offset)
@@ -163,7 +164,7 @@ def _rapid(cell: str, columns: Columns, file: str, line: int) -> float:
 def is_row(line: str) -> bool:
     """Whether a line holds nothing but numbers, three at least."""
     cells = re.split(r"[\s,;]+", line.replace('"', "").strip(" \t,;"))
-    return len(cells) >= 3 and all(_NUMBER.fullmatch(cell) or _NOT_FINITE.fullmatch(cell) for cell in cells)
+    return len(cells) >= 3 and all(NUMBER.fullmatch(cell) or _NOT_FINITE.fullmatch(cell) for cell in cells)
 
 
 def leading_lines(data: bytes) -> Iterator[str]:
@@ -194,7 +195,7 @@ def _head(data: bytes) -> tuple[str | None, int, bool, int]:
             if is_header(mark[1]):
                 comment, comment_line = mark[1], line
         elif text.strip():
-            if any(_NUMBER.fullmatch(cell) for cell in re.split(r"[\s,;]+", text)):
+            if any(NUMBER.fullmatch(cell) for cell in re.split(r"[\s,;]+", text)):
                 break
             return text, line, True, end + 1
         start, line = end + 1, line + 1
@@ -222,7 +223,8 @@ def _cells(line: str) -> list[str]:
 
 def _number(cell: str) -> float:
     """Value of a cell, NaN where it is no number."""
-    return float(cell.upper().replace("D", "E")) if _NUMBER.fullmatch(cell) else math.nan
+    value = plain_number(cell)
+    return math.nan if value is None else value
 
 
 def _fast(chunk: bytes, width: int) -> tuple[Floats, Ints] | None:

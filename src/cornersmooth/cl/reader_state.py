@@ -46,11 +46,6 @@ class ReaderState(Poses):
     finished: bool = False  #: FINI was met
     findings: dict[str, Finding] = field(default_factory=dict)  #: by text, in the order in which they were first met
 
-    @property
-    def stopped(self) -> bool:
-        """Whether the rest of the file is of no interest."""
-        return self.finished and self.lenient
-
     def note(self, code: str, line: int, **values: object) -> None:
         """Count a finding; equal texts are one."""
         new = finding(code, line, 1, **values)
