@@ -22,7 +22,7 @@ from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.geometry.ragged import starts
 from cornersmooth.kinematics import Machine, check_travel, solutions, tool_axis
 from cornersmooth.kinematics.poses import angle_between, nose_position
-from cornersmooth.model import Bools, Floats, Ints, Move, Program, SmoothProgram
+from cornersmooth.model import Bools, Floats, Ints, Move, Program, Runs, SmoothProgram
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.messages import Findings, refused
 from cornersmooth.nc.planes import turned_part
@@ -109,9 +109,10 @@ def within_reach(smoothed: SmoothProgram, form: Form) -> SmoothProgram:
     Where poses are at the limit of a rotary axis, the curve of a run may go beyond it within the tolerance. That of a
     single corner does not: its axes are between those of the poses.
     """
-    if smoothed.runs is None or form.machine is None or not form.rotary or form.rewind:
+    runs, machine = smoothed.runs, form.machine
+    if runs is None or machine is None or not form.rotary or form.rewind:
         return smoothed
-    near = _near_limits(smoothed, form)
+    near = _near_limits(runs, machine, smoothed)
     if not near.any():
         return smoothed
     try:
@@ -123,12 +124,10 @@ def within_reach(smoothed: SmoothProgram, form: Form) -> SmoothProgram:
     return smoothed
 
 
-def _near_limits(smoothed: SmoothProgram, form: Form) -> Bools:
+def _near_limits(runs: Runs, machine: Machine, smoothed: SmoothProgram) -> Bools:
     """(r,) bool: runs with a pose so near to the limit of an axis that the curve may go beyond it."""
-    runs, machine, settings = smoothed.runs, form.machine, smoothed.settings
-    assert runs is not None
-    assert machine is not None
-    if len(machine.names) < 2:
+    settings = smoothed.settings
+    if len(machine.names) < 2:  # whose limits are those of the directions, too
         return np.ones(len(runs), np.bool_)
     found = solutions(machine, smoothed.program.axis[runs.pose])
     swing = np.degrees(_SWING * settings.tolerance / settings.axis_scale)
