@@ -4,7 +4,6 @@ it, or it is refused with code 2 and a hint that works.
 
 from __future__ import annotations
 
-import io
 import re
 from dataclasses import replace
 from itertools import product
@@ -12,12 +11,10 @@ from itertools import product
 import numpy as np
 import pytest
 
-from cornersmooth import Program, nc
 from cornersmooth.cl import read
 from cornersmooth.errors import SettingsError
-from cornersmooth.nc import control_names, fit_settings, load_control, write
+from cornersmooth.nc import control_names, load_control
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing import smooth
 from nc.cases import ALL, RUNNABLE, Case
 from nc.grammars import reader
 from nc.promise import written
@@ -170,20 +167,3 @@ def test_a_tool_that_only_turns(case: Case) -> None:
     else:
         assert modes == {found.pieces[1].mode}
         assert all(piece.feed is None for piece in turns)
-
-
-def test_findings_do_not_tell_how_far_ahead_rows_are_made(monkeypatch: pytest.MonkeyPatch) -> None:
-    """They come in one order, however fast the thread of the rows is."""
-    form = Case("fanuc", "g1", "table-bc", tcp=False).choose()
-    x = np.arange(20.0)
-    lean = 0.3 + 0.1 * (x % 2)
-    program = Program.from_poses(
-        np.stack((x, x % 3, 0 * x), axis=1), np.stack((np.sin(lean), 0 * x, np.cos(lean)), axis=1)
-    )
-    smoothed = smooth(program, fit_settings(Settings(tolerance=0.05), form, program.units))
-    found = []
-    for ahead in (list, iter):
-        monkeypatch.setattr(nc, "_one_ahead", ahead)
-        found.append(write(smoothed, io.BytesIO(), form=form).findings)
-    assert {"CS311", "CS367"} <= {finding.code for finding in found[0]}
-    assert found[0] == found[1]
