@@ -97,9 +97,11 @@ class Lexer:
     def motion(self, line: Line) -> Columns | None:
         """Columns of a motion block; None where the line is something else."""
         given = {word.name: word for word in line.words}
-        if len(given) < len(line.words) or any(map(self.without_point, line.words)) or _signed(given.get("G")):
-            return None
-        return self.block(given)
+        code = given["G"].text if "G" in given else ""
+        # no control knows a code with a sign: such a line is read on its own, to be complained of
+        signed = code[:1] == "G" and ("-" in code or "+" in code)
+        alone = signed or len(given) < len(line.words) or any(map(self.without_point, line.words))
+        return None if alone else self.block(given)
 
     def without_point(self, word: Word) -> bool:
         """Whether a number may be counted in the least increment of the control; zero is zero in any case."""
@@ -120,11 +122,6 @@ class Lexer:
             if found:
                 return found[-1] + 1
         return 0
-
-
-def _signed(code: Word | None) -> bool:
-    """Whether there is a code with a sign, which no control knows: read on its own, to be complained of."""
-    return code is not None and code.text[:1] == "G" and ("-" in code.text or "+" in code.text)
 
 
 def number_of(match: re.Match[str], group: str | int, name: str) -> Word:

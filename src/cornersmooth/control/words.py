@@ -26,22 +26,13 @@ BY_WORD: Final = "DC"
 
 
 class Word(NamedTuple):
-    """A word of a line.
+    """A word of a line."""
 
-    Parameters
-    ----------
-    name : str
-        The same for all controls where it means the same: vectors are I J K, second points U V W.
-    text : str
-        As written.
-    start, stop : int
-        Where in the line the digits stand that may differ from block to block; equal where the word is always the
-        same, as G1 is.
-    """
-
-    name: str
+    name: str  #: the same for all controls where it means the same: vectors are I J K, second points U V W
     value: float
-    text: str
+    text: str  #: as written
+    #: start, stop: where in the line the digits stand that may differ from block to block; equal where the word is
+    #: always the same, as G1 is
     start: int = 0
     stop: int = 0
 

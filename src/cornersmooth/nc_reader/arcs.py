@@ -20,18 +20,9 @@ _UNLIKE = 0.01
 def circles(
     table: Table, before: Floats, end: Floats, counterclockwise: Bools, plane: int, problems: list[Problem]
 ) -> tuple[Floats, Floats, Floats]:
-    """Circles of G2 and G3 by radius R or by centre I J K, in units of the text.
+    """Circles of G2 and G3 by radius R or by centre I J K, in units of the text, in the plane 17, 18 or 19.
 
-    Parameters
-    ----------
-    table : Table
-        Of the k circular blocks.
-    before, end : (k, 3) float64
-    counterclockwise : (k,) bool
-    plane : int
-        17, 18 or 19.
-    problems : list of Problem
-        Takes CS520, an arc that does not reach its end, or whose ends are not as far from its centre.
+    `problems` takes CS520, an arc that does not reach its end, or whose ends are not as far from its centre.
 
     Returns
     -------

@@ -50,20 +50,12 @@ class ReadingOptions:
     def of(
         cls, control: str, machine: Machine | None, *, tcp: bool, tolerance: float, axis_length: float
     ) -> ReadingOptions:
-        """Choose it.
-
-        Raises
-        ------
-        SettingsError
-            CS204 for an unknown control, CS215 for positions of a machine that is not named.
-        """
-        without = machine is not None and not machine.names
-        if without:
-            machine = None
+        """Choose it; errors as in `read_nc`."""
         dialect = dialect_of(control, "".join(machine.names) if machine is not None else "")
-        if machine is None and not tcp and not without:
+        if machine is None and not tcp:
             raise SettingsError("CS215", "machine positions need a machine", "name it with --machine")
-        return cls(control, dialect, machine, tcp, tolerance, axis_length)
+        turns = machine is not None and len(machine.names) > 0
+        return cls(control, dialect, machine if turns else None, tcp, tolerance, axis_length)
 
     def steps(self, sample: bytes) -> Steps:
         """Printed digits of a piece of a text, as its control's format shows them."""

@@ -124,20 +124,14 @@ class Rotary:
         allowed = self.tolerance / self.axis_length
         if len(self.machine.names) < 2:
             return np.full(len(vector), _BEYOND * allowed if self.machine.names else 0.0)
-        about = self.machine.axes[0].unit
-        least, largest = self._reach
-        cosine, step = vector @ about, np.radians(self.angle_step)
-        edge = (cosine <= least + step**2) | (cosine >= largest - step**2)
-        sine = np.linalg.norm(np.cross(vector, about), axis=1)
-        return np.where(sine <= _POLE * allowed, allowed, np.where(edge, _BEYOND * allowed, 0.0))
-
-    @property
-    def _reach(self) -> tuple[float, float]:
-        """Least and largest cosine of the angle between the first axis and the tool, as the second one turns it."""
         about, second, tool = self.machine.axes[0].unit, self.machine.axes[1].unit, self.machine.tool
+        # the second axis turns the tool, so that the cosine of its angle to the first one swings about a middle
         middle = float(about @ second) * float(second @ tool)
         swing = float(np.linalg.norm(np.cross(about, second)) * np.linalg.norm(np.cross(second, tool)))
-        return middle - swing, middle + swing
+        cosine, step = vector @ about, np.radians(self.angle_step)
+        edge = (cosine <= middle - swing + step**2) | (cosine >= middle + swing - step**2)
+        sine = np.linalg.norm(np.cross(vector, about), axis=1)
+        return np.where(sine <= _POLE * allowed, allowed, np.where(edge, _BEYOND * allowed, 0.0))
 
     def steps(self, lever: float) -> tuple[float, float]:
         """Steps of tip and vector that printed digits stand for, `lever` being the longest."""
@@ -227,23 +221,18 @@ class Rotary:
 
         `start` and `end` are words of the linear axes, mm; `angles` degrees where it begins; `turn` the turns, rad.
         """
-        machine = self.machine
-        none = np.zeros(len(start))
+        machine, none = self.machine, np.zeros(len(start))
         moved = _Moved(np.broadcast_to(machine.tool, start.shape), none, none)
-        for index in (1, 0):
-            moved = moved.turned(machine.axes[index], angles[:, index], turn[:, index], np.zeros(3))
+        for k in (1, 0):
+            moved = moved.turned(machine.axes[k], angles[:, k], turn[:, k], np.zeros(3))
         axis_bend = moved.bend
         if self.tip_control:
             return none, axis_bend
-        nose = machine.tool_length * machine.tool
         moved = _Moved(np.zeros_like(start), none, none)
         for axis, k in self._carrying("head"):
-            moved = moved.turned(axis, angles[:, k], turn[:, k], nose + axis.point)
-        moved = replace(
-            moved,
-            point=moved.point + start + machine.part_zero,
-            way=moved.way + np.linalg.norm(end - start, axis=1),
-        )
+            moved = moved.turned(axis, angles[:, k], turn[:, k], machine.tool_length * machine.tool + axis.point)
+        way = moved.way + np.linalg.norm(end - start, axis=1)
+        moved = _Moved(moved.point + start + machine.part_zero, way, moved.bend)
         for axis, k in self._carrying("table"):
             moved = moved.turned(axis, angles[:, k], turn[:, k], np.array(axis.point))
         return moved.bend, axis_bend
