@@ -21,7 +21,7 @@ ARRAYS = ("tip", "axis", "kind", "feed", "line", "feed_mode", "keep")
 
 
 def outcome(data: bytes, *, fast: bool) -> Program | str:
-    finds = bulk.find_plain if fast else lambda text: None
+    finds = bulk.find_plain if fast else lambda text, first: None
     try:
         with patch.object(bulk, "find_plain", finds):
             return read_apt(clean(data, "x.cls"), name="x.cls")

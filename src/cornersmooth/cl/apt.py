@@ -87,7 +87,7 @@ def read_apt(
         if state.finished and lenient:
             break
         if part.poses is not None:
-            _plain(state, part.poses, part.first)
+            _plain(state, part.poses)
             continue
         for record in read_records(part.text.split(b"\n")[:-1], part.first, decode, name, part.follows):
             _obey(state, record)
@@ -97,10 +97,10 @@ def read_apt(
     return _program(state)
 
 
-def _plain(state: ReaderState, poses: Floats, line: int) -> None:
+def _plain(state: ReaderState, poses: Floats) -> None:
     """Carry out some plain GOTO statements."""
     if state.finished:
-        raise error("CS118", state.file, line, word="GOTO")
+        raise error("CS118", state.file, int(poses[0, 6]), word="GOTO")
     if state.curve is not None:
         motion_statements.finish_curve(state)
     if state.spline is not None:

@@ -31,7 +31,7 @@ _PLAIN: Final = re.compile(
 class Part(NamedTuple):
     """Consecutive lines of a file: plain GOTO lines, or others."""
 
-    first: int  #: number of the first line, from 1
+    first: int  #: number of the first line of the text, from 1
     text: bytes = b""  #: of lines that are not surely plain
     poses: Floats | None = None  #: (m, 7): tip and axis as written, with NaN where a pose has no axis, and line
     follows: str = "GOTO"  #: what comes after the text
@@ -44,14 +44,11 @@ def parts(data: bytes) -> Iterator[Part]:
         end = _chunk_end(data, begin)
         text = data[begin:end]
         at = 0
-        for start, stop, poses in find_plain(text) or ():
+        for start, stop, after, poses in find_plain(text, line) or ():
             if at < start:
                 yield Part(line, text[at:start])
-                line += text.count(b"\n", at, start)
-            poses[:, 6] += line - poses[0, 6]
             yield Part(line, poses=poses)
-            line += text.count(b"\n", start, stop)
-            at = stop
+            at, line = stop, after
         if at < len(text):
             yield Part(line, text[at:], follows="GOTO" if end < len(data) else "the end of the file")
         begin, line = end, line + text.count(b"\n", at)
@@ -67,12 +64,15 @@ def _chunk_end(data: bytes, start: int) -> int:
     return len(data) if stop < 0 else stop + 1
 
 
-def find_plain(text: bytes) -> list[tuple[int, int, Floats]] | None:
+def find_plain(text: bytes, first: int) -> list[tuple[int, int, int, Floats]] | None:
     """Find and convert the runs of plain GOTO statements; None if any of them needs care.
 
-    First and last byte of each come with its poses, (m, 7) as in `Part`, whose lines are counted without all others.
+    Of each run: its first byte, and byte and line after it, and its poses, (m, 7) as in `Part`. The text begins with
+    line `first`.
     """
     spans = [found.span() for found in _PLAIN.finditer(text)]
+    if not spans:
+        return None
     plain = b"".join([text[start:stop] for start, stop in spans])
     chosen = plain.translate(None, b"GOT/ $")
     letters = np.frombuffer(plain, np.uint8)
@@ -85,7 +85,6 @@ def find_plain(text: bytes) -> list[tuple[int, int, Floats]] | None:
     except ValueError:
         return None
     poses = np.full((len(line), 7), np.nan)
-    poses[:, 6] = line
     if len(values) == 6 * len(poses):
         poses[:, :6] = values.reshape(-1, 6)
     else:
@@ -96,8 +95,11 @@ def find_plain(text: bytes) -> list[tuple[int, int, Floats]] | None:
     if not (np.abs(poses[:, :3]) <= FARTHEST).all():
         return None
     counts = [text.count(b"GOTO", start, stop) for start, stop in spans]
-    ends = np.cumsum(counts).tolist()
-    return [(*span, poses[end - count : end]) for span, end, count in zip(spans, ends, counts, strict=True)]
+    lines = first + np.searchsorted(np.flatnonzero(np.frombuffer(text, np.uint8) == ord("\n")), spans)
+    size = lines[:, 1] - lines[:, 0]
+    poses[:, 6] = line + np.repeat(lines[:, 0] - np.cumsum(size) + size, counts)
+    runs = zip(spans, lines[:, 1].tolist(), np.cumsum(counts).tolist(), counts, strict=True)
+    return [(start, stop, after, poses[end - count : end]) for (start, stop), after, end, count in runs]
 
 
 def _numbers_of_lines(text: bytes) -> Ints:
