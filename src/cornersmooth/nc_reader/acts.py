@@ -90,9 +90,8 @@ class ModalState:
     coordinates: str = ""
     plane: TiltedPlane | None = None  #: that is on
     left_turned: bool = False  #: a plane that is off again has left the rotary axes where no word says
-    idle: Floats = field(
-        default_factory=lambda: np.zeros(2)
-    )  #: degrees that axes have turned while the tool axis stands
+    #: degrees that rotary axes have turned while the tool axis stands
+    idle: Floats = field(default_factory=lambda: np.zeros(2))
 
     @property
     def tip_control(self) -> str:
