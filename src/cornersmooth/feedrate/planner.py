@@ -68,7 +68,7 @@ def plan(
     path = build_path(
         smooth_program.program, smooth_program.corners, smooth_program.settings, limits, runs=smooth_program.runs
     )
-    return plan_path(path, limits, machine=machine, progress=progress)
+    return plan_along(path, limits, None if machine is None else follow(machine, path), progress=progress)
 
 
 def direct(
@@ -103,7 +103,7 @@ def direct(
     limits = Limits() if limits is None else limits
     settings = Settings() if settings is None else settings
     path = build_path(program, None, settings, limits, stop_everywhere=baseline == "exact_stop")
-    return plan_path(path, limits, machine=machine, progress=progress)
+    return plan_along(path, limits, None if machine is None else follow(machine, path), progress=progress)
 
 
 def passed(path: Path, limits: Limits, machine_axes: MachineAxes | None) -> Path:
@@ -124,17 +124,6 @@ def _not_crowded(path: Path, period: float) -> Floats:
     apart = (path.length[sharp - 1] + path.length[sharp]) / 2.0
     found[sharp] = np.minimum(found[sharp], np.sqrt(found[sharp] * apart / period))
     return found
-
-
-def plan_path(
-    path: Path,
-    limits: Limits,
-    *,
-    machine: Machine | None = None,
-    progress: Progress | None = None,
-) -> TimeLaw:
-    """Plan the motion along any path."""
-    return plan_along(path, limits, None if machine is None else follow(machine, path), progress=progress)
 
 
 def plan_along(

@@ -68,16 +68,7 @@ class WrittenMotion:
 
 
 def written_motion(nc: NcProgram, name: str, axis_length: float = 10.0) -> WrittenMotion:
-    """Read the motion of a text.
-
-    Parameters
-    ----------
-    nc : NcProgram
-        As `cornersmooth.nc_reader.read_nc` gives it.
-    name : str
-        File name for messages.
-    axis_length : float, mm
-    """
+    """Read the motion of a text; `name` is that of its file, for messages, and `axis_length` in mm."""
     of_curve, *numbers = _curve_pieces(nc, axis_length)
     count = 1 + np.bincount(of_curve, minlength=len(nc)) - (nc.kind == Element.CURVE)
     owner = np.repeat(np.arange(len(nc)), count)
