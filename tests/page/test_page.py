@@ -286,6 +286,25 @@ def test_commands_write_pages(tmp_path):
     assert meta["verdict"].startswith("PASSED: within 0.02 mm everywhere")
 
 
+@pytest.mark.parametrize("command", ["smooth", "verify"])
+def test_a_page_and_its_report_give_one_verdict(command, tmp_path, monkeypatch):
+    """Also what made it looser, which is known to the command alone."""
+    source, nc, found = tmp_path / "part.cls", tmp_path / "part.nc", tmp_path / "found"
+    source.write_text(PATH.format(name="PART", comment="none"))
+    monkeypatch.setenv("CORNERSMOOTH_TOLERANCE", "0.2")
+    reports = ("--report", f"{found}.html", "--report", f"{found}.json")
+    assert run("smooth", source, "-o", nc, *(reports if command == "smooth" else ())).returncode == 0
+    if command == "verify":
+        assert run("verify", source, nc, *reports).returncode == 0
+    report = json.loads((tmp_path / "found.json").read_text())
+    meta, _ = values_of((tmp_path / "found.html").read_text())
+    assert "the tolerance 0.2 mm is larger" in report["verdict_text"]
+    assert meta["verdict"].startswith(report["verdict_text"])
+    assert meta["badge"] == report["verdict"]
+    listed = [one["text"].partition(" (")[0] for one in meta["problems"]]
+    assert listed == [one["text"].partition(" (")[0] for one in report["findings"] if one["severity"] != "note"]
+
+
 def test_the_time_is_that_of_the_whole_program_or_none(tmp_path, monkeypatch):
     source, nc = tmp_path / "long.cls", tmp_path / "long.nc"
     rows = "".join(f"GOTO/{x}.0,{x % 2}.0,0.0\n" for x in range(31))
