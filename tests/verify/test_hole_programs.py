@@ -79,7 +79,6 @@ REFUSED_ONCE = {
     1600308: "taps left out, and bores above each other with coolant between them",
     1600475: "ten holes at one place, by another digit",
     1520289: "holes of two tools in one line",
-    1520304: "holes above each other that are not drilled",
     1005030: "the CL file's own rapid into a hole that is drilled behind it",
 }
 

@@ -179,7 +179,7 @@ class Parse:
                 element += 1
             elif self._hole[following] and (
                 self._over(following, element)
-                or (self._may_be_left_out(following) and self._begins(following, element))
+                or (self._may_be_left_out(following) and self._begins(following, element) is not None)
             ):
                 break
             elif along.stays(element):
@@ -206,16 +206,17 @@ class Parse:
         while self._over(stop, end) or (end > element and self._ahead.has(end) and lines.stands(end)):
             end += 1
         late = -1 if self._hole[stop + 1] and not self._fed[stop] else 1
-        ends = [(2, True, end, end)]
+        ends = [(2, True, 0, end, end)]
         for one in range(element, end + 1):
             if one > element and lines.feeds(one - 1):
                 lowest = min(lowest, lines.height(move, one - 1))
             done = lowest <= lines.room - cycle.depth or (math.isinf(lowest) and self._may_be_left_out(stop))
             whole = one == end or lines.block(one).start == one  # a cycle of the control is one block
-            if (done or one == end) and whole and self._begins(stop, one):
+            lacks = self._begins(stop, one) if whole and (done or one == end) else None
+            if lacks is not None:
                 found, left = lines.check(move, range(element, self._end_of(stop, element, one)), cycle)
                 wrong = 2 if any(one.code != "CS541" for one in found) else int(bool(found))
-                ends.append((wrong, left, late * one, one))
+                ends.append((wrong, left, lacks, late * one, one))
         wrong, *_, best = min(ends)
         doubt = self._doubt(stop, element) if wrong == 2 else None  # a wrong feed leaves none
         return doubt or self._leave(stop, element, best)
@@ -228,23 +229,28 @@ class Parse:
             return end + int(lines.height(move, end) > before)
         return end
 
-    def _begins(self, stop: int, element: int) -> bool:
-        """Whether what follows a stop can begin with an element."""
+    def _begins(self, stop: int, element: int) -> int | None:
+        """How many holes and moves are left out if what follows a stop begins with an element; None if nothing does."""
         lines, following, has = self.lines, stop + 1, self._ahead.has(element)
         inside = self._hole[stop] and lines.height(self._move[stop], element - 1) < -lines.room
         at_feed = inside and self._cycles[self._move[stop]].feed_out  # the way out is the hole's
         if self._fed[stop] and not at_feed and self._feeds_on(stop, element):
-            return True
+            return 0
         if self._fed[stop] and not self._done(stop, element):
-            return False
+            return None
+        lacks = int(self._fed[stop])  # feed moves that lead nowhere
         if following == len(self.moves):
-            return not has
+            return None if has else lacks
         if self._hole[following]:
             below = lines.height(self._move[following], element - 1) < -lines.room  # from there no hole is fed
-            over = not inside and self._over(following, element) and not (below and lines.feeds(element))
-            return over or (self._may_be_left_out(following) and self._begins(following, element))
-        there = element > 0 and lines.at(self._move[following], element - 1)
-        return self._reaches(following, element) or (there and self._begins(following, element))
+            if not inside and self._over(following, element) and not (below and lines.feeds(element)):
+                return lacks
+            behind = self._begins(following, element) if self._may_be_left_out(following) else None
+            return None if behind is None else behind + 1 + lacks
+        if self._reaches(following, element):
+            return lacks
+        shared = self._begins(following, element) if element and lines.at(self._move[following], element - 1) else None
+        return None if shared is None else shared + lines.feeds(element - 1)  # a rapid is rather written as one
 
     def _feeds_on(self, stop: int, element: int) -> bool:
         """Whether feed moves from an element on may lead to the last pose before the next stop."""
