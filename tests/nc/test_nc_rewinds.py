@@ -129,7 +129,8 @@ def test_turns_of_the_tools_before_are_left_where_the_axes_go_to_zero(
 ) -> None:
     rings = [*ring(0, 30), "RAPID", ring(20, 30)[-1], "RAPID", ring(20, 30)[0]]
     tool = ["SPINDL/8000,RPM,CLW", "RAPID", ring(20, 30)[0], "FEDRAT/500,MMPM", *rings, *rings]
-    cl = ["UNITS/MM", "LOADTL/2", *tool, "LOADTL/3", *tool, "GOHOME", *tool, "FINI"]
+    upright = ["RAPID", "GOTO/0,0,20,0,0,1", "FEDRAT/500,MMPM", "GOTO/0,0,0", "GOTO/20,0,0"]
+    cl = ["UNITS/MM", "LOADTL/2", *tool, "LOADTL/4", *upright, "LOADTL/3", *tool, "GOHOME", *tool, "FINI"]
     machine = load_machine("table-ac")
     form = choose_form(control, name, machine=machine)
     settings = fit_settings(Settings(tolerance=EPS, **how), form, "mm")
@@ -146,7 +147,7 @@ def test_turns_of_the_tools_before_are_left_where_the_axes_go_to_zero(
             first.append(float(turn[1]))
         high &= not turn
         most = max(most, abs(float(turn[1]))) if turn else most
-    assert len(first) == 3
+    assert len(first) == 4
     if control == "siemens":  # its axes go where the next motion has them
         assert most > 1500
     else:

@@ -59,6 +59,7 @@ WARNINGS: Final = {
     "CS383": "a dwell under feed per revolution: it counts turns of the spindle {where}",
     # tools
     "CS337": "the first motion of a tool turns it to a tilted axis; see that it is free to, or name the machine",
+    "CS337b": "the first motion of a tool turns it to a tilted axis; see that tool and table are free to",
     "CS333": "the first motion of a tool is a feed move: it feeds {where}; put a RAPID before it",
     "CS358": (
         "tool tip control after a tilted tool: the rotary axes are where it has left them. The part program may turn "

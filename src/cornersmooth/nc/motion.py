@@ -272,8 +272,11 @@ class Motion:
     def _note_first(self, pose: int, *, rapid: bool) -> None:
         """Say that the control turns the tool on its own before its first position, or feeds to it."""
         form, line = self.at.form, int(self.program.line[pose])
-        if form.orientation in ("vector", "point") and self.program.axis[pose][2] < UPRIGHT:
-            self.findings.note("CS337", line)
+        if self.program.axis[pose][2] < UPRIGHT:
+            if form.orientation in ("vector", "point"):
+                self.findings.note("CS337", line)
+            elif form.orientation == "angles" and "{rotary_zero}" in form.begin:
+                self.findings.note("CS337b", line)
         if not rapid:
             where = "down from the height of the retract" if form.table.program.retract else "from where the machine is"
             self.findings.note("CS333", line, where=where)

@@ -194,12 +194,12 @@ def from_zero(form: Form, program: Program, axis: Floats, angles: Floats, move: 
     # a pose that repeats the one before is no row
     rows = rows[(move[rows] == starts) & rapid[rows] & ~np.isnan(angles[rows]).any(axis=1)]
     for row, end in pairwise([*rows.tolist(), len(move)]):
-        first, along = angles[row].copy(), machine.axes[0].unit
+        first, along, whole = angles[row].copy(), machine.axes[0].unit, endless
         stands = np.nanmax(angles[row:end, 0]) - np.nanmin(angles[row:end, 0]) <= _PARALLEL
         if len(machine.names) == 2 and stands and norm(np.cross(axis[row:end], along)).max() <= _PARALLEL:
             angles[row:end, 0] += np.clip(0.0, *machine.limits[0]) - first[0]
-            endless = endless & (False, True)
-        angles[row:end, endless] += -360.0 * np.round(first[endless] / 360.0)
+            whole = endless & (False, True)
+        angles[row:end, whole] += -360.0 * np.round(first[whole] / 360.0)
 
 
 def check_first_block(
