@@ -514,12 +514,19 @@ def test_several_tools_have_no_common_length_where_it_counts() -> None:
 
 
 @pytest.mark.parametrize(
-    ("axis", "machine", "count"), [("0,0,1", "", 0), ("0.6,0,0.8", "", 1), ("0.6,0,0.8", "table-ac", 0)]
+    ("control", "axis", "machine", "count"),
+    [
+        ("fanuc", "0,0,1", "", 0),
+        ("fanuc", "0.6,0,0.8", "", 1),
+        ("fanuc", "0,0,1", "table-ac", 0),
+        ("fanuc", "0.6,0,0.8", "table-ac", 1),  # at zero where tip control comes on
+        ("haas", "0.6,0,0.8", "table-ac", 0),
+    ],
 )
-def test_a_tilted_first_pose_is_said_where_the_text_cannot_turn_the_tool_before(axis, machine, count) -> None:
+def test_a_tilted_first_pose_is_said_where_the_text_cannot_turn_the_tool_before(control, axis, machine, count) -> None:
     cl = f"UNITS/MM\nMULTAX\nLOADTL/1\nRAPID\nGOTO/0,0,9,{axis}\nFEDRAT/100,MMPM\nGOTO/9,0,0\nFINI\n"
     program = read(cl.encode(), name="part.cls")
-    form = choose_form("fanuc", machine=load_machine(machine) if machine else None)
+    form = choose_form(control, machine=load_machine(machine) if machine else None)
     written = write(smooth(program, fit_settings(Settings(), form, program.units)), io.BytesIO(), form=form)
     assert codes(written, fragment=False).get("CS337", 0) == count
 
