@@ -113,7 +113,7 @@ def test_verification_is_the_same(monkeypatch):
     write(smooth(program, fit_settings(Settings(tolerance=0.02), choose_form(), "mm")), stream)
     nc = read_nc(stream.getvalue())
     used = []
-    monkeypatch.setattr(crews._Member, "start", _counted(crews._Member.start, used))
+    monkeypatch.setattr(crews.Helper, "start", _counted(crews.Helper.start, used))
     one, two = (verify(program, nc, tolerance=0.02, processes=processes) for processes in (1, 2))
     for field in fields(one):
         np.testing.assert_equal(getattr(one, field.name), getattr(two, field.name), err_msg=field.name)
@@ -128,8 +128,15 @@ def _counted(start, used):
     return counted
 
 
+def _helper(work):
+    """A helper that works already."""
+    helper = crews.Helper(lambda _: work())
+    helper.start()
+    return helper
+
+
 def test_helper_works_meanwhile():
-    helper = crews.Helper(lambda: (os.getpid(), bytes(1_000_000)))
+    helper = _helper(lambda: (os.getpid(), bytes(1_000_000)))
     process, data = helper.result()
     helper.end()
     assert process != os.getpid()
@@ -140,14 +147,14 @@ def test_helper_raises_what_its_work_raises():
     def work():
         raise ValueError("helper")
 
-    helper = crews.Helper(work)
+    helper = _helper(work)
     with pytest.raises(ValueError, match="helper"):
         helper.result()
     helper.end()
 
 
 def test_helper_that_is_killed_is_want_of_memory():
-    helper = crews.Helper(lambda: os.kill(os.getpid(), signal.SIGKILL))
+    helper = _helper(lambda: os.kill(os.getpid(), signal.SIGKILL))
     with pytest.raises(MemoryError):
         helper.result()
     helper.end()
@@ -165,7 +172,7 @@ def test_helper_that_is_sent_away_leaves_nobody_behind(tmp_path):
 
         return list(crews.map_in_processes(item, range(10**6), 2))
 
-    helper = crews.Helper(work)
+    helper = _helper(work)
     while len(list(tmp_path.iterdir())) < 2:
         time.sleep(0.005)
     used = [int(path.name) for path in tmp_path.iterdir()]
