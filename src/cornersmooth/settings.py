@@ -103,7 +103,7 @@ class Settings(OptionFields):
     method: str = option(
         AUTO,
         "How the curves are made. With auto: global in curves (g6.2, bspline, poly, spl); in lines proportional, or "
-        "global where its program is faster under --limits. "
+        "global where its program is faster under --limits, given by itself: --machine alone does not compare them. "
         + " ".join(f"With {item.name}: {item.summary}." for item in METHODS.values())
         + " Global takes less time on the machine and about a block a pose in curves; on LinuxCNC it takes more time.",
     )

@@ -90,8 +90,9 @@ class Declared:
     )
     limits: MachineName | None = _everyday(
         "NAME|FILE",
-        "Say the time under the limits of this machine's axes; the words of the program stay as they are. A name that "
-        "'cornersmooth machines' lists, or a TOML file with [dynamics.X] and so on. [default: those of --machine]",
+        "Say the time under the limits of this machine's axes. The form of the words stays as it is; smooth takes the "
+        "faster --method for lines by this time. A name that 'cornersmooth machines' lists, or a TOML file with "
+        "[dynamics.X] and so on. [default: those of --machine]",
     )
     feed: float | None = _everyday("MM/MIN", "Feed for moves that the CL file gives none for.")
     output: Path | None = _everyday("-o", "NC file, - for standard output. [default: - for a single input]")
