@@ -79,9 +79,13 @@ def test_axis_of_linuxcnc_opens_a_cl_file(part: Path) -> None:
         (("info", "missing.cls", "--json"), "CS100"),
         (("time", "part.cls", "--limits", "nobody", "--json"), "CS250"),
         (("info", "part.cls", "--json", "--tolerence", "1"), None),
+        (("smooth", "bad.cls", "--json", "-o", "new.nc"), "CS110"),
+        (("smooth", "part.cls", "--json", "-o", "bad.cls"), "CS403"),
+        (("smooth", "part.cls", "--json", "-o", "part.cls"), "CS220"),
     ],
 )
 def test_an_error_is_an_object_too(part: Path, words: tuple[str, ...], code: str | None) -> None:
+    part.with_name("bad.cls").write_text("GOTO/1,2\n")
     result = run(*words, cwd=part.parent)
     found = json.loads(result.stdout)
     schema = json.loads(files("cornersmooth.report").joinpath("error.schema.json").read_text())

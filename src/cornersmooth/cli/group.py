@@ -16,7 +16,7 @@ from cornersmooth import __version__
 from cornersmooth.cli.command import write_part
 from cornersmooth.cli.commands import COMMANDS, GROUPS
 from cornersmooth.cli.options import Options
-from cornersmooth.cli.show import print_message, say_json
+from cornersmooth.cli.show import error_contents, print_message, say_json
 from cornersmooth.errors import EXIT_INTERNAL, CornersmoothError, SettingsError, internal_error, message
 from cornersmooth.system.output import ClosedPipe, reason
 
@@ -138,8 +138,7 @@ def _failed(args: list[str] | None, failure: CornersmoothError) -> int:
     """Print an error, as an object too where the output was to be one (report/error.schema.json); return its code."""
     _say(str(failure))
     if "--json" in (sys.argv[1:] if args is None else args) and sys.stdout is not None:
-        contents = {name: getattr(failure, name) or None for name in ("code", "what", "hint", "file", "line")}
-        say_json({"schema": "cornersmooth-error/1", "exit_code": failure.exit_code, **contents})
+        say_json(error_contents(failure))
     return failure.exit_code
 
 

@@ -20,6 +20,8 @@ from cornersmooth.cli.show import more
 from cornersmooth.errors import (
     EXIT_INTERNAL,
     CornersmoothError,
+    InputError,
+    OutputError,
     Verdict,
     VerdictError,
     internal_error,
@@ -85,6 +87,7 @@ class Outcome:
     job: Job
     exit_code: int = 0
     message: str = ""
+    error: CornersmoothError | None = None  #: why there is no report
     contents: dict[str, Any] = field(default_factory=dict)
     #: why nothing had to be done
     skipped: str = ""
@@ -119,19 +122,18 @@ def run_job(job: Job, progress: Progress | None = None) -> Outcome:
     try:
         _smooth_file(job, outcome, progress)
     except CornersmoothError as failure:
-        outcome.exit_code = failure.exit_code
-        outcome.message = str(failure)
+        outcome.error = failure
     except MemoryError:
-        outcome.exit_code = 3
-        outcome.message = message("error", "not enough memory for this file; cut it at a tool change", place=job.source)
+        outcome.error = InputError("", "not enough memory for this file", "cut it at a tool change", file=job.source)
     except ClosedPipe:
         if not job.batch:
             raise
-        outcome.exit_code = 4
-        outcome.message = message("error", "the reader of an output has gone; run it again", place=job.source)
+        outcome.error = OutputError("", "the reader of an output has gone", "run it again", file=job.source)
     except Exception as failure:
         outcome.exit_code = EXIT_INTERNAL
         outcome.message = internal_error(failure, job.source)
+    if outcome.error is not None:
+        outcome.exit_code, outcome.message = outcome.error.exit_code, str(outcome.error)
     return outcome
 
 

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Final, TextIO
 
-from cornersmooth.errors import message, printable
+from cornersmooth.errors import CornersmoothError, message, printable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -224,6 +224,12 @@ def say_json(contents: Mapping[str, Any]) -> None:
     if (sys.stdout.encoding or "").lower().replace("-", "") != "utf8":  # the code page of a console
         text = _OUTSIDE_ASCII.sub(lambda one: json.dumps(one[0])[1:-1], text)
     print(text, end="")  # noqa: T201
+
+
+def error_contents(failure: CornersmoothError) -> dict[str, Any]:
+    """Give the object of an error (report/error.schema.json)."""
+    fields = {name: getattr(failure, name) or None for name in ("code", "what", "hint", "file", "line")}
+    return {"schema": "cornersmooth-error/1", "exit_code": failure.exit_code, **fields}
 
 
 def say_line(text: str, indent: int = 2) -> None:

@@ -84,8 +84,9 @@ def _alone(job: Job) -> int:
     if printed:
         show.show_verdict(outcome.contents, outcome.saving)
     _print_notes(outcome)
-    if outcome.contents and given.as_json:
-        show.say_json(outcome.contents)
+    contents = outcome.contents or (show.error_contents(outcome.error) if outcome.error else {})
+    if contents and given.as_json:
+        show.say_json(contents)
     if printed:
         show.show_summary(outcome.contents, outcome.seconds, given.verbose)
     return outcome.exit_code
