@@ -181,3 +181,26 @@ def test_a_chamfer_leaves_the_rest_known(corner: str, tmp_path: Path) -> None:
     assert told.startswith("PASSED")
     assert f"G1 Z-1. F350.\nX-9. {corner}\nY9.\n".encode() in new
     assert int(re.search(r"(\d+) of \d+ cuts smoothed", told)[1]) >= len(PASS)  # type: ignore[index]
+
+
+@pytest.mark.parametrize("control", ["fanuc", "linuxcnc"])
+@pytest.mark.parametrize("command", ["time", "compare", "filter"])
+def test_limits_without_an_axis_that_moves_are_refused(control: str, command: str, tmp_path: Path) -> None:
+    (tmp_path / "part.nc").write_text(PROGRAMS[control])
+    (tmp_path / "router.toml").write_text("axis = []\n[dynamics.X]\nvelocity = 6000\nacceleration = 500\njerk = 1e4\n")
+    out = ("-o", "new.nc") if command == "filter" else ()
+    done = run(command, "part.nc", "--control", control, "--limits", "router.toml", *out, cwd=tmp_path)
+    assert done.returncode == USAGE
+    assert b"error[CS263]" in done.stderr
+    assert b"[dynamics.Y] and [dynamics.Z]" in done.stderr
+    assert b"Warning" not in done.stderr
+    assert not (tmp_path / "new.nc").exists()
+
+
+def test_the_machine_file_of_the_page_is_complete(tmp_path: Path) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "linuxcnc.md").read_text()
+    block = re.search(r"\n\n(    axis = \[\]\n(?:    .*\n|\n)+)", page)[1]  # type: ignore[index]
+    (tmp_path / "router.toml").write_text(re.sub("(?m)^    ", "", block))
+    (tmp_path / "part.nc").write_text(PROGRAMS["linuxcnc"])
+    done = run("time", "part.nc", "--control", "linuxcnc", "--limits", "router.toml", cwd=tmp_path)
+    assert done.returncode == DONE, done.stderr

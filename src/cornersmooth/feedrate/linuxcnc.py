@@ -28,7 +28,7 @@ import numpy as np
 
 from cornersmooth.arrays.vectors import dot, norm, unit
 from cornersmooth.errors import InputError
-from cornersmooth.kinematics import Machine
+from cornersmooth.kinematics import Machine, check_dynamics
 from cornersmooth.model import MM_PER_UNIT, Bools, Floats, Ints
 
 #: ``CARTFUZZ`` of posemath, mm or degrees: an axis that moves by less does not move
@@ -267,10 +267,19 @@ def _in_turn(taken: Floats, overlap: Floats) -> tuple[Floats, Floats]:
     return np.array(begin), np.array(end)
 
 
-def axis_limits(machine: Machine) -> AxisLimits:
-    """Limits of the axes of a machine, as ``[AXIS_*]`` of its configuration has them."""
+def axis_limits(machine: Machine, lines: Lines) -> AxisLimits:
+    """Limits of the axes of a machine, as ``[AXIS_*]`` of its configuration has them.
+
+    Raises
+    ------
+    SettingsError
+        CS263: an axis that lines move has no velocity, or no acceleration.
+    """
     limits = {item.name: item.per_second for item in machine.dynamics}
     columns = np.array([limits.get(name, (np.inf,) * 3) for name in _AXES])
+    moved: Bools = np.any(np.abs(lines.end - lines.start) >= FUZZ, axis=0)
+    moved[:3] |= (np.abs(lines.arc[:, 9:]) < 1.0).any(axis=0)  # NaN for lines
+    check_dynamics(machine, [name for name, moves in zip(_AXES, moved, strict=True) if moves])
     return AxisLimits(columns[:, 0], columns[:, 1])
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import compress
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from cornersmooth.feedrate.written import text_path
 from cornersmooth.filter.checking import Place, motion_of, shared
 from cornersmooth.filter.motion import Job
 from cornersmooth.filter.runs import NONE, Reading, Run
-from cornersmooth.kinematics import Machine
+from cornersmooth.kinematics import Machine, check_dynamics
 from cornersmooth.model import Floats
 from cornersmooth.nc_reader import NcProgram
 from cornersmooth.times.saving import LINUXCNC
@@ -29,7 +30,7 @@ class Times:
     They are those of `ramp_times`, and on LinuxCNC by the law of its planner. No text is planned twice.
 
     Errors: a pose out of reach; CS264: a program for LinuxCNC has motion of a kind whose law is not known; CS263: the
-    machine does not say how fast its axes may go.
+    machine does not say how fast an axis may go that moves.
     """
 
     job: Job
@@ -71,6 +72,10 @@ class Times:
     def _planned(self, nc: NcProgram, firsts: Sequence[int]) -> Floats:
         """Time of the stretches of a motion that begin in some lines, without the rapids to them, s."""
         path = text_path(nc, Limits(), settings=self.job.settings)
+        moved = np.ptp(path.program.tip, axis=0) > 0.0
+        turns = np.ptp(path.program.axis, axis=0).any()  # the tip stays where it is, and the linear axes follow
+        names = ("X", "Y", "Z", *self.axes.names) if turns else compress("XYZ", moved)
+        check_dynamics(self.axes, names)
         taken = np.where(path.rapid, 0.0, ramp_times(path, Limits(), self.axes))
         which = np.searchsorted(firsts, np.abs(path.program.line[path.move]) - 1, side="right") - 1
         return np.bincount(which, taken, len(firsts)).astype(np.float64)
@@ -80,7 +85,7 @@ class Times:
         if reading.data not in self.ends:
             moves = program_lines(reading.data.decode("utf-8", "replace"))
             ends = np.zeros(max(len(reading), 1))
-            ends[moves.number - 1] = line_times(moves, axis_limits(self.axes))[1]
+            ends[moves.number - 1] = line_times(moves, axis_limits(self.axes, moves))[1]
             self.ends[reading.data] = np.maximum.accumulate(ends)
         return self.ends[reading.data]
 

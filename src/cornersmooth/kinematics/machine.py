@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -279,6 +279,14 @@ class Machine:
 def with_dynamics(machine: Machine | None) -> Machine | None:
     """Return the machine where it says how fast its axes may go; otherwise the tip alone has limits."""
     return machine if machine is not None and machine.dynamics else None
+
+
+def check_dynamics(machine: Machine, names: Iterable[str]) -> None:
+    """Refuse a machine without velocity or acceleration of some axes that move (SettingsError CS263)."""
+    known = {item.name for item in machine.dynamics if math.isfinite(item.velocity + item.acceleration)}
+    if missing := [f"[dynamics.{name}]" for name in names if name not in known]:
+        what = f"machine {machine.name} lacks {' and '.join(missing)}, with velocity and acceleration"
+        raise SettingsError("CS263", what, "add them to the file: the program moves these axes")
 
 
 def endless(machine: Machine) -> Machine:

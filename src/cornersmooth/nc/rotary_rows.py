@@ -323,7 +323,7 @@ def rounded_lines(
         moves = np.flatnonzero((np.abs(np.diff(place, axis=0)) >= FUZZ).any(axis=1))
         lines = Lines(place[moves], place[moves + 1], feed[kept[moves + 1]], blends(rows, kept)[moves + 1])
         time = np.zeros(len(kept))
-        time[moves + 1] = line_times(lines, axis_limits(form.machine))[1]
+        time[moves + 1] = line_times(lines, axis_limits(form.machine, lines))[1]
         return np.maximum.accumulate(time)
 
     if placed:

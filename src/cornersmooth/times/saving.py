@@ -126,7 +126,7 @@ class Timing:
         lines = program_lines(text.decode("utf-8", "replace"), program.source.name)
         if not len(lines) or self.form.machine is None:
             return 0.0
-        start, end = line_times(lines, axis_limits(self.machine))
+        start, end = line_times(lines, axis_limits(self.machine, lines))
         place = np.vstack((lines.start[:1], lines.end))
         time = np.concatenate((start[:1], end))
         columns = ["XYZABC".index(axis.name) for axis in self.form.machine.axes]
