@@ -90,6 +90,10 @@ def test_short_blocks_have_the_feed_of_their_place() -> None:
         wrong = [*right]
         wrong[place] = 2000.0
         assert [one.code for one in verify(cl, _text(wrong, heights), tolerance=0.02).problems] == ["CS541"]
+    other = [*right]
+    other[len(down)] = 900.0
+    (one,) = verify(cl, _text(other, heights), tolerance=0.02).problems
+    assert one.text == "the feed is 900 mm/min, the CL file says 150, then 2000"  # either would do there
     all_fast = [2000.0] * len(heights)
     assert [one.code for one in verify(cl, _text(all_fast, heights), tolerance=0.02).problems] == ["CS541"]
 

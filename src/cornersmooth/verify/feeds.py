@@ -40,6 +40,7 @@ def check_feeds(match: Match, found: Findings) -> None:
     wrong = np.full(len(element), -1)
     first, last = _runs_between(task, *place)
     good |= (first == last) & (_misfit(task, nc, element, first, first) < 0)
+    until = wrong.copy()  # the last run whose feed would do, from `wrong` on
     if len(rows := np.flatnonzero(~good)):
         own = start[rows]
         limits = match.lowest[own], match.high[own]
@@ -48,20 +49,18 @@ def check_feeds(match: Match, found: Findings) -> None:
         latest, earliest = reach(task, six[0], from_, limits, 1), reach(task, six[1], to, limits, -1)
         between = latest + _HAIR < earliest - _HAIR
         runs = _runs_between(task, latest, earliest)
-        wrong[rows] = np.where(between, _misfit(task, nc, element[rows], *runs), -1)
+        wrong[rows] = until[rows] = np.where(between, _misfit(task, nc, element[rows], *runs), -1)
         if len(some := np.flatnonzero(~between)):
             limits, rows = (limits[0][some], limits[1][some]), rows[some]
             around = (reach(task, six[k][some], (from_, to)[k][some], limits, 2 * k - 1) for k in (0, 1))
             runs = _runs_between(task, *around)
-            wrong[rows] = np.where(_fits_any(task, nc, element[rows], *runs), -1, first[rows])
+            wrong[rows], until[rows] = np.where(_fits_any(task, nc, element[rows], *runs), -1, runs)
         good = wrong < 0
     wrongs = np.flatnonzero(~good)
     if len(wrongs):
         shown = wrongs[np.diff(wrongs, prepend=-2) > 1]
-        moves = task.feed_runs[1][wrong[shown]]
-        problems = [
-            _problem(match.original, nc, *row) for row in zip(element[shown].tolist(), moves.tolist(), strict=True)
-        ]
+        rows = zip(element[shown].tolist(), wrong[shown].tolist(), until[shown].tolist(), strict=True)
+        problems = [_problem(match.original, nc, row, task.feed_runs[1][low : high + 1]) for row, low, high in rows]
         found.feeds = Runs(problems, begins=not good[0], ends=not good[-1])
 
 
@@ -151,11 +150,12 @@ def feed_at(task: Task, nc: Elements, element: int, move: int, place: float) -> 
         or _fits_any(task, nc, np.array([element]), first, last)[0]
     ):
         return []
-    return [_problem(task.original, nc, element, move)]
+    return [_problem(task.original, nc, element, np.array([move]))]
 
 
-def _problem(original: Original, nc: Elements, element: int, move: int) -> Problem:
-    program, pose = original.program, int(original.pose[move])
+def _problem(original: Original, nc: Elements, element: int, moves: Ints) -> Problem:
+    """What is wrong with the feed of an element, for which the feed of any of some moves would do."""
+    program, pose = original.program, int(original.pose[moves[0]])
     unit = "rev" if program.feed_mode[pose] == FeedMode.PER_REVOLUTION else "min"
     stated = "rev" if nc.per_revolution[element] else "min"
     if np.isnan(nc.feed[element]):
@@ -163,6 +163,9 @@ def _problem(original: Original, nc: Elements, element: int, move: int) -> Probl
     elif unit != stated:
         what = "CS543", f"the feed is per {stated}, the CL file says per {unit}"
     else:
-        what = "CS541", f"the feed is {nc.feed[element]:g} mm/{stated}, the CL file says {program.feed[pose]:g}"
+        poses = original.pose[moves]
+        feeds = program.feed[poses[program.feed_mode[poses] == program.feed_mode[pose]]].tolist()
+        wanted = ", then ".join(dict.fromkeys(f"{feed:g}" for feed in feeds))
+        what = "CS541", f"the feed is {nc.feed[element]:g} mm/{stated}, the CL file says {wanted}"
     code, text = what
     return Problem(code, int(program.line[pose]), int(nc.line[element]), text)
