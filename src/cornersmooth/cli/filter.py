@@ -19,7 +19,7 @@ from cornersmooth.control.program import Text
 from cornersmooth.errors import CornersmoothError, SettingsError, Verdict, command_text
 from cornersmooth.filter import Filtered, filter_program, verify_programs
 from cornersmooth.filter.checking import measure
-from cornersmooth.filter.program import THREE_AXES, read_program, refuse_cl_file
+from cornersmooth.filter.program import THREE_AXES, read_program, refuse_cl_file, refuse_no_program
 from cornersmooth.filter.runs import FILTERED, ProgramReader
 from cornersmooth.filter.times import Times
 from cornersmooth.kinematics import Machine
@@ -163,7 +163,8 @@ def verify_with_program(data: bytes, name: str, given: Options) -> int:
         raise click.UsageError(f"{new_name} is a CL file, and the CL file comes first; write: {order}")
     old = OldProgram.of(data, name, given)
     how = {**how_read(old.given), "paths": old.paths, "processes": useful_processes()}
-    found = verify_programs(data, new, old.form, old.settings, **how)
+    with files.naming(name):
+        found = verify_programs(data, new, old.form, old.settings, new_name=new_name, **how)
     assert found.checked is not None
     wrong, tolerance = found.checked.wrong, old.settings.tolerance
     judgement = Judgement(found.verdict, _to_check(found), 0, "", _problems(wrong) or _measured(found, tolerance))
@@ -306,6 +307,8 @@ def options_for(data: bytes, name: str, given: Options) -> Options:
         show.warn(head.remark, name)
     default = click.get_current_context().get_parameter_source("control") == click.core.ParameterSource.DEFAULT
     if default and not recognise_control(data[:HEAD]) and needs_its_control(data[:HEAD]):
+        with files.naming(name):
+            refuse_no_program(ProgramReader("fanuc", THREE_AXES).read(data))
         what = f"{name} does not say its control, and has numbers without a point or comments after a semicolon"
         raise SettingsError("CS267", what, "name it: --control grbl, mach3, linuxcnc, siemens or another")
     alone = not head.given.machine and not names_tip_control(data)
@@ -332,7 +335,8 @@ def time_of_program(data: bytes, name: str, given: Options) -> int:
     how = {**how_read(given), "axes": axes, "processes": useful_processes()}
     with files.naming(name):
         if given.text:
-            found = verify_programs(data, files.read_input(given.text)[0], form, settings, **how)
+            new, new_name = files.read_input(given.text)
+            found = verify_programs(data, new, form, settings, new_name=new_name, **how)
         else:
             found = filter_program(data, form, settings, verify=False, **how)
         if found.seconds is None and not (found.checked and found.checked.wrong):  # nothing differs

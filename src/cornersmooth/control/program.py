@@ -146,6 +146,10 @@ class Stream:
                     cuts = execute(state, lines.line(k), self._lexer)
                     yield Act(first + k, lines.line(k), before, state, cuts)
 
+    def __len__(self) -> int:
+        """Lines from the first on that is executed."""
+        return len(self._plain)
+
     def _weak(self, state: State, first: int, stop: int) -> bool:
         """Whether feeds of some lines are written so that the control may count them in another unit."""
         inch = self._weak_feed and state.unit != 1.0
@@ -179,7 +183,7 @@ def _begin(text: Text) -> int:
 
 def execute(state: State, text: bytes, lexer: Lexer) -> str:
     """Execute a line that is no plain motion block; say why it is left as it is where it cuts, else nothing."""
-    line = _line_of(text, lexer)
+    line = line_of(text, lexer)
     if line is None or (line.words and line.words[0].name == "DEF"):  # a variable of Siemens, with its name as a word
         plain, before = lexer.comment.sub(" ", text.upper().decode("latin-1")).strip(), state.copy()
         why = _execute_unread(state, _HEAD.sub("", plain, count=1), lexer)
@@ -193,7 +197,7 @@ def execute(state: State, text: bytes, lexer: Lexer) -> str:
     return "the operator may skip the block" if line.skipped else "other words in the block"
 
 
-def _line_of(text: bytes, lexer: Lexer) -> Line | None:
+def line_of(text: bytes, lexer: Lexer) -> Line | None:
     """Words of a line; None where the lexer does not know them."""
     try:
         return lexer.line(text, 0, None)
@@ -207,7 +211,7 @@ def _execute_unread(state: State, plain: str, lexer: Lexer) -> str:
         state.lose_place()
         return ""
     lost, bare = {match[1] for match in _WORKED_OUT.finditer(plain)}, _CORNER.sub(" ", _WORKED_OUT.sub(" ", plain))
-    line = _line_of(bare.encode("latin-1"), lexer) if bare != plain else None
+    line = line_of(bare.encode("latin-1"), lexer) if bare != plain else None
     if line is None and state.table.row(plain) is not UNKNOWN:
         line = Line(0, (Word("block", 0.0, plain),))
     elif line is None and _KLARTEXT_PATH.match(plain) and "RAPID" in state.table.named:

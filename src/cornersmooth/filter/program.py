@@ -23,7 +23,7 @@ from cornersmooth.kinematics import Machine
 from cornersmooth.nc import fit_settings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc_reader import NcProgram
-from cornersmooth.nc_reader.recognition import is_cl_file
+from cornersmooth.nc_reader.recognition import foreign_kind, is_cl_file
 from cornersmooth.provenance import HEAD
 from cornersmooth.settings import Settings
 from cornersmooth.system.processes import return_free_memory
@@ -126,8 +126,8 @@ def filter_program(
     SettingsError
         The form cannot hold what the settings ask for, or `axes` does not say how fast its axes may go.
     InputError
-        `axes` does not reach a pose; CS594: a CL file, or a table of points; CS264: on LinuxCNC a program with arcs
-        has no time.
+        `axes` does not reach a pose; CS594: a CL file, or a table of points; CS595: no program; CS264: on LinuxCNC a
+        program with arcs has no time.
     """
     settings = Settings() if settings is None else settings
     alone = settings.lines == "long" and not form.long_lines  # without tip control: from vertex to vertex
@@ -229,11 +229,17 @@ def verify_programs(
     axes: Machine | None = None,
     paths: bool = False,
     processes: int = 1,
+    new_name: str = "the second program",
 ) -> Filtered:
-    """Compare a program with the one that it was made from, whoever made it; parameters as of `filter_program`."""
+    """Compare a program with the one that it was made from, whoever made it.
+
+    `new_name` is for messages; the other parameters are those of `filter_program`.
+    """
     settings = Settings() if settings is None else settings
     job, before = read_program(old, form, settings, tip_from_start=tip_from_start, inch=inch, processes=processes)
-    where, wrong = places(before, job.reader.read(new), job.reader)
+    whole = job.reader.read(new)
+    refuse_no_program(whole, new_name)
+    where, wrong = places(before, whole, job.reader)
     after = job.reader.read(new, [place.stop for place in where])
     checked = Checked(tuple(wrong)) if wrong else check(job, before, after, where)
     way = _Way(after, where, {}, checked)
@@ -242,10 +248,22 @@ def verify_programs(
     return replace(found, compared=True)
 
 
-def refuse_cl_file(head: bytes) -> None:
-    """Refuse a CL file by its beginning (InputError CS594)."""
+def refuse_cl_file(head: bytes, file: str | None = None) -> None:
+    """Refuse what is no program by its beginning (InputError CS594: a CL file; CS595: a page, a drawing, a model)."""
+    if kind := foreign_kind(head):
+        raise InputError("CS595", f"this is {kind}, not an NC program", "give an NC program", file=file)
     if is_cl_file(head):
-        raise InputError("CS594", "this is a CL file, not an NC program", "make a program of it: 'cornersmooth smooth'")
+        hint = "make a program of it: 'cornersmooth smooth'"
+        raise InputError("CS594", "this is a CL file, not an NC program", hint, file=file)
+
+
+def refuse_no_program(reading: Reading, file: str | None = None) -> None:
+    """Refuse what `refuse_cl_file` does, and a text without any block that moves or sets anything (CS595)."""
+    refuse_cl_file(reading.data[:HEAD], file)
+    if not reading.blocks:
+        binary = ": this is a binary file, or a text in UTF-16" * (b"\0" in reading.data)
+        what = f"no NC block that moves or sets anything was found{binary}"
+        raise InputError("CS595", what, "give an NC program, and its control with --control", file=file)
 
 
 def read_program(
@@ -260,6 +278,7 @@ def read_program(
     tcp = form.orientation != "machine"
     reader = ProgramReader(form.table.dialect, form.machine, tcp=tcp, tip_from_start=tip_from_start, inch=inch)
     old = reader.read(data)
+    refuse_no_program(old)
     cuts = (old.lines(k, k + 1) for run in old.runs for k in range(run.first, run.stop))
     spelling = Spelling.of(islice(cuts, SAMPLE), len(reader.axes))
     if old.runs and settings.lines is not None:

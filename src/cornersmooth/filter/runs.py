@@ -11,9 +11,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.control.program import Stream, Text
+from cornersmooth.control.program import Stream, Text, line_of
 from cornersmooth.control.state import Rows, State
-from cornersmooth.control.table import FRAME, PRESET, table_of
+from cornersmooth.control.table import FRAME, PRESET, UNKNOWN, table_of
 from cornersmooth.control.word_tables import CONTROLS
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import Bools, Floats
@@ -58,6 +58,9 @@ _NAMED: Final = {axis: re.compile(rb"(?i)(?<![A-Z])%b" % axis.encode()) for axis
 #: a word that may turn an axis that a program of three axes has not, and what a cut that has it is left for
 TURNS: Final = re.compile(rb"(?i)(?<![A-Z,])[ABC][ \t]*=?[ \t]*[-+]?[\d.]")
 _TURNS: Final = "an axis turns in it: name the machine"
+
+#: a value for a variable, and a word that begins with O in LinuxCNC
+_VARIABLE: Final = re.compile(rb"(?i)[ \t]*(N?\d+[ \t]+)?(#(\d+|<[^>]*>)[ \t]*=|[RQ][LRS]?\d+[ \t]*=|FN ?\d|O[ \t]*<)")
 
 #: what `Reading.why` says of lines that are no cuts, and of plain cuts
 NO_CUT, PLAIN_CUT = 0, 1
@@ -121,6 +124,7 @@ class Reading(Text):
     at: dict[int, State] = field(default_factory=dict)  #: before the lines that were chosen
     said: frozenset[str] = frozenset()  #: groups that the program has set
     absent: tuple[str, ...] = ()  #: linear axes that the program never names
+    blocks: bool = False  #: whether any block moves or sets anything
 
     def __post_init__(self) -> None:
         self.why = np.zeros(len(self), np.uint16)
@@ -208,7 +212,20 @@ class ProgramReader:
         found.at |= dict.fromkeys(stops_left, last)
         found.at = {line: replace(state, place=state.place | still) for line, state in found.at.items()}
         found.said = frozenset(last.last_words)
+        found.blocks = bool(found.said) or found.cuts > 0 or self._acts(stream)
         return found
+
+    def _acts(self, stream: Stream) -> bool:
+        """Whether any block has words that are known, or sets a variable."""
+        if len(stream.others) < len(stream):  # a motion block
+            return True
+        for _, text in stream.others:
+            line = line_of(text, self.lexer)
+            rows = [] if line is None else self._first.rows(line.words)
+            known = line is not None and bool(line.words) and all(row is not UNKNOWN for _, _, row in rows)
+            if known or _VARIABLE.match(text):
+                return True
+        return False
 
     def _take_rows(self, found: Reading, rows: Rows, corners: Bools, cause: str) -> None:
         """Note the runs among motion blocks, and why others are left."""

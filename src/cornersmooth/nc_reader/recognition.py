@@ -35,6 +35,19 @@ def is_cl_file(head: bytes) -> bool:
     return _OTHER.search(head) is not None
 
 
+#: how files begin that are neither programs nor CL files
+_FOREIGN: Final = {
+    "an HTML page": re.compile(rb"(?i)\A(\xef\xbb\xbf)?\s*<(!doctype html|html)\b"),
+    "an SVG drawing or other XML": re.compile(rb"(?i)\A(\xef\xbb\xbf)?\s*<(\?xml|svg)\b"),
+    "an STL model": re.compile(rb"(?i)\A\s*solid\b[^\n]*\n\s*(facet|endsolid)\b"),
+}
+
+
+def foreign_kind(head: bytes) -> str:
+    """What a file that is neither a program nor a CL file looks like by its beginning; empty where nothing tells."""
+    return next((kind for kind, sign in _FOREIGN.items() if sign.search(head)), "")
+
+
 #: tool vectors and tip control: what a machine of three axes does not explain
 _TIP: Final = re.compile(
     rb"(?i)(?<![A-Z_,#<])[ABC]3[ \t]*=|(?<![A-Z])T[XYZ][-+]?[\d.]"
