@@ -99,13 +99,17 @@ def test_time_of_a_program_in_which_nothing_can_be_smoothed(tmp_path: Path) -> N
     assert seconds["unsmoothed"] == seconds["as_written"] == pytest.approx(6.0, abs=0.1)
 
 
-def test_errors_of_times_say_the_file_and_the_line(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("old", "new_words"), [("G2 X60 Y5 I5 J0", "G33 X60 K1"), ("G2 X60", "G81 R2 Z-1\nG80\nG2 X60")]
+)
+def test_a_program_without_a_time_gets_the_fewest_blocks(old: str, new_words: str, tmp_path: Path) -> None:
     arc, new = tmp_path / "arc.nc", tmp_path / "new.nc"
-    arc.write_text(PROGRAMS["linuxcnc, G64, an arc inside"][2].replace("G2 X60 Y5 I5 J0", "G33 X60 K1"))
-    told = run("filter", arc, *LINUXCNC, "--limits", "xyzac-trt", "-o", new)
-    assert told.returncode == BAD_INPUT
-    assert f"{arc}:16: error[CS264]".encode() in told.stderr
-    assert not new.exists()
+    arc.write_text(PROGRAMS["linuxcnc, G64, an arc inside"][2].replace(old, new_words))
+    limited = run("filter", arc, *LINUXCNC, "--limits", "xyzac-trt", "-o", new)
+    plain = run("filter", arc, *LINUXCNC, "-o", tmp_path / "plain.nc")
+    assert limited.returncode == plain.returncode == DONE
+    assert f"{arc}:16: warning: {new_words[:3]}: the law of LinuxCNC".encode() in limited.stderr
+    assert new.read_bytes() == (tmp_path / "plain.nc").read_bytes()
 
 
 def test_compare_looks_at_a_part_of_a_long_program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -256,6 +256,9 @@ def _show(name: str, contents: Mapping[str, Any], found: Filtered, given: Option
     show.print_verdict(contents, counts, ["all outside of runs is the same byte for byte"])
     if found.checked is not None:
         show_wrong(name, found.checked.wrong)
+    if found.untimed is not None:
+        what = f"{found.untimed.what}, so the time is not known and --limits has no effect"
+        show.warn(what, f"{name}:{found.untimed.line}")
     if not found.units_said and given.units is None:
         show.warn("the program does not say its units: millimetres are taken; give --units", name)
     left = found.left if given.verbose else found.left[:_SHOWN]
@@ -339,6 +342,8 @@ def time_of_program(data: bytes, name: str, given: Options) -> int:
             found = verify_programs(data, new, form, settings, new_name=new_name, **how)
         else:
             found = filter_program(data, form, settings, verify=False, **how)
+        if found.untimed is not None:
+            raise found.untimed
         if found.seconds is None and not (found.checked and found.checked.wrong):  # nothing differs
             alone = Times(*read_program(data, form, settings, **how_read(given)), axes).as_it_is()
             found = replace(found, seconds=(alone, alone))

@@ -67,6 +67,7 @@ class Filtered:
     changed: tuple[tuple[int, int, int, int], ...] = ()
     rounding: float = 0.0  #: mm: by how much the program lets the control round what has changed: it adds to ε
     block_time: float = 0.0  #: s: that of `Checked.short`
+    untimed: InputError | None = None  #: why the time of the program is not known where it was wanted
     compared: bool = False  #: whether two programs were compared alone, and nothing was to be smoothed
 
     @property
@@ -109,7 +110,8 @@ def filter_program(
     verify : bool
         Whether both programs are read and compared. Runs that do not pass stay as they are.
     axes : Machine, optional
-        Take what is fastest under the limits of the axes of this machine, and say its time.
+        Take what is fastest under the limits of the axes of this machine, and say its time. Where the time of the
+        program is not known (CS264), it gets the fewest blocks, and `Filtered.untimed` says why.
     most : int, optional
         Only whole runs from the middle are smoothed, of no more cuts than this.
     paths : bool
@@ -126,8 +128,7 @@ def filter_program(
     SettingsError
         The form cannot hold what the settings ask for, or `axes` does not say how fast its axes may go.
     InputError
-        `axes` does not reach a pose; CS594: a CL file, or a table of points; CS595: no program; CS264: on LinuxCNC a
-        program with arcs has no time.
+        `axes` does not reach a pose; CS594: a CL file, or a table of points; CS595: no program.
     """
     settings = Settings() if settings is None else settings
     alone = settings.lines == "long" and not form.long_lines  # without tip control: from vertex to vertex
@@ -138,9 +139,12 @@ def filter_program(
     few = settings.lines is None
     texts, why = fewest(job, old, old.runs, arcs=not alone) if few else smoothed(job, old, old.runs)
     times = None if axes is None else Times(job, old, axes)
+    untimed = None if times is None else times.unknown()
+    times = times if untimed is None else None
     if few and not alone and times is not None and old.runs and not old.absent:
         texts, why = _fastest(job, old, texts, why, times)
-    return _result(job, old, _way(job, old, texts, why, verify=verify), times, paths=paths)
+    found = _result(job, old, _way(job, old, texts, why, verify=verify), times, paths=paths)
+    return replace(found, untimed=untimed)
 
 
 @dataclass(frozen=True)

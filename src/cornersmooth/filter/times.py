@@ -9,7 +9,7 @@ from itertools import compress
 import numpy as np
 
 from cornersmooth.arrays.vectors import norm
-from cornersmooth.errors import SettingsError
+from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.feedrate import Limits
 from cornersmooth.feedrate.even_ramps import ramp_times
 from cornersmooth.feedrate.linuxcnc import axis_limits, line_times, program_lines
@@ -56,6 +56,15 @@ class Times:
         if not self.old.runs and not by_own_law(self.job):
             raise no_runs()
         return self.of_change(self.old, [Place(run, run.first, run.stop) for run in self.old.runs])[0]
+
+    def unknown(self) -> InputError | None:
+        """Why the time of the program is not known (CS264, with the line); None where it is."""
+        try:
+            if by_own_law(self.job):
+                self._ends(self.old)
+        except InputError as error:
+            return error
+        return None
 
     def _seconds(self, reading: Reading, where: Sequence[Place]) -> list[float]:
         """Time of each place, s."""
