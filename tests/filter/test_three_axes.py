@@ -204,3 +204,25 @@ def test_the_machine_file_of_the_page_is_complete(tmp_path: Path) -> None:
     (tmp_path / "part.nc").write_text(PROGRAMS["linuxcnc"])
     done = run("time", "part.nc", "--control", "linuxcnc", "--limits", "router.toml", cwd=tmp_path)
     assert done.returncode == DONE, done.stderr
+
+
+def test_tip_control_without_a_machine_names_its_line(tmp_path: Path) -> None:
+    text = "G21 G90 G94\n(M428)\n\nM428\nG0 X0 Y0 Z20 A0 C0\nG1 Z-1 F350\nX1 A5\nX2 A9\nM429\nM2\n"
+    (tmp_path / "part.nc").write_text(text)
+    for order in (("filter", "part.nc", "-o", "new.nc"), ("compare", "part.nc", "--limits", THREE_AXES)):
+        made = run(*order, "--control", "linuxcnc", cwd=tmp_path)
+        assert made.returncode == USAGE
+        assert b"part.nc:4: error[CS215]: the program has tip control" in made.stderr
+        assert b"--machine" in made.stderr
+
+
+def test_an_unknown_control_names_all_that_work(tmp_path: Path) -> None:
+    (tmp_path / "part.nc").write_text(PROGRAMS["linuxcnc"])
+    made = run("filter", "part.nc", "--control", "marlin", "-o", "new.nc", cwd=tmp_path)
+    assert made.returncode == USAGE
+    hint = made.stderr.decode().partition("hint: ")[2].strip()
+    alone = {name.strip() for name in re.split(r", or, read as LinuxCNC,|, ", hint.partition("one of ")[2])}
+    assert alone >= {"fanuc", "linuxcnc", "siemens", "grbl", "grblhal", "fluidnc", "mach", "mach3", "mach4"}
+    for name in ("grbl", "mach3", "linuxcnc"):
+        made = run("filter", "part.nc", "--control", name, "-o", f"{name}.nc", cwd=tmp_path)
+        assert made.returncode == DONE, made.stderr

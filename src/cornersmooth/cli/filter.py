@@ -305,6 +305,12 @@ def options_for(data: bytes, name: str, given: Options) -> Options:
         if given.limits:
             show.warn(f"times are those of LinuxCNC's law: that of {given.control} is not known", name)
         given = replace(given, control="linuxcnc")
+    try:
+        given.load_control()
+    except SettingsError as error:
+        if error.code == "CS210":
+            error = SettingsError("CS210", error.what, f"{error.hint}, or, read as LinuxCNC, {', '.join(ALIKE)}")
+        raise error from None
     head = recognised(given, data[:HEAD])
     if head.remark:
         show.warn(head.remark, name)
@@ -314,8 +320,16 @@ def options_for(data: bytes, name: str, given: Options) -> Options:
             refuse_no_program(ProgramReader("fanuc", THREE_AXES).read(data))
         what = f"{name} does not say its control, and has numbers without a point or comments after a semicolon"
         raise SettingsError("CS267", what, "name it: --control grbl, mach3, linuxcnc, siemens or another")
-    alone = not head.given.machine and not names_tip_control(data)
-    return replace(head.given, machine=THREE_AXES) if alone else head.given
+    if head.given.machine:
+        return head.given
+    tip = names_tip_control(data)
+    if tip is None:
+        return replace(head.given, machine=THREE_AXES)
+    control = head.given.load_control()
+    if not any({"vector", "point"} & one.modes.keys() for one in control.forms.values()):
+        what = f"the program has tip control, and {control.name} has it for rotary words alone"
+        raise SettingsError("CS215", what, "name the machine of its rotary words with --machine", file=name, line=tip)
+    return head.given
 
 
 def how_read(given: Options) -> dict[str, Any]:

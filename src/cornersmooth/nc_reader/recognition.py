@@ -60,14 +60,14 @@ _BRACKETS: Final = re.compile(rb"\([^()\n]*\)")
 _SEMICOLON: Final = re.compile(rb";[ \t]*[^\s]")
 
 
-def names_tip_control(data: bytes) -> bool:
-    """Whether an NC program has tool vectors, or words of tool tip control."""
+def names_tip_control(data: bytes) -> int | None:
+    """Line, from 1, in which an NC program has tool vectors or words of tool tip control; None for nowhere."""
     for match in _TIP.finditer(data):
         start = data.rfind(b"\n", 0, match.start()) + 1
         end = data.find(b"\n", start)
         if _TIP.search(_ASIDE.sub(b"", data[start : len(data) if end < 0 else end])):
-            return True
-    return False
+            return data.count(b"\n", 0, start) + 1
+    return None
 
 
 def needs_its_control(head: bytes) -> bool:
