@@ -136,7 +136,7 @@ def wrong_programs(text: str) -> str:
         found = cornersmooth.verify(program, text.replace(old, new, 1).encode(), tolerance=0.01, axis_length=10)
         first = found.problems[0]
         cl_line = f" (CL line {first.cl_line})" if first.cl_line else ""
-        lines += f"| {what} | `part.nc:{first.nc_line}`: {first.text}{cl_line} |\n"
+        lines += f"| {what} | `part.nc:{first.nc_line}`: {first.text.partition('; ')[0]}{cl_line} |\n"
     return lines
 
 

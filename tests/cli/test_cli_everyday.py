@@ -32,7 +32,9 @@ def test_a_program_without_a_work_offset(part: Path, control: str) -> None:
     assert b"NOT VERIFIED: that no work offset is selected is the program's own word" in found.stdout
     assert b"--work-offset none" in found.stdout
     assert run("verify", part, out, "--work-offset", "none").stdout.startswith(b"PASSED")
-    assert run("verify", part, out, "--work-offset", "G55").returncode == USAGE
+    other = run("verify", part, out, "--work-offset", "G55")
+    assert other.returncode == USAGE
+    assert "write the program with 'smooth --work-offset'" in one_line(other.stderr)
 
 
 def test_a_work_offset_that_is_missing_is_named_as_a_machinist_does(part: Path) -> None:

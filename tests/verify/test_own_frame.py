@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from cornersmooth import Verdict, Verification, read, verify
-from cornersmooth.errors import InputError
+from cornersmooth.errors import InputError, command_text
 from cornersmooth.kinematics import load_machine
 from cornersmooth.nc import Frame, choose_form, load_control
 from cornersmooth.pipeline import postprocess
+from cornersmooth.report.verdict import judge
 from cornersmooth.settings import Settings
 from oracle.files import SAMPLES
 from oracle.share import covering_share, how_many, share_of_kinds
@@ -150,7 +151,23 @@ def test_a_text_with_another_work_offset_says_so(control: str, offset: str, othe
     block = f"CYCL DEF 247 DATUM SETTING Q339=+{offset}" if control == "heidenhain" else offset
     said = re.compile(rf"(\d+ )?{re.escape(block)}")
     back = [line.removesuffix(offset) + other if said.fullmatch(line) else line for line in lines]
-    assert any(f"was made for {offset}" in problem for problem in _problems(control, back))
+    problems = _problems(control, back)
+    command = command_text(["cornersmooth", "smooth", "--work-offset", other])
+    assert any(
+        problem.endswith(f"was made for {offset}; to run it there, write it with: {command}") for problem in problems
+    )
+
+
+def test_tip_control_at_other_angles_has_its_reason() -> None:
+    lines = _text("fanuc").splitlines()
+    zero = next(number for number, line in enumerate(lines) if line.startswith("G0 A0."))
+    assert lines[zero + 1].startswith("G43.4")
+    del lines[zero]
+    found = verify(_program(), ("\n".join(lines) + "\n").encode(), **_how("fanuc"))
+    what, hint = next(problem.text.split("; ") for problem in found.problems if "at zero" in problem.text)
+    assert what == "G43.4 without the rotary axes at zero before it"
+    assert "WKP = 0" in hint
+    assert judge(found).text.startswith(f"FAILED: 1 problem, first in NC line {zero + 1}: {what}; not verified")
 
 
 #: one tool, cut once: what is lost is said nowhere else

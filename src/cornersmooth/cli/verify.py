@@ -50,7 +50,10 @@ def run_verify(given: Options) -> int:
     given = head.given
     given.check_axis()
     if given.work_offset not in (None, "none"):
-        raise click.UsageError("--work-offset takes 'none' here: any other is read from the program")
+        raise click.UsageError(
+            "--work-offset takes 'none' here: any other is read from the program. To change it, write the program with "
+            "'smooth --work-offset'"
+        )
     control, reader = given.load_control(), given.reading_back()
     machine = reader["machine"]
     measures = {name: getattr(given, name) for name in ("tolerance", "axis_length", "axis_tolerance")}

@@ -19,6 +19,7 @@ import numpy as np
 
 from cornersmooth.control.state import LastWord, State
 from cornersmooth.control.table import Row, any_of, shown, title_of
+from cornersmooth.errors import command_text
 from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.nc_reader.rotary import tool_vectors
 from cornersmooth.nc_words.blocks import NOT_LISTED, Block
@@ -90,8 +91,9 @@ class StateRules:
     def unframed(self, code: str, line: int, *texts: str) -> None:
         """Complain of the blocks around the motion; where they are the user's own, they are taken on trust."""
         if FRAME in self._left:
-            self.trusted += [(line, text) for text in texts]
-            self.unsure += [(line, text) for text in texts]
+            blocks = [(line, text.partition("; ")[0]) for text in texts]
+            self.trusted += blocks
+            self.unsure += blocks
         else:
             self.wrong(code, line, *texts)
 
@@ -145,7 +147,11 @@ class StateRules:
             if not before:
                 self.wrong(NOT_LISTED, line, f"{word} without {shown(row.after)} before it")
         if row.zero and (not self.machine.angles or self._positions.away(self.machine.angles)):
-            self.unframed(NOT_LISTED, line, f"{word} without the rotary axes at zero before it")
+            text = (
+                f"{word} without the rotary axes at zero before it; turn them to zero: where a parameter says so "
+                "(FANUC: WKP = 0), the part program turns with the angles at which they are then"
+            )
+            self.unframed(NOT_LISTED, line, text)
         if row.high and not self._high:
             self.unframed(NOT_LISTED, line, f"{word} without a retract before it")
         if row.retract:
@@ -265,8 +271,13 @@ class StateRules:
         wanted = self.made.get("OFFSET") or next((row.preset for row in self._listed if row.preset), "NONE")
         if kept is None or not self.made or self.is_left("offset") or wanted == "NONE":
             return
-        if re.split(r"=\+?", kept.text)[-1].replace(" ", "_") != wanted:
-            yield f"{kept.text}, where the program was made for {wanted.replace('_', ' ')}"
+        offset = re.split(r"=\+?", kept.text)[-1]
+        if offset.replace(" ", "_") != wanted:
+            command = command_text(["cornersmooth", "smooth", "--work-offset", offset])
+            yield (
+                f"{kept.text}, where the program was made for {wanted.replace('_', ' ')}; to run it there, write it "
+                f"with: {command}"
+            )
 
     def end(self, line: int) -> None:
         """Look at what holds where the program ends; `line` is that of its end."""

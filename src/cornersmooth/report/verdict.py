@@ -130,7 +130,7 @@ def _problems_text(found: Verification) -> str:
         return text
     first = found.problems[0]
     line = f" in NC line {first.nc_line}" if first.nc_line else ""
-    return f"{text}, first{line}: {first.text}"
+    return f"{text}, first{line}: {first.text.partition('; ')[0]}"
 
 
 def trusted_blocks(found: Verification) -> Iterator[Finding]:

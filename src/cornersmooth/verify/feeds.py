@@ -59,8 +59,9 @@ def check_feeds(match: Match, found: Findings) -> None:
     wrongs = np.flatnonzero(~good)
     if len(wrongs):
         shown = wrongs[np.diff(wrongs, prepend=-2) > 1]
-        rows = zip(element[shown].tolist(), wrong[shown].tolist(), until[shown].tolist(), strict=True)
-        problems = [_problem(match.original, nc, row, task.feed_runs[1][low : high + 1]) for row, low, high in rows]
+        moves = task.feed_runs[1]
+        each = zip(element[shown].tolist(), wrong[shown].tolist(), until[shown].tolist(), strict=True)
+        problems = [_problem(match.original, nc, row, moves[one : last_one + 1]) for row, one, last_one in each]
         found.feeds = Runs(problems, begins=not good[0], ends=not good[-1])
 
 
