@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cornersmooth.errors import InputError
 from cornersmooth.feedrate.linuxcnc import AxisLimits, Lines, line_times, program_lines
 from cornersmooth.model import Floats
 
@@ -157,6 +158,24 @@ def test_a_program_begins_in_g64() -> None:
     times = {word: line_times(program_lines(word + cuts), LIMITS)[1][-1] for word in ("", "G64\n", "G61\n")}
     assert times[""] == times["G64\n"]
     assert times["G61\n"] > 1.5 * times[""]
+
+
+@pytest.mark.parametrize(
+    "line", ["o100 sub", "N5 o<hole> call", "#1=3", "X#1", "Z[1+1]", "o110 while [#5 lt 10]", "M98 P100", "G90.1"]
+)
+def test_what_the_text_does_not_say_has_no_time(line: str) -> None:
+    with pytest.raises(InputError, match="CS264") as error:
+        program_lines(f"O0001\n(X#1 [a remark])\nG1 X5 F100\n{line}\n", "part.ngc")
+    assert error.value.line == 4
+
+
+def test_distances_take_the_time_of_positions() -> None:
+    head, tail = "G0 X0 Y0 Z5\nG1 F900\n", "G0 Z5\n"
+    there = "G90\nX10\nX12 Y3\nZ-1\n" + tail
+    by = "G91\nX10\nX2 Y3\nZ-6\nG90\n" + tail
+    assert line_times(program_lines(head + by), LIMITS)[1][-1] == line_times(program_lines(head + there), LIMITS)[1][-1]
+    home = "G91 G28 Z0\nG90\n"  # a rapid of a length that is not known
+    assert len(program_lines(head + there + home)) == len(program_lines(head + there))
 
 
 if __name__ == "__main__":

@@ -49,8 +49,11 @@ _AXES = "XYZABC"
 #: axes of G17, G18 and G19 in the order in which a right-handed turn about the third goes round, and letters of centres
 _PLANES = {17: ((0, 1, 2), "IJ"), 18: ((2, 0, 1), "KI"), 19: ((1, 2, 0), "JK")}
 
-#: G codes of motion that the law does not hold for: splines, threads, cycles, and feed per revolution
-_UNKNOWN = frozenset((5, 5.1, 5.2, 33, 33.1, 38.2, 76, *range(81, 90), 95, 96))
+#: G codes of motion that the law does not hold for: splines, threads, cycles, absolute centres, and feed per revolution
+_UNKNOWN = frozenset((5, 5.1, 5.2, 33, 33.1, 38.2, 76, *range(81, 90), 90.1, 95, 96))
+
+#: loops, calls, and values that the control works out: what it runs is not in the text
+_WORKED_OUT = re.compile(r"[#\[]|^\s*/?\s*(N\s*\d+\s*)?O\s*(\d+|<[^>]*>)\s*[A-Z]|M\s*0*9[789](?![\d.])")
 
 
 @dataclass(frozen=True)
@@ -294,21 +297,27 @@ def program_lines(text: str, name: str | None = None) -> Lines:
     Raises
     ------
     InputError
-        CS264: it has other motion than lines and arcs, or a line has no feed.
+        CS264: it has other motion than lines and arcs, or a line has no feed; loops, calls of subprograms, variables.
     """
     # it begins in G64 without P: on the whole controller a relief took 3.52 s with and without the word
     place, feed, blend, timed, unit, code, plane = [np.nan] * 6, np.nan, 0.0, False, MM_PER_UNIT["mm"], 0.0, 17
+    relative = False
     rows: list[tuple[list[float], list[float], float, float, list[float], int]] = []
     for number, line in enumerate(text.upper().splitlines(), 1):
-        words = [(letter, float(value)) for letter, value in _WORD.findall(_COMMENT.sub("", line))]
+        block = _COMMENT.sub("", line)
+        if _WORKED_OUT.search(block):
+            what = "a loop, a call or a variable: how long it takes is not in the program"
+            raise InputError("CS264", what, "leave out the time", file=name, line=number)
+        words = [(letter, float(value)) for letter, value in _WORD.findall(block)]
         codes = {value for letter, value in words if letter == "G"}
         if strange := codes & _UNKNOWN:
             what = f"G{min(strange):g}: the law of LinuxCNC's planner is known for lines and arcs only"
             raise InputError("CS264", what, "leave out the time, or write lines", file=name, line=number)
-        if rows and (codes & {4, 53} or any(letter in "MT" for letter, _ in words)):
+        if rows and (codes & {4, 28, 30, 53} or any(letter in "MT" for letter, _ in words)):
             rows[-1] = (*rows[-1][:3], np.nan, *rows[-1][4:])
         unit = MM_PER_UNIT["inch" if 20 in codes else "mm"] if codes & {20, 21} else unit
         timed = (93 in codes) if codes & {93, 94} else timed
+        relative = (91 in codes) if codes & {90, 91} else relative
         code = next(iter(codes & {0.0, 1.0, 2.0, 3.0}), code)
         plane = int(next(iter(codes & {17.0, 18.0, 19.0}), plane))
         given = {letter: value * (unit if letter in "XYZIJKR" else 1.0) for letter, value in words}
@@ -317,12 +326,18 @@ def program_lines(text: str, name: str | None = None) -> Lines:
             blend = np.nan
         elif 64 in codes:
             blend = given.get("P", 0.0) * unit
-        target = [given.get(axis, old) for axis, old in zip(_AXES, place, strict=True)]
-        if 53 in codes:  # in coordinates of the machine: where that is in those of the part, nothing says
-            place = [np.nan if axis in given else old for axis, old in zip(_AXES, place, strict=True)]
+        if codes & {28, 30, 53}:  # in coordinates of the machine: where that is in those of the part, nothing says
+            some = given if 53 in codes else _AXES
+            place = [np.nan if axis in some else old for axis, old in zip(_AXES, place, strict=True)]
             continue
-        ends = [0.0 if np.isnan(value) else value for value in target]
-        begins = [end if np.isnan(old) else old for old, end in zip(place, ends, strict=True)]
+        if relative:
+            target = [old + given.get(axis, 0.0) for axis, old in zip(_AXES, place, strict=True)]
+            begins = [0.0 if np.isnan(old) else old for old in place]
+            ends = [old + given.get(axis, 0.0) for axis, old in zip(_AXES, begins, strict=True)]
+        else:
+            target = [given.get(axis, old) for axis, old in zip(_AXES, place, strict=True)]
+            ends = [0.0 if np.isnan(value) else value for value in target]
+            begins = [end if np.isnan(old) else old for old, end in zip(place, ends, strict=True)]
         place = target
         round_ = code > 1.0 and bool(given.keys() & set("XYZIJKR"))
         if begins == ends and not round_:
