@@ -108,6 +108,6 @@ def test_the_verdict_names_program_control_blocks_error_corners_and_what_to_chec
     assert re.fullmatch(r" {8}measured: tip 0\.00\d\d mm, axis point 0\.0\d{3} mm \(H 10 mm\) in the program", lines[2])
     assert lines[3] == "        2 of 2 corners rounded, no corner stays sharp"
     assert re.fullmatch(r" {8}time on table-ac \d+\.\d s instead of \d+\.\d s( \([+-]\d+ %\))?", lines[4])
-    check = next(k for k, line in enumerate(lines) if line.startswith("CHECK   line 5: the CL file loads no tool"))
+    check = next(k for k, line in enumerate(lines) if line.startswith("CHECK   CL line 5: the CL file loads no tool"))
     assert lines[check].endswith(" [CS334]")
     assert lines[check + 1] == "        hint: see that it is the right one, or load it with LOADTL"

@@ -147,7 +147,7 @@ def test_a_feed_beyond_what_the_control_takes_is_a_warning(
     cl.write_text(PARTS.replace("FEDRAT/500", f"FEDRAT/{feed}"))
     made = run("smooth", cl, "-o", "-", "--control", control, *CONTROLS[control])
     assert made.returncode == DONE, made.stderr
-    assert ("CHECK   line 7: feed beyond the" in one_line(made.stderr)) == (said is not None)
+    assert ("CHECK   CL line 7: feed beyond the" in one_line(made.stderr)) == (said is not None)
     assert said is None or said in made.stderr
 
 

@@ -147,7 +147,7 @@ def show_verdict(contents: Mapping[str, Any], saving: Saving | None = None) -> N
     for finding in contents["findings"]:
         if finding["to_check"]:
             what, _, hint = finding["text"].partition("; ")
-            line = f"line {finding['line']}: " if finding["line"] else ""
+            line = f"CL line {finding['line']}: " if finding["line"] else ""
             times = f" ({finding['count']:,} times)" if finding["count"] > 1 else ""
             print_line(f"{'CHECK':<{len(INDENT)}}{line}{what}{times} [{finding['code']}]")
             if hint:
