@@ -180,3 +180,9 @@ def test_distances_take_the_time_of_positions() -> None:
 
 if __name__ == "__main__":
     main()
+
+
+def test_straight_on_is_as_nearly_straight_on() -> None:
+    """Tolerance over the smallest number was infinite, with a warning."""
+    straight, bent = (program_lines(f"G64 P20\nG0 X0 Y0\nG1 F9000 X100\nX200 Y{y}\nX300\n") for y in ("0", "0.00001"))
+    assert line_times(straight, LIMITS)[1] == pytest.approx(line_times(bent, LIMITS)[1], rel=1e-6)

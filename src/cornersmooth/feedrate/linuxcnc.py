@@ -229,8 +229,8 @@ def _arc_speeds(lines: Lines, limits: AxisLimits, moves: _Moves, cosine: Floats)
         reach = np.minimum(reach, np.where(bent, given_up, length / 2.0))
         tolerance = np.fmin(tolerance, np.minimum(np.where(blend > 0.0, blend, np.inf), length / 4.0))
         flat = flat & (~bent | (norm(np.cross(across, axis)) < _ONE_PLANE))
-    height = tolerance / np.maximum(1.0 - np.sin(half), np.finfo(np.float64).tiny)
-    reach = np.minimum(reach, np.cos(half) * height)
+    # cos/(1 − sin), where straight on would be 0/0; rounded to floats no cosine here is 0
+    reach = np.minimum(reach, tolerance * (1.0 + np.sin(half)) / np.cos(half))
     return np.where(flat, np.sqrt(_ARC_SHARE * limits.acceleration[:3].min() * np.tan(half) * reach), 0.0)
 
 
