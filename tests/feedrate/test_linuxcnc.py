@@ -184,5 +184,5 @@ if __name__ == "__main__":
 
 def test_straight_on_is_as_nearly_straight_on() -> None:
     """Tolerance over the smallest number was infinite, with a warning."""
-    straight, bent = (program_lines(f"G64 P20\nG0 X0 Y0\nG1 F9000 X100\nX200 Y{y}\nX300\n") for y in ("0", "0.00001"))
+    straight, bent = (program_lines(f"G64 P20\nG0 X0 Y0\nG1 F9000 X100\nX200 Y{y}\nX300\n") for y in ("0", "0.000001"))
     assert line_times(straight, LIMITS)[1] == pytest.approx(line_times(bent, LIMITS)[1], rel=1e-6)
