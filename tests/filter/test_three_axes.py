@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from cornersmooth.nc_reader.recognition import needs_its_control
@@ -204,6 +206,28 @@ def test_the_machine_file_of_the_page_is_complete(tmp_path: Path) -> None:
     (tmp_path / "part.nc").write_text(PROGRAMS["linuxcnc"])
     done = run("time", "part.nc", "--control", "linuxcnc", "--limits", "router.toml", cwd=tmp_path)
     assert done.returncode == DONE, done.stderr
+
+
+@pytest.mark.parametrize(
+    ("control", "options", "text", "noted"),
+    [
+        ("linuxcnc", (), PROGRAMS["linuxcnc"], True),
+        ("grbl", (), PROGRAMS["linuxcnc"], True),
+        ("linuxcnc", ("--limits", THREE_AXES), PROGRAMS["linuxcnc"], False),
+        ("linuxcnc", ("--lines", "dense"), PROGRAMS["linuxcnc"], False),
+        ("linuxcnc", (), "G21 G90 G94 G17\nG0 X0 Y0\nG1 Z-1 F350\nM2\n", False),
+        ("fanuc", (), PROGRAMS["fanuc"], False),
+    ],
+)
+def test_arcs_without_limits_are_noted_on_linuxcnc(
+    control: str, options: tuple[object, ...], text: str, noted: bool, tmp_path: Path
+) -> None:
+    """Cuts along an arc that LinuxCNC may run slower than its chords; nothing is noted where none was written."""
+    arc = "".join(f"X{20 - 20 * math.cos(a):.3f} Y{20 * math.sin(a):.3f}\n" for a in np.linspace(0.05, 3.0, 60))
+    (tmp_path / "part.nc").write_text(text.replace(CUTS, arc))
+    made = run("filter", "part.nc", "--control", control, *options, "-o", "new.nc", cwd=tmp_path)
+    assert made.returncode == DONE, made.stderr
+    assert (b"arcs may take longer on LinuxCNC: give --limits" in made.stderr) is noted
 
 
 def test_tip_control_without_a_machine_names_its_line(tmp_path: Path) -> None:

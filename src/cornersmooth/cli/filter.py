@@ -253,7 +253,10 @@ def _show(name: str, contents: Mapping[str, Any], found: Filtered, given: Option
     if found.seconds is not None:
         before, after = found.seconds
         counts += f", {after:.1f} s instead of {before:.1f} s ({100.0 * (after / before - 1.0):+.1f} %)"
-    show.print_verdict(contents, counts, ["all outside of runs is the same byte for byte"])
+    slow = bool(given.load_control().lines.planner) and given.limits is None and given.lines is None
+    note = "arcs may take longer on LinuxCNC: give --limits"
+    notes = [note] * (slow and 0 < found.new_lines < found.lines)
+    show.print_verdict(contents, counts, [*notes, "all outside of runs is the same byte for byte"])
     if found.checked is not None:
         show_wrong(name, found.checked.wrong)
     if found.untimed is not None:
