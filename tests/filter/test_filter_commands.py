@@ -51,12 +51,25 @@ def test_time_of_a_program_as_it_is_and_smoothed(how: tuple[str, ...], tmp_path:
     assert b"as it is" in run("time", part, *how, *EPS).stdout
 
 
+def test_time_beside_a_program_of_another_tolerance_says_what_to_give(tmp_path: Path) -> None:
+    part = written(tmp_path, "linuxcnc, G91")
+    on = ("--lines", "dense", "-e", "0.05", "-o", "new.nc")
+    assert run("filter", part, *LINUXCNC, *on, cwd=tmp_path).returncode == DONE
+    told = run("time", part, "--text", "new.nc", *LINUXCNC, "-e", "0.005", cwd=tmp_path)
+    assert told.returncode == 1
+    assert b"CS521" in told.stderr
+    assert b"hint: no time is given: give -e and -H as the second program was made" in told.stderr
+    told = run("time", part, "--text", "new.nc", *LINUXCNC, "-e", "0.05", cwd=tmp_path)
+    assert told.returncode == DONE, told.stderr
+
+
 def test_time_beside_a_program_that_is_another_one(tmp_path: Path) -> None:
     part, new = written(tmp_path, "fanuc words"), tmp_path / "new.nc"
     new.write_bytes(part.read_bytes().replace(b"T1 M6", b"T2 M6"))
     told = run("time", part, "--text", new, *FANUC)
     assert told.returncode == 1
     assert b"CS591" in told.stderr
+    assert b"hint: no time is given" not in told.stderr
     arc = tmp_path / "arc.nc"
     arc.write_text(PROGRAMS["linuxcnc, G64, an arc inside"][2].replace("G2 X60 Y5 I5 J0", "G33 X60 K1"))
     told = run("time", arc, *LINUXCNC)
@@ -219,13 +232,19 @@ def test_jumps_of_programs_are_no_statements_of_cl_files(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize(
-    ("word", "total"), [("G64 P0.02 Q0.01", "0.04"), ("G64 P0.02", "0.05"), ("G64 P0.02 Q0", "0.03"), ("G61", "")]
+    ("word", "total"),
+    [
+        ("G64 P0.02 Q0.01", "0.04 mm {} (0.01 + 0.02 at corners + 0.01 where lines are merged)"),
+        ("G64 P0.02", "0.05 mm {} (0.01 + 0.02 at corners + 0.02 where lines are merged)"),
+        ("G64 P0.02 Q0", "0.03 mm {} (0.01 + 0.02 at corners)"),
+        ("G61", ""),
+    ],
 )
 def test_blending_of_the_program_is_added_in_the_first_line(word: str, total: str, tmp_path: Path) -> None:
     (tmp_path / "part.ngc").write_text(f"{word}\n" + PLAIN.format(CUTS))
     on = ("--control", "linuxcnc", "--machine", THREE_AXES, "-e", 0.01)
     report = json.loads(run("filter", "part.ngc", *on, *DENSE, "-o", "new.ngc", "--json", cwd=tmp_path).stdout)
-    more = f"; {total} mm with the tolerance of the program itself" * bool(total)
+    more = f"; {total.format('with the tolerance of the program itself')}" * bool(total)
     assert report["verdict"] == "PASSED"
     assert re.search(r"tip [\d.e-]+ mm, axis point [\d.e-]+ mm(.*)$", report["verdict_text"])[1] == more
 

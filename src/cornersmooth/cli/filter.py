@@ -241,7 +241,10 @@ def _measured(found: Filtered, tolerance: float) -> str:
     assert found.checked is not None
     tip, axis_point = found.checked.tip, found.checked.axis_point
     point = f", axis point {axis_point:.4g} mm" if axis_point == axis_point else ""
-    more = f"; {tolerance + found.rounding:g} mm with the tolerance of the program itself" * bool(found.rounding)
+    corners, merged = found.own_tolerances
+    parts = f"{tolerance:g} + {corners:g} at corners" + f" + {merged:g} where lines are merged" * bool(merged)
+    own = f"; {tolerance + found.rounding:g} mm with the tolerance of the program itself ({parts})"
+    more = own * bool(found.rounding)
     short, blocks, least = found.checked.short, found.checked.blocks, 1000.0 * found.block_time
     more += f"; CHECK: {short:,} of {blocks:,} blocks come faster than one in {least:g} ms" * bool(short)
     return f"within {tolerance:g} mm: tip {tip:.4g} mm{point}{more}"
@@ -366,6 +369,8 @@ def time_of_program(data: bytes, name: str, given: Options) -> int:
             found = replace(found, seconds=(alone, alone))
     if found.checked is not None and found.checked.wrong:
         show_wrong(given.text, found.checked.wrong)
+        if {one.code for one in found.checked.wrong} <= {"CS521", "CS522"}:
+            show.print_line("hint: no time is given: give -e and -H as the second program was made")
         return 1
     assert found.seconds is not None
     before, after = found.seconds

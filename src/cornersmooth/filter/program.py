@@ -65,10 +65,16 @@ class Filtered:
     motions: tuple[NcProgram, NcProgram] | None = None
     #: first and last line of each run that was replaced, in the old program and in the new one; of those in `motions`
     changed: tuple[tuple[int, int, int, int], ...] = ()
-    rounding: float = 0.0  #: mm: by how much the program lets the control round what has changed: it adds to ε
+    #: mm: within what the program lets the control round what has changed, and merge its lines: both add to ε
+    own_tolerances: tuple[float, float] = (0.0, 0.0)
     block_time: float = 0.0  #: s: that of `Checked.short`
     untimed: InputError | None = None  #: why the time of the program is not known where it was wanted
     compared: bool = False  #: whether two programs were compared alone, and nothing was to be smoothed
+
+    @property
+    def rounding(self) -> float:
+        """Sum of the program's own tolerances in mm."""
+        return sum(self.own_tolerances)
 
     @property
     def verdict(self) -> Verdict:
@@ -347,16 +353,17 @@ def _result(job: Job, old: Reading, way: _Way, times: Times | None, *, paths: bo
         seconds=times.of_change(new, where) if times is not None and where else None,
         motions=pair(job, old, new, drawn) if paths and where else None,
         changed=tuple((place.run.first + 1, place.run.stop, place.first + 1, place.stop) for place in drawn),
-        rounding=where[0].run.state.unit * _rounding(new.data) if where else 0.0,
+        own_tolerances=_own_tolerances(new.data, where[0].run.state.unit) if where else (0.0, 0.0),
         block_time=block_time(job),
     )
 
 
-def _rounding(data: bytes) -> float:
-    """By how much a program lets the control round it, in its units; 0.0 for unknown."""
+def _own_tolerances(data: bytes, unit: float) -> tuple[float, float]:
+    """Within what a program lets the control round it, and merge its lines, in mm; 0.0 for unknown."""
     # LinuxCNC without Q merges lines within P, too
-    found = ((float(p), float(q or p) if word[:3] == b"G64" else 0.0) for word, p, q in _OWN.findall(data.upper()))
-    return max(map(sum, found), default=0.0)
+    words = _OWN.findall(data.upper())
+    found = ((unit * float(p), unit * float(q or p) if word[:3] == b"G64" else 0.0) for word, p, q in words)
+    return max(found, key=sum, default=(0.0, 0.0))
 
 
 def compare_filtered(
