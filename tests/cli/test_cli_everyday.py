@@ -75,6 +75,30 @@ def test_axis_of_linuxcnc_opens_a_cl_file(part: Path) -> None:
     assert b"part.cls:9: error" in result.stderr
 
 
+def test_axis_of_linuxcnc_opens_a_program(tmp_path: Path) -> None:
+    """Run the line `ngc` of docs/linuxcnc.md as AXIS does: it loads what is printed, and nothing after an error."""
+    page = (Path(__file__).parents[2] / "docs" / "linuxcnc.md").read_text()
+    command = next(line.split(" = ")[1] for line in page.splitlines() if line.strip().startswith("ngc = "))
+    limits = Path(__file__).parents[2] / "samples" / "machines" / "three-axis.toml"
+    command = command.replace("/home/cnc/router.toml", str(limits))
+    around = environment(AXIS_PROGRESS_BAR="1", PATH=f"{SCRIPT.parent}{os.pathsep}{os.environ['PATH']}")
+    cuts = "".join(f"X{0.1 * k:.3f}\n" for k in range(1, 40))
+    (tmp_path / "part.ngc").write_text(f"G21 G90 G94 G17\nG0 X0 Y0 Z5\nG1 Z-1 F900\n{cuts}G0 Z5\nM2\n")
+    (tmp_path / "hello.ngc").write_text("hello\n")
+
+    def opened(name: str) -> subprocess.CompletedProcess[bytes]:
+        order = f"{command} '{tmp_path / name}'"
+        return subprocess.run(["sh", "-c", order], env=around, capture_output=True, check=False)
+
+    result = opened("part.ngc")
+    assert result.returncode == DONE, result.stderr
+    assert result.stdout.startswith(b"G21 G90 G94 G17\n")
+    assert result.stdout.endswith(b"G0 Z5\nM2\n")
+    assert len(result.stdout.splitlines()) < 12
+    result = opened("hello.ngc")
+    assert (result.returncode, result.stdout) == (BAD_INPUT, b"")
+
+
 @pytest.mark.parametrize(
     ("words", "code"),
     [
