@@ -250,3 +250,14 @@ def test_an_unknown_control_names_all_that_work(tmp_path: Path) -> None:
     for name in ("grbl", "mach3", "linuxcnc"):
         made = run("filter", "part.nc", "--control", name, "-o", f"{name}.nc", cwd=tmp_path)
         assert made.returncode == DONE, made.stderr
+
+
+def test_a_program_that_gains_no_time_is_to_be_left(tmp_path: Path) -> None:
+    relief = "".join(f"G1 X{0.5 * k:.3f} Z{math.cos(0.4 * k) - 2:.3f}\n" for k in range(1, 61))
+    (tmp_path / "part.nc").write_text(f"G21 G90 G17 G94\nG0 X0 Y0 Z-1\nF600\n{relief}G0 Z5\nM2\n")
+    made = run("filter", "part.nc", "--control", "linuxcnc", "--limits", THREE_AXES, "-o", "new.nc", cwd=tmp_path)
+    told = made.stderr.decode().splitlines()[0]
+    times = re.search(r", ([\d.]+) s instead of ([\d.]+) s \([-+][\d.]+ %\)(.*)", told)
+    assert times, made.stderr
+    assert times[1] == times[2]
+    assert times[3] == "; no time is gained, leave the program as it was"

@@ -255,7 +255,8 @@ def _show(name: str, contents: Mapping[str, Any], found: Filtered, given: Option
     counts = f"{found.new_lines:,} lines from {found.lines:,} lines"
     if found.seconds is not None:
         before, after = found.seconds
-        counts += f", {after:.1f} s instead of {before:.1f} s ({100.0 * (after / before - 1.0):+.1f} %)"
+        share = f"({100.0 * (after / before - 1.0):+.1f} %)"
+        counts += f", {after:.1f} s instead of {before:.1f} s {share}{Saving(before, after).advice}"
     slow = bool(given.load_control().lines.planner) and given.limits is None and given.lines is None
     note = "arcs may take longer on LinuxCNC: give --limits"
     notes = [note] * (slow and 0 < found.new_lines < found.lines)

@@ -40,7 +40,7 @@ _SLOPE: Final = math.acos(1.0 / 1.02)
 
 #: what a run in time per block is left for
 TIMED: Final = "each cut says its own time (G93)"
-NO_FEWER: Final = "no fewer blocks keep ε"
+NO_FEWER: Final = "already as few blocks as ε allows"
 
 
 @dataclass(frozen=True)

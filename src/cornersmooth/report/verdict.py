@@ -63,6 +63,11 @@ class Saving:
         """Whether the program as it is written takes less time, in the digits that are written."""
         return round(self.written, 1) < round(self.direct, 1)
 
+    @property
+    def advice(self) -> str:
+        """What to do where nothing is gained, after a semicolon; else nothing."""
+        return "" if self.gains else "; no time is gained, leave the program as it was"
+
 
 @dataclass(frozen=True)
 class Judgement:
@@ -157,8 +162,7 @@ def time_text(saving: Saving, limits: str | None) -> str:
     share = f" ({100.0 * (saving.written / saving.direct - 1.0):+.0f} %)" if saving.direct else ""
     against = f" of {saving.against}" if saving.against else ""
     where = f" on {limits}" if limits else ""
-    advice = "" if saving.gains else "; no time is gained, leave the program as it was"
-    text = f"time{where} {saving.written:.1f} s instead of {saving.direct:.1f} s{against}{share}{advice}"
+    text = f"time{where} {saving.written:.1f} s instead of {saving.direct:.1f} s{against}{share}{saving.advice}"
     return text + limits_text(saving.limits) + ("" if limits else f"; {limits_of(None)}")
 
 
