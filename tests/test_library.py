@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import inspect
 import io
+import pickle
 import re
 import subprocess
 import sys
@@ -247,20 +248,81 @@ def test_a_module_can_be_run():
     assert done.stdout.startswith("cornersmooth")
 
 
-@pytest.mark.parametrize(
-    "call",
-    [
-        lambda: Settings(tolerance="0.01"),
-        lambda: Settings(weights=("a", 1.0)),
-        lambda: cornersmooth.from_poses([[0, 0, 0], [1, 0, 0]], [[0, 0, 1]]),
-        lambda: cornersmooth.from_poses([[0, 0]], [[0, 0, 1]]),
-        lambda: cornersmooth.from_poses([["a", 0, 0]], [[0, 0, 1]]),
-        lambda: cornersmooth.from_poses([], []),
-        lambda: cornersmooth.from_poses([[0, 0, 0]], [[0, 0, 1]], feed=[1.0, 2.0]),
-        lambda: cornersmooth.smooth(np.zeros((3, 6)), Settings()),
-    ],
-)
-def test_wrong_types_and_lengths_are_errors_of_the_library(call):
+#: calls that are wrong, of names in `Things`, and their codes
+WRONG = """
+CS167 from_poses(TIPS, [[0, 0, 1]])
+CS167 from_poses([[0, 0]], [[0, 0, 1]])
+CS167 from_poses([["a", 0, 0]], [[0, 0, 1]])
+CS167 from_poses([], [])
+CS167 from_poses(None, AXES)
+CS167 from_poses(TIPS, AXES, feed="fast")
+CS167 from_poses(TIPS, AXES, feed=[1.0, 2.0])
+CS167 from_poses(TIPS, AXES, kind=[99] * 3)
+CS167 from_poses(TIPS, AXES, kind=[258] * 3)
+CS167 from_poses(TIPS, AXES, kind=[2.7] * 3)
+CS167 from_poses(TIPS, AXES, kind=[3] * 3)
+CS167 from_poses(TIPS, AXES, kind=[2])
+CS167 from_poses(TIPS, AXES, line=["a"] * 3)
+CS167 smooth(TIPS, Settings())
+CS167 smooth(program, 0.01)
+CS167 smooth(program, form="g1")
+CS167 postprocess(program, target, form="g1")
+CS167 postprocess(program, io.StringIO())
+CS167 postprocess(program, target, processes="2")
+CS167 write(smoothed, "part.nc", form=form)
+CS167 write(smoothed, io.StringIO(), form=form)
+CS167 write(program, io.BytesIO(), form=form)
+CS167 plan(program)
+CS167 plan(smoothed, machine="table-ac")
+CS167 direct(program, machine="table-ac")
+CS230 direct(program, Limits(feed=100), "foo")
+CS167 choose_form("fanuc", machine="table-ac")
+CS167 choose_form(5)
+CS167 sample(program)
+CS167 corner_table(program)
+CS167 corner_table(smoothed, rows=[99999])
+CS167 corner_table(smoothed, rows=[0.5])
+CS167 verify("part.cls", b"", tolerance=0.1)
+CS167 verify(program, "%\\nG1 X1\\n", tolerance=0.1)
+CS167 read(None)
+CS167 read(b"", operation=1)
+CS167 read(b"", spindle=1000)
+CS230 read(b"", units="cm")
+CS167 filter_program("G1 X1", form)
+CS202 Settings(tolerance="0.01")
+CS202 Settings(tolerance=None)
+CS202 Settings(axis_length=None)
+CS202 Settings(weights=1)
+CS202 Settings(weights=(1.0,))
+CS202 Settings(weights=("a", 1.0))
+CS202 Settings(weights=[9.0, 1.0])
+CS202 Limits(feed="1")
+CS202 Limits(accel=None)
+CS202 Frame(header="abc")
+"""
+
+
+@pytest.fixture(scope="module")
+def things() -> dict[str, object]:
+    """What the wrong calls are of."""
+    tips, axes = [[0, 0, 0], [9, 0, 0], [9, 9, 0]], [[0, 0, 1]] * 3
+    program, form = cornersmooth.from_poses(tips, axes, feed=100), cornersmooth.choose_form("fanuc", "g1")
+    smoothed = cornersmooth.smooth(program, form=form)
+    own = {"TIPS": tips, "AXES": axes, "program": program, "form": form, "smoothed": smoothed, "target": io.BytesIO()}
+    return {**{name: getattr(cornersmooth, name) for name in cornersmooth.__all__}, **own, "io": io}
+
+
+@pytest.mark.parametrize("line", WRONG.strip().splitlines())
+def test_wrong_arguments_are_errors_of_the_library(things: dict[str, object], line: str) -> None:
+    code, call = line.split(" ", 1)
     with pytest.raises(CornersmoothError) as caught:
-        call()
-    assert caught.value.hint
+        eval(call, things)
+    assert (caught.value.code, bool(caught.value.hint), len(str(caught.value)) < 300) == (code, True, True)
+
+
+def test_arguments_of_many_kinds_are_right(things: dict[str, object]) -> None:
+    table = cornersmooth.corner_table(things["smoothed"], rows=[0])
+    assert len(table["line"]) == 1
+    assert cornersmooth.from_poses([[0, 0, 0]], [[0, 0, 1]], kind=np.array([1.0])).kind.dtype == np.uint8
+    assert Settings(tolerance=np.float64(0.02), weights=[1, 1]).weights == (1.0, 1.0)
+    assert pickle.loads(pickle.dumps(cornersmooth.postprocess)) is cornersmooth.postprocess

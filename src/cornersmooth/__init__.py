@@ -98,7 +98,12 @@ def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module 'cornersmooth' has no attribute {name!r}")
     module = import_module(f"cornersmooth.{_HOME[name]}")
-    return module.Program.from_poses if name == "from_poses" else getattr(module, name)
+    found = module.Program.from_poses if name == "from_poses" else getattr(module, name)
+    if not isinstance(found, type):
+        from cornersmooth.arguments import checked
+
+        found = globals()[name] = checked(found, __name__)
+    return found
 
 
 def __dir__() -> list[str]:

@@ -193,24 +193,33 @@ class Program:
             Any length but zero; normalised here.
         feed : (n,) array_like or float, mm/min
             Positive, NaN where there is none.
+        kind : (n,) array_like of int, optional
+            How each pose is reached: 2 by a cut (the default), 1 by a rapid; 0 is a start that is only stated, from
+            which the motion does not begin. With ``arcs`` in `rest` 3 is an arc, with ``statements`` 4 a hole.
+        line : (n,) array_like of int, optional
+            Source line of each pose; 1 to n by default.
+        rest
+            Other fields of `Program`.
 
         Returns
         -------
         Program
-            n poses in mm with unit axes; all of kind `Move.LINEAR` unless `kind` says otherwise.
+            n poses in mm with unit axes.
 
         Raises
         ------
         InputError
             CS167: arrays of no poses, or that do not have a row of three numbers for each; a number that is not
-            finite, an axis of length zero, or a feed that is not positive.
+            finite, an axis of length zero, a feed that is not positive, or a kind that there is not.
         """
         tip, axis = _rows_of_three("tip", tip), _rows_of_three("axis", axis)
-        n = len(tip)
-        if len(axis) != n or np.shape(feed) not in ((), (n,)):
-            lengths = f"there are {n} tips, {len(axis)} axes and {np.size(feed)} feeds"
+        n, feed = len(tip), _numbers(feed)
+        if len(axis) != n or feed.shape not in ((), (n,)):
+            lengths = f"there are {n} tips, {len(axis)} axes and {feed.size} feeds"
             raise InputError("CS167", lengths, "give as many of each, or one feed for all")
-        feed = np.broadcast_to(np.asarray(feed, np.float64), (n,)).copy()
+        feed = np.broadcast_to(feed, (n,)).copy()
+        aside = {Move.ARC: "arcs", Move.HOLE: "statements"}  # what says the rest of a move
+        kinds = [one for one in Move if one not in aside or aside[one] in rest]
         _refuse(~np.isfinite(tip).all(axis=1), "tip", tip, "give finite numbers, in mm")
         largest = np.abs(axis).max(axis=1, initial=0.0)
         _refuse(~((largest > 0.0) & (largest < np.inf)), "axis", axis, "give a direction: finite numbers, not all zero")
@@ -219,9 +228,9 @@ class Program:
         return cls(
             tip=tip,
             axis=axis / np.linalg.norm(axis, axis=1, keepdims=True),
-            kind=np.full(n, Move.LINEAR, np.uint8) if kind is None else np.asarray(kind, np.uint8),
+            kind=_whole("kind", np.full(n, Move.LINEAR) if kind is None else kind, n, kinds).astype(np.uint8),
             feed=feed,
-            line=np.arange(1, n + 1) if line is None else np.asarray(line, np.int64),
+            line=_whole("line", np.arange(1, n + 1) if line is None else line, n),
             feed_mode=rest.pop("feed_mode", np.zeros(n, np.uint8)),
             keep=rest.pop("keep", np.zeros(n, np.uint8)),
             **rest,
@@ -285,15 +294,31 @@ class Program:
         return np.stack((first, last), axis=1).astype(np.int64)
 
 
+def _numbers(values: Any) -> Floats:
+    """Array of what a user gives; empty where that is no array of numbers."""
+    try:
+        return np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        return np.empty(0)
+
+
 def _rows_of_three(what: str, values: Any) -> Floats:
     """Array (n, 3) of what a user gives."""
-    try:
-        array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        array = np.empty(0)
-    if array.size == 0 or array.shape[-1] != 3:
+    array = _numbers(values)
+    if array.size == 0 or array.shape[-1:] != (3,):
         raise InputError("CS167", f"{what} has the shape {array.shape}", "give one row of three numbers for each pose")
     return array.reshape(-1, 3)
+
+
+def _whole(what: str, values: Any, n: int, choices: list[Move] | None = None) -> Ints:
+    """Array (n,) of whole numbers, one of several where there are choices, of what a user gives."""
+    array = _numbers(values)
+    if array.shape != (n,):
+        raise InputError("CS167", f"{what} has the shape {array.shape}", "give one whole number for each pose")
+    names = [f"{one.value} for {one.name}" for one in choices or ()]
+    wrong = ~np.isin(array, choices) if choices else ~(np.abs(array) < 2.0**53) | (array != np.floor(array))
+    _refuse(wrong, what, array, f"give {', '.join(names) or 'a whole number'}")
+    return array.astype(np.int64)
 
 
 def _refuse(wrong: Bools | np.bool_, what: str, values: Floats, hint: str) -> None:

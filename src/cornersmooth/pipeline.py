@@ -129,12 +129,7 @@ def smooth(
     ------
     SettingsError
         The form cannot hold what the settings ask for.
-    InputError
-        CS167: it is no program.
     """
-    if not isinstance(program, Program):
-        what = f"a {type(program).__name__} is no program"
-        raise InputError("CS167", what, "make one with Program.from_poses(tip, axis), or read a file")
     settings = Settings() if settings is None else settings
     if form is not None:
         settings = nc.fit_settings(settings, form, program.units)

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, fields, replace
-from numbers import Real
 from typing import Any, Literal
 
+from cornersmooth.arguments import shown, wanted
 from cornersmooth.errors import SettingsError
 from cornersmooth.methods import AUTO, CURVES_METHOD, DEFAULT_METHOD, METHODS
 
@@ -52,6 +52,13 @@ def key_of(name: str, unit: str) -> str:
 
 class OptionFields:
     """Fields that `option` makes, of a frozen dataclass."""
+
+    def __post_init__(self) -> None:
+        """Refuse values that do not fit the annotations of their fields (CS202)."""
+        for item in self.__dataclass_fields__.values():  # type: ignore[attr-defined]
+            value = getattr(self, item.name)
+            if text := wanted(item.type, value):
+                raise SettingsError("CS202", f"{item.name} is {shown(value)}", f"give {text}")
 
     def _value(self, name: str) -> Any:
         """Value of an option, or of that which counts instead."""
@@ -156,6 +163,7 @@ class Settings(OptionFields):
     shortest_line: float = option(1e-3, unit="mm", bounds=(0.0, 1.0))
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.method not in (AUTO, *METHODS):
             raise SettingsError("CS201", f"unknown method {self.method!r}", f"use {' or '.join((AUTO, *METHODS))}")
         if self.lines not in (None, "dense", "long"):
@@ -165,9 +173,7 @@ class Settings(OptionFields):
             raise SettingsError("CS207", f"the method {self.method} has its own {names}", f"leave out {names}")
         for name, (low, high) in BOUNDS.items():
             value = getattr(self, name)
-            for number in value if isinstance(value, tuple) else () if value is None else (value,):
-                if not isinstance(number, Real) or isinstance(number, bool):
-                    raise SettingsError("CS202", f"{name} is {number!r}", "give a number")
+            for number in value if isinstance(value, (tuple, list)) else () if value is None else (value,):
                 if not (math.isfinite(number) and low <= float(number) <= high):
                     raise SettingsError("CS202", f"{name} is {number:g}", f"give a value from {low:g} to {high:g}")
         object.__setattr__(self, "weights", tuple(round(float(w), WEIGHT_DECIMALS) for w in self.weights))
@@ -356,6 +362,7 @@ class Limits(OptionFields):
     )
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         for item in fields(self):
             value = getattr(self, item.name)
             if value is not None and not (math.isfinite(value) and value > 0.0):
@@ -378,7 +385,7 @@ class Limits(OptionFields):
 
 
 @dataclass(frozen=True)
-class FrameSettings:
+class FrameSettings(OptionFields):
     """Name, work offset, texts, retracts and holes of a program. Lengths in mm."""
 
     #: None for that of the CL file, or of the control's table

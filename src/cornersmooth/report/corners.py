@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cornersmooth.arrays.vectors import angle_between, dot, norm, square, unit
+from cornersmooth.errors import InputError
 from cornersmooth.geometry import nurbs
 from cornersmooth.methods import METHODS
 from cornersmooth.model import Corners, Floats, Ints, LimitedBy, SmoothProgram, Status, Trait
@@ -53,9 +54,18 @@ def corner_table(smoothed: SmoothProgram, rows: Ints | None = None, *, dense: bo
     dict
         Column name, with its unit, to an array of g values; those of docs/smooth.md, and those
         that only the method has.
+
+    Raises
+    ------
+    InputError
+        CS167: there are no such rows.
     """
     program, corners, settings = smoothed.program, smoothed.corners, smoothed.settings
-    rows = np.arange(len(corners)) if rows is None else rows
+    rows = np.arange(len(corners)) if rows is None else np.asarray(rows)
+    if rows.ndim != 1 or not np.isin(rows, np.arange(len(corners))).all():
+        hint = f"give a list of whole numbers from 0 to {len(corners) - 1}"
+        raise InputError("CS167", "rows of corner_table are none of the corners", hint)
+    rows = rows.astype(np.int64)
     pose, before, after = corners.pose[rows], corners.before[rows], corners.after[rows]
     legs = legs_at(program, settings.axis_length, pose, before, np.where(after < 0, pose, after))
     tip_in, tip_out = legs.tip_in, legs.tip_out
