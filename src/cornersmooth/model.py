@@ -195,7 +195,7 @@ class Program:
             Positive, NaN where there is none.
         kind : (n,) array_like of int, optional
             How each pose is reached: 2 by a cut (the default), 1 by a rapid; 0 is a start that is only stated, from
-            which the motion does not begin. With ``arcs`` in `rest` 3 is an arc, with ``statements`` 4 a hole.
+            which the motion does not begin; 3 is an arc of `Program.arcs`, 4 a hole of a cycle in `Program.statements`.
         line : (n,) array_like of int, optional
             Source line of each pose; 1 to n by default.
         rest
@@ -218,8 +218,6 @@ class Program:
             lengths = f"there are {n} tips, {len(axis)} axes and {feed.size} feeds"
             raise InputError("CS167", lengths, "give as many of each, or one feed for all")
         feed = np.broadcast_to(feed, (n,)).copy()
-        aside = {Move.ARC: "arcs", Move.HOLE: "statements"}  # what says the rest of a move
-        kinds = [one for one in Move if one not in aside or aside[one] in rest]
         _refuse(~np.isfinite(tip).all(axis=1), "tip", tip, "give finite numbers, in mm")
         largest = np.abs(axis).max(axis=1, initial=0.0)
         _refuse(~((largest > 0.0) & (largest < np.inf)), "axis", axis, "give a direction: finite numbers, not all zero")
@@ -228,7 +226,7 @@ class Program:
         return cls(
             tip=tip,
             axis=axis / np.linalg.norm(axis, axis=1, keepdims=True),
-            kind=_whole("kind", np.full(n, Move.LINEAR) if kind is None else kind, n, kinds).astype(np.uint8),
+            kind=_whole("kind", np.full(n, Move.LINEAR) if kind is None else kind, n, list(Move)).astype(np.uint8),
             feed=feed,
             line=_whole("line", np.arange(1, n + 1) if line is None else line, n),
             feed_mode=rest.pop("feed_mode", np.zeros(n, np.uint8)),
