@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 from cornersmooth.nc_reader.recognition import needs_its_control
 from filter.foreign import by_words, difference
 from oracle.command import DONE, USAGE, run
+from page.making import values_of
 
 EPS = 0.01
 THREE_AXES = Path(__file__).parents[2] / "samples" / "machines" / "three-axis.toml"
@@ -255,9 +257,21 @@ def test_an_unknown_control_names_all_that_work(tmp_path: Path) -> None:
 def test_a_program_that_gains_no_time_is_to_be_left(tmp_path: Path) -> None:
     relief = "".join(f"G1 X{0.5 * k:.3f} Z{math.cos(0.4 * k) - 2:.3f}\n" for k in range(1, 61))
     (tmp_path / "part.nc").write_text(f"G21 G90 G17 G94\nG0 X0 Y0 Z-1\nF600\n{relief}G0 Z5\nM2\n")
-    made = run("filter", "part.nc", "--control", "linuxcnc", "--limits", THREE_AXES, "-o", "new.nc", cwd=tmp_path)
+    on = ("--control", "linuxcnc", "--limits", THREE_AXES, "--report", "page.html")
+    made = run("filter", "part.nc", *on, "-o", "new.nc", cwd=tmp_path)
     told = made.stderr.decode().splitlines()[0]
     times = re.search(r", ([\d.]+) s instead of ([\d.]+) s \([-+][\d.]+ %\)(.*)", told)
     assert times, made.stderr
     assert times[1] == times[2]
     assert times[3] == "; no time is gained, leave the program as it was"
+    planned = dict(values_of((tmp_path / "page.html").read_text())[0]["facts"])["planned with"]
+    assert planned.startswith("feed as programmed; the law of linuxcnc-2.9; axes of ")
+    given = tomllib.loads(THREE_AXES.read_text())["dynamics"]["Y"]
+    assert "Y up to {velocity:g} mm/min, {acceleration:g} mm/s2".format(**given) in planned
+    assert "5000" not in planned  # mm/s³ of the tip: that law has none
+
+
+def test_a_run_with_as_few_blocks_as_can_be_is_no_fault(tmp_path: Path) -> None:
+    (tmp_path / "part.nc").write_text(FANUC.format("".join(f"X{k}. Y{k % 2}. Z-{k}.\n" for k in range(1, 9))))
+    made = run("filter", "part.nc", "--control", "fanuc", "-o", "new.nc", cwd=tmp_path)
+    assert "already as few blocks as ε allows" in made.stderr.decode()

@@ -163,7 +163,7 @@ def _page(
         badge=Verdict(contents["verdict"]),
         head=[(label, value) for label, value in head if value],
         problems=_problems(found, [one for one in findings if one["severity"] != "note"]),
-        facts=[*inputs, *facts, *_limit_facts(subject.machine)],
+        facts=[*inputs, *facts, *_limit_facts(subject.machine, subject.planner)],
         notes=[
             (f"CL line {one['line']}: " if one["line"] else "") + _text(one)
             for one in findings
@@ -203,14 +203,13 @@ def _measured_facts(found: Verification, whose: str) -> list[tuple[str, str]]:
     ]
 
 
-def _limit_facts(machine: Machine | None) -> list[tuple[str, str]]:
+def _limit_facts(machine: Machine | None, planner: str) -> list[tuple[str, str]]:
     limits, machine = Limits(), with_dynamics(machine)
     bundled = json.loads((files("cornersmooth.page") / "assets/vendor/versions.json").read_text(encoding="utf-8"))
+    tip = f"{limits.accel:g} mm/s² and {limits.jerk:g} mm/s³ along the path, period {1000.0 * limits.period:g} ms"
+    law = f"the law of {planner}" if planner else tip
+    axes = () if machine is None else (f"axes of {machine.name}", *(item.describe() for item in machine.dynamics))
     return [
-        (
-            "planned with",
-            f"feed as programmed, {limits.accel:g} mm/s², {limits.jerk:g} mm/s³, period {1000.0 * limits.period:g} ms"
-            + (f", axes of {machine.name}" if machine is not None else ""),
-        ),
+        *[("planned with", "; ".join(("feed as programmed", law, *axes)))] * (not planner or bool(axes)),
         ("made by", f"cornersmooth {__version__}, three.js {bundled['three']}, uPlot {bundled['uplot']}"),
     ]
