@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, fields, replace
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 from cornersmooth.arguments import shown, wanted
 from cornersmooth.errors import SettingsError
@@ -50,6 +50,9 @@ def key_of(name: str, unit: str) -> str:
     return f"{name}_{unit.replace('/', '_per_')}" if unit else name
 
 
+Record = TypeVar("Record", bound="OptionFields")
+
+
 class OptionFields:
     """Fields that `option` makes, of a frozen dataclass."""
 
@@ -78,9 +81,20 @@ class OptionFields:
         return {key_of(item.name, item.metadata["unit"]): self._value(item.name) for item in items}
 
 
+def described(record: type[Record]) -> type[Record]:
+    """Add the options of a record to its docstring: their units, and helps as the command line has them."""
+    lines = [record.__doc__ or "", "", "Attributes", "----------"]
+    for item in fields(record):  # type: ignore[arg-type]
+        unit = f", {item.metadata['unit']}" if item.metadata["unit"] else ""
+        lines += [f"{item.name} : {item.type}{unit}", f"    {item.metadata['help'] or f'Default {item.default}.'}"]
+    record.__doc__ = "\n".join(lines)
+    return record
+
+
 Lines = Literal["dense", "long"]
 
 
+@described
 @dataclass(frozen=True)
 class Settings(OptionFields):
     """What `cornersmooth.smooth` promises and how it goes about it. Lengths in mm, angles in degrees."""
@@ -340,6 +354,7 @@ BOUNDS: dict[str, tuple[float, float]] = {
 }
 
 
+@described
 @dataclass(frozen=True)
 class Limits(OptionFields):
     """Limits of the motion; the defaults are those of the paper's Example 2."""
