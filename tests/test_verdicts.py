@@ -166,9 +166,8 @@ def test_strange_requests_are_warned_of(text, options, warning, tmp_path, capsys
     odd = tmp_path / "odd.cls"
     odd.write_text(text)
     run(["smooth", str(odd), "-o", str(tmp_path / "odd.nc"), *options])
-    assert (
-        len(re.findall(rf"^CHECK   (?:CL line \d+: )?{re.escape(warning)}", capsys.readouterr().err, re.MULTILINE)) == 1
-    )
+    check = rf"^CHECK   (?:CL line \d+: )?{re.escape(warning)}"
+    assert len(re.findall(check, capsys.readouterr().err, re.MULTILINE)) == 1
 
 
 def test_nothing_is_strange_about_a_usual_file(part, tmp_path, capsys):

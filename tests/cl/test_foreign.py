@@ -28,7 +28,7 @@ FOREIGN = {
     "MATLAB": b"P = [\n0 0 40 0 0 1;\n14 3 0 0.1 0 0.995;\n];\n",
     "SprutCAM": b"PARTNO A\nUNITS MM\nGOTO X 0 Y 0 Z 40\nMULTIGOTO X 14 Y 3 Z 0 A 5.7 C 90\n",
     "XML": b"<?xml version='1.0'?>\n<cld><linear/></cld>\n",
-    "HTML page": b'<!doctype html>\n<html lang="en">\n<style>\n.a { width: 9px; }\n</style>\n1, 2, 3\n</html>\n',
+    "web page (HTML)": b'<!doctype html>\n<html lang="en">\n<style>\n.a { width: 9px; }\n</style>\n1, 2, 3\n</html>\n',
     "zip": b"PK\x03\x04\x14\x00\x00\x00",
     "NumPy": b"\x93NUMPY\x01\x00v\x00",
 }

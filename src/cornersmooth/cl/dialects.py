@@ -99,7 +99,7 @@ _FORMATS: Final = tuple(
         ("YAML file", rb"\A(---\s|\w+:[ \t]*\n[ \t]*(- |\w+:))", "write its poses as a table x,y,z,i,j,k"),
         ("MATLAB script", rb"\A\s*\w+ *= *\[", "write the matrix as a table x,y,z,i,j,k, with writematrix"),
         ("XML file", rb"\A\s*<\?xml", f"export {_APT}"),
-        ("HTML page", rb"(?i)\A\s*(<!--[^>]*-->\s*)*<(!DOCTYPE\s+html|html\b)", f"export {_APT}"),
+        ("web page (HTML)", rb"(?i)\A\s*(<!--[^>]*-->\s*)*<(!DOCTYPE\s+html|html\b)", f"export {_APT}"),
         ("CLData listing of SprutCAM", rb"^(MULTI)?GOTO +[XYZ] *-?[\d.]", f"export {_APT} with its APT post"),
         ("spreadsheet or archive (zip)", rb"\APK\x03\x04", "save it as CSV"),
         ("NumPy file", rb"\A\x93NUMPY", "write it with numpy.savetxt, with a header x,y,z,i,j,k"),
