@@ -100,7 +100,7 @@ def __getattr__(name: str) -> Any:
     module = import_module(f"cornersmooth.{_HOME[name]}")
     found = module.Program.from_poses if name == "from_poses" else getattr(module, name)
     if not isinstance(found, type):
-        from cornersmooth.arguments import checked
+        from cornersmooth.errors import checked
 
         found = globals()[name] = checked(found, __name__)
     return found

@@ -10,8 +10,7 @@ import math
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, Literal, TypeVar
 
-from cornersmooth.arguments import shown, wanted
-from cornersmooth.errors import SettingsError
+from cornersmooth.errors import SettingsError, shown, wanted
 from cornersmooth.methods import AUTO, CURVES_METHOD, DEFAULT_METHOD, METHODS
 
 

@@ -128,6 +128,13 @@ def test_feeds_keep_the_digits_of_the_program(tmp_path: Path) -> None:
     assert b"F1.08313" in new
 
 
+def test_whole_numbers_keep_their_points(tmp_path: Path) -> None:
+    cuts = "".join(f"X{k}. Y0. Z-1.\n" for k in range(1, 30))
+    told, new = filtered(tmp_path, PROGRAMS["fanuc"].split("G1 Z-1.")[0] + f"G1 Z-1. F350.\n{cuts}G0 Z20.\nM30\n%\n")
+    assert told.startswith("PASSED")
+    assert b"X29. Y0. Z-1." in new
+
+
 def test_a_modal_cycle_of_klartext_is_called_by_every_block(tmp_path: Path) -> None:
     text = KLARTEXT.replace("13 L Z+2 R0 FMAX", "13 M89")
     assert filtered(tmp_path, text, "--control", "heidenhain")[0].startswith("NOT SMOOTHED")

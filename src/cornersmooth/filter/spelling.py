@@ -54,19 +54,20 @@ class Spelling:
         places = [(word, number.lstrip(b"+-")) for word, number in every if word not in (b"F", b"G")]
         tips = [_decimals(number) for word, number in places if word in _AXES]
         others = [_decimals(number) for word, number in places if word not in _AXES]
+        pointed = any(b"." in number for _, number in places)  # a control may count numbers without it in increments
         signs = sum(number.startswith(b"+") for word, number in every if word not in (b"F", b"G"))
         short = sum(number.startswith(b".") and number != b"." for _, number in places)
         zeros = sum(number.startswith(b"0.") and len(number) > 2 for _, number in places)
         spaced = sum(text.strip().count(b" ") + text.count(b"\t") > 0 for text in texts)
         missing = sum(sum(word not in (b"F", b"G") for word, _ in block) < words for block in blocks)
         return cls(
-            tip=max(tips, default=0),
-            other=max(others, default=0),
+            tip=max(*tips, pointed) if tips else 0,
+            other=max(*others, pointed) if others else 0,
             feed=max(map(_decimals, feeds), default=0),
             signs=2 * signs > len(tips),
             spaces=2 * spaced > len(raw),
             leading_zeros=zeros >= short,
-            trailing_zeros=len(set(tips)) < 2 and len(set(others)) < 2,
+            trailing_zeros=any(tips + others) and len(set(tips)) < 2 and len(set(others)) < 2,
             feed_point=not feeds or any(b"." in number for number in feeds),
             modal=2 * missing > len(raw),
             codes=2 * sum(any(word == b"G" for word, _ in block) for block in blocks) > len(raw),
