@@ -206,7 +206,7 @@ class Parse:
         while self._over(stop, end) or (end > element and self._ahead.has(end) and lines.stands(end)):
             end += 1
         late = -1 if self._hole[stop + 1] and not self._fed[stop] else 1
-        ends = [(2, True, 0, end, end)]
+        ends = [(2, True, 0, True, end, end)]
         for one in range(element, end + 1):
             if one > element and lines.feeds(one - 1):
                 lowest = min(lowest, lines.height(move, one - 1))
@@ -216,7 +216,9 @@ class Parse:
             if lacks is not None:
                 found, left = lines.check(move, range(element, self._end_of(stop, element, one)), cycle)
                 wrong = 2 if any(one.code != "CS541" for one in found) else int(bool(found))
-                ends.append((wrong, left, lacks, late * one, one))
+                words = late < 0 and one > element and self._has_words(one)  # are rather between holes than in one
+                tool = late > 0 and move + 1 < self._move[-1] and self._has_tool(move + 1, one)  # of the next move
+                ends.append((wrong, left, lacks, not (words or tool), late * one, one))
         wrong, *_, best = min(ends)
         doubt = self._doubt(stop, element) if wrong == 2 else None  # a wrong feed leaves none
         return doubt or self._leave(stop, element, best)
