@@ -7,6 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
+from cornersmooth.errors import Verdict
 from cornersmooth.model import Move, Statement
 from cornersmooth.verify import verify
 from oracle.share import share
@@ -112,4 +113,5 @@ def test_a_program_passes_where_its_elements_can_be_divided_among_the_holes(seed
     program = said(Statement(1, 3, "CYCLE", CYCLE), off, kind=kind, tip=tip)
     nc = text("G43.5 H1", *((code, x, 0.0, z) for code, x, z in lines))
     found = verify(program, nc, tolerance=0.01)
-    assert (not found.problems) == is_right(holes, lines), (holes, lines, found.problems)
+    # holes above one another in one line: a wrong one may be NOT VERIFIED
+    assert (found.verdict is Verdict.PASSED) == is_right(holes, lines), (holes, lines, found.problems)
