@@ -70,7 +70,7 @@ function worstOf({ w_nc: lines, w_off: off, w_axis_off: axisOff }, run) {
   return best;
 }
 
-/** Seconds that a run takes less than before; null where that is not planned. @param {Run} run */
+/** Seconds that a run takes less than before, to the millisecond; null where that is not planned. @param {Run} run */
 function gainOf({ before, after }) {
-  return before === null || after === null ? null : before - after;
+  return before === null || after === null ? null : Math.round(1000 * (before - after)) / 1000;
 }
