@@ -12,6 +12,7 @@ from typing import Final
 
 from cornersmooth.cl.messages import error
 from cornersmooth.model import Units
+from cornersmooth.nc_reader.recognition import HTML
 
 #: how much of a file is looked at
 HEAD: Final = 1 << 16
@@ -99,7 +100,7 @@ _FORMATS: Final = tuple(
         ("YAML file", rb"\A(---\s|\w+:[ \t]*\n[ \t]*(- |\w+:))", "write its poses as a table x,y,z,i,j,k"),
         ("MATLAB script", rb"\A\s*\w+ *= *\[", "write the matrix as a table x,y,z,i,j,k, with writematrix"),
         ("XML file", rb"\A\s*<\?xml", f"export {_APT}"),
-        ("web page (HTML)", rb"(?i)\A\s*(<!--[^>]*-->\s*)*<(!DOCTYPE\s+html|html\b)", f"export {_APT}"),
+        ("web page (HTML)", HTML.pattern, f"export {_APT}"),
         ("CLData listing of SprutCAM", rb"^(MULTI)?GOTO +[XYZ] *-?[\d.]", f"export {_APT} with its APT post"),
         ("spreadsheet or archive (zip)", rb"\APK\x03\x04", "save it as CSV"),
         ("NumPy file", rb"\A\x93NUMPY", "write it with numpy.savetxt, with a header x,y,z,i,j,k"),

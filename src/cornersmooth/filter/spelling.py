@@ -54,9 +54,8 @@ class Spelling:
         places = [(word, number.lstrip(b"+-")) for word, number in every if word not in (b"F", b"G")]
         tips = [_decimals(number) for word, number in places if word in _AXES]
         others = [_decimals(number) for word, number in places if word not in _AXES]
-        pointed = int(
-            any(b"." in number for _, number in places)
-        )  # a control may count numbers without it in increments
+        # a control may count numbers without a point in increments: one digit behind it keeps it
+        pointed = int(any(b"." in number for _, number in places))
         signs = sum(number.startswith(b"+") for word, number in every if word not in (b"F", b"G"))
         short = sum(number.startswith(b".") and number != b"." for _, number in places)
         zeros = sum(number.startswith(b"0.") and len(number) > 2 for _, number in places)

@@ -35,9 +35,12 @@ def is_cl_file(head: bytes) -> bool:
     return _OTHER.search(head) is not None
 
 
+#: how a page for a browser begins
+HTML: Final = re.compile(rb"(?i)\A(\xef\xbb\xbf)?\s*(<!--[^>]*-->\s*)*<(!DOCTYPE\s+html|html\b)")
+
 #: how files begin that are neither programs nor CL files
 _FOREIGN: Final = {
-    "an HTML page": re.compile(rb"(?i)\A(\xef\xbb\xbf)?\s*<(!doctype html|html)\b"),
+    "an HTML page": HTML,
     "an SVG drawing or other XML": re.compile(rb"(?i)\A(\xef\xbb\xbf)?\s*<(\?xml|svg)\b"),
     "an STL model": re.compile(rb"(?i)\A\s*solid\b[^\n]*\n\s*(facet|endsolid)\b"),
 }

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from array import array
+from bisect import bisect_left, bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple, Self
 
 import numpy as np
 
 from cornersmooth.model import Ints, Move
-from cornersmooth.nc_reader.elements import Problem
+from cornersmooth.nc_reader.elements import Event, Problem
 from cornersmooth.nc_reader.tool import beyond_digits
 from cornersmooth.statements.asked import NOTHING, Asking
 from cornersmooth.statements.cycles import Drilling, drillings
@@ -100,3 +102,29 @@ class Stops:
             np.unique(stated).tolist(),
             changes,
         )
+
+
+@dataclass
+class Words:
+    """What a program says in front of which element, as it is read."""
+
+    events: Sequence[Event]  #: by their elements; more come while the program is read
+    _changes: array[int] = field(default_factory=lambda: array("q"))  # elements that tool changes are in front of
+    _seen: int = 0  # words that tool changes were looked for in
+    _chosen: float = -1.0
+    _tool: float = -1.0
+
+    def between(self, first: int, stop: int) -> Sequence[Event]:
+        """Words in front of elements, from the first to `stop`, that excluded."""
+        places = (bisect_left(self.events, one, key=lambda event: event.element) for one in (first, stop))
+        return self.events[slice(*places)]
+
+    def tool_changes(self, element: int) -> int:
+        """How many tool changes are in front of an element."""
+        for event in self.events[self._seen :]:
+            self._chosen = event.value if event.letter == "T" else self._chosen
+            if (event.letter, event.value) == ("M", 6.0) and self._chosen != self._tool:
+                self._tool = self._chosen
+                self._changes.append(event.element)
+        self._seen = len(self.events)
+        return bisect_right(self._changes, element)

@@ -11,7 +11,6 @@ decides what is named, and never whether a program passes.
 from __future__ import annotations
 
 import math
-from array import array
 from bisect import bisect_left, bisect_right
 from collections.abc import Generator, Iterator, Sequence
 from typing import Final, NamedTuple
@@ -21,7 +20,7 @@ import numpy as np
 from cornersmooth.model import Move
 from cornersmooth.nc_reader.elements import Ahead, Event, Problem
 from cornersmooth.nc_reader.tool import directions, moving_rapids
-from cornersmooth.verify.acts import Acts, Hole, Step, Stops
+from cornersmooth.verify.acts import Acts, Hole, Step, Stops, Words
 from cornersmooth.verify.along_tool import AlongTool
 from cornersmooth.verify.feeds import feed_at, out_of_hole
 from cornersmooth.verify.holes import HoleLines
@@ -51,12 +50,7 @@ class Parse:
     """Goes through the acts of the CL file and the elements of a program, at least one, side by side."""
 
     def __init__(self, task: Task, ahead: Ahead, events: Sequence[Event], along: AlongTool, acts: Acts) -> None:
-        self._task, self._ahead, self._events, self._along, self.acts = task, ahead, events, along, acts
-        self._changes, self._words, self._tools = (
-            array("q"),
-            0,
-            (-1.0, -1.0),
-        )  # elements behind tool changes; words so far
+        self._task, self._ahead, self._words, self._along, self.acts = task, ahead, Words(events), along, acts
         self.lines = HoleLines(task.original, ahead, task.axis_length, task.tolerance)
         stops = Stops.of(task.original, self.lines)
         self.moves, self._move, self._hole, self._holes = stops.moves, stops.move, stops.hole, stops.holes
@@ -153,8 +147,7 @@ class Parse:
         gone = self._gone + np.append(0.0, np.cumsum(ways))
         self._gone = float(gone[-1])
         length, last = self._task.path.length, self._task.original.trail.last
-        words = (bisect_left(self._events, one, key=lambda event: event.element) for one in (element, end))
-        elements = sorted({event.element for event in self._events[slice(*words)]})
+        elements = sorted({event.element for event in self._words.between(element, end)})
         for one, near in zip(elements, lines.poses_near(elements, moves), strict=True):
             there = [move for move in near if move >= self._cut_at and lines.at(move - 1, one - 1)]
             if there:
@@ -410,19 +403,12 @@ class Parse:
 
     def _has_tool(self, move: int, element: int) -> bool:
         """Whether as many tool changes are in front of an element as in front of a move."""
-        chosen, tool = self._tools
-        for event in self._events[self._words :]:
-            chosen = event.value if event.letter == "T" else chosen
-            if (event.letter, event.value) == ("M", 6.0) and chosen != tool:
-                tool = chosen
-                self._changes.append(event.element)
-        self._words, self._tools = len(self._events), (chosen, tool)
-        return bisect_right(self._loads, self._task.original.pose[move]) == bisect_right(self._changes, element)
+        return bisect_right(self._loads, self._task.original.pose[move]) == self._words.tool_changes(element)
 
     def _has_words(self, element: int) -> bool:
         """Whether words are in front of an element that do not belong into a hole."""
-        first, stop = (side(self._events, element, key=lambda one: one.element) for side in (bisect_left, bisect_right))
-        return any((one.letter, one.value) not in _IN_HOLES for one in self._events[first:stop])
+        words = self._words.between(element, element + 1)
+        return any((one.letter, one.value) not in _IN_HOLES for one in words)
 
     def _may_be_left_out(self, stop: int) -> bool:
         cycle = self._cycles[self._move[stop]]
