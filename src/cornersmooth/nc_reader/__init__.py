@@ -18,7 +18,7 @@ Where is what:
 
 - bytes to tables: `control` (lines, words and what they mean), `dialects` (grammar), `acts` (what a block does)
 - tables to elements: `reader` goes through the text (`reading`: a whole one), `execution` executes: `arcs`, `splines`,
-  `rotary`; `needed_states` says which words want another state; `retracts` leads back from retracts, `planes` are tilted
+  `rotary`; `needed_states` says which words want another state; `retracts` leads back from them, `planes` are tilted
 - what comes out: `elements`; `curves` evaluates, `tool` says where the tool is
 """
 
