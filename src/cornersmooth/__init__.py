@@ -65,7 +65,7 @@ if TYPE_CHECKING:
 
     from_poses = Program.from_poses
 
-__version__ = "0.3.0"
+__version__ = "0.4.0.dev0"
 
 #: module of each public name
 _HOME = {
