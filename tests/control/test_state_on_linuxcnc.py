@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import random
 import shutil
-import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,8 +14,8 @@ import cornersmooth as cs
 from cornersmooth.control.program import Text
 from cornersmooth.control.state import Rows, State
 from cornersmooth.filter.runs import ProgramReader
-from filter.foreign import CANON, PYTHON
 from filter.test_filter_by_foreign_readers import THREE_AXES, seeded
+from oracle.interpreter import RefusedError, rows_of
 from oracle.share import how_many
 
 #: digits of the interpreter's own numbers
@@ -36,12 +35,11 @@ def dropped(text: str, rng: random.Random) -> str:
 
 def interpreted(text: str, folder: Path) -> list[tuple[str, int, list[float]]] | None:
     """Kinds, lines and numbers of the interpreter; None where it refuses the program."""
-    (folder / "program.ngc").write_text(text)
-    found = subprocess.run(
-        [PYTHON, CANON, folder / "program.ngc"], capture_output=True, text=True, check=False, timeout=120
-    )
-    rows = [line.split() for line in found.stdout.splitlines()]
-    return None if found.returncode else [(row[0], int(row[1]), [float(one) for one in row[2:]]) for row in rows]
+    try:
+        rows = rows_of(text.encode(), folder)
+    except RefusedError:
+        return None
+    return [(row[0], int(row[1]), [float(one) for one in row[2:]]) for row in rows]
 
 
 def claimed(text: str) -> Iterator[tuple[int, State, bool]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache, partial
 
 import numpy as np
 
@@ -20,7 +21,7 @@ def chords(curve: Curve, first: float, last: float, tolerance: float) -> np.ndar
         while j < len(t) - 1:
             way, gone = at[j + 1] - at[i], at[i : j + 2] - at[i]
             along = gone @ way / (way @ way)
-            if np.linalg.norm(gone - along[:, None] * way, axis=1).max() > tolerance:
+            if ((gone - along[:, None] * way) ** 2).sum(axis=1).max() > tolerance**2:
                 break
             j += 1
         kept.append(j)
@@ -89,12 +90,19 @@ def fine() -> str:
     return program([np.column_stack((t, 3 * np.sin(0.3 * t), -1 - 0.5 * np.cos(0.5 * t)))])
 
 
-PROGRAMS = {
-    "relief": relief(),
-    "coarse relief": relief(step=0.6),
-    "mould": mould(),
-    "mould, turned": mould(30.0),
-    "mould, coarse": mould(tolerance=0.01),
-    "carving": carving(),
-    "fine": fine(),
+_PROGRAMS: dict[str, Callable[[], str]] = {
+    "relief": relief,
+    "coarse relief": partial(relief, step=0.6),
+    "mould": mould,
+    "mould, turned": partial(mould, 30.0),
+    "mould, coarse": partial(mould, tolerance=0.01),
+    "carving": carving,
+    "fine": fine,
 }
+NAMES = tuple(_PROGRAMS)
+
+
+@cache
+def made(name: str) -> str:
+    """The program of a name."""
+    return _PROGRAMS[name]()

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import re
-import subprocess
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from oracle.frechet import leash_is_enough
+from oracle.interpreter import rows_of
 
 #: kind of a row and its numbers: what a reader says of a program, in order
 Row = tuple[str, tuple[float, ...]]
-
-PYTHON = Path("/usr/bin/python3")
-CANON = Path(__file__).parents[1] / "nc" / "linuxcnc_canon.py"
 
 
 #: words that a filter may add to its runs
@@ -57,14 +54,10 @@ _LEFT_OUT = re.compile(rb"(?m)^((N\d+ )?T\d+ M6|G43 H\d+(?: (?=G|Z))?|M42[89]|M6
 
 
 def by_rs274(text: bytes, folder: Path) -> list[Row]:
-    """Rows of LinuxCNC's interpreter."""
-    file = folder / "program.ngc"
-    file.write_bytes(_LEFT_OUT.sub(b"", text))
-    result = subprocess.run([PYTHON, CANON, file], capture_output=True, text=True, check=False, timeout=120)
-    assert result.returncode == 0, result.stderr
+    """Rows of LinuxCNC's interpreter; RefusedError where it does not take the program."""
     found: list[Row] = []
     place, plane = np.zeros(3), 17
-    for kind, _, *texts in (line.split() for line in result.stdout.splitlines()):
+    for kind, _, *texts in rows_of(_LEFT_OUT.sub(b"", text), folder):
         numbers = tuple(map(float, texts)) if kind.isalpha() else ()
         if kind == "plane":
             plane = _PLANES[int(numbers[0])]

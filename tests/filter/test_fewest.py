@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from cornersmooth.errors import Verdict
 from cornersmooth.filter import Filtered, filter_program, verify_programs
 from cornersmooth.filter.program import THREE_AXES
 from cornersmooth.filter.runs import ProgramReader
-from filter.fine_programs import HEAD, PROGRAMS, program, relief
+from filter.fine_programs import HEAD, NAMES, made, program, relief
 from filter.foreign import by_rs274, by_words, difference
 from oracle.command import DONE, run
 
@@ -33,6 +34,7 @@ COUNTS = {
 }
 
 
+@cache
 def few(text: str | bytes, control: str = "fanuc", **options: object) -> Filtered:
     """What the filter makes of a program in its default way."""
     form = cs.choose_form(control, "g1", machine=THREE_AXES)
@@ -47,9 +49,9 @@ def blocks(text: str | bytes) -> int:
 
 
 @pytest.mark.parametrize("control", ["fanuc", "haas", "mitsubishi"])
-@pytest.mark.parametrize("name", [name for name in PROGRAMS if name != "mould, turned"])  # all its arcs are steep
+@pytest.mark.parametrize("name", [name for name in NAMES if name != "mould, turned"])  # all its arcs are steep
 def test_few_blocks_say_the_same_motion(name: str, control: str) -> None:
-    text = PROGRAMS[name]
+    text = made(name)
     found = few(text, control)
     assert found.verdict is Verdict.PASSED
     assert difference(by_words(text.encode()), by_words(found.data), EPS) == ""
@@ -57,10 +59,10 @@ def test_few_blocks_say_the_same_motion(name: str, control: str) -> None:
     assert b"R" in found.data
 
 
-@pytest.mark.parametrize("name", PROGRAMS)
+@pytest.mark.parametrize("name", NAMES)
 def test_blocks_are_near_a_greedy_count(name: str) -> None:
     """Where F counts along a helix; where it does not, helices are flat."""
-    assert blocks(few(PROGRAMS[name], "linuxcnc").data) <= 1.3 * COUNTS[name]
+    assert blocks(few(made(name), "linuxcnc").data) <= 1.3 * COUNTS[name]
 
 
 def steepest(text: bytes) -> float:
@@ -81,7 +83,7 @@ def steepest(text: bytes) -> float:
 @pytest.mark.parametrize("name", ["mould, turned", "fine"])
 def test_helices_are_flat_where_f_counts_in_their_plane(name: str) -> None:
     """FANUC: F along the arc, and the third axis is faster by as much as it rises (1403#5 HTG 0)."""
-    text = PROGRAMS[name]
+    text = made(name)
     assert steepest(few(text, "fanuc").data) < 1.021
     assert steepest(few(text, "linuxcnc").data) > 1.05
 
@@ -102,9 +104,9 @@ def test_a_run_behind_another_kind_of_feed(mode: str) -> None:
 
 @pytest.mark.linuxcnc
 @pytest.mark.skipif(shutil.which("rs274") is None, reason="LinuxCNC is not installed")
-@pytest.mark.parametrize("name", PROGRAMS)
+@pytest.mark.parametrize("name", NAMES)
 def test_linuxcnc_takes_the_arcs(name: str, tmp_path: Path) -> None:
-    text = PROGRAMS[name].replace("%\nO1\n", "").replace("%\n", "")
+    text = made(name).replace("%\nO1\n", "").replace("%\n", "")
     found = few(text, "linuxcnc")
     assert found.verdict is Verdict.PASSED
     assert difference(by_rs274(text.encode(), tmp_path), by_rs274(found.data, tmp_path), EPS) == ""
@@ -126,9 +128,9 @@ def test_a_smooth_path_stays_smooth() -> None:
     assert max(turns(by_words(few(text).data))[2:-2]) < 2.3
 
 
-@pytest.mark.parametrize("name", PROGRAMS)
+@pytest.mark.parametrize("name", NAMES)
 def test_what_is_filtered_again_stays(name: str) -> None:
-    once = few(PROGRAMS[name])
+    once = few(made(name))
     again = few(once.data)
     assert again.new_lines <= once.new_lines
     assert blocks(again.data) >= 0.97 * blocks(once.data)
@@ -168,7 +170,7 @@ def test_plane_and_motion_are_put_back() -> None:
 
 
 def test_arcs_that_are_off_are_found() -> None:
-    text = PROGRAMS["fine"].encode()
+    text = made("fine").encode()
     new = few(text, "linuxcnc").data
     form = cs.choose_form("linuxcnc", "g1", machine=THREE_AXES)
     assert verify_programs(text, new, form, cs.Settings(tolerance=EPS)).verdict is Verdict.PASSED
@@ -191,7 +193,7 @@ def test_each_cut_keeps_its_feed() -> None:
 
 def test_the_fastest_is_taken_where_times_are_known() -> None:
     machine = cs.load_machine(Path(__file__).parents[2] / "samples" / "machines" / "three-axis.toml")
-    text = PROGRAMS["relief"].replace("%\nO1\n", "").replace("%\n", "").replace("F300", "F3000")
+    text = made("relief").replace("%\nO1\n", "").replace("%\n", "").replace("F300", "F3000")
     # exact stop at each vertex; blending, which is fast already: on the whole controller 67 lines with arcs took 1.79 s
     # within 4 m/s² where the 488 of the program took 1.67 s, and 403 without arcs 1.66 s
     for before, share, lines in (("G61\n", 0.6, 0.5), ("", 1.001, 0.9)):
@@ -318,7 +320,7 @@ def test_a_run_goes_on_where_the_text_is_divided() -> None:
 
 def test_long_lines_without_tip_control_are_the_fewest_lines() -> None:
     form = cs.choose_form("fanuc", "g1", machine=THREE_AXES)
-    found = cs.filter_program(PROGRAMS["relief"].encode(), form, cs.Settings(tolerance=EPS, lines="long"))
+    found = cs.filter_program(made("relief").encode(), form, cs.Settings(tolerance=EPS, lines="long"))
     assert found.verdict is Verdict.PASSED
     assert found.new_lines < 0.9 * found.lines
     assert not re.search(rb"\n(G1[78] )?G0?[23] ", found.data)

@@ -41,8 +41,13 @@ class Case:
 
 
 @cache
+def _machine(name: str) -> Machine:
+    return load_machine(name)
+
+
+@cache
 def _form(case: Case, endless: bool) -> Form:
-    machine = load_machine(case.machine) if case.machine else None
+    machine = _machine(case.machine) if case.machine else None
     if machine is not None and endless:
         machine = without_limits(machine)
     return choose_form(case.control, case.form, machine=machine, tcp=case.tcp)

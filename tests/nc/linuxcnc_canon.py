@@ -2,8 +2,9 @@
 
 Arcs, dwells and tools too, with the numbers that the interpreter gives, and offsets in units of the program.
 
-Runs under Debian's Python, which has LinuxCNC's modules: ``python3 linuxcnc_canon.py FILE``. Exit code 1 and the
-interpreter's words for an error.
+Runs under Debian's Python, which has LinuxCNC's modules. It takes names of files from standard input, a line each, and
+answers each with the exit code, where FILE.rows has the positions and FILE.errors the interpreter's words for an error.
+A copy of this process reads each, so that no program knows of another; `oracle.interpreter` asks it.
 """
 
 import os
@@ -93,9 +94,22 @@ class Canon:
         return lambda *numbers: None
 
 
-with tempfile.TemporaryDirectory() as folder:
-    path = os.path.join(folder, "parameters.var")
-    open(path, "w").close()
-    result, last = gcode.parse(sys.argv[1], Canon(path), "G21", "")
-if result > gcode.MIN_ERROR:
-    sys.exit(f"line {last}: {gcode.strerror(result)}")
+def show(name):
+    """Print the rows of a program."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "parameters.var")
+        open(path, "w").close()
+        result, last = gcode.parse(name, Canon(path), "G21", "")
+    if result > gcode.MIN_ERROR:
+        sys.exit(f"line {last}: {gcode.strerror(result)}")
+
+
+for line in sys.stdin:
+    program = line.rstrip("\n")
+    child = os.fork()
+    if not child:
+        for number, ending in ((1, ".rows"), (2, ".errors")):
+            os.dup2(os.open(program + ending, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), number)
+        show(program)
+        break
+    print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)

@@ -29,6 +29,7 @@ from nc.reading import Reading
 from nc.rotations import tool_direction
 from oracle.chains import cl_text, random_chains
 from oracle.files import OWN, of_corpus
+from oracle.interpreter import rows_of
 from oracle.judge import judge
 from oracle.motion import Path as Motion
 from oracle.motion import unit
@@ -36,8 +37,6 @@ from oracle.share import covering_share, how_many, share
 
 Floats = NDArray[np.float64]
 
-PYTHON = Path("/usr/bin/python3")
-CANON = Path(__file__).parent / "linuxcnc_canon.py"
 SAMPLES = Path(__file__).parents[2] / "samples"
 
 pytestmark = [
@@ -50,13 +49,10 @@ pytestmark = [
 
 def positions(text: str, folder: Path) -> list[tuple[str, Floats]]:
     """Kind and X Y Z A B C of every move, in full precision."""
-    file = folder / "program.ngc"
     # without the running controller its modules have no tool table; `accepted` lets the tools be loaded
-    file.write_text(re.sub(r"^(T\d+ M6|G43 H\d+( (?=G))?|M42[89]$)", "", text, flags=re.MULTILINE))
-    result = subprocess.run([PYTHON, CANON, file], capture_output=True, text=True, check=False, timeout=120)
-    assert result.returncode == 0, result.stderr
-    rows = [line.split() for line in result.stdout.splitlines() if line.startswith(("feed ", "rapid "))]
-    return [(row[0], np.array([float(number) for number in row[2:]])) for row in rows]
+    alone = re.sub(r"^(T\d+ M6|G43 H\d+( (?=G))?|M42[89]$)", "", text, flags=re.MULTILINE)
+    rows = rows_of(alone.encode(), folder)
+    return [(row[0], np.array([float(number) for number in row[2:]])) for row in rows if row[0] in ("feed", "rapid")]
 
 
 def accepted(text: str, folder: Path) -> None:
