@@ -89,7 +89,7 @@ def test_units_coolant_and_spindle_of_the_writer_are_those_of_the_table(control:
 @pytest.mark.parametrize("control", CONTROLS)
 def test_feeds_of_rising_arcs_are_read_as_they_are_written(control: str) -> None:
     forms = cs.nc.load_control(control).forms.values()
-    written = {mode.motion.feed_in_plane for form in forms for mode in form.modes.values()}
+    written = {mode.feed_in_plane for form in forms for mode in form.modes.values()}
     assert written == {read_nc(b"", control=control).feed_in_plane}
     assert written == {control in ("fanuc", "haas", "mitsubishi", "generic")}
 

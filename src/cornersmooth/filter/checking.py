@@ -224,7 +224,7 @@ def _left_otherwise(job: Job, run: Run, state: State, following: bytes) -> str:
     if not np.isclose(there, wanted, rtol=0.0, atol=room, equal_nan=True).all():
         return f"the run ends at {_told(state.place)}, not at {_told(run.end)}"
     wanted_groups = run.state.groups | {"motion": "line"}
-    if says_motion(following) or "code" not in job.form.mode.motion.modal:
+    if says_motion(following) or "code" not in job.form.mode.modal:
         del wanted_groups["motion"]
     if plane_of(state) == plane_of(run.state) != 0:
         wanted_groups.pop("plane", None)

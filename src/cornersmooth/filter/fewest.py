@@ -98,7 +98,7 @@ def _planes(job: Job, state: State, reading: Reading) -> tuple[int, ...]:
     tips = wanted == ANGLES or (wanted == ANY and state.groups["tip"] != "off" and TURNS.search(reading.data))
     if not mode.circles or not plane or tips:
         return ()
-    if mode.motion.arc_directions or mode.circles_in_xy:
+    if mode.arc_directions or mode.circles_in_xy:
         return (17,) if plane == 17 else ()
     return (17, 18, 19) if state.frames == () else (plane,)
 
@@ -118,8 +118,8 @@ def _texts(job: Job, reading: Reading, group: _Group) -> list[bytes | None]:
     decimals = _decimals(job, place)
     digits = max(decimals[0], _RADIUS_DIGITS[group.unit != 1.0])
     if group.mode is not None:
-        flat = bool(group.mode.motion.arc_directions)
-        slope = _SLOPE if group.mode.motion.feed_in_plane else math.inf
+        flat = bool(group.mode.arc_directions)
+        slope = _SLOPE if group.mode.feed_in_plane else math.inf
         step = group.unit * 10.0**-digits
         limits = PieceLimits(_USED * job.settings.tolerance, group.planes, flat, step, slope=slope)
         pieces = fewest_pieces(Polyline(group.unit * place[:, :3], fixed, begins), limits)
@@ -186,7 +186,7 @@ def _blocks(
 ) -> list[bytes]:
     """A block for each piece, without line ends."""
     spelling, mode = job.spelling, group.mode or job.form.mode
-    look = job.spelling.motion(mode.motion)
+    look = job.spelling.motion(mode)
     gap = " " if look.spaces else ""
     first = begins[pieces.start]
     leaves = spelling.modal and bool(look.modal)
@@ -266,7 +266,7 @@ def _shared_out(
     job: Job, reading: Reading, group: _Group, pieces: Pieces, own: Ints, saved: Bools, blocks: list[bytes]
 ) -> list[bytes | None]:
     """Texts of runs, with what is put back behind each."""
-    look = (group.mode or job.form.mode).motion
+    look = group.mode or job.form.mode
     ends = np.cumsum(np.bincount(own, minlength=len(group.runs)))
     texts: list[bytes | None] = []
     for k, run in enumerate(group.runs):

@@ -145,7 +145,7 @@ def _start(job: Job, run: Run, form: Form, before: str) -> bytes:
 
 
 def _block(job: Job, run: Run, place: Floats, form: Form, *, rapid: bool) -> bytes:
-    look, axes, spelling = form.mode.motion, job.reader.axes, job.spelling
+    look, axes, spelling = form.mode, job.reader.axes, job.spelling
     vector = axes[3:] == ("I", "J", "K")
     other = place[3:] / np.linalg.norm(place[3:]) if vector else place[3:]
     words = [*"XYZ", *(form.mode.words if vector else axes[3:])]

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Final
 
-from cornersmooth.nc.control import Digits, Mode, Motion
+from cornersmooth.nc.control import Digits, Mode
 from cornersmooth.nc.form import Form
 from cornersmooth.text import format_number
 
@@ -93,21 +93,18 @@ class Spelling:
         layout = replace(table.layout, block_number="", longest_block=0)
         lines = table.lines if rounding else replace(table.lines, rounding="")
         bare = replace(table, program=program, digits=digits, layout=layout, lines=lines)
-        return replace(form, table=bare, mode=self._mode(form.mode), upright=None, plane=None, extras=())
+        mode = replace(form.mode, on=(), off=(), within_on=(), within_off=(), begin=None, tool_end=None)
+        return replace(form, table=bare, mode=self.motion(mode), upright=None, plane=None, extras=())
 
     def with_digits(self, digits: Digits, *, inch: bool) -> Spelling:
         """Return the same with no fewer digits than a control has."""
         tip = max(self.tip, digits.inch if inch else digits.mm)
         return replace(self, tip=tip, other=max(self.other, digits.angle))
 
-    def _mode(self, mode: Mode) -> Mode:
-        motion = self.motion(mode.motion)
-        return replace(mode, on=(), off=(), within_on=(), within_off=(), begin=None, tool_end=None, motion=motion)
-
-    def motion(self, motion: Motion) -> Motion:
+    def motion(self, mode: Mode) -> Mode:
         """Give the words of a control as these blocks have them."""
         own = replace(
-            motion,
+            mode,
             signs=self.signs,
             spaces=self.spaces,
             leading_zeros=self.leading_zeros,
@@ -115,7 +112,7 @@ class Spelling:
             feed_point=self.feed_point,
             with_z="",
         )
-        if motion.line != "G1" or not self.line:
+        if mode.line != "G1" or not self.line:
             return own
         zero = self.line[1:-1]
         return replace(own, line=self.line, clockwise=f"G{zero}2", counterclockwise=f"G{zero}3")

@@ -107,7 +107,7 @@ def _within(machine: Machine, runs: Sequence[Run], settings: Settings) -> Machin
 
 def _split(job: Job, form: Form, text: bytes, runs: Sequence[Run]) -> Iterator[list[bytes] | None]:
     """Cut a text with a comment before each run into blocks that say on their own what holds; None as in `_write`."""
-    look, (before, behind) = form.mode.motion, form.table.layout.comment
+    look, (before, behind) = form.mode, form.table.layout.comment
     rapid, rapid_end, line_word = (word.encode() for word in (look.rapid, look.rapid_end, look.line))
     mode, rounding, feed = _MINUTE, b"", b""
     angles = dict.fromkeys(form.machine.names if form.machine is not None and form.rotary else (), math.nan)

@@ -100,10 +100,8 @@ def fit_settings(settings: Settings, form: Form, units: Units) -> Settings:
             )
         settings = settings.but(curve_share=long.curve_share, line_share=long.line_share, blend_share=long.blend_share)
     block_time = long.block_time if settings.block_time is None else settings.block_time
-    if (
-        form.orientation == "machine" and form.mode.motion.fastest
-    ):  # no block is passed sooner than inverse time can say
-        block_time = max(block_time, 60.0 / form.mode.motion.fastest)
+    if form.orientation == "machine" and form.mode.fastest:  # no block is passed sooner than inverse time can say
+        block_time = max(block_time, 60.0 / form.mode.fastest)
     return settings.with_method(curves=form.curves).but(
         lines=lines,
         block_time=block_time,
@@ -214,7 +212,7 @@ def _add_warnings(form: Form, smoothed: SmoothProgram, circles: Circles, planes:
     if not form.rotary:  # rotary words say which way to turn; feed moves that turn so far are refused before
         poses, _ = program.axis_steps(rapid, FLIP_ANGLE)
         findings.note_each("CS326", program.line[poses], angle=FLIP_ANGLE)
-    largest = form.mode.motion.largest_feed
+    largest = form.mode.largest_feed
     beyond = ~rapid & (program.feed_mode == FeedMode.PER_MINUTE) & (program.feed > (largest or np.inf))
     findings.note_each("CS388", program.line[beyond], largest=largest)
     if form.orientation == "machine":

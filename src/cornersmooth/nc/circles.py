@@ -97,7 +97,7 @@ def plan_circles(
     digits = form.table.digits
     vectors = to_ticks(digits.vector_length * program.axis, digits.vector)
     modes = (form.mode, *(form.in_plane(upright=plane.upright) for plane in planes.planes))
-    able = [(bool(mode.motion.arc_directions), mode.circles, mode.circles_in_xy) for mode in modes]
+    able = [(bool(mode.arc_directions), mode.circles, mode.circles_in_xy) for mode in modes]
     flat, circular, in_xy = np.array(able)[of + 1].T
     keeps = inside | (vectors[arcs.pose] == vectors[arcs.pose - 1]).all(axis=1)
     if rotary is not None:

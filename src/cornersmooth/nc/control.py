@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Literal
+from functools import cached_property
+from typing import Annotated, Literal, get_args
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.model import FeedMode, Units
@@ -178,14 +179,13 @@ class Digits:
 
 
 @dataclass(frozen=True)
-class Mode:
-    """One way in which a form can say the orientation."""
+class Mode(Motion):
+    """One way in which a form can say the orientation, with the motion of the control where it says nothing else."""
 
     words: tuple[str, ...] = ()  #: addresses of vector or point; rotary addresses come from the machine
     #: on, off: blocks before the motion and after it; with ``{offset}``, the length register
     on: Blocks = ()
     off: Blocks = ()
-    motion: Motion = Motion()
     circles: bool = False  #: whether arcs may be written as circular blocks, without the words of the orientation
     circles_in_xy: bool = False  #: whether only those of G17 may: the length of the tool acts across the plane
     #: whether tables that would tilt their plane must stand at zero, where tip control began
@@ -236,11 +236,20 @@ class FormTable:
     """
 
     name: str
-    modes: Mapping[Orientation, Mode]
     curve: CurveStyle = ""
     description: str = ""
+    vector: Mode | None = None
+    point: Mode | None = None
+    angles: Mode | None = None
+    machine: Mode | None = None
+    fixed: Mode | None = None
     upright: Mode | None = None
     plane: Mode | None = None
+
+    @cached_property
+    def modes(self) -> Mapping[Orientation, Mode]:
+        """The modes that say the orientation, by its name."""
+        return {name: mode for name in get_args(Orientation) if (mode := getattr(self, name)) is not None}
 
 
 @dataclass(frozen=True)

@@ -14,13 +14,12 @@ from pathlib import Path
 from typing import Any, get_args
 
 from cornersmooth.control.table import Row, table_of
-from cornersmooth.errors import SettingsError
-from cornersmooth.nc.control import STEPS, Blocks, Control, Digits, FormTable, Mode, Motion, Orientation, Words
+from cornersmooth.nc.control import STEPS, Blocks, Control, Digits, FormTable, Motion, Orientation, Words
 from cornersmooth.nc_reader import CONTROLS
-from cornersmooth.tables import Shelf, Table, check_pattern, filled, is_file
+from cornersmooth.tables import Shelf, Table, filled, is_file
 
-_FORM_KEYS = ("description", "curve", "upright", "plane", *get_args(Orientation))
-_MOTION_KEYS = tuple(item.name for item in fields(Motion))
+#: modes of a form, and how many words of the tool axis they have
+_MODES = dict.fromkeys((*get_args(Orientation), "upright", "plane"), 0) | {"vector": 3, "point": 3}
 #: what stands in braces in blocks of the program, names of steps among it
 _PROGRAM_BRACES: Table = {"program": "O1", "units": "G21", "blend": "0.001"} | dict.fromkeys(STEPS, "")
 #: what stands in braces in blocks
@@ -48,7 +47,6 @@ _CYCLE_BRACES: Table = dict.fromkeys(
     "",
 ) | {"milliseconds": 1, "speed": ""}
 _EXTRA_BRACES: Table = {"blend": "0.001", "turn": "0.01"}  #: the same in blocks of extras
-_LARGEST = 9999  #: largest number of a machine function
 #: functions that mean the same on every machine (ISO 6983-1; M17 ends a subprogram)
 _FIXED = re.compile(r"M(\d|17|19|30)")
 #: functions that move the tool, change what coordinates mean, or jump to other blocks
@@ -133,107 +131,87 @@ def parse_control(text: str | Table, *, file: str = "<control>", name: str = "co
         for system, entry in _SHELF.table(digits.pop("systems", {}), "digits.systems").items():
             where = f"digits.systems.{system}"  # with those of the table where it says nothing
             systems[system] = _SHELF.record(Digits, digits | _SHELF.table(entry, where), where)
-        motion = table.get("motion", {})
+        motion = table.pop("motion", {})
         _SHELF.record(Motion, motion, "motion")
-        rest = {key: value for key, value in table.items() if key != "motion"}
         return _SHELF.record(
             Control,
-            {"name": name, "forms": {}} | rest | {"digits": digits},
+            {"name": name, "forms": {}} | table | {"digits": digits},
             "",
             given={"like": like, "systems": systems, "own": True},
-            words=_words,
-            forms=lambda forms, where: _forms(forms, where, motion),
+            words=partial(_SHELF.record, Words, coolant=_coolant, coolant_off=_coolant),
+            forms=partial(_forms, motion=motion),
             trusted=partial(_trusted, dialect=like),
         )
 
 
-def _words(table: Any, where: str) -> Words:
-    def coolant(given: Any, place: str) -> dict[str, Blocks]:
-        blocks = _SHELF.table(given, place).items()
-        return {word.upper(): _SHELF.texts(entry, f"{place}.{word}") for word, entry in blocks}
-
-    return _SHELF.record(Words, table, where, coolant=coolant, coolant_off=coolant)
+def _coolant(given: Any, where: str) -> dict[str, Blocks]:
+    blocks = _SHELF.table(given, where).items()
+    return {word.upper(): _SHELF.texts(entry, f"{where}.{word}") for word, entry in blocks}
 
 
 def _forms(forms: Any, where: str, motion: Table) -> dict[str, FormTable]:
-    if not _SHELF.table(forms, where):
+    """Forms whose modes have the motion of the control, but for what they say themselves."""
+    found = {}
+    for name, entry in _SHELF.table(forms, where).items():
+        place, form = f"{where}.{name}", dict(_SHELF.table(entry, f"{where}.{name}"))
+        for key in form.keys() & _MODES.keys():
+            form[key] = motion | _SHELF.table(form[key], f"{place}.{key}")
+        found[name] = _SHELF.record(FormTable, form, place, given={"name": name})
+        if not found[name].modes:
+            raise _SHELF.wrong(f"{place} says no orientation", f"use one of {', '.join(get_args(Orientation))}")
+        if found[name].curve and {"angles", "machine"} & form.keys():
+            raise _SHELF.wrong(
+                f"{place} has curves in rotary words", "write lines: leave out curve, or angles and machine"
+            )
+        for key, mode in found[name].modes.items():
+            if len(mode.words) != _MODES[key]:
+                raise _SHELF.wrong(f"{place}.{key} has {len(mode.words)} words", f"give {_MODES[key]}")
+        plane = found[name].plane
+        if plane and plane.rotations and not re.fullmatch(r"(?!(.)\1)[xyz][xy][xyz]", plane.rotations):
+            what = f"{place}.plane.rotations is {plane.rotations!r}"
+            raise _SHELF.wrong(what, "give three axes, as in zxz; the second is not z")
+    if not found:
         raise _SHELF.wrong("there are no forms", "write a table [forms.g1]")
-    return {name: _form(name, entry, motion) for name, entry in forms.items()}
-
-
-def _form(name: str, entry: Any, motion: Table) -> FormTable:
-    where, orientations = f"forms.{name}", get_args(Orientation)
-    _SHELF.check_keys(_SHELF.table(entry, where), _FORM_KEYS, f"{where}.")
-    mode = partial(_mode, motion=motion)
-    modes = {key: mode(entry[key], f"{where}.{key}") for key in orientations if key in entry}
-    if entry.get("curve") and {"angles", "machine"} & modes.keys():
-        raise _SHELF.wrong(f"{where} has curves in rotary words", "write lines: leave out curve, or angles and machine")
-    for orientation, found in modes.items():
-        wanted = {"vector": 3, "point": 3}.get(orientation, 0)
-        if len(found.words) != wanted:
-            raise _SHELF.wrong(f"{where}.{orientation} has {len(found.words)} words", f"give {wanted}")
-    rest = {key: value for key, value in entry.items() if key not in orientations}
-    form = _SHELF.record(FormTable, rest, where, given={"name": name, "modes": modes}, upright=mode, plane=mode)
-    if not modes:
-        raise _SHELF.wrong(f"{where} says no orientation", f"use one of {', '.join(orientations)}")
-    return form
+    return found
 
 
 def _trusted(given: Any, where: str, dialect: str) -> frozenset[str]:
-    """All machine functions that some patterns hold which a shop's own table declares not to move the tool."""
-    found: set[str] = set()
+    """Machine functions that a shop's own table declares not to move the tool."""
     rows = table_of(dialect).listed if dialect in CONTROLS else ()
 
     def row_of(word: str) -> Row | None:
         return next((row for row in rows if row.pattern.fullmatch(word)), None)
 
-    def wrong(why: object) -> SettingsError:
-        return _SHELF.wrong(f"{where}: {why}", 'give machine functions, as in ["M208"]')
-
-    any_function = row_of(f"M{_LARGEST}")
-    for pattern in _SHELF.texts(given, where):
-        try:
-            check_pattern(pattern)
-        except ValueError as error:
-            raise wrong(error) from error
-        own = {word for number in range(_LARGEST + 1) if re.fullmatch(pattern, word := f"M{number}")}
-        if not pattern.startswith("M") or not own:
-            raise wrong(f"{pattern!r} is no machine function: other words may move the tool")
-        for word in sorted(own, key=lambda word: int(word[1:])):
-            if _MOVING.fullmatch(word) or (dialect == "heidenhain" and _PATH_FUNCTIONS.fullmatch(word)):
-                raise wrong(f"{pattern!r} holds {word}, which may move the tool")
-            if _FIXED.fullmatch(word) or row_of(word) is not any_function:
-                raise wrong(f"{pattern!r} holds {word}, which verification compares with the CL file")
-        found |= own
+    found = _SHELF.texts(given, where)
+    for word in found:
+        why = ""
+        if not re.fullmatch(r"M[1-9]\d{0,3}", word):
+            why = "is no machine function: other words may move the tool"
+        elif _MOVING.fullmatch(word) or (dialect == "heidenhain" and _PATH_FUNCTIONS.fullmatch(word)):
+            why = "may move the tool"
+        elif _FIXED.fullmatch(word) or row_of(word) is not row_of("M9999"):
+            why = "is a function that verification compares with the CL file"
+        if why:
+            raise _SHELF.wrong(f"{where}: {word!r} {why}", 'give machine functions, as in ["M208"]')
     return frozenset(found)
 
 
-def _mode(entry: Any, where: str, motion: Table) -> Mode:
-    known = (*(item.name for item in fields(Mode) if item.name != "motion"), *_MOTION_KEYS)
-    _SHELF.check_keys(_SHELF.table(entry, where), known, f"{where}.")
-    own = {key: value for key, value in entry.items() if key in _MOTION_KEYS}
-    rest = {key: value for key, value in entry.items() if key not in _MOTION_KEYS}
-    mode = _SHELF.record(Mode, rest, where, given={"motion": _SHELF.record(Motion, motion | own, where)})
-    if mode.rotations and not re.fullmatch(r"(?!(.)\1)[xyz][xy][xyz]", mode.rotations):
-        what = f"{where}.rotations is {mode.rotations!r}"
-        raise _SHELF.wrong(what, "give three axes, as in zxz; the second is not z")
-    return mode
-
-
-#: names of what verification leaves to such a table, and the fields of `Words` that say it
-_STATED: dict[tuple[str, ...], tuple[str, ...]] = {
-    ("tool", "next tool"): ("tool_change", "tool_select"),
-    ("spindle", "speed"): ("spindle_speed", "clockwise", "counterclockwise", "spindle_off", "spindle_orient"),
-    ("coolant",): ("coolant",),
-    ("dwell",): ("dwell",),
-    ("stop",): ("stop", "optional_stop"),
-    ("compensation", "register"): ("compensation_left", "compensation_right", "compensation_off"),
+FRAME = "program frame"  #: name of the frame of the program in what is left to a table
+#: names of what verification leaves to a table that says it in its own way, and the blocks that say it, as `_blocks`
+#: names them
+_STATED: dict[tuple[str, ...], str] = {
+    ("tool", "next tool"): r"words\.tool_(change|select)",
+    ("spindle", "speed"): r"words\.(spindle_\w+|clockwise|counterclockwise)",
+    ("coolant",): r"words\.coolant",
+    ("dwell",): r"words\.dwell",
+    ("stop",): r"words\.(optional_)?stop",
+    ("compensation", "register"): r"words\.compensation_(left|right|off)",
+    ("offset",): r"modes\..*\.on",
+    ("end",): r"program\.end",
+    (FRAME,): r"program\..*|modes\..*\.(off|within_on|within_off|begin)",
 }
 #: those of which only new blocks are the table's own: stops for a tool are named by the words of the tool
-_TOOLS = (("tool", "next tool"), ("stop",))
-#: blocks around the motion
-_FRAME = ("start", "begin", "tool_end", "between_tools", "end", "retract", "work_offset_block")
-FRAME = "program frame"  #: name of the frame of the program in what is left to a table
+_NEW_ALONE = (("tool", "next tool"), ("stop",), ("end",), (FRAME,))
 
 
 def own_words(table: Control) -> tuple[str, ...]:
@@ -245,47 +223,38 @@ def own_words(table: Control) -> tuple[str, ...]:
     """
     if not table.own:
         return ()
-    base = load_control(table.dialect)
-    known, names = set(_blocks(base)), list[str]()
-    blocks = [block for block in _blocks(table) if block not in known and not re.fullmatch(r"\{\w+\}", block)]
-    for kinds, words in _STATED.items():
-        if any(getattr(table.words, name) != getattr(base.words, name) for name in words):
+    own, base = _blocks(table), _blocks(load_control(table.dialect))
+    known, names = {block for some in base.values() for block in some}, list[str]()
+    blocks = [block for some in own.values() for block in some if block not in known]
+    for kinds, pattern in _STATED.items():
+        both = [key for key in own if key in base and re.fullmatch(pattern, key)]
+        if any(own[key] != base[key] for key in both):
             names += kinds
-            blocks += [block for name in words if kinds not in _TOOLS for block in _of_field(table, name)]
-    modes = [  # of the forms that both tables have
-        (form.modes[turn], base.forms[name].modes[turn])
-        for name, form in sorted(table.forms.items())
-        if name in base.forms
-        for turn in sorted(form.modes.keys() & base.forms[name].modes.keys())
-    ]
-    if any(own.on != other.on for own, other in modes):
-        names.append("offset")
-        blocks += [block for own, _ in modes for block in own.on]
-    if table.program.end != base.program.end:
-        names.append("end")
-    framed = any(getattr(table.program, name) != getattr(base.program, name) for name in _FRAME)
-    around = ("off", "within_on", "within_off", "begin")
-    framed |= any(getattr(own, name) != getattr(other, name) for own, other in modes for name in around)
-    return (*dict.fromkeys(blocks), *dict.fromkeys(names), *((FRAME,) if framed else ()))
+            blocks += [block for key in both if kinds not in _NEW_ALONE for block in own[key]]
+    return (*dict.fromkeys(block for block in blocks if not re.fullmatch(r"\{\w+\}", block)), *dict.fromkeys(names))
 
 
-def _blocks(table: Control) -> Iterator[str]:
-    """All blocks of a table; the direction of the spindle and the units put in."""
-    for block in _texts([getattr(table.program, name) for name in _FRAME]):
-        yield from (block.replace("{units}", units) for units in table.layout.units.values())
-    for item in fields(table.words):
-        yield from _of_field(table, item.name)
+def _blocks(table: Control) -> dict[str, Blocks]:
+    """Blocks of a table by their place; the direction of the spindle and the units put in."""
+    words, found = table.words, dict[str, list[str]]()
+    for name in ("start", "begin", "tool_end", "between_tools", "end", "retract", "work_offset_block"):
+        found[f"program.{name}"] = list(getattr(table.program, name))
+    for item in fields(words):
+        found[f"words.{item.name}"] = list(_texts(getattr(words, item.name)))
     for form in table.forms.values():
-        for mode in filter(None, (*form.modes.values(), form.upright, form.plane)):
-            yield from _texts([mode.on, mode.off, mode.within_on, mode.within_off, mode.begin, mode.tool_end])
-    yield from _texts([(extra.on, extra.off) for extra in table.extras.values()])
-
-
-def _of_field(table: Control, name: str) -> Iterator[str]:
-    """Blocks of a field of `Words`."""
-    words = table.words
-    for block in _texts(getattr(words, name)):
-        yield from (block.replace("{direction}", turn) for turn in (words.clockwise, words.counterclockwise))
+        for turn, mode in {**form.modes, "upright": form.upright, "plane": form.plane}.items():
+            for name in ("on", "off", "within_on", "within_off", "begin", "tool_end") if mode else ():
+                blocks = getattr(mode, name)  # None is what the program says
+                kind = "modes" if turn in form.modes else "others"
+                found[f"{kind}.{form.name}.{turn}.{name}"] = [f"{{{name}}}"] if blocks is None else list(blocks)
+    found["extras"] = [block for extra in table.extras.values() for block in (*extra.on, *extra.off)]
+    put = {"{direction}": (words.clockwise, words.counterclockwise), "{units}": tuple(table.layout.units.values())}
+    for brace, values in put.items():
+        found = {
+            key: [block.replace(brace, value) for block in some for value in (values if brace in block else values[:1])]
+            for key, some in found.items()
+        }
+    return {key: tuple(some) for key, some in found.items()}
 
 
 def _texts(value: object) -> Iterator[str]:

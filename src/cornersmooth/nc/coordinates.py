@@ -35,7 +35,7 @@ class Coordinates:
     @property
     def motion(self) -> Motion:
         """How motion blocks look."""
-        return self.form.mode.motion
+        return self.form.mode
 
     @property
     def gap(self) -> str:

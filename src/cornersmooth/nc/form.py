@@ -200,7 +200,7 @@ def choose_form(
         raise SettingsError("CS232", what, "leave out --planes")
     orientation, mode = _mode(table, chosen, machine, tcp)
     chosen_extras = tuple(_extra(table, name, extra) for extra in dict.fromkeys(extras))
-    if machine is not None and machine.modulo and not mode.motion.shortest:
+    if machine is not None and machine.modulo and not mode.shortest:
         what = f"{table.name} has no words by which {' and '.join(machine.modulo)} goes the shorter way"
         raise SettingsError("CS215", what, "leave out modulo in the machine file")
     plane = _plane(table, chosen, machine) if planes else None

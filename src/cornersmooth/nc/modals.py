@@ -84,7 +84,7 @@ class Modals:
             case "tip", True:
                 on = [block.format(offset=self.offset, **self.tilt) for block in self.mode.on]
                 within = self.set(functions=True)
-                if self.mode.on[-1:] == (self.mode.motion.with_z,) and not within:  # functions within want it before
+                if self.mode.on[-1:] == (self.mode.with_z,) and not within:  # functions within want it before
                     self.waiting = on.pop()
                 return [*self._extras("on", outside=True), *on, *within]
             case "tip", False:
@@ -271,7 +271,7 @@ class Modals:
 
         Rotary axes are let turn, and clamped again.
         """
-        table, motion, words = self.form.table, self.form.mode.motion, []
+        table, motion, words = self.form.table, self.form.mode, []
         position = {name: value for name, value in self._position(key).items() if (name == "Z") is z}
         for name, value in position.items():
             unit = MM_PER_UNIT[self.units] if name in LINEAR else 1.0

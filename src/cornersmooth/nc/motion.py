@@ -313,7 +313,7 @@ class Motion:
     def _note_turns(self, rows: BlockRows) -> None:
         """Say that an endless axis gets words that some machines of the control refuse."""
         form = self.at.form
-        if "CS346" in self._noted or form.mode.motion.endless_words or form.machine is None:
+        if "CS346" in self._noted or form.mode.endless_words or form.machine is None:
             return
         axes = form.machine.axes[: len(form.machine.names)]
         endless = [k for k, axis in enumerate(axes) if axis.limits is None and not axis.modulo]

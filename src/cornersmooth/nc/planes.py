@@ -126,7 +126,7 @@ def _plane(axis: Floats, settings: Settings, form: Form) -> tuple[Plane | None, 
     assert form.plane is not None
     digits = form.table.digits.angle
     if form.plane.rotations:
-        plus = form.plane.motion.signs
+        plus = form.plane.signs
         angle_words = [format_number(angle, digits, plus=plus) for angle in tilting_angles(form.plane.rotations, axis)]
         frame = rotations_frame(form.plane.rotations, [float(number) for number in angle_words])
         plane = Plane(frame, dict(zip(("first", "second", "third"), angle_words, strict=True)))

@@ -28,7 +28,7 @@ def with_planned_feeds(
     stands still; what the block takes, more than nothing, over which those under inverse time (G93) get one; and the
     programmed feed, mm/min, which holds where the plan says none.
     """
-    motion, digits = form.mode.motion, form.table.digits
+    motion, digits = form.mode, form.table.digits
     scale = 10.0**digits.feed
     unit = (motion.inch_feed if program.units == "inch" else 1) / program.mm_per_unit
     given = np.rint(programmed * unit * scale)

@@ -156,7 +156,7 @@ class _Chunk:
 
     def in_time(self, filled: FilledPath, own: slice, findings: Findings) -> tuple[FilledPath, Floats | None]:
         """The path without rows that are too short to be timed by us, and moves per minute; those of `own` count."""
-        rate, fastest = self._rates(filled), self.form.mode.motion.fastest or math.inf
+        rate, fastest = self._rates(filled), self.form.mode.fastest or math.inf
         if rate is None:
             return filled, None
         if self.form.orientation == "machine" and (rate > fastest).any():
