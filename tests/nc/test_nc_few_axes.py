@@ -163,7 +163,7 @@ def test_a_method_that_turns_the_tool_elsewhere_is_refused() -> None:
     lines = [f"GOTO/{12 * (k % 3)},{k},0,0,{-np.sin(a):.7f},{np.cos(a):.7f}" for k, a in enumerate(turn.tolist())]
     program, form, stream = program_of(lines), choose_form("fanuc", machine=FOUR["table A"]), io.BytesIO()
     fitted = fit_settings(Settings(tolerance=EPS, method="zhang2016"), form, "mm")
-    with pytest.raises(InputError, match=r"turns the tool out of what A of machine reaches.*\n.*--method proportional"):
+    with pytest.raises(InputError, match=r"beyond the reach of A of machine\n.*--method proportional"):
         write(smooth(program, fitted), stream, form=form)
     assert verify(program, text_of(program, form), tolerance=EPS, machine=FOUR["table A"]).problems == ()
 

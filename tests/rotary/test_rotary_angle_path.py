@@ -14,7 +14,7 @@ from cornersmooth.errors import InputError
 from cornersmooth.kinematics import Machine, load_machine, machine_names, poses, tool_axis
 from cornersmooth.kinematics.poses import angle_between
 from cornersmooth.model import Move
-from cornersmooth.rotary import angle_path, axis_findings, fill, insertions, rapid_moves, rotary_angles, still_poses
+from cornersmooth.rotary import angle_path, fill, insertions, rapid_moves, rotary_angles, still_poses
 from cornersmooth.rotary.angle_path import RotaryPath
 from oracle.messages import one_line
 from oracle.share import covering_share
@@ -309,7 +309,8 @@ def test_unreachable_axis():
         )
     assert one_line(caught.value) == (
         "part.cls:8: error: tool axis (0.984808, 0.000000, -0.173648) is 10.000 deg beyond the reach of C and B of "
-        "nutated-bc; turn the part or use a machine that reaches it"
+        "nutated-bc; turn the part or use a machine that reaches it; --method proportional turns the tool no farther "
+        "than poses"
     )
 
 
@@ -365,7 +366,7 @@ def test_blocks_change_nothing(size: int, seed: int, monkeypatch: pytest.MonkeyP
     rapid = rng.random(n) < 0.03
     machine = limited("table-ac", (-720, 720), (-100, 100)) if seed % 2 else load_machine("table-ac")
     whole = rotary_angles(machine, tip, axis, tolerance=TOLERANCE, rapid=rapid, line=np.arange(n))
-    for module in (angle_path, axis_findings, poses):
+    for module in (angle_path, poses):
         monkeypatch.setattr(module, "CHUNK", size)
     parts = rotary_angles(machine, tip, axis, tolerance=TOLERANCE, rapid=rapid, line=np.arange(n))
     np.testing.assert_array_equal(parts.angles, whole.angles)

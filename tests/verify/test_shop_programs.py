@@ -20,7 +20,7 @@ def test_random_programs_for_these_machines(seed: int) -> None:
     one = shop_trial(seed)
     word, why, _ = outcome(one)
     assert word in ("passed", "refused"), f"{one}: {why}"
-    assert word == "passed" or "the method turns the tool" in why or "or give --rewind" in why, why
+    assert word == "passed" or "--method proportional turns the tool" in why or "or give --rewind" in why, why
 
 
 def test_blocks_are_not_merged_past_a_corner_of_two_parameters() -> None:

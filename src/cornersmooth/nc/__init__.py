@@ -24,6 +24,7 @@ from cornersmooth.nc.control_tables import (
 )
 from cornersmooth.nc.coordinates import Coordinates
 from cornersmooth.nc.form import Form, check_program, choose_form
+from cornersmooth.nc.hole_cycles import plan_drilling
 from cornersmooth.nc.holes import Holes
 from cornersmooth.nc.messages import Findings
 from cornersmooth.nc.modals import Modals
@@ -175,9 +176,9 @@ def write(
     frame.refuse_tool(chosen, program)
     modals = Modals(chosen, values, frame.texts(chosen, values), findings, program.units)
     modals.now["blend"] = usual_blend = round(float(values["blend"]) / BLEND_STEP) if chosen.table.lines.rounding else 0
-    comments, skip, native = frame.comments, frame.skip_cycles, frame.cycles == "native"
-    statements = StatementWriter(chosen, program, findings, modals, comments=comments, skip_cycles=skip)
-    planes = plan_planes(program, smoothed.settings, chosen, findings, drills=native)
+    drillings, native = plan_drilling(program, findings), frame.cycles == "native"
+    statements = StatementWriter(chosen, program, findings, modals, comments=frame.comments)
+    planes = plan_planes(program, smoothed.settings, chosen, findings, drillings, drills=native)
     check_travel_of_words(planes, program, chosen, findings)
     of_rows = Findings()  # rows are made as they are written: their findings come last
     rows, circles = _rows(smoothed, chosen, planes, of_rows)
@@ -187,7 +188,9 @@ def write(
     blocks = Blocks(program, circles, modals, findings, usual_blend=usual_blend)
     approach = max(frame.approach, POINT_APPROACH) if chosen.orientation == "point" else frame.approach
     motion = Motion(program, tilting, modals, blocks, findings, approach, frame.retract)
-    script = Script(statements, motion, Holes(motion, statements, native), planes)
+    script = Script(
+        statements, motion, Holes(motion, statements, drillings, skip=frame.skip_cycles, native=native), planes
+    )
     text = frame.start(stream, chosen)
     motion.say(modals.start())
     for some in rows:

@@ -242,10 +242,11 @@ def _blocks(table: Control) -> dict[str, Blocks]:
     for item in fields(words):
         found[f"words.{item.name}"] = list(_texts(getattr(words, item.name)))
     for form in table.forms.values():
-        for turn, mode in {**form.modes, "upright": form.upright, "plane": form.plane}.items():
+        for turn in _MODES:
+            mode = getattr(form, turn)
             for name in ("on", "off", "within_on", "within_off", "begin", "tool_end") if mode else ():
                 blocks = getattr(mode, name)  # None is what the program says
-                kind = "modes" if turn in form.modes else "others"
+                kind = "others" if turn in ("upright", "plane") else "modes"
                 found[f"{kind}.{form.name}.{turn}.{name}"] = [f"{{{name}}}"] if blocks is None else list(blocks)
     found["extras"] = [block for extra in table.extras.values() for block in (*extra.on, *extra.off)]
     put = {"{direction}": (words.clockwise, words.counterclockwise), "{units}": tuple(table.layout.units.values())}

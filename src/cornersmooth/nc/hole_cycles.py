@@ -26,8 +26,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import pairwise
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -35,7 +34,8 @@ import numpy as np
 from cornersmooth.kinematics import machine_position, tool_axis
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program
 from cornersmooth.nc.form import Form
-from cornersmooth.nc.statement_args import milliseconds, tool_starts, words_of
+from cornersmooth.nc.messages import Findings
+from cornersmooth.nc.statement_args import cutter_diameter, ends, milliseconds, spindle_order, tool_starts, words_of
 
 _MOST_PECKS = 1000  #: more pecks in one hole are a misunderstanding
 _KINDS = {"DRILL", "FACE", "SPOT", "CSINK", "REAM", "BORE", "DEEP", "DEEP2", "BRKCHP", "TAP"}
@@ -190,11 +190,61 @@ def _pairs(args: Sequence[float | str]) -> Given | None:
     return kinds, values
 
 
+@dataclass(frozen=True)
+class Drilling:
+    """What the CL file says of holes from some statement on."""
+
+    cycle: Cycle | None = None  #: None where no cycle is in force, or it is not understood
+    line: int = 0  #: of the last CYCLE statement, 0 for none
+    clockwise: bool = False  #: whether the spindle has been started clockwise, as for a tap
+
+
+@dataclass(frozen=True)
+class Drillings:
+    """What holds for the holes of a program."""
+
+    first: tuple[int, ...]  #: pose from which on each holds, ascending
+    each: tuple[Drilling, ...]
+
+    def at(self, poses: Ints) -> tuple[list[Drilling], Ints]:
+        """What holds at poses (k,), each once, and the first of these for each."""
+        number, first = np.unique(np.searchsorted(self.first, poses, side="right") - 1, return_index=True)
+        return [self.each[one] for one in number.tolist()], poses[first]
+
+
+def plan_drilling(program: Program, findings: Findings) -> Drillings:
+    """Go through the statements about cycles, and about the spindle, whose turns a dwell may count."""
+    given: Given | None = (set(), {})
+    drills, now, speed, diameter = False, Drilling(), None, 0.0
+    first, each = [0], [now]
+    for statement in program.statements:
+        if statement.word in ("CUTTER", "TLDATA"):
+            diameter = cutter_diameter(statement, program)
+        elif statement.word == "SPINDL":
+            order = spindle_order(statement, diameter) or ("", None)
+            speed, now = order[1] or speed, replace(now, clockwise=order[0] in ("CLW", "ON"))
+        elif statement.word == "CYCLE" and ends(statement):
+            drills = False
+        elif statement.word == "CYCLE":
+            now, drills = replace(now, line=statement.line), drills or words_of(statement) != ["INIT"]
+            given = in_force(given, statement.args, program)
+            if has_fixed_order(statement.args, program):
+                findings.note("CS385", statement.line)
+        else:
+            continue
+        now = replace(now, cycle=read_cycle(given, program, speed) if drills else None)
+        if statement.word == "CYCLE" and now.cycle is not None and now.cycle.pecking and not now.cycle.steps:
+            findings.note("CS321", statement.line)
+        first.append(statement.pose)
+        each.append(now)
+    return Drillings(tuple(first), tuple(each))
+
+
 _SIDES: Final = (["LEFT"], ["RIGHT"])  #: sides of the path on which cutter compensation keeps the tool
 _ALONG_Z, _SAME_PLACE = 1e-9, 1e-9  #: by how much a tool axis along Z may be off, and a position at angles of zero, mm
 
 
-def upright_poses(program: Program, form: Form, *, drills: bool) -> Bools:
+def upright_poses(program: Program, form: Form, drillings: Drillings, *, drills: bool) -> Bools:
     """(n,) whether a pose belongs to a tool that runs without tool tip control, for cycles or cutter compensation.
 
     In curves all tools do that can: without words of the tool axis arcs are circles, and curves those of every control.
@@ -220,27 +270,19 @@ def upright_poses(program: Program, form: Form, *, drills: bool) -> Bools:
         here = slice(first, stop)
         if not tilted[here].any():
             offset = any(first <= pose < stop for pose in compensated)
-            chosen[here] = form.curves or offset or has_cycles(program, form, here, drills=drills)
+            chosen[here] = form.curves or offset or has_cycles(program, form, here, drillings, drills=drills)
     return chosen
 
 
-def has_cycles(program: Program, form: Form, part: slice, *, drills: bool) -> bool:
+def has_cycles(program: Program, form: Form, part: slice, drillings: Drillings, *, drills: bool) -> bool:
     """Whether any hole of a part of the poses can be a cycle of the control; `drills` as in `upright_poses`."""
-    given: Given | None = (set(), {})
-    stated, clockwise = list[tuple[int, Given | None, bool]](), False  # a tap turns the spindle clockwise
-    for statement in program.statements if (program.kind[part] == Move.HOLE).any() else ():
-        if statement.word == "SPINDL":
-            clockwise = not {"OFF", "NOMORE", "CCLW", "LOCK", "ORIENT"} & set(words_of(statement))
-        elif statement.word == "CYCLE" and words_of(statement)[:1] not in (["OFF"], ["NOMORE"]):
-            given = in_force(given, statement.args, program)
-            stated.append((statement.pose, given, clockwise))
-    for (first, given, clockwise), (until, _, _) in pairwise([*stated, (len(program), None, False)]):
-        poses = np.arange(max(first, part.start), min(until, part.stop))
-        poses = poses[program.kind[poses] == Move.HOLE]
-        cycle = read_cycle(given, program, None) if len(poses) else None
-        if cycle is not None and (clockwise if cycle.tap else drills) and kind_of(cycle, form, program, poses[:1]):
-            return True
-    return False
+    poses = part.start + np.flatnonzero(program.kind[part] == Move.HOLE)
+    return any(
+        one.cycle is not None
+        and (one.clockwise if one.cycle.tap else drills)
+        and kind_of(one.cycle, form, program, pose[None])
+        for one, pose in zip(*drillings.at(poses), strict=True)
+    )
 
 
 def _can_stand_upright(form: Form) -> bool:

@@ -11,20 +11,20 @@ Python runs per run of holes; per hole where the control has a cycle for it, or 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
 from itertools import accumulate, chain, pairwise, repeat, takewhile
 
 import numpy as np
 
+from cornersmooth.arrays import some_rows
 from cornersmooth.arrays.vectors import dot
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program
 from cornersmooth.nc.blocks import feed_digits, feed_ticks
 from cornersmooth.nc.circles import FIRST_PLANE
 from cornersmooth.nc.control import Blocks
 from cornersmooth.nc.coordinates import BlockRows, Coordinates
-from cornersmooth.nc.hole_cycles import Cycle, hole_feeds, kind_of
+from cornersmooth.nc.hole_cycles import Cycle, Drillings, hole_feeds, kind_of
 from cornersmooth.nc.messages import refused
 from cornersmooth.nc.motion import NOWHERE, Motion
 from cornersmooth.nc.statement_writer import StatementWriter
@@ -41,7 +41,10 @@ class Holes:
     """Writes the holes of a program."""
 
     motion: Motion  #: what the moves over holes and into them are written by
-    statements: StatementWriter  #: the cycle in force, and the spindle
+    statements: StatementWriter  #: writes dwells and comments, and knows how the spindle turns
+    drillings: Drillings
+    _: KW_ONLY
+    skip: bool = False  #: whether holes that cannot be written are left out with a warning
     native: bool = False  #: whether holes are cycles of the control, where they can be
     _left: tuple[int, Floats] = (-1, np.zeros(3))  #: the last hole, and the place (3,) above it where it was left, mm
 
@@ -53,32 +56,42 @@ class Holes:
 
     def write(self, rows: Rows) -> None:
         """Write holes of one cycle, of the control or as plain moves; those left out are only approached."""
-        motion, poses, cycle = self.motion, rows.move, self.statements.cycle
+        motion, poses = self.motion, rows.move
         program, motion.return_to = motion.program, NOWHERE
-        heights = travel_height(program, poses, self._approached[poses])
+        said = self.drillings.at(poses[:1])[0][0]
+        travel, cycle = travel_height(program, poses, self._approached[poses]), said.cycle
         kind, why = self._cycle_of_control(cycle, poses)
         if cycle is None or (cycle.tap and not kind):
-            if not self.statements.skip_cycles:
-                raise refused("CS342", program, self.statements.cycle_line or int(program.line[poses[0]]), why=why)
+            if not self.skip:
+                raise refused("CS342", program, said.line or int(program.line[poses[0]]), why=why)
             motion.findings.note_each("CS315", program.line[poses], why=why)
-            self._over_holes(rows, *self._crossings(poses, heights))
-            return
-        travel = np.maximum(heights, max(cycle.retract, cycle.clearance or 0.0))
-        clearance = travel if cycle.clearance is None else np.full(len(poses), cycle.clearance)
-        if kind:
+            cycle = None
+        else:
+            travel = np.maximum(travel, max(cycle.retract, cycle.clearance or 0.0))
+        clearance = np.full(len(poses), cycle.clearance) if cycle and cycle.clearance is not None else travel
+        if cycle is not None and kind:
             self._cycles(cycle, kind, poses, travel, clearance)
             return
-        motion.findings.note_each("CS316", program.line[poses])
-        motion.note_holes(poses, -1 if motion.modals.comes_first else int(poses[0]) - 1, travel, clearance)
+        if cycle is not None:
+            motion.findings.note_each("CS316", program.line[poses])
+            motion.note_holes(poses, -1 if motion.modals.comes_first else int(poses[0]) - 1, travel, clearance)
         enter, leave = self._crossings(poses, travel)
         hole, tip, rapid, dwell = hole_moves(cycle, program, poses, (enter, clearance, leave))
-        feed, mode = hole_feeds(cycle, program, poses[hole])
         plain = BlockRows.straight(program, motion.ticks_at(rows, tip, hole), poses[hole])
-        plain = motion.moving(replace(plain, rapid=rapid, dwell=dwell, feed=feed, mode=mode))
+        plain = replace(plain, rapid=rapid, dwell=dwell)
+        if cycle is None:
+            for k, place in enumerate((program.tip[poses] / program.mm_per_unit).tolist()):
+                words = (
+                    f"{name}{format_number(x, motion.at.decimals[0])}" for name, x in zip("XYZ", place, strict=True)
+                )
+                motion.say(self.statements.warning_comment(f"NOT DRILLED: HOLE AT {' '.join(words)}"))
+                motion.emit_above(motion.moving(some_rows(plain, hole == k)))
+            return
+        feed, mode = hole_feeds(cycle, program, poses[hole])
+        plain = motion.moving(replace(plain, feed=feed, mode=mode))
         per_turn = bool((plain.mode[~plain.rapid][-1:] == FeedMode.PER_REVOLUTION).all())
         waits = plain.dwell is not None and plain.dwell.any()
-        line = self.statements.cycle_line
-        motion.emit_above(plain, self.statements.dwell(cycle.dwell, line, per_turn=per_turn) if waits else ())
+        motion.emit_above(plain, self.statements.dwell(cycle.dwell, said.line, per_turn=per_turn) if waits else ())
 
     def _crossings(self, poses: Ints, travel: Floats) -> tuple[Floats, Floats]:
         """Go up over the hole before, if there is one, where these are higher; heights as of `crossings`."""
@@ -124,73 +137,40 @@ class Holes:
         if kind == "tap":
             motion.findings.note_each("CS348", lines)
         motion.note_cut(int(poses[0]), turning=motion.modals.turning)
-        mode = int(hole_feeds(cycle, program, poses[:1])[1][0])
         motion.say(motion.modals.set(plane=FIRST_PLANE))  # a cycle drills across the plane
-        made = cycle_blocks(cycle, kind, motion.at, program, poses, (travel, clearance), motion.modals.speed or 0.0)
-        for k, (before, goes, blocks, over) in enumerate(made):
-            if goes:
-                motion.say(before)
-                way = np.stack((over if motion.position is None else motion.position, over, over))
+        at, speed, (feeds, modes) = motion.at, motion.modals.speed or 0.0, hole_feeds(cycle, program, poses)
+        table, frame, digits = (
+            at.form.table.cycles,
+            np.eye(3) if at.plane is None else at.plane.frame,
+            at.form.table.digits,
+        )
+        each: Blocks = getattr(table, kind)
+        once = next(
+            (k for k, block in enumerate(each) if "{x}" in block), 0
+        )  # those before are written where they change
+        over = at.ticks(program.tip[poses] + travel[:, None] * frame[:, 2], program.axis[poses])
+        words = [feed_digits(ticks, at) for ticks in feed_ticks(feeds, modes, program, at).tolist()]
+        turns = np.where((modes == FeedMode.PER_REVOLUTION) | (speed == 0.0), 1.0, speed)
+        written: Blocks = ()
+        for k, pose in enumerate(poses.tolist()):
+            if k == 0 or over[k, 2] != over[k - 1, 2]:
+                motion.say(table.off if written else ())
+                written, way = (), np.stack((over[k] if motion.position is None else motion.position, over[k], over[k]))
                 way[:2, 2] = way[:2, 2].max()
-                way = way if k or not np.isnan(came) else over[None]
+                way = way if k or not np.isnan(came) else over[k][None]
                 motion.emit(motion.moving(BlockRows.straight(program, way, poses[[k] * len(way)], rapid=True)))
                 motion.say(motion.modals.go_on())
-                motion.say(motion.modals.set(feed_mode=mode))
-            motion.say(blocks)
-            motion.stand(over)
-        motion.say(motion.at.form.table.cycles.off)
+                motion.say(motion.modals.set(feed_mode=int(modes[0])))
+            pitch = format_number(feeds[k] / program.mm_per_unit / turns[k], max(at.decimals[0], digits.most))
+            values = {"feed": words[k], "pitch": pitch}
+            values |= {"speed": format_number(speed, digits.speed, trim=True).rstrip(".")}
+            values |= _numbers(cycle, at, program, program.tip[pose] @ frame, (travel[k], clearance[k]))
+            blocks = tuple(block.format(**values) for block in each)
+            motion.say(blocks[once:] if written and written == blocks[:once] else blocks)
+            written = blocks[:once] or blocks
+            motion.stand(over[k])
+        motion.say(table.off)
         motion.modals.now["feed"] = -1
-
-    def _over_holes(self, rows: Rows, enter: Floats, leave: Floats) -> None:
-        """Go over holes that are left out, and say so."""
-        motion, program, poses = self.motion, self.motion.program, rows.move
-        own = np.repeat(np.arange(len(poses)), 2)
-        height = np.column_stack((enter, leave)).reshape(-1, 1)
-        ticks = motion.ticks_at(rows, program.tip[poses[own]] + height * program.axis[poses[own]], own)
-        for k, tip in enumerate((program.tip[poses] / program.mm_per_unit).tolist()):
-            place = " ".join(
-                f"{name}{format_number(x, motion.at.decimals[0])}" for name, x in zip("XYZ", tip, strict=True)
-            )
-            motion.say(self.statements.warning_comment(f"NOT DRILLED: HOLE AT {place}"))
-            one = BlockRows.straight(program, ticks[2 * k : 2 * k + 2], poses[[k, k]], rapid=True)
-            motion.emit_above(motion.moving(one))
-
-
-def cycle_blocks(
-    cycle: Cycle,
-    kind: str,
-    at: Coordinates,
-    program: Program,
-    poses: Ints,
-    heights: tuple[Floats, Floats],
-    speed: float,
-) -> Iterator[tuple[Blocks, bool, Blocks, Ints]]:
-    """Holes as a cycle of the control, from travel and clearance (h,) mm above each.
-
-    For each hole: blocks before, whether the tool goes over it then, blocks of the hole, and the row of ticks over it.
-    Blocks before those of each place, and the way over it, are written where they change.
-    """
-    table, frame = at.form.table.cycles, np.eye(3) if at.plane is None else at.plane.frame
-    once = next((k for k, block in enumerate(getattr(table, kind)) if "{x}" in block), 0)
-    over = at.ticks(program.tip[poses] + heights[0][:, None] * frame[:, 2], program.axis[poses])
-    feeds, modes = hole_feeds(cycle, program, poses)
-    words = [feed_digits(ticks, at) for ticks in feed_ticks(feeds, modes, program, at).tolist()]
-    once_written: Blocks = ()
-    for k, pose in enumerate(poses.tolist()):
-        goes = k == 0 or bool(over[k, 2] != over[k - 1, 2])
-        before, once_written = (table.off if once_written else (), ()) if goes else ((), once_written)
-        turns = 1.0 if modes[k] == FeedMode.PER_REVOLUTION or not speed else speed
-        values = _numbers(cycle, at, program, program.tip[pose] @ frame, (heights[0][k], heights[1][k]))
-        values |= {
-            "feed": words[k],
-            "pitch": format_number(
-                feeds[k] / program.mm_per_unit / turns, max(at.decimals[0], at.form.table.digits.most)
-            ),
-            "speed": format_number(speed, at.form.table.digits.speed, trim=True).rstrip("."),
-        }
-        blocks = tuple(block.format(**values) for block in getattr(table, kind))
-        yield before, goes, blocks[once:] if once_written and once_written == blocks[:once] else blocks, over[k]
-        once_written = blocks[:once] or blocks
 
 
 def _numbers(
@@ -215,27 +195,29 @@ def _numbers(
 
 
 def hole_moves(
-    cycle: Cycle, program: Program, poses: Ints, above: tuple[Floats, Floats, Floats]
+    cycle: Cycle | None, program: Program, poses: Ints, above: tuple[Floats, Floats, Floats]
 ) -> tuple[Ints, Floats, Bools, Bools]:
-    """Plain moves for holes of one cycle, m of them: the hole of each, its end (m, 3) mm, rapids, dwells after it.
+    """Plain moves for holes, or over them without a cycle: the hole of each, its end (m, 3) mm, rapids, dwells after it.
 
     Heights (h,) above the holes, mm: to which the tool comes, where feeding begins, and from which it goes.
     """
     enter, clearance, leave = above
-    moves = [(enter, True), (clearance, True)]  # heights, and whether in rapid
-    pecks = accumulate(chain(cycle.steps, repeat(cycle.steps[-1]))) if cycle.steps else ()
-    depths = (*takewhile(lambda depth: depth < cycle.depth - LEAST_PECK, pecks), cycle.depth)
-    for before, depth in pairwise((0.0, *depths)):
-        if before > 0.0:
-            moves += [(clearance, True)] * cycle.full_retract + [(np.minimum(clearance, PECK_GAP - before), True)]
-        moves.append((np.full(len(poses), -depth), False))
-    dwell = (np.arange(len(moves) + 1 + cycle.feed_out) == len(moves) - 1) & (cycle.dwell > 0)
-    moves += [(clearance, False)] * cycle.feed_out + [(leave, True)]
-    height = np.stack([height for height, _ in moves], axis=1)
+    moves = [(enter, True, False)]  # heights, whether in rapid, whether the tool waits there
+    if cycle is not None:
+        moves.append((clearance, True, False))
+        pecks = accumulate(chain(cycle.steps, repeat(cycle.steps[-1]))) if cycle.steps else ()
+        depths = (*takewhile(lambda depth: depth < cycle.depth - LEAST_PECK, pecks), cycle.depth)
+        for before, depth in pairwise((0.0, *depths)):
+            if before > 0.0:
+                moves += [(clearance, True, False)] * cycle.full_retract
+                moves.append((np.minimum(clearance, PECK_GAP - before), True, False))
+            moves.append((np.full(len(poses), -depth), False, depth == cycle.depth and cycle.dwell > 0))
+        moves += [(clearance, False, False)] * cycle.feed_out
+    moves.append((leave, True, False))
+    height = np.stack([height for height, _, _ in moves], axis=1)
     tip = program.tip[poses][:, None, :] + height[..., None] * program.axis[poses][:, None, :]
-    count = len(poses)
-    hole = np.repeat(np.arange(count), len(moves))
-    return hole, tip.reshape(-1, 3), np.tile([rapid for _, rapid in moves], count), np.tile(dwell, count)
+    rapid, waits = (np.tile([move[k] for move in moves], len(poses)) for k in (1, 2))
+    return np.repeat(np.arange(len(poses)), len(moves)), tip.reshape(-1, 3), rapid, waits
 
 
 def crossings(program: Program, poses: Ints, travel: Floats, came: float) -> tuple[Floats, Floats]:

@@ -141,10 +141,6 @@ REFUSALS: Final[dict[str, tuple[str, str]]] = {
         "the tool change of the control table has {{speed}}, and the CL file gives tool {tool} none",
         "add SPINDL, or --spindle",
     ),
-    "CS361": (
-        "the method turns the tool out of what {axis} of {machine} reaches, within the tolerance",
-        "use --method proportional, which does not",
-    ),
     "CS377": (
         "a rotary axis would have to turn back in a cut with cutter compensation",
         "let the CAM system put the cutter's radius into the path",

@@ -24,7 +24,7 @@ from cornersmooth.geometry.arcs import poses_and_arcs
 from cornersmooth.kinematics import Machine, machine_position, solutions, tool_axis
 from cornersmooth.model import Floats, Ints, Keep, Move, Numbers, Program
 from cornersmooth.nc.form import Form
-from cornersmooth.nc.hole_cycles import has_cycles, upright_poses
+from cornersmooth.nc.hole_cycles import Drillings, has_cycles, upright_poses
 from cornersmooth.nc.messages import Findings
 from cornersmooth.nc.statement_args import check_tool_travel, tool_starts
 from cornersmooth.settings import Settings
@@ -64,7 +64,9 @@ class Planes:
         return frames[self.of[poses]]
 
 
-def plan_planes(program: Program, settings: Settings, form: Form, findings: Findings, *, drills: bool) -> Planes:
+def plan_planes(
+    program: Program, settings: Settings, form: Form, findings: Findings, drillings: Drillings, *, drills: bool
+) -> Planes:
     """Choose the runs of poses that are written in planes.
 
     A run has one axis, cuts, and lies between rapids or changes of the tool: there it can go up and be turned. Where a
@@ -72,14 +74,14 @@ def plan_planes(program: Program, settings: Settings, form: Form, findings: Find
     but for holes that are cycles of the control, which tool tip control does not take: they stand in a plane that is
     not tilted. Tools of `upright_poses`, where `drills` is explained, have a plane of their own.
     """
-    upright = upright_poses(program, form, drills=drills)
+    upright = upright_poses(program, form, drillings, drills=drills)
     of = np.where(upright, np.int32(0), np.int32(-1))
     zero = np.zeros(2) if form.rotary else None
     found = [Plane(np.eye(3), angles=zero, upright=True)] if upright.any() else []
     planes: dict[tuple[str, ...], int] = {}
     for first, stop in _runs(program) if form.plane is not None else []:
         along_z = bool(norm(program.axis[first] - _UNIT["z"]) <= _SAME)
-        if upright[first] or (along_z and not has_cycles(program, form, slice(first, stop), drills=drills)):
+        if upright[first] or (along_z and not has_cycles(program, form, slice(first, stop), drillings, drills=drills)):
             continue
         line = int(program.line[first])
         plane, why = _plane(program.axis[first], settings, form)

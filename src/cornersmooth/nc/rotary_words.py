@@ -22,13 +22,12 @@ from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.geometry.ragged import starts
 from cornersmooth.kinematics import Machine, check_travel, solutions, tool_axis
 from cornersmooth.kinematics.poses import angle_between, nose_position
-from cornersmooth.model import Bools, Floats, Ints, Move, Program, Runs, SmoothProgram
+from cornersmooth.model import Bools, Floats, Ints, Program, Runs, SmoothProgram
 from cornersmooth.nc.form import Form
-from cornersmooth.nc.messages import Findings, refused
+from cornersmooth.nc.messages import Findings
 from cornersmooth.nc.planes import turned_part
 from cornersmooth.nc.statement_args import tool_starts
 from cornersmooth.rotary import rapid_moves, rewound_angles, rotary_angles, still_poses
-from cornersmooth.rotary.axis_findings import reach_error
 from cornersmooth.smoothing.sampling import Rows, all_dense_rows
 from cornersmooth.system.processes import return_free_memory
 
@@ -60,7 +59,6 @@ def rotary_way(rows: Rows, smoothed: SmoothProgram, form: Form, findings: Findin
     tip, axis, move = rows.tip, rows.other, rows.move
     tolerance = form.rotary_tolerance(settings.tolerance, settings.axis_scale)
     rapid, file = rapid_moves(program.kind)[move], program.source.name
-    _check_reach(machine, program, axis, move, tolerance)
     how: dict[str, Any] = {"tolerance": tolerance, "rapid": rapid, "line": program.line[move], "file": file}
     how |= {"still": still_poses(program.kind)[move], "still_tolerance": form.angle_rounding}
     left = np.zeros(len(move), np.bool_)
@@ -85,22 +83,6 @@ def machine_of(form: Form) -> Machine:
     if form.machine is None:
         raise SettingsError("CS215", f"{form.control} form {form.name} needs a machine", "name it with --machine")
     return form.machine
-
-
-def _check_reach(machine: Machine, program: Program, axis: Floats, move: Ints, tolerance: float) -> None:
-    """Refuse the first pose that an axis is missing for, or a method that turns the tool to where one is."""
-    if len(machine.names) > 1:
-        return
-    file = program.source.name
-    beyond = np.where(program.kind == Move.FROM, 0.0, solutions(machine, program.axis).beyond)
-    poses = np.flatnonzero(beyond > tolerance)
-    if len(poses):
-        pose = int(poses[0])
-        raise reach_error(machine, program.axis[pose], float(beyond[pose]), int(program.line[pose]), file)
-    rows = np.flatnonzero(solutions(machine, axis).beyond > tolerance)
-    if len(rows):
-        line = int(program.line[move[rows[0]]])
-        raise refused("CS361", program, line, axis=machine.names[0], machine=machine.name)
 
 
 def within_reach(smoothed: SmoothProgram, form: Form) -> SmoothProgram:

@@ -27,6 +27,11 @@ def words_of(statement: Statement) -> list[str]:
     return [value for value in statement.args if isinstance(value, str) and value]
 
 
+def ends(statement: Statement) -> bool:
+    """Whether a statement ends what others of its word have begun."""
+    return words_of(statement)[:1] in (["OFF"], ["NOMORE"])
+
+
 def number_after(statement: Statement, word: str) -> list[float]:
     """Return the number that stands after a word, if any."""
     args = statement.args
@@ -83,13 +88,31 @@ def spindle_args(statement: Statement) -> tuple[list[str], list[float]]:
     return words, numbers
 
 
-def spindle_speed(statement: Statement, diameter: float) -> float | None:
-    """Revolutions per minute of SPINDL, or what gives its cutting speed at a diameter, mm; None for neither."""
+def spindle_order(statement: Statement, diameter: float) -> tuple[str, float | None] | None:
+    """What SPINDL asks for: ORIENT, OFF, CLW, CCLW or ON, and the speed, rev/min; None where it is not understood.
+
+    A cutting speed counts at a diameter, mm.
+    """
     words, numbers = spindle_args(statement)
-    unit = cutting_unit(words)
-    if len(numbers) != 1 or not numbers[0] > 0.0 or (unit and not diameter > 0.0):
+    known = {"RPM", "CLW", "CCLW", "ON", "OFF", "SFM", "SMM", "LOCK", "ORIENT", "NOMORE"}.issuperset(words)
+    if not known or len(numbers) > 1 or any(number < 0.0 for number in numbers):
         return None
-    return float(round(numbers[0] * _MM_PER_MINUTE[unit] / (math.pi * diameter))) if unit else numbers[0]
+    if "LOCK" in words or "ORIENT" in words:
+        return ("ORIENT", None) if numbers in ([], [0.0]) else None
+    if "OFF" in words or "NOMORE" in words or numbers == [0.0]:
+        return "OFF", None
+    unit = cutting_unit(words)
+    if numbers and unit and not diameter > 0.0:
+        return None
+    speeds = [float(round(value * _MM_PER_MINUTE[unit] / (math.pi * diameter))) if unit else value for value in numbers]
+    return next((word for word in ("CCLW", "CLW") if word in words), "ON"), next(iter(speeds), None)
+
+
+def cutter_diameter(statement: Statement, program: Program) -> float:
+    """Diameter of CUTTER/d,r,e,... or TLDATA/MILL,d,..., mm; 0 for none."""
+    numbers = numbers_of(statement)
+    mill = statement.word == "CUTTER" or {"MILL", "DRILL"} & set(words_of(statement))
+    return numbers[0] * program.mm_per_unit if mill and numbers else 0.0
 
 
 def cutting_unit(words: list[str]) -> str:

@@ -15,7 +15,6 @@ from cornersmooth.model import FeedMode, Move, Program, Statement
 from cornersmooth.nc.circles import FIRST_PLANE
 from cornersmooth.nc.control import Blocks, Words
 from cornersmooth.nc.form import Form
-from cornersmooth.nc.hole_cycles import Cycle, Given, has_fixed_order, in_force, read_cycle
 from cornersmooth.nc.messages import Findings, refused
 from cornersmooth.nc.modals import Modals
 from cornersmooth.nc.program_frame import comment_lines
@@ -23,11 +22,12 @@ from cornersmooth.nc.statement_args import (
     GEARS,
     TOOL_WORDS,
     ahead_of_tools,
+    cutter_diameter,
     cutting_unit,
+    ends,
     milliseconds,
     numbers_of,
-    spindle_args,
-    spindle_speed,
+    spindle_order,
     spoken_text,
     tool_loads,
     whole_number,
@@ -53,14 +53,9 @@ class StatementWriter:
     findings: Findings  #: takes what is noticed
     modals: Modals  #: what the control remembers
     comments: bool = True  #: whether comments are written
-    skip_cycles: bool = False  #: whether hole cycles that cannot be written are left out with a warning
     changed: bool = False  #: a tool change, or the way home, left the machine elsewhere
     direction: str = "clockwise"  #: field of the words for the way in which the spindle turns, as it was named last
     _diameter: float = 0.0
-    cycle: Cycle | None = None  #: the cycle for the holes that follow, None where it is not understood
-    cycle_line: int = 0  #: of the last CYCLE statement, 0 for none
-    _given: Given | None = field(default_factory=lambda: (set(), {}))
-    _drilling: bool = False
     words: Words = field(init=False)
     _loads: dict[int, tuple[int, int]] = field(init=False)  #: tool and length register of statements, by identity
     _ahead_of_tools: frozenset[int] = field(init=False)
@@ -139,9 +134,9 @@ class StatementWriter:
         diameter = self._diameter
         for statement in between:
             if statement.word in ("CUTTER", "TLDATA"):
-                diameter = self._diameter_of(statement)
-            elif statement.word == "SPINDL" and (speed := spindle_speed(statement, diameter)):
-                return speed
+                diameter = cutter_diameter(statement, self.program)
+            elif statement.word == "SPINDL" and (order := spindle_order(statement, diameter)) and order[1]:
+                return order[1]
         return None
 
     def _speed_text(self, speed: float) -> str:
@@ -166,44 +161,27 @@ class StatementWriter:
 
     def cutter(self, statement: Statement) -> list[str]:
         """CUTTER/d,r,e,... and TLDATA/MILL,d,...: the diameter is kept."""
-        self._diameter = self._diameter_of(statement)
+        self._diameter = cutter_diameter(statement, self.program)
         return self.comment(statement.text)
-
-    def _diameter_of(self, statement: Statement) -> float:
-        """Diameter of CUTTER or TLDATA, mm; 0 for none."""
-        numbers = numbers_of(statement)
-        mill = statement.word == "CUTTER" or {"MILL", "DRILL"} & set(words_of(statement))
-        return numbers[0] * self.program.mm_per_unit if mill and numbers else 0.0
 
     def spindle(self, statement: Statement) -> list[str] | None:
         """SPINDL in every order of its words."""
-        words, numbers = spindle_args(statement)
-        if not set(words) <= {"RPM", "CLW", "CCLW", "ON", "OFF", "SFM", "SMM", "LOCK", "ORIENT", "NOMORE"}:
+        order = spindle_order(statement, self._diameter)
+        if order is None or (order[0] == "ORIENT" and not self.words.spindle_orient):
             return None
-        if "LOCK" in words or "ORIENT" in words:
-            if numbers not in ([], [0.0]) or not self.words.spindle_orient:
-                return None
+        turn, speed = order
+        if turn in ("ORIENT", "OFF"):
             self.modals.switch("spindle", ())
-            return list(self.words.spindle_orient)
-        if "OFF" in words or "NOMORE" in words or numbers == [0.0]:
-            self.modals.switch("spindle", ())
-            return list(self.words.spindle_off) or None
-        if len(numbers) > 1 or any(number < 0.0 for number in numbers):
-            return None
-        speed = spindle_speed(statement, self._diameter)
-        if numbers and speed is None:
-            return None
-        if numbers and (cutting := cutting_unit(words)):
-            self.findings.note("CS322", statement.line, unit=cutting)
-        if "CLW" in words or "CCLW" in words:
-            self.direction = "counterclockwise" if "CCLW" in words else "clockwise"
+            return list(self.words.spindle_orient if turn == "ORIENT" else self.words.spindle_off) or None
+        if speed is not None and (unit := cutting_unit(words_of(statement))):
+            self.findings.note("CS322", statement.line, unit=unit)
+        self.direction = {"CLW": "clockwise", "CCLW": "counterclockwise"}.get(turn, self.direction)
         direction = getattr(self.words, self.direction)
         if speed is None and self.modals.speed is None:
             self.findings.note("CS335", statement.line)
             self.modals.switch("spindle", (direction,))
             return [direction]
         self.modals.speed = self.modals.speed if speed is None else speed
-        self._read_cycle()
         digits = self._speed_text(self.modals.speed or 0.0)
         turning = tuple(block.format(speed=digits, direction=direction) for block in self.words.spindle_speed)
         if not self.modals["spindle"] and id(statement) in self._ahead_of_tools:
@@ -262,7 +240,7 @@ class StatementWriter:
 
     def compensation(self, statement: Statement) -> list[str] | None:
         """CUTCOM/LEFT|RIGHT[,plane][,n] and CUTCOM/OFF; CS336 for a control that is given none."""
-        if words_of(statement)[:1] in (["OFF"], ["NOMORE"]):
+        if ends(statement):
             return (self.modals.set(compensation=()) or list(self.words.compensation_off)) or None
         names, numbers, words = words_of(statement), numbers_of(statement), self.words
         if not words.compensation_left and names[:1] in (["LEFT"], ["RIGHT"]):
@@ -284,25 +262,6 @@ class StatementWriter:
         change = self.modals.set(plane=_PLANES[names[1]] if len(names) > 1 else FIRST_PLANE)
         begun = self.modals.now["compensation"] = tuple(block.format(register=register) for block in side)
         return [*change, *begun]
-
-    def hole_cycle(self, statement: Statement) -> list[str]:
-        """CYCLE: kept for the holes that follow."""
-        words = words_of(statement)
-        if words[:1] in (["OFF"], ["NOMORE"]):
-            self.cycle, self._drilling = None, False
-            return []
-        self.cycle_line, self._drilling = statement.line, self._drilling or words != ["INIT"]
-        self._given = in_force(self._given, statement.args, self.program)
-        self._read_cycle()
-        if has_fixed_order(statement.args, self.program):
-            self.findings.note("CS385", statement.line)
-        if self.cycle is not None and self.cycle.pecking and not self.cycle.steps:
-            self.findings.note("CS321", statement.line)
-        return self.comment(statement.text)
-
-    def _read_cycle(self) -> None:
-        """Read the last cycle at the speed of the spindle: a dwell may count in revolutions."""
-        self.cycle = read_cycle(self._given, self.program, self.modals.speed) if self._drilling else None
 
     def end(self, statement: Statement) -> list[str]:
         """END: the end of the text; in the middle of the path a stop."""
@@ -355,7 +314,7 @@ _HANDLERS: dict[str, Handler] = {
     "COOLNT": StatementWriter.coolant,
     "DELAY": StatementWriter.delay,
     "CUTCOM": StatementWriter.compensation,
-    "CYCLE": StatementWriter.hole_cycle,
+    "CYCLE": lambda writer, statement: [] if ends(statement) else writer.comment(statement.text),  # see `Drillings`
     "STOP": lambda writer, statement: writer.halt(writer.words.stop),
     "OPSTOP": lambda writer, statement: writer.halt(writer.words.optional_stop),
     "GOHOME": StatementWriter.go_home,

@@ -10,25 +10,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cornersmooth.arrays import joined_rows
+from cornersmooth.arrays.vectors import norm
 from cornersmooth.errors import Finding, InputError
 from cornersmooth.kinematics.machine import Machine
 from cornersmooth.kinematics.poses import (
     angle_between,
     closest_second,
     passes_pole,
+    pole_distance,
     solutions,
     tool_axis,
 )
 from cornersmooth.model import Bools, Floats, Ints, Move
-from cornersmooth.rotary.axis_findings import limit_error, pole_finding, reach_error, rewind_finding, swap_finding
 from cornersmooth.rotary.branch_choice import (
     LIMIT_SLACK,
+    NO_TURN,
     PREFERENCE_COST,
     CutTooFarError,
     NoChoiceError,
     Stretches,
     WideSteps,
     choose,
+    limit_error,
     meet_at_pole,
     parts_of_cut,
     too_far,
@@ -36,6 +39,8 @@ from cornersmooth.rotary.branch_choice import (
 )
 
 CHUNK = 1 << 15  #: Poses worked on at a time, so that memory is needed for their angles and little else.
+#: A cut counts as near the pole where the first rotary axis turns by so many times what the tool axis turns by.
+NEAR_POLE = 20.0
 #: Rounds of dividing cuts, after which limits are an error; a round divides all cuts that are too far by themselves.
 REWIND_ROUNDS = 100
 
@@ -298,3 +303,65 @@ def _fill_cone(
 def _chunks(n: int) -> Iterator[slice]:
     """Rows 0 to n - 1, some at a time."""
     return (slice(begin, min(begin + CHUNK, n)) for begin in range(0, n, CHUNK))
+
+
+def reach_error(machine: Machine, axis: Floats, beyond: float, line: int, file: str | None) -> InputError:
+    """Say that no rotary angles give this axis."""
+    vector = ", ".join(f"{number:.6f}" for number in axis)
+    return InputError(
+        "CS361",
+        f"tool axis ({vector}) is {beyond:.3f} deg beyond the reach of {' and '.join(machine.names)} of {machine.name}",
+        "turn the part or use a machine that reaches it; --method proportional turns the tool no farther than poses",
+        file=file,
+        line=line or None,
+    )
+
+
+def pole_finding(
+    machine: Machine, tip: Floats, axis: Floats, angles: Floats, rapid: Bools, line: Ints
+) -> tuple[Finding, ...]:
+    """Cuts near the pole, where the first rotary axis turns fast: where, how close, how fast."""
+    if len(machine.names) < 2:
+        return ()
+    found = [np.zeros(0, np.int64)]
+    for begin in range(0, len(axis) - 1, CHUNK):
+        here = slice(begin, begin + CHUNK + 1)
+        turn, tilt = np.abs(np.diff(angles[here, 0])), norm(np.diff(axis[here], axis=0))
+        fast = (turn > NO_TURN) & (turn > NEAR_POLE * np.degrees(tilt)) & ~rapid[here][1:]
+        found.append(begin + np.flatnonzero(fast))
+    edges = np.concatenate(found)
+    if not len(edges):
+        return ()
+    turns = np.abs(angles[edges + 1, 0] - angles[edges, 0])
+    lengths = norm(tip[edges + 1] - tip[edges])
+    rates = np.where(lengths > 0, turns / np.where(lengths > 0, lengths, 1.0), np.inf)
+    worst = int(np.argmax(rates))
+    closest = float(min(pole_distance(machine, axis[edges]).min(), pole_distance(machine, axis[edges + 1]).min()))
+    name = machine.names[0]
+    speed = f"{rates[worst]:.4g} deg/mm" if np.isfinite(rates[worst]) else "with the tip standing still"
+    text = (
+        f"the tool axis comes within {closest:.3g} deg of the pole of {name}, which turns fast there: "
+        f"{turns[worst]:.4g} deg in one move, {speed}"
+    )
+    passages = 1 + int(np.count_nonzero(np.diff(edges) > 1))
+    return (Finding("CS363", "warning", int(line[edges[worst] + 1]), text, passages),)
+
+
+def rewind_finding(machine: Machine, angles: Floats, rapid: Bools, line: Ints) -> tuple[Finding, ...]:
+    """Rapids in which an axis turns back by whole turns to stay inside its limits."""
+    rapids = np.flatnonzero(rapid[1:])
+    step, findings = np.abs(angles[rapids + 1] - angles[rapids]), list[Finding]()
+    for axis, name in enumerate(machine.names):
+        moves = np.flatnonzero(step[:, axis] > 180 + NO_TURN)
+        if len(moves):
+            text = f"{name} turns back by {step[moves[0], axis]:.4g} deg in a rapid, to stay inside its limits"
+            findings.append(Finding("CS364", "warning", int(line[rapids[moves[0]] + 1]), text, len(moves)))
+    return tuple(findings)
+
+
+def swap_finding(machine: Machine, swaps: Ints, line: Ints) -> tuple[Finding, ...]:
+    """Rapids in which the rotary axes go over to their other solution."""
+    if not len(swaps):
+        return ()
+    text = f"{' and '.join(machine.names)} go over to their other solution in a rapid: keep clear of the part there"
+    return (Finding("CS365", "note", int(line[swaps[0]]), text, len(swaps)),)

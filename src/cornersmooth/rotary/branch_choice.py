@@ -11,11 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cornersmooth.errors import InputError
 from cornersmooth.kinematics.machine import Machine
 from cornersmooth.kinematics.poses import pole_angle, solutions, wrap
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.rotary.subdivision import ruled_axis
 
+NO_TURN = 1e-6  #: Turns of a rotary axis below this (degrees) are rounding.
 #: What a full turn back of an axis in a rapid costs, in degrees of rotation: so much that rotation never outweighs it.
 REWIND_COST = 1e9
 #: What a start on the solution that is not preferred costs, in degrees of rotation: more than any start turn.
@@ -289,3 +290,39 @@ def unwrap(machine: Machine, axis: Floats, start: Ints, end: Ints, angles: Float
         angles[1:] += 360 * turns
     way = angles[wide] + np.cumsum(steps, axis=0)
     return WideSteps(wide, way.min(axis=0), way.max(axis=0))
+
+
+def ruled_axis(start: Floats, end: Floats, share: Floats) -> Floats:
+    """Unit axes (..., 3) at shares of ways on which both ends run evenly; the first axis where they cancel out."""
+    direction = start * (1 - share) + end * share
+    length = np.linalg.norm(direction, axis=-1, keepdims=True)
+    return np.where(length > 0, direction / np.where(length > 0, length, 1.0), start)
+
+
+def limit_error(
+    machine: Machine, both: Floats, words: Floats | None, line: int, file: str | None, since: int = 0
+) -> InputError:
+    """Say that a rotary word leaves its limits: with either solution alone, or because the cut began on the other one.
+
+    `both` (2, 2) are the solutions of the pose, `words` (2,) those at which the furthest choice leaves the limits; the
+    cut starts at the line `since`, 0 where unknown.
+    """
+    limits = machine.limits
+    turned = both + 360 * np.round((limits.clip(-1e6, 1e6).mean(axis=1) - both) / 360)
+    excess = np.maximum(np.maximum(limits[:, 0] - turned, turned - limits[:, 1]), 0.0)
+    alone = bool((excess.max(axis=1) > NO_TURN).all())
+    shown = turned[int(np.argmin(excess.max(axis=1)))] if alone or words is None else words
+    over = np.maximum(limits[:, 0] - shown, shown - limits[:, 1])
+    axis = int(np.argmax(over))
+    name = machine.names[axis]
+    limit = limits[axis, 0] if shown[axis] < limits[axis, 0] else limits[axis, 1]
+    text = f"{name} would have to go to {shown[axis]:.3f} deg, its limit is {limit:g} deg"
+    if alone or words is None:
+        hint = "turn the part or use a machine with more travel"
+    else:
+        text += f", in a cut from line {since} on" if since else ", in one cut"
+        hint = (
+            "interrupt the cut with a retract in rapid before, so that the axis can turn back, or give --rewind, "
+            "for a control that has a retract"
+        )
+    return InputError("CS362", text, hint, file=file, line=line or None)

@@ -31,7 +31,7 @@ from cornersmooth.kinematics.poses import (
     wrap,
 )
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.rotary.axis_findings import limit_error
+from cornersmooth.rotary.branch_choice import limit_error, ruled_axis
 
 ROUNDS = 28  #: Rounds of division.
 PARTS = 64  #: The most parts that an interval is divided into at once.
@@ -303,13 +303,6 @@ def axis_bend(machine: Machine, turn: Floats, start: Floats, end: Floats, slack:
     away = np.minimum(np.maximum(_sine(machine, start), _sine(machine, end)) + slack + turn[:, 1] / 2, 1.0)
     bound: Floats = away * turn[:, 0] ** 2 + 2 * turn[:, 0] * turn[:, 1] + turn[:, 1] ** 2
     return bound
-
-
-def ruled_axis(start: Floats, end: Floats, share: Floats) -> Floats:
-    """Unit axes (..., 3) at shares of ways on which both ends run evenly; the first axis where they cancel out."""
-    direction = start * (1 - share) + end * share
-    length = np.linalg.norm(direction, axis=-1, keepdims=True)
-    return np.where(length > 0, direction / np.where(length > 0, length, 1.0), start)
 
 
 def ruled_bend(start: Floats, end: Floats) -> Floats:
