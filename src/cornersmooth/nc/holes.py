@@ -197,7 +197,7 @@ def _numbers(
 def hole_moves(
     cycle: Cycle | None, program: Program, poses: Ints, above: tuple[Floats, Floats, Floats]
 ) -> tuple[Ints, Floats, Bools, Bools]:
-    """Plain moves for holes, or over them without a cycle: the hole of each, its end (m, 3) mm, rapids, dwells after it.
+    """Plain moves for holes, or over them without a cycle: hole of each, its end (m, 3) mm, rapids, dwells after it.
 
     Heights (h,) above the holes, mm: to which the tool comes, where feeding begins, and from which it goes.
     """
