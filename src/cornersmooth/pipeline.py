@@ -320,7 +320,7 @@ def _with_planned_feeds(text: bytes, program: Program, settings: Settings, form:
     """The text with the feeds of its own plan."""
     from cornersmooth.feedrate import block_feeds, plan_text
     from cornersmooth.kinematics import with_dynamics
-    from cornersmooth.nc.planned_feeds import with_planned_feeds
+    from cornersmooth.nc.program_frame import with_planned_feeds
 
     written = read_back(text, form, settings, program.source.name)
     machine = with_dynamics(form.machine)

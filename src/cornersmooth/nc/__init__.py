@@ -11,7 +11,7 @@ from cornersmooth.errors import Finding, SettingsError
 from cornersmooth.methods import CURVES_METHOD, DEFAULT_METHOD
 from cornersmooth.model import FeedMode, Move, SmoothProgram, Units
 from cornersmooth.nc.blocks import Blocks
-from cornersmooth.nc.circles import Circles, plan_circles, with_arcs
+from cornersmooth.nc.circles import Circles, plan_circles
 from cornersmooth.nc.control import Control
 from cornersmooth.nc.control_tables import (
     control_aliases,
@@ -25,14 +25,13 @@ from cornersmooth.nc.control_tables import (
 from cornersmooth.nc.coordinates import Coordinates
 from cornersmooth.nc.form import Form, check_program, choose_form
 from cornersmooth.nc.hole_cycles import plan_drilling
-from cornersmooth.nc.holes import Holes
 from cornersmooth.nc.messages import Findings
 from cornersmooth.nc.modals import Modals
 from cornersmooth.nc.motion import Motion
 from cornersmooth.nc.planes import Planes, check_travel_of_words, plan_planes
 from cornersmooth.nc.program_frame import BLEND_STEP, POINT_APPROACH, Frame, Stream
 from cornersmooth.nc.rotary_words import rotary_way, within_reach
-from cornersmooth.nc.script import Script
+from cornersmooth.nc.script import Holes, Script
 from cornersmooth.nc.statement_writer import StatementWriter
 from cornersmooth.rotary import rapid_moves
 from cornersmooth.settings import FLIP_ANGLE, Settings
@@ -211,6 +210,7 @@ def _add_warnings(form: Form, smoothed: SmoothProgram, circles: Circles, planes:
     findings.note_each("CS313", lines[(circles.blocks > 0) & ~circles.curved])
     findings.note_each("CS313b", lines[circles.curved])
     findings.note_each("CS314", lines[circles.blocks == 0])
+    findings.note_each("CS317", np.array([one.line for one in program.statements if one.word == "PAINT"], np.int64))
     rapid = rapid_moves(program.kind)
     if not form.rotary:  # rotary words say which way to turn; feed moves that turn so far are refused before
         poses, _ = program.axis_steps(rapid, FLIP_ANGLE)
@@ -267,4 +267,4 @@ def _rows(smoothed: SmoothProgram, form: Form, planes: Planes, findings: Finding
         rows = long_rows(coarse_rows(smoothed, circles), smoothed, form)
     else:
         rows = dense_rows(smoothed, circles)
-    return with_arcs(rows, program, circles), circles
+    return rows, circles

@@ -9,8 +9,7 @@ Where words of a second point would have to move with the tip, arcs are curves. 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,7 +19,7 @@ from cornersmooth.model import Bools, FeedMode, Floats, Ints, Keep, Program
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.planes import Planes, turned_part
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing.sampling import ArcBlocks, Rows
+from cornersmooth.smoothing.sampling import ArcBlocks
 from cornersmooth.text import to_ticks
 
 #: largest turn of one circular block: in R form a control cannot tell which way to go near 180 degrees
@@ -57,6 +56,15 @@ class Circles(ArcBlocks):
     plane: Ints  #: (k,) 17, 18 or 19
     clockwise: Bools  #: (k,) G2 rather than G3, seen from the positive end of the axis that stands on the plane
     radius: Ints  #: (k,) in steps of the last written digit
+    pose: Ints  #: (k,) that each leads to, ascending
+
+    def of(self, move: Ints) -> Ints | None:
+        """(r,) circle that rows of moves are on, -1 for none; None where the program has none."""
+        circular = np.flatnonzero((self.blocks > 0) & ~self.curved)
+        if not len(circular):
+            return None
+        found = circular[np.minimum(np.searchsorted(self.pose[circular], move), len(circular) - 1)]
+        return np.where(self.pose[found] == move, found, -1)
 
 
 @dataclass(frozen=True)
@@ -121,7 +129,7 @@ def plan_circles(
         curves = _curves(program, settings, np.flatnonzero(keeps & per_minute & ~offset & (blocks == 0)), weight)
         curved = curves > 0
         blocks += curves
-    return Circles(blocks, curved, weight, plane + FIRST_PLANE, height < 0.0, ticks)
+    return Circles(blocks, curved, weight, plane + FIRST_PLANE, height < 0.0, ticks, arcs.pose)
 
 
 def _may_turn(form: Form, angles: Floats, plane: Ints) -> Bools:
@@ -152,18 +160,6 @@ def _curves(program: Program, settings: Settings, rows: Ints, decimals: int | No
         found[deviation > chord] *= 2
     found[(deviation > chord) | (4 * found >= arc_lines(program, settings))] = 0
     return found
-
-
-def with_arcs(rows: Iterator[Rows], program: Program, circles: Circles) -> Iterator[Rows]:
-    """Rows with `Rows.arc`: all rows of a pose that an arc leads to are on it."""
-    circular = (circles.blocks > 0) & ~circles.curved
-    if not circular.any():
-        yield from rows
-        return
-    own = np.full(len(program), -1, np.int64)
-    own[program.arcs.pose] = np.where(circular, np.arange(len(circular)), -1)
-    for part in rows:
-        yield replace(part, arc=own[part.move])
 
 
 def _deviation(

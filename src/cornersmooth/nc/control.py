@@ -20,6 +20,7 @@ Orientation = Literal["vector", "point", "angles", "machine", "fixed"]
 LINE_ENDS: Mapping[str, bytes] = {"lf": b"\n", "crlf": b"\r\n"}  #: what lines may end with
 CurveStyle = Literal["", "g6.2", "bspline", "poly", "spl"]  #: how curves are written; empty for lines
 INVERSE_TIME = 2  #: feed modes of the words: those of `model.FeedMode`, and inverse time
+INVERSE_TIME_DECIMALS = 3  #: decimals of F of inverse time: FANUC takes 0.001 to 9999.999
 _FEED_MODES = {
     "per_minute": int(FeedMode.PER_MINUTE),
     "per_revolution": int(FeedMode.PER_REVOLUTION),

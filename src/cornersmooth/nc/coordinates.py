@@ -207,7 +207,7 @@ class BlockRows:
     feed: Floats  #: (r,) mm/min, mm/rev or 1/min, NaN where there is none
     mode: Ints  #: (r,) `FeedMode` or `INVERSE_TIME`
     curve: NDArray[np.int8]  #: (r,) as in `Rows`
-    arc: Ints | None = None  #: (r,) as in `Rows`
+    arc: Ints | None = None  #: (r,) circle that the tool gets here on, -1 for none; None where there is none
     dwell: Bools | None = None  #: (r,) where the tool waits after the block
     #: (r, 4, c) Bézier points of the knot intervals of curves, in units of the text, for polynomials
     bezier: Floats | None = None

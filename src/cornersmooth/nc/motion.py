@@ -78,7 +78,7 @@ class Motion:
 
     def lines(self, rows: Rows) -> None:
         """Write rows of one kind."""
-        move, arc, program, at = rows.move, rows.arc, self.program, self.at
+        move, arc, program, at = rows.move, self.blocks.circles.of(rows.move), self.program, self.at
         first, kind, start = int(move[0]), program.kind, None
         ticks = at.ticks(rows.tip, rows.other)
         self._go_back(first, rows.other[:1])

@@ -16,6 +16,7 @@ from cornersmooth.kinematics.machine import LINEAR
 from cornersmooth.methods import METHODS
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program, SmoothProgram
 from cornersmooth.nc.circles import ArcAngles
+from cornersmooth.nc.control import INVERSE_TIME_DECIMALS
 from cornersmooth.nc.form import TIP_SHARE, Form
 from cornersmooth.nc.messages import Findings
 from cornersmooth.nc.rotary_words import RotaryWay, machine_of
@@ -36,7 +37,6 @@ LARGEST_TURN = 60.0
 _SHORTEST_TIMES = 1.5  #: shortest times of a block that short ones are merged to
 #: part of the tolerance, and turn of an axis in degrees, that such a block may have
 _MERGED_SHARE, _MERGED_TURN = 0.8, 5.0
-INVERSE_TIME_DECIMALS = 3  #: decimals of F of inverse time: FANUC takes 0.001 to 9999.999
 #: parts of a long step at whose ends lines may end, and how long it is beside the longer one of its
 #: neighbours, and beside what the axis turns at the axis point
 _STATIONS, _LONG_STEP = 2, 0.1
@@ -159,7 +159,9 @@ class _Chunk:
         rate, fastest = self._rates(filled), self.form.mode.fastest or math.inf
         if rate is None:
             return filled, None
-        if self.form.orientation == "machine" and (rate > fastest).any():
+        # rows of two parameters are not compared with the motion at their own
+        one_parameter = METHODS[self.smoothed.settings.method].one_parameter
+        if self.form.orientation == "machine" and one_parameter and (rate > fastest).any():
             before, filled = len(filled.pose), self._merged(filled, rate, fastest)
             findings.note_each("CS372", np.zeros(before - len(filled.pose), np.int64))
             rate = self._rates(filled)
@@ -183,8 +185,6 @@ class _Chunk:
         # the way between two rows bends, too: what turns little bends little
         tip, axis_point = _MERGED_SHARE * limits.tip, _MERGED_SHARE * limits.axis_point
         limits = replace(limits, tip=tip, axis_point=axis_point, turn=min(limits.turn, _MERGED_TURN))
-        if not METHODS[self.smoothed.settings.method].one_parameter:
-            fixed = fixed | _beside_far_corners(found, self.at_pose[filled.pose] & ~filled.inserted, limits)
         kept = fewest_lines(replace(found, fixed=fixed | ends | ~between, position=position), limits)
         return some_rows(filled, kept)
 
@@ -234,15 +234,6 @@ def _with_stations(filled: FilledPath, cut: Bools, limits: LineLimits) -> Filled
     return FilledPath(
         filled.pose[row], added | filled.inserted[row], between(filled.tip), limits.axis_of(angles), angles
     )
-
-
-def _beside_far_corners(rows: Vertices, at_pose: Bools, limits: LineLimits) -> Bools:
-    """(m,) bool: rows of the two moves at poses that the motion is far from at their own parameter."""
-    axis_point = rows.tip + limits.axis_length * limits.axis_of(rows.words)
-    off_tip, off_axis_point = norm(rows.tip - rows.original_tip), norm(axis_point - rows.original_axis_point)
-    far = at_pose & ((off_tip > limits.tip) | (off_axis_point > limits.axis_point))
-    move = np.concatenate(([0], np.cumsum(at_pose)[:-1]))
-    return np.isin(move, move[far]) | np.isin(move, move[far] + 1)
 
 
 def _cuts(move: Ints, program: Program) -> Bools:

@@ -54,15 +54,18 @@ def spoken_text(statement: Statement) -> str:
 
 
 def with_starts(program: Program) -> tuple[Statement, ...]:
-    """Statements of the program, and one for every FROM, which is a pose there, after what stands before it."""
+    """Statements but PAINT, which only the CAM screen shows, and one for every FROM after what stands before it."""
     starts = np.flatnonzero(program.kind == Move.FROM).tolist()
-    if not starts:
-        return program.statements
     stated = [
         Statement(pose, int(program.line[pose]), "FROM", tuple((program.tip[pose] / program.mm_per_unit).tolist()))
         for pose in starts
     ]
-    return tuple(sorted((*program.statements, *stated), key=lambda one: (one.pose, one.word == "FROM")))
+    return tuple(
+        sorted(
+            (*(one for one in program.statements if one.word != "PAINT"), *stated),
+            key=lambda one: (one.pose, one.word == "FROM"),
+        )
+    )
 
 
 def milliseconds(amount: float, in_revolutions: bool, speed: float | None) -> int | None:

@@ -39,9 +39,7 @@ from cornersmooth.text import format_number
 #: words whose text is for the machinist: comments without the word
 _TEXT_WORDS = frozenset("$$ PPRINT REMARK TPRINT LETTER DISPLY".split())
 _PLANES = {"XYPLAN": 17, "ZXPLAN": 18, "YZPLAN": 19}  #: words for planes, with the G code of each
-_SILENT = frozenset(
-    {"END-OF-PATH", "FINI", "PAINT", "REWIND"}
-)  #: words that say nothing beside what the text shows anyway
+_SILENT = frozenset({"END-OF-PATH", "FINI", "REWIND"})  #: words that say nothing beside what the text shows anyway
 
 
 @dataclass
@@ -72,8 +70,6 @@ class StatementWriter:
         word, known = statement.word, id(statement) not in self._unknown
         handler = _HANDLERS.get(word)
         written = None if handler is None else handler(self, statement)
-        if word == "PAINT":
-            self.findings.note("CS317", statement.line)
         if word in _TEXT_WORDS:
             return self.comment(spoken_text(statement))
         if word in _SILENT or (word == "CUTCOM" and written is None and known):  # CUTCOM/ON before the side

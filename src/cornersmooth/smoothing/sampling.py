@@ -36,9 +36,6 @@ class Rows:
     #: 0 for the end of a line; 1 to 5 for a control point of a transition, from 1 on for one of a section of a run
     curve: NDArray[np.int8]
     joined: Bools  #: (r,): first control points that are the end of the row before, with no line between
-    #: (r,): Row of `Program.arcs` where the tool gets here on a circle or helix about that arc's axis, -1 where it
-    #: gets here straight; None where the program has no such rows.
-    arc: Ints | None = None
     #: (r,): Moves per minute (inverse time) of rows that are timed so, NaN for the others; None where none is.
     rate: Floats | None = None
     #: (r, 3): Of control points: knot, weight and, in the last row of a curve, the last knot, zero elsewhere. None in
