@@ -274,7 +274,24 @@ def test_a_row_alone_has_no_neighbour_and_one_that_differs_is_found():
     alone = to_and_fro([0.0])
     assert neighbouring_passes(alone, alone, 2.0, 4.0) is None
     assert neighbouring_passes(to_and_fro([0.0] * 3, pitch=5.0), to_and_fro([0.0] * 3, pitch=5.0), 2.0, 4.0) is None
+    again = to_and_fro([0.0] * 3, pitch=1e-13)  # the same row once more, but for rounding
+    assert neighbouring_passes(again, again, 2.0, 4.0) is None
     path = to_and_fro([0.0] * 9)
     found = neighbouring_passes(path, to_and_fro([0.0] * 4 + [0.005] + [0.0] * 4), 2.0, 4.0)
     assert found.max_mm == pytest.approx(0.005, abs=1e-9)
     assert 21 * 3 <= found.cl_line <= 21 * 6 + 1
+
+
+@pytest.mark.parametrize("gap", [False, True])
+def test_a_line_in_short_steps_is_as_far_as_in_one(gap):
+    tips = np.linspace([0.0, 0.0, 0.0], [20.0, 0.0, 0.0], 4001)
+    whole = straight(tips[[0, -1]])
+    # a line far away and the way back may come before it
+    chopped = straight(np.concatenate((tips + [0.0, 0.0, 500.0], tips))) if gap else straight(tips)
+    points = np.random.default_rng(3).uniform([-6.0, -6.0, -1.0], [26.0, 6.0, 6.0], (how_many(50, 500), 3))
+    tool = Tool.of(10, 2)
+    expected = distance_to_motion(points, whole, tool, 8.0, reach=20.0)
+    assert distance_to_motion(points, chopped, tool, 8.0, reach=20.0) == pytest.approx(expected, abs=1e-9)
+    deep = distance_to_motion(points, chopped, tool, 8.0, reach=20.0, deepest=0.5)
+    assert ((deep > -0.5) == (expected > -0.5)).all()
+    assert deep[deep > -0.5] == pytest.approx(expected[expected > -0.5], abs=1e-9)

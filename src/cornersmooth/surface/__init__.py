@@ -123,7 +123,7 @@ def measure_surface(
         raise SettingsError("CS271", "there is no feed move, so no surface", "give a program that cuts")
     points = envelope_points(original, tool, edge, levels=levels, stations=stations)
     reach = max(10.0 * tolerance, 0.02 * tool.diameter)
-    own = distance_to_motion(points.point, original, tool, edge, reach=reach)
+    own = distance_to_motion(points.point, original, tool, edge, reach=reach, deepest=BURIED)
     on = own > -BURIED  # never NaN: the point is on the tool somewhere
     rows = np.flatnonzero(on)
     points, own = some_rows(points, rows), own[rows]

@@ -13,6 +13,7 @@ an equation p cos φ + q sin φ = c for the angle of n about the axis: two point
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -81,6 +82,23 @@ class Parts:
 
     def __len__(self) -> int:
         return len(self.segment)
+
+    @cached_property
+    def _gone(self) -> Floats:
+        """(p + 1,) way up to each part, and to the end."""
+        return np.concatenate(([0.0], np.cumsum(self.way)))
+
+    def moved(self, low: Floats | Ints, high: Floats | Ints) -> Floats:
+        """How far any point of interest moves at most between places: numbers of parts, and shares of them."""
+        places = np.arange(len(self) + 1)
+        return np.interp(high, places, self._gone) - np.interp(low, places, self._gone)
+
+    def stretches(self, longest: float) -> tuple[Ints, Ints]:
+        """First parts (s,) of stretches without gaps, about `longest` mm or one part long, and the parts behind."""
+        gap = (self.low == 0.0) & ~self.motion.joined[self.segment]
+        begins = gap | (np.diff(np.floor(self._gone / longest)) > 0.0)
+        first = np.flatnonzero(begins)
+        return first, np.append(first[1:], len(self))
 
     def at(self, part: Ints, share: Floats) -> tuple[Floats, Floats]:
         """Tip and unit axis (k, 3) at shares (k,) of parts (k,)."""

@@ -24,6 +24,9 @@ _WAY_BACK = 2.0
 #: cosine of the angle up to which passes are parallel
 _PARALLEL = 0.9
 
+#: mm; a pass that is nearer is the same once more, and lies in no direction
+_SAME = 1e-6
+
 #: places worked on together
 _TOGETHER = 2048
 
@@ -107,7 +110,7 @@ class _Path:
         chord, foot, distance, length, inside = self._feet(points)
         parallel = np.abs(np.einsum("qcd,qd->qc", self.way[chord], ways)) > _PARALLEL
         other = np.abs(length - along[:, None]) > _WAY_BACK * distance
-        good = inside & parallel & other & (distance > 0.0) & (distance <= within)
+        good = inside & parallel & other & (distance > _SAME) & (distance <= within)
         best = np.where(good, distance, np.inf).argmin(axis=1)
         row = np.arange(len(points))
         return foot[row, best], np.where(good[row, best], chord[row, best], -1)
