@@ -325,3 +325,21 @@ def _refuse(wrong: Bools | np.bool_, what: str, values: Floats, hint: str) -> No
         pose = int(np.argmax(wrong))
         numbers = ", ".join(f"{value:g}" for value in np.atleast_1d(values[pose]))
         raise InputError("CS167", f"the {what} of pose {pose} is {numbers}", hint)
+
+
+def rapid_moves(kind: NDArray[np.uint8]) -> Bools:
+    """Poses of a program whose move does not cut, so that solution and turn may change in it: (n,) bool.
+
+    Neither does the first move, nor an arc, from a start position that is stated and not moved to.
+    """
+    rapid: Bools = (kind != Move.LINEAR) & (kind != Move.ARC)
+    first = np.cumsum(kind != Move.FROM) == 1
+    rapid[1:] |= (kind[:-1] == Move.FROM) & (first[1:] | (kind[1:] == Move.ARC))
+    rapid[:1] = True
+    return rapid
+
+
+def still_poses(kind: NDArray[np.uint8]) -> Bools:
+    """Poses of a program through which nothing is cut: holes, and rapids with no cut after them; (n,) bool."""
+    rapid = rapid_moves(kind)
+    return rapid & np.append(rapid[1:], True) | (kind == Move.HOLE)

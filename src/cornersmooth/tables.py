@@ -6,7 +6,6 @@ A table may say ``like = NAME`` and then only what is different from that one, `
 
 from __future__ import annotations
 
-import difflib
 import re
 import tomllib
 import warnings
@@ -377,4 +376,6 @@ def _plain(name: str) -> str:
 
 def closest(word: str, known: Sequence[str]) -> str:
     """Return the known word that is most like this one; empty where none is."""
-    return next(iter(difflib.get_close_matches(word, known, n=1)), "")
+    from difflib import get_close_matches
+
+    return next(iter(get_close_matches(word, known, n=1)), "")

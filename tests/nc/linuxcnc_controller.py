@@ -31,9 +31,8 @@ from scipy.spatial import cKDTree
 
 from cornersmooth.cl import read
 from cornersmooth.kinematics import load_machine
-from cornersmooth.model import Program
+from cornersmooth.model import Program, rapid_moves
 from cornersmooth.nc import choose_form, fit_settings, write
-from cornersmooth.rotary import rapid_moves
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 

@@ -13,8 +13,8 @@ import pytest
 from cornersmooth.errors import InputError
 from cornersmooth.kinematics import Machine, load_machine, machine_names, poses, tool_axis
 from cornersmooth.kinematics.poses import angle_between
-from cornersmooth.model import Move
-from cornersmooth.rotary import angle_path, fill, insertions, rapid_moves, rotary_angles, still_poses
+from cornersmooth.model import Move, rapid_moves, still_poses
+from cornersmooth.rotary import angle_path, fill, insertions, rotary_angles
 from cornersmooth.rotary.angle_path import RotaryPath
 from oracle.messages import one_line
 from oracle.share import covering_share

@@ -19,8 +19,8 @@ from cornersmooth.kinematics import (
     tool_axis,
 )
 from cornersmooth.kinematics.poses import angle_between
-from cornersmooth.model import Move
-from cornersmooth.rotary import FilledPath, Insertions, fill, insertions, rapid_moves, rotary_angles
+from cornersmooth.model import Move, rapid_moves
+from cornersmooth.rotary import FilledPath, Insertions, fill, insertions, rotary_angles
 from oracle.share import covering_share, how_many
 
 STEPS = 24

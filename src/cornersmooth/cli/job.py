@@ -28,7 +28,7 @@ from cornersmooth.errors import (
     message,
     printable,
 )
-from cornersmooth.kinematics import Machine
+from cornersmooth.kinematics import Machine, with_dynamics
 from cornersmooth.methods import AUTO
 from cornersmooth.model import Program
 from cornersmooth.nc import Form, Frame
@@ -213,6 +213,8 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> None:
     outcome.verdict_text = "; ".join(filter(None, (result.judgement.text, job.loosened)))
     with_page = any(suffix_of(path) == ".html" for path in job.reports)
     timed_too = given.time or (len(program) <= TIMED_POSES and (with_page or not (given.quiet or job.batch)))
+    machine = result.form.machine if job.axes is None else job.axes
+    timed_too = timed_too and with_dynamics(machine) is not None
     if timed_too and result.verdict in (Verdict.PASSED, Verdict.INCOMPLETE):
         from cornersmooth.times.saving import planned_saving
 

@@ -12,12 +12,13 @@ from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
 import click
-from click.shell_completion import CompletionItem
 
 _LENGTH = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(mm|in|inch|\")?")
 
 
 if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
+
     _ParamType = click.ParamType[Any]
 else:  # click before 8.4 has no type for what it gives
     _ParamType = click.ParamType
@@ -109,6 +110,8 @@ _FOLDERS = {"controls": ("nc", "controls"), "machines": ("kinematics", "machines
 
 def _forms(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
     """Names of the forms of the control that is chosen, or of all of them."""
+    from click.shell_completion import CompletionItem
+
     tables = _tables("controls", ctx)
     chosen = ctx.params.get("control")
     name = chosen if isinstance(chosen, str) else getattr(chosen, "name", "")
@@ -119,6 +122,8 @@ def _forms(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
 
 
 def _offer(kind: str, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+    from click.shell_completion import CompletionItem
+
     tables = _tables(kind, ctx)
     items = [
         CompletionItem(name, help=str(table.get("description", "")) or None)

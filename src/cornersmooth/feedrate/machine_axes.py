@@ -24,8 +24,8 @@ from cornersmooth.feedrate.rational_curves import WHOLE
 from cornersmooth.kinematics import Machine
 from cornersmooth.kinematics.machine import PARALLEL
 from cornersmooth.kinematics.poses import continued
-from cornersmooth.model import Floats, Ints
-from cornersmooth.rotary import rapid_moves, rotary_angles
+from cornersmooth.model import Floats, Ints, rapid_moves
+from cornersmooth.rotary import rotary_angles
 
 #: rotary angles may lie beyond the reach by so many times the cone: as many as `rotary_angles` lets pass
 _CONES = 2.0

@@ -9,7 +9,7 @@ import numpy as np
 
 from cornersmooth.errors import Finding, SettingsError
 from cornersmooth.methods import CURVES_METHOD, DEFAULT_METHOD
-from cornersmooth.model import FeedMode, Move, SmoothProgram, Units
+from cornersmooth.model import FeedMode, Move, SmoothProgram, Units, rapid_moves
 from cornersmooth.nc.blocks import Blocks
 from cornersmooth.nc.circles import Circles, plan_circles
 from cornersmooth.nc.control import Control
@@ -33,7 +33,6 @@ from cornersmooth.nc.program_frame import BLEND_STEP, POINT_APPROACH, Frame, Str
 from cornersmooth.nc.rotary_words import rotary_way, within_reach
 from cornersmooth.nc.script import Holes, Script
 from cornersmooth.nc.statement_writer import StatementWriter
-from cornersmooth.rotary import rapid_moves
 from cornersmooth.settings import FLIP_ANGLE, Settings
 from cornersmooth.smoothing.sampling import Rows, all_dense_rows, curve_rows, dense_rows
 

@@ -14,14 +14,14 @@ from cornersmooth.geometry.ragged import spread
 from cornersmooth.kinematics import inverse_time, machine_position, tip_position, tool_axis
 from cornersmooth.kinematics.machine import LINEAR
 from cornersmooth.methods import METHODS
-from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program, SmoothProgram
+from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program, SmoothProgram, rapid_moves
 from cornersmooth.nc.circles import ArcAngles
 from cornersmooth.nc.control import INVERSE_TIME_DECIMALS
 from cornersmooth.nc.form import TIP_SHARE, Form
 from cornersmooth.nc.messages import Findings
 from cornersmooth.nc.rotary_words import RotaryWay, machine_of
 from cornersmooth.nc.statement_args import check_tool_travel
-from cornersmooth.rotary import FilledPath, fill, insertions, rapid_moves
+from cornersmooth.rotary import FilledPath, fill, insertions
 from cornersmooth.settings import TIMED_POSES, Settings
 from cornersmooth.smoothing.blending import largest_blends
 from cornersmooth.smoothing.long_lines import LineLimits, Vertices, fewest_lines, segments_of_rows, vertices

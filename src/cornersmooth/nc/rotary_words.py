@@ -22,12 +22,11 @@ from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.geometry.ragged import starts
 from cornersmooth.kinematics import Machine, check_travel, solutions, tool_axis
 from cornersmooth.kinematics.poses import angle_between, nose_position
-from cornersmooth.model import Bools, Floats, Ints, Program, Runs, SmoothProgram
+from cornersmooth.model import Bools, Floats, Ints, Program, Runs, SmoothProgram, rapid_moves, still_poses
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.messages import Findings
 from cornersmooth.nc.planes import turned_part
 from cornersmooth.nc.statement_args import tool_starts
-from cornersmooth.rotary import rapid_moves, rewound_angles, rotary_angles, still_poses
 from cornersmooth.smoothing.sampling import Rows, all_dense_rows
 from cornersmooth.system.processes import return_free_memory
 
@@ -55,6 +54,8 @@ def rotary_way(rows: Rows, smoothed: SmoothProgram, form: Form, findings: Findin
 
     Raises InputError where the machine cannot follow the path.
     """
+    from cornersmooth.rotary import rewound_angles, rotary_angles
+
     program, settings, machine = smoothed.program, smoothed.settings, machine_of(form).with_longest_tool()
     tip, axis, move = rows.tip, rows.other, rows.move
     tolerance = form.rotary_tolerance(settings.tolerance, settings.axis_scale)

@@ -12,10 +12,10 @@ from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.feedrate import Limits, TimeLaw, direct, plan_text
 from cornersmooth.feedrate.written import written_motion
 from cornersmooth.kinematics import Machine, endless, with_dynamics
-from cornersmooth.model import Bools, Floats, Program
+from cornersmooth.model import Bools, Floats, Program, rapid_moves
 from cornersmooth.nc_reader import NcProgram
 from cornersmooth.report.paths import OriginalPath, WrittenPath
-from cornersmooth.rotary import rapid_moves, rotary_angles
+from cornersmooth.rotary import rotary_angles
 from cornersmooth.settings import Settings
 
 #: moves up to which a motion is planned: some 10 s of work

@@ -11,15 +11,14 @@ from cornersmooth.arrays.vectors import dot, norm
 from cornersmooth.errors import Finding, InputError
 from cornersmooth.geometry.arcs import arc_radii
 from cornersmooth.kinematics import Machine
-from cornersmooth.model import Floats, Ints, Move, Program, SmoothProgram, Status
+from cornersmooth.model import Floats, Ints, Move, Program, SmoothProgram, Status, rapid_moves
 from cornersmooth.report.corners import corner_table, counts_of, worst_corners
 from cornersmooth.report.record import SCHEMA, NcFile, cl_file, findings_table, record, report_json
-from cornersmooth.report.tables import Columns, csv_text
 from cornersmooth.report.verdict import judge, sharp_corners
-from cornersmooth.rotary import rapid_moves, rotary_angles
 from cornersmooth.smoothing.construction import construction_of
 
 if TYPE_CHECKING:
+    from cornersmooth.report.tables import Columns
     from cornersmooth.verify import Verification
 
 __all__ = ["SCHEMA", "NcFile", "corners_csv", "findings_table", "report", "report_json"]
@@ -111,6 +110,8 @@ def report(
 
 def corners_csv(smoothed: SmoothProgram, *, dense: bool = True) -> Iterator[str]:
     """The table of corners as CSV text, a block of rows at a time; `dense` as for `report`."""
+    from cornersmooth.report.tables import csv_text
+
     count = len(smoothed.corners)
 
     def columns(part: slice) -> Columns:
@@ -161,6 +162,8 @@ def rotary_marks(program: Program, machine: Machine | None) -> list[dict[str, An
     """
     if machine is None or not machine.names or len(program) < 3:
         return []
+    from cornersmooth.rotary import rotary_angles
+
     rapid = rapid_moves(program.kind)
     try:
         angles = rotary_angles(machine, program.tip, program.axis, tolerance=_TOLERANCE, rapid=rapid).angles

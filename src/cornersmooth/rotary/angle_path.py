@@ -21,7 +21,7 @@ from cornersmooth.kinematics.poses import (
     solutions,
     tool_axis,
 )
-from cornersmooth.model import Bools, Floats, Ints, Move
+from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.rotary.branch_choice import (
     LIMIT_SLACK,
     NO_TURN,
@@ -137,24 +137,6 @@ def rewound_angles(
             behind = far.poses + 1
             source, left = np.insert(source, behind, source[far.poses]), np.insert(left, behind, True)
     return path, source, left
-
-
-def rapid_moves(kind: NDArray[np.uint8]) -> Bools:
-    """Poses of a program whose move does not cut, so that solution and turn may change in it: (n,) bool.
-
-    Neither does the first move, nor an arc, from a start position that is stated and not moved to.
-    """
-    rapid: Bools = (kind != Move.LINEAR) & (kind != Move.ARC)
-    first = np.cumsum(kind != Move.FROM) == 1
-    rapid[1:] |= (kind[:-1] == Move.FROM) & (first[1:] | (kind[1:] == Move.ARC))
-    rapid[:1] = True
-    return rapid
-
-
-def still_poses(kind: NDArray[np.uint8]) -> Bools:
-    """Poses of a program through which nothing is cut: holes, and rapids with no cut after them; (n,) bool."""
-    rapid = rapid_moves(kind)
-    return rapid & np.append(rapid[1:], True) | (kind == Move.HOLE)
 
 
 def _sorted_poses(

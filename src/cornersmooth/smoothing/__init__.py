@@ -11,7 +11,6 @@ from cornersmooth.errors import Finding, InputError
 from cornersmooth.model import Bools, Move, Program, SmoothProgram
 from cornersmooth.settings import FLIP_ANGLE, Settings
 from cornersmooth.smoothing.construction import construction_of, one_corner_each
-from cornersmooth.smoothing.given_curves import beside_chords, given_runs, with_runs, without
 
 
 def smooth(
@@ -30,13 +29,16 @@ def smooth(
     settings = (Settings() if settings is None else settings).with_method()
     refuse_flips(program)
     program, settings = one_corner_each(program, settings)
-    program, settings = beside_chords(program, settings)
-    program, settings, runs = given_runs(program, settings) if curves else (program, settings, None)
     method = construction_of(settings.method)
-    if runs is None:
+    if program.curves is None:
         smoothed = method.smooth(program, settings, progress, processes)
     else:
-        smoothed = with_runs(method.smooth(without(program, runs), settings, progress, processes), program, runs)
+        from cornersmooth.smoothing.given_curves import beside_chords, given_runs, with_runs, without
+
+        program, settings = beside_chords(program, settings)
+        program, settings, runs = given_runs(program, settings) if curves else (program, settings, None)
+        smoothed = method.smooth(program if runs is None else without(program, runs), settings, progress, processes)
+        smoothed = smoothed if runs is None else with_runs(smoothed, program, runs)
     if settings.axis_tolerance is not None:
         turned = settings.axis_scale * 2.0 * np.sin(smoothed.corners.orientation_error / 2.0)
         smoothed = replace(smoothed, corners=replace(smoothed.corners, axis_error=turned))

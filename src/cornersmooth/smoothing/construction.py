@@ -6,8 +6,7 @@ Corners are worked on in batches of whole arrays; `cornersmooth.methods` lists t
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
@@ -201,10 +200,18 @@ def place_corners(
             put(found, rows, part, legs.shift)
         return min(start + BATCH, k)
 
-    with ThreadPoolExecutor(THREADS) as pool:  # numpy leaves the interpreter free; batches share no rows
-        for done in (pool.map if k > BATCH else map)(settle, range(0, k, BATCH)):
+    def settle_all(run: Callable[[Callable[[int], int], range], Iterable[int]]) -> None:
+        for done in run(settle, range(0, k, BATCH)):
             if progress is not None:
                 progress(done, k)
+
+    if k <= BATCH:
+        settle_all(map)
+    else:
+        from concurrent.futures import ThreadPoolExecutor
+
+        with ThreadPoolExecutor(THREADS) as pool:  # numpy leaves the interpreter free; batches share no rows
+            settle_all(pool.map)
     return found
 
 

@@ -29,8 +29,7 @@ _FEWEST = 4
 def beside_chords(program: Program, settings: Settings) -> tuple[Program, Settings]:
     """Take what the moves are off the curves of the file off ε, as `one_corner_each` does with what it moves."""
     curves = program.curves
-    if curves is None:
-        return program, settings
+    assert curves is not None
     points = _at_height(curves.bezier, settings.axis_length)
     bend = 0.75 * np.diff(points, 2, axis=1).reshape(len(points), -1, 3)  # see `verify.bending`
     off, moved = norm(bend).max(axis=1), np.zeros(len(program)) if program.moved is None else program.moved.copy()

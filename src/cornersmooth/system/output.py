@@ -9,15 +9,11 @@ Windows refuses both for a file that is open.
 from __future__ import annotations
 
 import contextlib
-import filecmp
 import glob
 import hashlib
 import json
 import os
-import secrets
-import shutil
 import stat
-import tempfile
 import time
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -180,6 +176,9 @@ def open_output(target: Target, *, hold: bool = False, replace: bool = True) -> 
         # a stream, a device or a pipe cannot be replaced, only written to
         with contextlib.nullcontext(cast(BinaryIO, target)) if path is None else open(path, "wb") as device:
             if hold:
+                import shutil
+                import tempfile
+
                 with (
                     temporary_name(tempfile.gettempdir(), "cornersmooth") as temporary,
                     _opened(temporary, mode=0o600) as file,
@@ -297,6 +296,8 @@ def _moved_to_free_place(temporary: str, target: str) -> bool:
                 pass
             os.replace(temporary, target)
     except FileExistsError:
+        import filecmp
+
         return filecmp.cmp(temporary, target, shallow=False)
     return True
 
@@ -319,7 +320,7 @@ def temporary_name(folder: str, name: str) -> Iterator[str]:
         with contextlib.suppress(OSError):
             if os.stat(left).st_mtime < time.time() - _ABANDONED:
                 os.unlink(left)
-    path = os.path.join(folder, f".{name}.{os.getpid()}-{secrets.token_hex(4)}.part")
+    path = os.path.join(folder, f".{name}.{os.getpid()}-{os.urandom(4).hex()}.part")
     _unfinished[path] = -1  # before it exists: a signal at any moment finds a name to remove
     try:
         yield path

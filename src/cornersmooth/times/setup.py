@@ -27,10 +27,10 @@ from cornersmooth.feedrate import Limits
 from cornersmooth.feedrate.path import Path, build_path
 from cornersmooth.kinematics import Machine, check_travel, nose_position
 from cornersmooth.kinematics.machine import PARALLEL
-from cornersmooth.model import Floats, Move, Program
+from cornersmooth.model import Floats, Move, Program, rapid_moves
 from cornersmooth.nc import Form
 from cornersmooth.pipeline import smooth
-from cornersmooth.rotary import rapid_moves, rotary_angles
+from cornersmooth.rotary import rotary_angles
 from cornersmooth.settings import Settings
 from cornersmooth.system.processes import map_in_processes
 from cornersmooth.times.saving import Timing, without_holes
