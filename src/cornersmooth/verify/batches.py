@@ -26,7 +26,7 @@ from cornersmooth.verify.passage import AROUND, LONGER
 from cornersmooth.verify.task import ARITHMETIC, Task
 
 #: elements in a batch
-BATCH: Final = 1 << 14
+BATCH: Final = 1 << 15
 
 #: a stretch, see `Batch.stretches`
 _STRETCH: Final = np.dtype(

@@ -64,23 +64,29 @@ class Compensated:
         before, offset = np.full((1, 6), np.inf), 0
         for nc in chunks:
             if len(nc):
-                ends = np.concatenate((before, np.hstack((nc.tip, nc.second))))
-                before = ends[-1:]
-                self._compare(nc, self._rows(nc, np.diff(ends, axis=0), offset))
+                changes = self._changes(offset, offset + len(nc))
+                if changes or self._state.on or self._state.ending:
+                    ends = np.concatenate((before, np.hstack((nc.tip, nc.second))))
+                    self._compare(nc, self._rows(nc, np.diff(ends, axis=0), changes))
+                before = np.hstack((nc.tip[-1:], nc.second[-1:]))
             offset += len(nc)
             yield nc
         if self._line and self._next < len(self._poses) and not self._wrong:
             self._say(self._line)
 
-    def _rows(self, nc: Elements, ways: Floats, offset: int) -> Ints:
-        """(k,) elements with which blocks end that lead somewhere under compensation, or end it."""
+    def _changes(self, offset: int, stop: int) -> list[tuple[int, bool]]:
+        """Words of compensation in front of elements from one on, which are counted from it, and whether on."""
         changes: list[tuple[int, bool]] = []
         for event in self._events[self._read :]:
-            if event.element >= offset + len(nc):
+            if event.element >= stop:
                 break
             self._read += 1
             if event.letter == "G" and event.value in _WORDS:
                 changes.append((event.element - offset, _WORDS[event.value]))
+        return changes
+
+    def _rows(self, nc: Elements, ways: Floats, changes: list[tuple[int, bool]]) -> Ints:
+        """(k,) elements with which blocks end that lead somewhere under compensation, or end it."""
         found = self._state.feeds(changes, nc.kind == Element.RAPID, ways)
         found &= leads_somewhere(nc, *np.hsplit(ways, 2)) | (nc.kind == Element.ARC)
         found[:-1] &= nc.line[1:] != nc.line[:-1]  # rotary words make several lines of a block

@@ -34,8 +34,10 @@ def check_feeds(match: Match, found: Findings) -> None:
     start, end = match.motion.last[:-1][feeding], match.motion.last[1:][feeding]
     place = match.place[start], match.place[end]
     # a planned feed of what does not move the tool, as a table that turns about it, tells nothing but a time
-    still = nc.least_feed[element] & (np.linalg.norm(match.six[end] - match.six[start], axis=1) <= ARITHMETIC)
-    still &= end == start + 1  # a full circle has more vertices
+    still = nc.least_feed[element] & (end == start + 1)  # a full circle has more vertices
+    planned = np.flatnonzero(still)
+    ways = match.six[end[planned]] - match.six[start[planned]]
+    still[planned] = np.linalg.norm(ways, axis=1) <= ARITHMETIC
     good = still | (nc.kind[element] == Element.RAPID)
     wrong = np.full(len(element), -1)
     first, last = _runs_between(task, *place)

@@ -34,11 +34,11 @@ class WordPlaces:
 
     def watch(self, chunks: Iterable[Elements]) -> Iterable[Elements]:
         """Give out the elements of a text, and take down those behind words that lead nowhere."""
-        offset, before, waiting = 0, np.full((1, 6), np.inf), np.zeros(0, np.int64)
+        offset, before, waiting = 0, [np.full((1, 3), np.inf)] * 2, np.zeros(0, np.int64)
         for nc in chunks:
             axis_step = nc.second_step * (self._task.axis_length if nc.second_is == "vector" else 1.0)
             self._room = min(nc.tip_step + axis_step, self._task.tolerance)
-            six = np.concatenate((before, np.hstack((nc.tip, nc.second))))
+            ends = nc.tip, nc.second
             new = [event.element for event in self._events[self._looked :]]
             self._looked = len(self._events)
             rows = np.unique(np.append(waiting, np.array(new, np.int64))) - offset
@@ -46,12 +46,15 @@ class WordPlaces:
             rows = rows[rows < len(nc)]
             while len(rows):
                 straight = (nc.kind[rows] == Element.RAPID) | (nc.kind[rows] == Element.LINE)
-                rows = rows[straight & ~leads_somewhere(nc, *np.hsplit(six[rows + 1] - six[rows], 2))]
+                first = rows[:, None] == 0
+                begins = (np.where(first, old, end[rows - 1]) for end, old in zip(ends, before, strict=True))
+                ways = (end[rows] - begin for end, begin in zip(ends, begins, strict=True))
+                rows = rows[straight & ~leads_somewhere(nc, *ways)]
                 self._still.update((offset + rows).tolist())
                 rows = rows + 1
                 waiting = np.append(waiting, rows[rows == len(nc)] + offset)
                 rows = rows[rows < len(nc)]
-            before = six[-1:]
+            before = [end[-1:] for end in ends] if len(nc) else before
             offset += len(nc)
             yield nc
 
