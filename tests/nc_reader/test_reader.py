@@ -292,3 +292,24 @@ def test_an_arc_on_which_an_axis_turns_is_not_looked_at() -> None:
     head = "%\nO1\nG21 G90 G94 G17 G40 G49 G80\nG54\nG0 A20. C10.\nG43.4 H1\nG0 X50. Y0.\nG0 Z5.\n"
     text = f"{head}G2 X60. Y0. I5. J0. A0. F500.\nM30\n%\n"
     assert read_nc(text.encode(), machine=load_machine("table-ac")).unlooked == ((9, "an arc on which an axis turns"),)
+
+
+def test_a_word_beside_a_dwell_changes_what_holds():
+    text = b"TRAORI\nORIWKS ORICURVE\nG0 X0 Y0 Z0 XH=0 YH=0 ZH=10\nG1 X1 F100\nG4 F1.5 TRAFOOF\nG1 X2 XH=1 YH=1 ZH=11\n"
+    (found,) = read_nc(text, control="siemens").problems
+    assert (found.code, found.nc_line) == ("CS506", 6)
+
+
+@pytest.mark.parametrize("word", ["M98", "M60"])
+def test_motion_behind_a_word_that_may_change_what_holds_was_not_looked_at(word):
+    text = f"G21 G90 G94 G17\nG0 X0. Y0. Z0.\nG1 X1. F100.\n{word}\nX2.\n{word}\nM30\n".encode()
+    found = read_nc(text)
+    assert found.unlooked == ((5, f"motion behind {word}, which may change what holds"),)
+    assert found.tip[-1].tolist() == [2.0, 0.0, 0.0]
+
+
+def test_another_transformation_is_no_tip_control():
+    text = "{}\nORIWKS ORIVECT\nG0 X0 Y0 Z0 A3=0 B3=0 C3=1\nG1 X1 F100\n"
+    first, second = (read_nc(text.format(word).encode(), control="siemens") for word in ("TRAORI", "TRAORI(2)"))
+    assert first.problems == ()
+    assert [problem.code for problem in second.problems] == ["CS506"]

@@ -10,6 +10,7 @@ import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 from typing import Final
 
 import numpy as np
@@ -37,6 +38,7 @@ CUTS: Final = ("line", "arc")
 VECTOR: Final = frozenset("IJK")
 _AXES: Final = "XYZABC"
 _ROTARY: Final = frozenset("ABC")
+_OF_MOTION: Final = frozenset((*_AXES, "F"))
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,11 @@ class LastWord:
     row: Row
     text: str  #: the word, with those beside it that say more of it
     line: int  #: from 1; 0 where nobody counts
+
+    @property
+    def odd(self) -> bool:
+        """Whether it is another word of its kind than verification accepts, as the second transformation."""
+        return self.row.listed and self.row.pattern.fullmatch(self.text) is None
 
     @property
     def off(self) -> bool:
@@ -87,6 +94,12 @@ class State:
         return _UNITS.get(self.groups["units"] or "", math.nan)
 
     @property
+    def plane(self) -> int:
+        """Plane of arcs that holds, 0 where that is not known; a mill begins in G17."""
+        plane = self.groups.get("plane", PRESET)
+        return 17 if plane == PRESET else int((plane or "G0")[1:])
+
+    @property
     def frames(self) -> tuple[str, ...] | None:
         """Words that turn, scale or mirror the places of the part; None where it is not known whether any does."""
         values = [value for group, value in self.groups.items() if group.startswith(FRAME)]
@@ -98,6 +111,10 @@ class State:
         """Words that say how exactly corners are passed; empty where there are none, or where that is not known."""
         path = self.groups.get("path")
         return "" if path in (None, PRESET) else path
+
+    def but(self, **groups: str | None) -> State:
+        """Return the same state with some groups set otherwise."""
+        return replace(self, groups=self.groups | groups)
 
     def lose_place(self, letters: Iterable[str] | None = None) -> None:
         """Take the places of some axes, or of all, as unknown."""
@@ -144,8 +161,7 @@ class State:
     def rows(self, words: Sequence[Word]) -> list[tuple[Word, str, Row]]:
         """Words of a block that are none of the motion, with their names in the table, and what they do there."""
         given = {word.name: word.value for word in words}
-        of_motion = {*self.axes, "F", *_AXES}
-        named = [(word, name) for word in words if (name := _name(word)) not in of_motion]
+        named = [(word, name) for word in words if (name := _name(word)) not in _OF_MOTION and name not in self.axes]
         alone = len(words) == 1
         return [(word, name, self.table.row(name, word.spelling, given, alone=alone)) for word, name in named]
 
@@ -189,13 +205,13 @@ class State:
         does: set[str] = set()
         for group, value in row.sets:
             value = word.spelling if value == "." else value
-            kind = group_of(group) or Group()
-            if kind.lettered and value is not None:
+            changes, lettered = _change(group)
+            if lettered and value is not None:
                 own = (other.text.replace(" ", "") for other in words if other.name in row.beside)
                 value = " ".join((value, *own))
             # LinuxCNC takes the feed as zero behind any word of its kind, the same one included
             if self.groups.get(group) != value or value is None or group == "feed":
-                does |= set(kind.changes.split())
+                does |= changes
             if group.startswith(FRAME):
                 does.add("place")
             self.groups[group] = value
@@ -218,13 +234,20 @@ class State:
             self.lose_place(VECTOR)
 
 
+@cache
+def _change(group: str) -> tuple[frozenset[str], bool]:
+    """What a change of a group does beside, and whether its value has the letters that belong to its word."""
+    kind = group_of(group) or Group()
+    return frozenset(kind.changes.split()), kind.lettered
+
+
 def _name(word: Word) -> str:
     """Name of a word in the table."""
     if word.name in ("G", "M"):
         return f"{word.name}{word.value:g}"
     if word.name in ("side", "block"):
         return word.text.upper()
-    if len(word.name) > 1 and re.search(r"\(\s*\)", word.text):
+    if len(word.name) > 1 and "(" in word.text and re.search(r"\(\s*\)", word.text):
         return f"{word.name}()"
     return word.name
 

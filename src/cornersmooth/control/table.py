@@ -32,7 +32,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, lru_cache
 from itertools import chain
 from typing import Any, Final, NamedTuple, Self
 
@@ -73,9 +73,9 @@ GROUPS: Final[Mapping[str, Group]] = {
     "coolant": Group("", "compared follows"),
     "smoothing": Group("", "", "smoothing of the control", lettered=True),
     "tip": Group("off angles vectors both", "", "tool tip control", "off", "length"),
-    "way": Group("", "", "ways of rotary axes"),
-    "orientation": Group("", "", "interpolation of the tool axis"),
-    "coordinates": Group("", "", "coordinates of the tool axis"),
+    "way": Group("shorter written", "", "ways of rotary axes"),
+    "orientation": Group("vectors points angles planes", "", "interpolation of the tool axis"),
+    "coordinates": Group("part machine", "", "coordinates of the tool axis"),
     f"{FRAME}dynamic": Group("", "follows outside", "dynamic work offset", "off"),
 }
 _FRAME: Final = Group("", "follows outside", "tilted plane", "off")
@@ -114,6 +114,9 @@ _ALIKE: Final = {"end": "anything", "register": "length", "offset": "length"}
 
 #: a number, where a row has a letter alone
 _NUMBER: Final = r"[-+]?[\d.]+"
+
+#: words without a name of their own whose rows are remembered
+_REMEMBERED: Final = 4096
 
 #: rules that are no text
 _KINDS: Final[Mapping[str, Callable[[str], Any]]] = {
@@ -233,6 +236,11 @@ class Row:
         values["share"] = share if "(?P<" in pattern else None
         return [replace(self, pattern=re.compile(pattern), says=says, **values), *rows]
 
+    @property
+    def listed(self) -> bool:
+        """Whether verification accepts the word."""
+        return self.pattern is not UNLISTED.pattern
+
     @cached_property
     def group(self) -> str:
         """The group that verification follows; empty for none."""
@@ -284,10 +292,30 @@ class Table:
         for key in chain((f"{name} alone",) * alone, *others) if name in self._with_others else ():
             if key in self.named:
                 return self.named[key]
-        if name in self.named:
-            return self.named[name]
-        found = (row for pattern, row in self.patterns if pattern.fullmatch(name) or row.pattern.fullmatch(text))
-        return next(found, UNKNOWN)
+        return self.named[name] if name in self.named else self._by_pattern(name, text)
+
+    @cached_property
+    def _by_pattern(self) -> Callable[[str, str], Row]:
+        def row(name: str, text: str) -> Row:
+            found = (row for pattern, row in self.patterns if pattern.fullmatch(name) or row.pattern.fullmatch(text))
+            return next(found, UNKNOWN)
+
+        return lru_cache(_REMEMBERED)(row)
+
+    def switched(self, blocks: Sequence[str]) -> Table:
+        """Table of a machine where such blocks, if any, switch tip control of the kinematics on and off."""
+        table = self
+        for block, tip in zip(blocks, ("both", "off"), strict=False):
+            word, *others = block.split()
+            beside = " ".join(f"{other}!" for other in others)
+            rows = Row.all_of(word, f"tip={tip} place: {beside}; alone follows; tip control of the kinematics")
+            key = " ".join((word, *(f"{other[0]}{float(other[1:]):g}" for other in others[-1:])))
+            table = replace(table, named={**table.named, key: rows[0]}, listed=(*rows, *table.listed))
+        return table
+
+    def words(self, group: str, *values: str) -> list[str]:
+        """Words that verification accepts and that set a group to one of some values."""
+        return [word for word, row in self.named.items() if row.listed and dict(row.sets).get(group) in values]
 
     @cached_property
     def means(self) -> Means:
@@ -330,8 +358,7 @@ def table_of(control: str) -> Table:
         if row.block:
             (positions if row.positions else blocks).append(row)
             continue
-        is_listed = row.pattern is not UNLISTED.pattern
-        listed += [row, *letters] if is_listed else []
+        listed += [row, *letters] if row.listed else []
         if not row.sets and not row.does:
             continue
         if word[0] == "/":
@@ -339,7 +366,7 @@ def table_of(control: str) -> Table:
         elif word.endswith("*"):
             patterns.append((re.compile(re.escape(word[:-1]) + ".*"), row))
         else:
-            named.setdefault(word[0] if is_listed and not _LITERAL.fullmatch(word) else word, row)
+            named.setdefault(word[0] if row.listed and not _LITERAL.fullmatch(word) else word, row)
     rows = [*named.values(), *(row for _, row in patterns)]
     arguments: dict[str, frozenset[str]] = {}
     for row in rows:

@@ -15,7 +15,7 @@ from cornersmooth.control.source import CHUNK
 from cornersmooth.control.state import VECTOR, State
 from cornersmooth.errors import CornersmoothError
 from cornersmooth.filter.meaning import Meanings
-from cornersmooth.filter.motion import Job, Stretch, motion, motion_of_runs, plane_of, program_of, says_motion
+from cornersmooth.filter.motion import Job, Stretch, motion, motion_of_runs, program_of, says_motion
 from cornersmooth.filter.runs import PLAIN_CUT, ProgramReader, Reading, Run
 from cornersmooth.model import Program
 from cornersmooth.nc_reader import NcProgram, Problem
@@ -226,7 +226,7 @@ def _left_otherwise(job: Job, run: Run, state: State, following: bytes) -> str:
     wanted_groups = run.state.groups | {"motion": "line"}
     if says_motion(following) or "code" not in job.form.mode.modal:
         del wanted_groups["motion"]
-    if plane_of(state) == plane_of(run.state) != 0:
+    if state.plane == run.state.plane != 0:
         wanted_groups.pop("plane", None)
     if other := [name for name, value in wanted_groups.items() if state.groups[name] != value]:
         return f"{', '.join(other)} is another one after the run"

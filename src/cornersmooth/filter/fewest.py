@@ -15,7 +15,7 @@ import numpy as np
 from cornersmooth.arrays.vectors import square, unit
 from cornersmooth.control.source import CHUNK
 from cornersmooth.control.state import State
-from cornersmooth.filter.motion import Job, plane_of, says_motion
+from cornersmooth.filter.motion import Job, says_motion
 from cornersmooth.filter.runs import ANGLES, ANY, NONE, TURNS, VECTOR, Reading, Run
 from cornersmooth.kinematics import tip_position, tool_axis
 from cornersmooth.model import Bools, Floats, Ints
@@ -69,7 +69,7 @@ def fewest(
         key = (
             int(reading.start[run.first]) // CHUNK,
             run.state.unit,
-            plane_of(run.state),
+            run.state.plane,
             stays,
             _planes(job, run.state, reading),
         )
@@ -94,7 +94,7 @@ def _mode(job: Job) -> Mode:
 
 def _planes(job: Job, state: State, reading: Reading) -> tuple[int, ...]:
     """Planes in which arcs may lie: none under tip control of rotary axes, that which holds under a frame."""
-    mode, plane, wanted = _mode(job), plane_of(state), job.reader.wanted
+    mode, plane, wanted = _mode(job), state.plane, job.reader.wanted
     tips = wanted == ANGLES or (wanted == ANY and state.groups["tip"] != "off" and TURNS.search(reading.data))
     if not mode.circles or not plane or tips:
         return ()

@@ -10,7 +10,6 @@ from typing import Final
 
 import numpy as np
 
-from cornersmooth.control.state import State
 from cornersmooth.control.table import PRESET
 from cornersmooth.errors import InputError
 from cornersmooth.filter.runs import ANY, TURNS, ProgramReader, Reading, Run
@@ -44,12 +43,6 @@ class Stretch:
     run: Run  #: says the state before the blocks
     text: bytes  #: whole lines
     line: int  #: number of the first, from 1
-
-
-def plane_of(state: State) -> int:
-    """Plane of arcs that holds, 0 where that is not known; a mill begins in G17."""
-    plane = state.groups.get("plane", PRESET)
-    return 17 if plane == PRESET else int((plane or "G0")[1:])
 
 
 def says_motion(line: bytes) -> bool:
@@ -132,8 +125,8 @@ def _start(job: Job, run: Run, form: Form, before: str) -> bytes:
     lines = [_block(job, run, run.start, form, rapid=True)]
     if 2 in words and mode != before:
         lines.append(words[2 if mode == "inverse" else 0].encode())
-    if state.groups.get("plane", PRESET) != PRESET and plane_of(state):  # that of arcs in its place
-        lines.append(b"G%d" % plane_of(state))
+    if state.groups.get("plane", PRESET) != PRESET and state.plane:  # that of arcs in its place
+        lines.append(b"G%d" % state.plane)
     # one that is not known differs from all of the run: a first cut that leaves it out is found
     value = 2.0 * float(np.max(run.feeds)) if math.isnan(state.feed) else state.feed
     feed = b" F%.9f" % value if mode != "inverse" else b""

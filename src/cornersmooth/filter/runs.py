@@ -28,8 +28,8 @@ FILTERED: Final = tuple(control for control in CONTROLS if control != "generic")
 #: how messages call the words of the tool axis
 _TOLD: Final = {ANGLES: "rotary words", VECTOR: "tool vectors", "both": "rotary words and tool vectors"}
 
-#: words of Siemens under which the tool axis runs as its words say, beside those that the control has by itself
-_EVEN: Final = {VECTOR: ("ORIVECT", "ORIPLANE", "ORIWKS", PRESET), ANGLES: ("ORIAXES", "ORIMKS", PRESET)}
+#: interpolation, and coordinates, of the tool axis under which it runs as its words say
+_EVEN: Final = {VECTOR: ("vectors", "planes", "part", PRESET), ANGLES: ("angles", "machine", PRESET)}
 
 #: degrees that a rotary word may change by in a cut: from half a turn on controls do not agree on the way
 _HALF_TURN: Final = 180.0

@@ -10,11 +10,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final, NamedTuple
 
 import numpy as np
 
+from cornersmooth.control.state import State
+from cornersmooth.control.table import PRESET
 from cornersmooth.control.words import Line, refused
 from cornersmooth.model import Floats
 from cornersmooth.nc_reader.elements import Problem
@@ -69,25 +71,18 @@ class HoleCycle:
 
 
 @dataclass
-class ModalState:
+class Running:
     """What holds between two lines; grammars read it, and set what has no `acts.Act`."""
 
+    machine: State  #: modal groups: the program's own, or those of the line that is read
     modal: Modal
     rotary: Rotary | None = None  #: with the length of the tool in the spindle
-    tip: str = ""  #: word of the tool tip control, or of the tool length, that is on
-    incremental: bool = False  #: G91 is in force, in which no motion is read
-    high_speed: bool = False  #: look ahead of the kind that some controls ask for with curves is on
     clamped: dict[str, bool] = field(default_factory=dict)  #: rotary axes with a clamp: kept, or words let them turn
-    keeps_tip: bool | None = None  #: whether the kinematics do, where the machine's file says what switches that
-    shorter_way: bool = False  #: whether rotary axes go it
     speed: float = math.nan  #: of the spindle
     rigid: bool = False  #: M29 asks the spindle to turn with the feed
     height: float | None = None  #: at which a run of modal cycles began (G98), in units of the program
     cycle: HoleCycle | None = None  #: that a block defines for others to call
     centre: dict[str, float] = field(default_factory=dict)  #: of circles to come
-    #: words that say how the tool axis is interpolated, and in which coordinates
-    orientation: str = ""
-    coordinates: str = ""
     plane: TiltedPlane | None = None  #: that is on
     left_turned: bool = False  #: a plane that is off again has left the rotary axes where no word says
     #: degrees that rotary axes have turned while the tool axis stands
@@ -95,8 +90,12 @@ class ModalState:
 
     @property
     def tip_control(self) -> str:
-        """Name of the tool tip control that is on."""
-        return " ".join(filter(None, (self.tip, self.coordinates, self.orientation))) if self.tip else ""
+        """Words of the tool tip control, or of the tool length, that is on; empty for none."""
+        groups, last = self.machine.groups, self.machine.last_words
+        if groups["tip"] != "off":
+            return " ".join(last[name].text for name in ("tip", "coordinates", "orientation") if name in last)
+        length = groups.get("tool_length", PRESET)
+        return "" if length in (PRESET, "off", None) else length
 
 
 class Move(NamedTuple):
@@ -137,7 +136,7 @@ def wrong(code: str, line: Line, text: str) -> Problem:
     return Problem(code, 0, line.number, text)
 
 
-def drill(cycle: HoleCycle, x: float, y: float, line: Line, state: ModalState) -> Acts:
+def drill(cycle: HoleCycle, x: float, y: float, line: Line, state: Running) -> Acts:
     """Give out the moves of a cycle at a place.
 
     Raises
@@ -149,7 +148,7 @@ def drill(cycle: HoleCycle, x: float, y: float, line: Line, state: ModalState) -
         raise refused(line, "a cycle whose heights are not one below another", "give them in their order")
     if cycle.step and (cycle.clearance - cycle.bottom) / cycle.step > _MOST_PECKS:
         raise refused(line, f"more than {_MOST_PECKS:,} pecks in one hole", "give a larger step")
-    before, free = state.modal, [axis for axis, kept in state.clamped.items() if not kept]
+    feed_before, free = state.modal.feed, [axis for axis, kept in state.clamped.items() if not kept]
     if free:
         yield wrong("CS538", line, f"a hole cycle while {' and '.join(free)} is not clamped")
     # all moves up to the next event are carried out together
@@ -157,7 +156,7 @@ def drill(cycle: HoleCycle, x: float, y: float, line: Line, state: ModalState) -
     yield Move({"G": 0.0, "Z": cycle.clearance}, later=True)
     if cycle.pitch is not None:
         yield Beside("G", 84.0)
-        state.modal = state.modal.but(per_revolution=True)
+        machine, state.machine = state.machine, state.machine.but(feed="revolution")
         if cycle.dwell:
             yield wrong("CS506", line, "a tap that waits at the bottom of its thread")
     feed = {} if cycle.feed is None else {"F": cycle.feed}
@@ -174,7 +173,9 @@ def drill(cycle: HoleCycle, x: float, y: float, line: Line, state: ModalState) -
     if cycle.feed_out or cycle.pitch is not None:
         yield Move({"G": 1.0, "Z": cycle.clearance}, later=True)
     yield Move({"G": 0.0, "Z": cycle.travel})
-    state.modal = state.modal.but(code=math.nan, feed=before.feed, per_revolution=before.per_revolution)
+    state.modal = replace(state.modal, code=math.nan, feed=feed_before)
+    if cycle.pitch is not None:
+        state.machine = machine
 
 
 def numbers(text: str) -> list[float | None]:

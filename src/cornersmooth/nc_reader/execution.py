@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
+from cornersmooth.control.state import State
 from cornersmooth.control.words import NURBS, Table, filled
-from cornersmooth.model import MM_PER_UNIT, Bools, Floats, Ints
+from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.arcs import circles
 from cornersmooth.nc_reader.elements import Curves, Element, Elements, NcArcs, Problem
 from cornersmooth.nc_reader.splines import Blocks, curves_of, cut_long
@@ -25,34 +26,27 @@ _WHOLE: Final = 2e-3
 
 @dataclass(frozen=True)
 class Modal:
-    """What holds from one block to the next."""
+    """Words of motion blocks that hold from one to the next."""
 
     code: float = float("nan")  #: G word of group 01; NaN before the first.
     #: In units of the text; NaN where not known yet.
     tip: tuple[float, ...] = (float("nan"),) * 3
     second: tuple[float, ...] = (float("nan"),) * 3
     feed: float = float("nan")
-    #: `inverse_time`: feeds are moves per minute
-    per_revolution: bool = False
-    inverse_time: bool = False
-    inch: bool = False
-    plane: int = 17  #: 17, 18 or 19
     points: bool = False  #: u V W have been met: they are the axis point
     rotary: str = ""  #: addresses of the rotary axes, nearest to the part first; empty for texts without any
     vector_length: float = math.inf  #: of the shortest tool vector so far
 
-    def but(self, **changes: Any) -> Modal:
-        """Return a copy with some values changed."""
-        return replace(self, **changes)
 
-
-def execute(table: Table, modal: Modal, problems: list[Problem]) -> tuple[Elements, Modal]:
+def execute(table: Table, modal: Modal, machine: State, problems: list[Problem]) -> tuple[Elements, Modal]:
     """Run the blocks of a table, which ends where no curve is open.
 
     Parameters
     ----------
     modal : Modal
         Before the first block.
+    machine : State
+        What holds in all of them.
     problems : list of Problem
         Takes what breaks the rules.
 
@@ -113,7 +107,7 @@ def execute(table: Table, modal: Modal, problems: list[Problem]) -> tuple[Elemen
         second=end[:, 3:],
         line=table.line[rows],
         feed=np.where(rapid, np.nan, feed[rows]),
-        per_revolution=np.full(len(rows), modal.per_revolution),
+        per_revolution=np.full(len(rows), machine.groups["feed"] == "revolution"),
         other_feed=np.full(len(rows), np.nan),
         least_feed=np.zeros(len(rows), np.bool_),
         feed_room=none,
@@ -121,7 +115,8 @@ def execute(table: Table, modal: Modal, problems: list[Problem]) -> tuple[Elemen
         tip_room=none.copy(),
         curves=replace(curves, element=curved) if len(curves) else curves,
     )
-    after = modal.but(
+    after = replace(
+        modal,
         code=float(code[-1]),
         tip=tuple(tip[-1].tolist()),
         second=tuple(second[-1].tolist()),
@@ -130,16 +125,25 @@ def execute(table: Table, modal: Modal, problems: list[Problem]) -> tuple[Elemen
         vector_length=vector_length,
     )
     _check(run, replace(modal, points=points), table, rows, code, straight, problems)
+    if machine.groups["feed"] == "inverse":  # every block of feed needs its F, and curves are refused (alarm PS1006)
+        missing = np.isnan(table.column("F")[rows]) & (code[rows] > 0)
+        problems += Problem.at("CS542", missing, run.line, "a block without F at inverse time feed (G93)", most=1)
+        text = "a curve at inverse time feed (G93)"
+        problems += Problem.at("CS511", code[rows] == NURBS, run.line, text, most=1)
     if is_arc.any():
-        run = replace(run, arcs=_arcs(run, modal, table, rows, code, problems))
+        element = np.flatnonzero(run.kind == Element.ARC)
+        own = rows[element]
+        part = Table(table.line[own], {name: column[own] for name, column in table.columns.items()})
+        start = np.vstack((modal.tip, run.tip))[element]
+        circle = circles(part, start, run.tip[element], code[own] == 3, machine.plane, problems)
+        run = replace(run, arcs=NcArcs(element, *circle))
     return run, after
 
 
-def in_mm(run: Elements, before: Modal, *, points: bool, inch_feed: float, feed_step: float) -> Elements:
+def in_mm(run: Elements, machine: State, *, points: bool, inch_feed: float, feed_step: float) -> Elements:
     """Return a run in millimetres, with `feed_step` as the room of feeds; feeds of a text in inches are `inch_feed`."""
-    factor = MM_PER_UNIT["inch" if before.inch else "mm"]
-    unit = factor * (inch_feed if before.inch and not before.per_revolution else 1.0)
-    unit = 1.0 if before.inverse_time else unit
+    factor, mode = machine.unit, machine.groups["feed"]
+    unit = 1.0 if mode == "inverse" else factor * (inch_feed if factor != 1.0 and mode == "minute" else 1.0)
     if factor != 1.0:  # a factor of one leaves the numbers untouched
         run.curves.point[:, : 6 if points else 3] *= factor
         run = replace(
@@ -151,15 +155,6 @@ def in_mm(run: Elements, before: Modal, *, points: bool, inch_feed: float, feed_
         )
     run.feed_room[:] += feed_step / 2 * unit
     return run
-
-
-def _arcs(run: Elements, modal: Modal, table: Table, rows: Ints, code: Floats, problems: list[Problem]) -> NcArcs:
-    """Circles of the arcs of a run; `rows` are the blocks of its elements, `code` the G word of each block."""
-    element = np.flatnonzero(run.kind == Element.ARC)
-    own = rows[element]
-    part = Table(table.line[own], {name: column[own] for name, column in table.columns.items()})
-    start, end = np.vstack((modal.tip, run.tip))[element], run.tip[element]
-    return NcArcs(element, *circles(part, start, end, code[own] == 3, modal.plane, problems))
 
 
 def _kept(table: Table, letters: str, before: tuple[float, ...], values: Floats) -> Bools:
@@ -221,10 +216,6 @@ def _check(
     given = [~np.isnan(table.columns[name]) for name in names if name in table.columns]
     text = "curve blocks without what begins a curve before them"
     problems += Problem.at("CS511", straight & np.any(given, axis=0), table.line, text, most=1) if given else []
-    if modal.inverse_time:  # under G93 every block of feed needs its F, and curves are refused (FANUC alarm PS1006)
-        missing = np.isnan(table.column("F")[rows]) & (own > 0)
-        problems += Problem.at("CS542", missing, line, "a block without F at inverse time feed (G93)", most=1)
-        problems += Problem.at("CS511", own == NURBS, line, "a curve at inverse time feed (G93)", most=1)
     if len(run.curves):  # first control points are where the tool is, digit for digit (FANUC alarm PS1009)
         exact = own[run.curves.element] == NURBS
         element = run.curves.element[exact]

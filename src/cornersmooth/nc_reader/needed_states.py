@@ -13,9 +13,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from cornersmooth.control.state import State
+from cornersmooth.control.table import PRESET
 from cornersmooth.control.words import BY_WORD, NURBS, Table
 from cornersmooth.model import Bools, Floats
-from cornersmooth.nc_reader.acts import ModalState
+from cornersmooth.nc_reader.acts import Running
 from cornersmooth.nc_reader.dialects.base import Dialect
 from cornersmooth.nc_reader.elements import Element, Elements, Problem
 from cornersmooth.nc_reader.execution import Modal
@@ -36,12 +38,12 @@ MOST_IDLE: Final = 180.0
 #: degrees at which a rotary axis counts as at zero
 _ZERO: Final = 1e-9
 
-#: what words of each kind are
+#: what words of each kind are, as `control.table` has tip control for them
 _KINDS = {
-    "vector": "a tool vector",
-    "point": "a second point on the tool axis",
+    "vectors": "a tool vector",
+    "points": "a second point on the tool axis",
     "angles": "tip and rotary words",
-    "machine": "words of the machine's axes",
+    "off": "words of the machine's axes",
 }
 
 
@@ -52,7 +54,7 @@ class Run:
     table: Table
     elements: Elements  #: with rotary words as degrees
     before: Modal
-    state: ModalState
+    state: Running
     dialect: Dialect
     #: lines of the way down from a retract, in which rotary axes turn before the control knows the tip
     approach: frozenset[int] = frozenset()
@@ -87,20 +89,48 @@ def control_problems(run: Run) -> Iterator[Problem]:
     """Curves, and words of the axis, that the control would not take for what they are."""
     table, state, dialect = run.table, run.state, run.dialect
     if state.rotary is not None:
-        kind, letters = ("angles" if state.rotary.tip_control else "machine"), {*state.rotary.names}
+        kind, letters = ("angles" if state.rotary.tip_control else "off"), {*state.rotary.names}
     else:
-        kind, letters = ("point", {*"UVW"}) if state.modal.points else ("vector", {*"IJ"})
-    if dialect.curves_need and not state.high_speed:
+        kind, letters = ("points", {*"UVW"}) if state.modal.points else ("vectors", {*"IJ"})
+    if dialect.curves_need and state.machine.groups["smoothing"] != dialect.curves_need:
         text = f"a curve where {dialect.curves_need} must be in force"
         yield from Problem.at(CONTROL_WORDS, table.column("G") == NURBS, table.line, text, most=1)
-    wanted = dialect.controls.get(kind)
-    if wanted is not None and state.tip_control not in wanted:
+    if dialect.asks_tip and not (holds := _holds_for(kind, state.machine)):
         line = table.line[table.rows_with(letters, run.before.code)]
-        need = " or ".join(word or "no tool tip control" for word in wanted)
-        text = f"{_KINDS[kind]} under {state.tip_control or 'no tool tip control'}, where {need} must be in force"
         turned = [] if state.rotary is None else list(run.approach)
-        unsure = state.tip_control in dialect.unsure.get(kind, ())
-        yield from Problem.at("" if unsure else CONTROL_WORDS, ~np.isin(line, turned), line, text, most=1)
+        if len(line := line[~np.isin(line, turned)]):
+            here, need = state.tip_control or "no tool tip control", _words_for(kind, state.machine)
+            text = f"{_KINDS[kind]} under {here}, where {need} must be in force"
+            yield Problem("" if holds is None else CONTROL_WORDS, 0, int(line[0]), text)
+
+
+def _holds_for(kind: str, machine: State) -> bool | None:
+    """Whether tip control is on, or off, as words of a kind want it; None where machine data decide.
+
+    Where it is on for all kinds, other words say how the axis is interpolated, and in which coordinates.
+    """
+    groups, system = machine.groups, "machine" if kind == "angles" else "part"
+    if (last := machine.last_words.get("tip")) is not None and last.odd:
+        return False
+    if kind == "points" and "orientation" not in groups:  # FANUC: words of G6.2, under the length of the tool
+        return True
+    if kind == "off" or groups["tip"] != "both":
+        return groups["tip"] == kind
+    law, place = groups.get("orientation", PRESET), groups.get("coordinates", PRESET)
+    if (law, place) == (kind, system) or (kind == "angles" and "orientation" not in groups):
+        return True
+    open_laws = {"vectors": (kind, "planes", PRESET), "angles": (kind, PRESET)}.get(kind, (kind,))
+    return None if law in open_laws and place in (system, PRESET) else False
+
+
+def _words_for(kind: str, machine: State) -> str:
+    """Words under which those of a kind are taken for what they are."""
+    if kind == "off":
+        return "no tool tip control"
+    system = "machine" if kind == "angles" else "part"
+    groups = ("tip", kind, "both"), ("coordinates", system), ("orientation", kind)
+    words = [" or ".join(machine.table.words(*group)) for group in groups]
+    return " ".join(filter(None, words)) if words[0] else "tool tip control for them"
 
 
 def plane_problems(run: Run) -> Iterator[Problem]:
@@ -137,7 +167,8 @@ def axis_problems(run: Run) -> Iterator[Problem]:
 
     Those are from 0 to 360 degrees, and go the shorter way by a word.
     """
-    table, way = run.table, run.dialect.shorter_way
+    table, machine = run.table, run.state.machine
+    way = machine.table.words("way", "shorter")
 
     def first(code: str, wrong: Bools, text: str) -> list[Problem]:
         return Problem.at(code, wrong, table.line, text, most=1)
@@ -149,12 +180,12 @@ def axis_problems(run: Run) -> Iterator[Problem]:
             yield from first(
                 "CS506", (values < 0.0) | (values >= 360.0), f"a word of {name} that is not from 0 to 360 degrees"
             )
-        if way == BY_WORD and axis.modulo:
+        if run.dialect.by_word and axis.modulo:
             yield from first("CS506", given & ~by_words, f"{name} without {BY_WORD}(), which sends it the shorter way")
-        elif way == BY_WORD:
+        elif run.dialect.by_word:
             yield from first("CS506", by_words, f"{name} with {BY_WORD}(), which is for modulo axes")
-        elif way and axis.modulo and not run.state.shorter_way:
-            yield from first("CS506", given, f"{name} without {way} in force, which sends it the shorter way")
+        elif way and axis.modulo and machine.groups["way"] != "shorter":
+            yield from first("CS506", given, f"{name} without {way[0]} in force, which sends it the shorter way")
         half = run.rotary.angle_step / 2
         beyond = (values < axis.low - half) | (values > axis.high + half)
         for angle in values[beyond][:1].tolist():
@@ -170,13 +201,13 @@ def kinematics_problems(run: Run) -> Iterator[Problem]:
     state, dialect, machine, tip_control = run.state, run.dialect, run.machine, run.rotary.tip_control
     angles = run.angles[1:]
     if dialect.switches:
-        on = state.keeps_tip
+        on = None if "tip" not in state.machine.last_words else state.machine.groups["tip"] != "off"
         if machine.tip_control and on is not tip_control:
             here, other = machine.tip_control if tip_control else machine.tip_control[::-1]
             before = "before any word of tip control" if on is None else f"under {other}"
-            text = f"{_KINDS['angles' if tip_control else 'machine']} {before}, where {here} must be in force"
+            text = f"{_KINDS['angles' if tip_control else 'off']} {before}, where {here} must be in force"
             yield from run.first(CONTROL_WORDS, (np.abs(angles) > _ZERO).any(axis=1), text)
-    elif tip_control and machine.names and state.tip_control in dialect.controls.get("machine", ()):
+    elif tip_control and machine.names and dialect.asks_tip and state.machine.groups["tip"] == "off":
         full = np.array([np.inf if axis.limits is not None else 360.0 for axis in machine.axes])
         off = np.abs(angles - run.rotary.zero) % full
         away = (np.minimum(off, full - off) > run.rotary.angle_step).any(axis=1)

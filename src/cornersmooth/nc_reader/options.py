@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
+from cornersmooth.control.table import Table
 from cornersmooth.errors import SettingsError
 from cornersmooth.nc_reader.dialects import Dialect, dialect_of
 from cornersmooth.nc_reader.rotary import Rotary
@@ -40,6 +41,7 @@ class ReadingOptions:
 
     control: str
     dialect: Dialect
+    table: Table  #: of words, with those that switch tip control of the machine's kinematics
     machine: Machine | None
     tcp: bool
     #: mm: as in `read_nc`
@@ -55,7 +57,9 @@ class ReadingOptions:
         if machine is None and not tcp:
             raise SettingsError("CS215", "machine positions need a machine", "name it with --machine")
         turns = machine is not None and len(machine.names) > 0
-        return cls(control, dialect, machine if turns else None, tcp, tolerance, axis_length)
+        switch = machine.tip_control if machine is not None and turns and dialect.switches else None
+        table = dialect.table.switched(switch or ())
+        return cls(control, dialect, table, machine if turns else None, tcp, tolerance, axis_length)
 
     def steps(self, sample: bytes) -> Steps:
         """Printed digits of a piece of a text, as its control's format shows them."""

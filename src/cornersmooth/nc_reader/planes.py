@@ -54,7 +54,7 @@ class TiltedPlane:
         """Return what holds behind the plane: where the rotary axes stand the text does not say."""
         known = np.array(modal.tip) @ self.frame.T + self.origin  # nothing where any of it is unknown
         second = (math.nan,) * 3 if rotary else tuple(self.tool.tolist())
-        return modal.but(tip=tuple(known.tolist()), second=second)
+        return replace(modal, tip=tuple(known.tolist()), second=second)
 
 
 def rotated_frame(turns: Sequence[tuple[str, float]]) -> Floats:

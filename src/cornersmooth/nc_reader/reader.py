@@ -7,15 +7,16 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from itertools import chain
-from typing import TYPE_CHECKING, Final, NoReturn
+from typing import Final, NoReturn
 
 import numpy as np
 
 from cornersmooth.control.source import Readable, read_lines
+from cornersmooth.control.state import State
 from cornersmooth.control.words import MOTION_CODES, Line, Table, joined_tables, table_of
 from cornersmooth.errors import InputError
 from cornersmooth.model import MM_PER_UNIT, Floats, Units
-from cornersmooth.nc_reader.acts import Act, Beside, ModalState, Move, Tilt, ToMachine
+from cornersmooth.nc_reader.acts import Act, Beside, Move, Running, Tilt, ToMachine
 from cornersmooth.nc_reader.elements import RETRACT, Element, Elements, Event, Problem, Second
 from cornersmooth.nc_reader.execution import Modal, execute, in_mm
 from cornersmooth.nc_reader.needed_states import (
@@ -32,8 +33,8 @@ from cornersmooth.nc_reader.planes import ASIDE, NOT_ABOVE, TiltedPlane
 from cornersmooth.nc_reader.retracts import Retracts
 from cornersmooth.nc_reader.rotary import MOST_LINES
 
-if TYPE_CHECKING:
-    pass
+#: groups that are known where the tool moves
+_HOLDS: Final = ("units", "feed", "distance", "plane", "tip", "tool_length", "orientation", "coordinates", "way")
 
 #: share of the tolerance, at the axis point, that a tool without words for its axis may lean
 FIXED_SHARE: Final = 0.1
@@ -58,7 +59,9 @@ class Reader:
         self.name, self.options, self.dialect, self.steps = name, options, options.dialect, steps
         rotary = options.rotary(steps)
         clamped = {} if rotary is None else {axis.name: True for axis in rotary.machine.axes if axis.clamp is not None}
-        self.state = ModalState(Modal(rotary="" if rotary is None else rotary.names), rotary, clamped=clamped)
+        modal = Modal(rotary="" if rotary is None else rotary.names)
+        self.state = Running(State(options.table, (*"XYZABCIJK",)), modal, rotary, clamped=clamped)
+        self._lost = ""  # words since the last motion that may have changed what holds
         self._tool = -1.0  # that has been chosen
         self._left_at: Floats | None = None  # where a tool of another length has left
         self._waiting: list[Table] = []
@@ -144,16 +147,28 @@ class Reader:
             self._single.append((line.number, row))
             return
         self._flush()
-        inch, elements = self.state.modal.inch, self.elements
+        units, elements = self.units, self.elements
+        self._take(line)
         try:
             for act in self.dialect.acts(line, self.state):
                 self._carry_out(line, act)
         except InputError as error:
             raise InputError(error.code, error.what, error.hint, file=self.name, line=error.line) from None
-        if elements and self.state.modal.inch != inch:
+        if elements and self.units != units:
             self._wrong("CS504", line, "units are changed in the middle of the path")
         self.events += [replace(event, element=self.elements) for event in self.late]
         self.late = []
+
+    def _take(self, line: Line) -> None:
+        """Change what holds; what is not known any more is taken to hold, and motion under it was not looked at."""
+        if self.blocks == 1 and line.words[0].name == "O":  # the name of the program
+            return
+        machine, before = self.state.machine, self.state.machine.groups
+        self.state.machine = machine = machine.after(line)
+        lost = [name for name in _HOLDS if machine.groups.get(name) is None and before.get(name) is not None]
+        if lost:
+            self._lost = " ".join(word.text for word in line.words)
+            machine.groups |= {name: before[name] for name in lost}
 
     def _carry_out(self, line: Line, act: Act) -> None:
         """Carry out what a line does."""
@@ -177,7 +192,7 @@ class Reader:
                 self._flush()
         else:
             modal = self.state.modal
-            self.state.modal = modal.but(code=row.get("G", modal.code), feed=row.get("F", modal.feed))
+            self.state.modal = replace(modal, code=row.get("G", modal.code), feed=row.get("F", modal.feed))
 
     def _beside(self, line: Line, word: Beside) -> None:
         """Take a word that stands beside the motion."""
@@ -254,7 +269,7 @@ class Reader:
         self.events.append(Event(self.elements, line.number, RETRACT, 0.0))
         gone = "XYZ" if state.plane is not None else axes
         tip = (math.nan if axis in gone else at for axis, at in zip("XYZ", state.modal.tip, strict=True))
-        state.modal = state.modal.but(tip=tuple(tip))
+        state.modal = replace(state.modal, tip=tuple(tip))
 
     def _wrong(self, code: str, line: Line, text: str) -> None:
         """Note what breaks the rules of the control."""
@@ -281,10 +296,13 @@ class Reader:
 
     def _execute(self, table: Table) -> None:
         state, before = self.state, self.state.modal
-        if state.incremental:
+        if self._lost:
+            self.unlooked.append((int(table.line[0]), f"motion behind {self._lost}, which may change what holds"))
+            self._lost = ""
+        if state.machine.groups["distance"] == "incremental":
             what, hint = "motion in incremental words (G91)", "write G90 after a position of the machine"
             raise InputError("CS503", what, hint, file=self.name, line=int(table.line[0]))
-        elements, state.modal = execute(table, before, self.problems)
+        elements, state.modal = execute(table, before, state.machine, self.problems)
         run = Run(table, elements, before, state, self.dialect)
         if state.rotary is not None:
             self._note(clamp_problems(run))
@@ -310,13 +328,13 @@ class Reader:
     def _come_back(self, run: Run) -> Run:
         """Leave out what is on the way back from a retract."""
         state, whole = self.state, run.elements
-        alone = state.tip_control in self.dialect.controls.get("machine", ("",))
-        free = state.rotary is not None and alone and not state.keeps_tip
+        alone = state.machine.groups["tip"] == "off" and (self.dialect.asks_tip or not state.tip_control)
+        free = state.rotary is not None and alone
         kept = self.retracts.arrive(whole, self._words(run.before), free=free)
         approach = frozenset(whole.line.tolist()).difference(kept.line.tolist())
         before = run.before
         if state.rotary is not None and 0 < len(kept) < len(whole):  # on the way back axes turn, too
-            before = before.but(second=tuple(whole.second[-len(kept) - 1].tolist()))
+            before = replace(before, second=tuple(whole.second[-len(kept) - 1].tolist()))
         return replace(run, elements=kept, before=before, approach=approach)
 
     def _words(self, modal: Modal) -> Floats:
@@ -327,7 +345,7 @@ class Reader:
     def _in_mm(self, run: Run) -> Elements:
         inch_feed, step = self.dialect.inch_feed, self.dialect.feed_step
         points = self.state.modal.points
-        return in_mm(run.elements, run.before, points=points, inch_feed=inch_feed, feed_step=step)
+        return in_mm(run.elements, self.state.machine, points=points, inch_feed=inch_feed, feed_step=step)
 
     def _resolved(self, run: Run) -> Elements:
         """Elements of a run in rotary words, in mm, as tips and tool vectors."""
@@ -343,8 +361,9 @@ class Reader:
             self._note(chain.from_iterable(rule(run) for rule in UNWRAPPED))
         self.state.left_turned = False
         rotary = replace(run.rotary, tip_step=factor * run.rotary.tip_step)
-        start = before.but(tip=tuple(factor * value for value in before.tip))
-        found = rotary.resolve(elements, start, inverse_time=before.inverse_time)
+        start = replace(before, tip=tuple(factor * value for value in before.tip))
+        inverse_time = self.state.machine.groups["feed"] == "inverse"
+        found = rotary.resolve(elements, start, inverse_time=inverse_time)
         lines, count = np.unique(found.line, return_counts=True)
         turned = "the way of a block that turns very far"
         self.unlooked += [(line, turned) for line in lines[count >= MOST_LINES].tolist()]
@@ -409,7 +428,7 @@ class Reader:
     @property
     def nothing(self) -> Elements:
         """No elements at all."""
-        none, _ = execute(table_of([(0, {"G": 0.0})]), self.state.modal, [])
+        none, _ = execute(table_of([(0, {"G": 0.0})]), self.state.modal, self.state.machine, [])
         return replace(none, tip_step=self.steps.tip, second_step=self.steps.second)
 
     def _collected(self) -> Elements:
@@ -427,4 +446,4 @@ class Reader:
     @property
     def units(self) -> Units:
         """Units in force."""
-        return "inch" if self.state.modal.inch else "mm"
+        return "inch" if self.state.machine.groups["units"] == "inch" else "mm"

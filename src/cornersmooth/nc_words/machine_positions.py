@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Set
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
-from cornersmooth.control.table import Row, Table
+from cornersmooth.control.table import Table
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine
@@ -55,11 +55,7 @@ class MachinePositions:
 
     def table(self, table: Table) -> Table:
         """Table of the control with the words that switch tip control of these kinematics, and with positions."""
-        for block, tip in zip(self._switch, ("both", "off"), strict=False):
-            word, *others = block.split()
-            beside = " ".join(f"{other}!" for other in others)
-            rows = Row.all_of(word, f"tip={tip} place: {beside}; alone follows; tip control of the kinematics")
-            table = replace(table, named={**table.named, word: rows[0]}, listed=(*rows, *table.listed))
+        table = table.switched(self._switch)
         return replace(table, blocks=(*table.blocks, *table.positions)) if self else table
 
     def away(self, angles: Mapping[str, float]) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Container, Mapping, Sequence, Set
+from collections.abc import Container, Set
 from typing import Final
 
 from cornersmooth.control.lexer import Lexer
@@ -11,13 +11,11 @@ from cornersmooth.control.table import table_of
 from cornersmooth.control.word_tables import word_table
 from cornersmooth.control.words import Columns, Line, Word, refused, tools_first
 from cornersmooth.errors import InputError
-from cornersmooth.nc_reader.acts import Acts, Beside, ModalState, Move
+from cornersmooth.nc_reader.acts import Acts, Beside, Move, Running
 
-#: groups, and effects, of M words that change what holds from block to block, for controls that have such
-_MODAL_M: Final = ("feed=", "tip=", "way=", "machine")
-
-#: effects of words that change nothing measured
-SILENT: Final = frozenset("nothing distance=absolute offset=. path=. smoothing=. smoothing=off cycles=off".split())
+#: effects of words that are read: those of groups whatever their known value, or the effect as a whole
+_READ: Final = frozenset("plane units feed tip tool_length orientation coordinates way compensation".split())
+_SILENT: Final = frozenset("nothing distance=absolute offset=. path=. smoothing=. smoothing=off cycles=off".split())
 
 
 class Dialect:
@@ -36,14 +34,10 @@ class Dialect:
     feed_step = 1e-4
     #: inches per minute that F counts in, in a text in inches
     inch_feed = 1.0
-    #: what must be in force for words of a kind: ``"vector"``, ``"point"``, ``"angles"``, ``"machine"``
-    controls: Mapping[str, Sequence[str]] = {}
-    #: what is not known to be in force for them: machine data or parameters decide
-    unsure: Mapping[str, Sequence[str]] = {}
-    #: whether texts can send the tool up, so that rotary axes turn there
+    #: whether texts can send the tool up, so that rotary axes turn there: the neutral form has no words for the machine
     retracts: bool = True
-    #: what sends a modulo axis the shorter way: `BY_WORD`, a word that is in force, or empty for a parameter
-    shorter_way: str = ""
+    #: whether a modulo axis goes the shorter way by `BY_WORD`; else by a word that is in force, or by a parameter
+    by_word: bool = False
     #: what must be in force for curves; empty for nothing
     curves_need: str = ""
     #: whether tip control is switched by blocks that the machine's file names
@@ -52,8 +46,6 @@ class Dialect:
     beside: Set[str] = frozenset("MTS")
     others: Container[str] = "DN%"
     quiet: Set[str] = frozenset()  #: words that are no events
-    #: whether M words may change what holds from block to block
-    modal_m: bool = False
     #: the first letter, or letters, of tip and second triple in the lexer, with their decimals
     digits: re.Pattern[bytes] = re.compile(rb"(?:([XYZ])|([IJUVW]))[-+]?\d*\.(\d*)")
 
@@ -62,12 +54,17 @@ class Dialect:
         for key, value in table["grammar"].items():
             setattr(self, key, value)
         self.switches, self.rotary, self.control = table.get("switches", False), rotary, control
-        self._table = table_of(control)
-        self.means = self._table.means
+        self.table = table_of(control)
+        self.means = self.table.means
         if rotary:
             self.digits = re.compile(
                 rb"(?<!K\d)(?:([XYZ])|(?<![A-Z0-9])([%b])(?:=DC\()?)[-+]?\d*\.(\d*)" % rotary.encode()
             )
+
+    @property
+    def asks_tip(self) -> bool:
+        """Whether words of the tool axis need tip control that words of the control switch on."""
+        return self.retracts and not self.switches
 
     def after_motion(self, letter: str, value: float) -> bool:
         """Whether a word acts after the motion of its block: M words that stop, end or switch off."""
@@ -79,7 +76,7 @@ class Dialect:
         columns = self.lexer.motion(line)
         return None if columns is None else values(columns)
 
-    def acts(self, line: Line, state: ModalState) -> Acts:
+    def acts(self, line: Line, state: Running) -> Acts:
         """Give out what a line that is no motion block does; each act is carried out before the next is wanted.
 
         Raises
@@ -93,17 +90,15 @@ class Dialect:
             return
         motion: dict[str, float] = {}
         for word in tools_first(line.words):
-            if word.spelling in self.quiet:
-                continue
             if self.moves(word):
                 motion[word.name] = word.value
-            elif word.name in self.beside and not (self.modal_m and self.effect(word).startswith(_MODAL_M)):
+            elif word.name in self.beside and self._is_event(word, state):
                 yield self.event(word)
-            elif word.name not in self.others:
+            elif word.name not in self.others and word.spelling not in self.quiet:
                 yield from self._mode(word, line, state)
         yield from self.motion(motion, line, state)
 
-    def alone(self, line: Line, state: ModalState) -> Acts | None:
+    def alone(self, line: Line, state: Running) -> Acts | None:
         """What a line does whose words mean something together, as those of cycles do; None for all others."""
         raise NotImplementedError
 
@@ -116,43 +111,35 @@ class Dialect:
         """What a word says beside the motion."""
         return Beside(word.name, word.value, word.text)
 
-    def motion(self, given: dict[str, float], line: Line, state: ModalState) -> Acts:
+    def motion(self, given: dict[str, float], line: Line, state: Running) -> Acts:
         """What the words of the motion of a line do."""
         yield Move(given)
 
-    def _mode(self, word: Word, line: Line, state: ModalState) -> Acts:
-        """Take a word that changes what holds from block to block, by its row in the table."""
-        effect, name = self.effect(word), word.spelling
-        group, _, value = effect.partition("=")
-        if group == "plane":
-            state.modal = state.modal.but(plane=int(word.value))
-        elif group == "units":
-            state.modal = state.modal.but(inch=value == "inch")
-        elif group == "feed":
-            if value == "inverse" and state.rotary is None:
-                what = "inverse time feed (G93) without rotary words"
-                raise InputError("CS503", what, "name the machine with --machine", line=line.number)
-            state.modal = state.modal.but(per_revolution=value == "revolution", inverse_time=value == "inverse")
-        elif group in ("tip", "tool_length") and value != "?":
-            state.tip = "" if value == "off" else name
-        elif group in ("orientation", "coordinates"):
-            setattr(state, group, name)
-        elif group == "way":  # without it turns are less than half a turn either way
-            state.shorter_way = name == self.shorter_way
-        elif effect == "distance=absolute":
-            state.incremental = False
-        elif effect not in SILENT and (group != "compensation" or value == "?"):
+    def _mode(self, word: Word, line: Line, state: Running) -> Acts:
+        """Look at a word that changes what holds from block to block: the machine has taken it."""
+        group, _, value = (effect := self._effect(word, state)).partition("=")
+        if effect == "feed=inverse" and state.rotary is None:
+            what = "inverse time feed (G93) without rotary words"
+            raise InputError("CS503", what, "name the machine with --machine", line=line.number)
+        if effect not in _SILENT and (group not in _READ or value == "?"):
             if word.name not in "GM":
                 raise self.not_understood(line, word.name, word.text)
             hint = "only absolute milling with tool vectors, axis points or rotary words is read"
-            raise refused(line, f"{name} is not understood", hint)
+            raise refused(line, f"{word.spelling} is not understood", hint)
         if group in ("tool_length", "compensation"):
-            yield Beside("G", word.value, name)
+            yield Beside("G", word.value, word.spelling)
 
-    def effect(self, word: Word) -> str:
+    @staticmethod
+    def _is_event(word: Word, state: Running) -> bool:
+        """Whether a word says something of the machine: not an M word that verification accepts as it is."""
+        row = state.machine.table.row(word.spelling)
+        return word.name != "M" or row.compared or not (row.listed or "machine" in row.does)
+
+    @staticmethod
+    def _effect(word: Word, state: Running) -> str:
         """What a word does in the first place; what is beside it in its row follows from that."""
         name = word.spelling if word.name in "GM" else word.name
-        return next(iter(self._table.row(name).effects), "unknown")
+        return next(iter(state.machine.table.row(name).effects), "unknown")
 
     def machine_axes(self, line: Line, beside: Set[tuple[str, float]]) -> str:
         """Axes that a block sends to positions of the machine; refuses words beside them but for some."""

@@ -8,7 +8,7 @@ from typing import Final
 
 from cornersmooth.control.lexer import NOT_NEGATIVE, NUMBER, POSITIVE, ZERO, Lexer, fixed, number_of
 from cornersmooth.control.words import SPL, Columns, Line, Word, refused
-from cornersmooth.nc_reader.acts import Acts, Beside, HoleCycle, ModalState, Move, Tilt, ToMachine, drill, wrong
+from cornersmooth.nc_reader.acts import Acts, Beside, HoleCycle, Move, Running, Tilt, ToMachine, drill, wrong
 from cornersmooth.nc_reader.dialects.base import Dialect, values
 from cornersmooth.nc_reader.planes import TiltedPlane, room_of, rotated_frame
 
@@ -52,14 +52,13 @@ class Heidenhain(Dialect):
     beside = frozenset(("M", "S", "side"))
     others = ()
     quiet = frozenset(("M99",))
-    modal_m = True
     digits = re.compile(rb"(?<!K\d)(?:(?<!T)([XYZ])|(T[XYZ]))[-+]?\d*\.(\d*)")
 
     def __init__(self, control: str, rotary: str = "") -> None:
         super().__init__(control, rotary)
         self.lexer = _KlartextLexer(rotary)
 
-    def alone(self, line: Line, state: ModalState) -> Acts | None:
+    def alone(self, line: Line, state: Running) -> Acts | None:
         """As `Dialect.alone`: blocks that are words, and positions of the machine."""
         if line.words[0].name == "block":
             return self._block(line.words[0].text, line, state)
@@ -74,7 +73,7 @@ class Heidenhain(Dialect):
         """As `Dialect.event`."""
         return Beside("G" if word.name == "side" else word.name, word.value, word.text)
 
-    def motion(self, given: dict[str, float], line: Line, state: ModalState) -> Acts:
+    def motion(self, given: dict[str, float], line: Line, state: Running) -> Acts:
         """As `Dialect.motion`."""
         if "centre" in given:
             state.centre = {axis: given[axis] for axis in "XY" if axis in given}
@@ -106,7 +105,7 @@ class Heidenhain(Dialect):
             raise refused(line, "M91 without FMAX", "positions of the machine are read in rapids only")
         yield ToMachine(axes)
 
-    def _circle(self, motion: dict[str, float], line: Line, state: ModalState) -> dict[str, float]:
+    def _circle(self, motion: dict[str, float], line: Line, state: Running) -> dict[str, float]:
         """C: about the centre that CC has written, in the plane XY; CR: with a radius."""
         centre = state.centre
         by_radius = line.words[0].text == "CR"
@@ -119,14 +118,11 @@ class Heidenhain(Dialect):
             return {**row, "G": motion["turn"]}
         return {**row, "G": motion["turn"], "I": centre["X"] - x, "J": centre["Y"] - y}
 
-    def _block(self, text: str, line: Line, state: ModalState) -> Acts:
+    def _block(self, text: str, line: Line, state: Running) -> Acts:
         """Blocks that are words: tools, cycles, functions."""
         if text.startswith(("BEGIN PGM", "END PGM")):
-            unit = text.split()[-1]
-            if unit not in ("MM", "INCH"):
+            if text.split()[-1] not in ("MM", "INCH"):
                 raise refused(line, f"{text}: no units", "name MM or INCH at its end")
-            if text.startswith("BEGIN"):
-                state.modal = state.modal.but(inch=unit == "INCH")
         elif match := _TOOL_CALL.fullmatch(text):
             if match[1] is not None:
                 yield Beside("T", float(match[1]), text)
@@ -153,11 +149,7 @@ class Heidenhain(Dialect):
             yield Tilt(None)
         elif text == "STOP":
             yield Beside("M", 0.0, text)
-        elif match := re.fullmatch(r"FUNCTION TCPM F (?:TCP|CONT) AXIS POS PATHCTRL (AXIS|VECTOR)(?: .*)?", text):
-            state.tip = f"TCPM {match[1]}"
-        elif text == "FUNCTION RESET TCPM":
-            state.tip = ""
-        elif not text.startswith(_SILENT):
+        elif not text.startswith(_SILENT) and dict(state.machine.table.row(text).sets).get("tip") is None:
             raise refused(line, f"{text} is not understood", "see that the control is the one the text is for")
 
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Set
+from dataclasses import replace
 
 from cornersmooth.control.lexer import NUMBER, Lexer, fixed, number_of
 from cornersmooth.control.word_tables import word_table
 from cornersmooth.control.words import MOTION_CODES, NURBS, Columns, Line, Word, refused
-from cornersmooth.nc_reader.acts import Acts, Beside, HoleCycle, ModalState, Move, Tilt, ToMachine, drill, wrong
+from cornersmooth.nc_reader.acts import Acts, Beside, HoleCycle, Move, Running, Tilt, ToMachine, drill, wrong
 from cornersmooth.nc_reader.dialects.base import Dialect
 from cornersmooth.nc_reader.planes import TiltedPlane, room_of, rotated_frame, turned_frame
 
@@ -41,17 +42,14 @@ class Iso(Dialect):
     others = "NOQ"
     #: whether a comment may begin with a semicolon
     semicolon: bool = False
-    #: name of the tool tip control under which hole cycles are taken; ``"none"`` where they are not known
-    cycles_in: str = "G43"
-    #: whether ``M29 S`` asks for taps that turn the spindle with the feed
-    rigid: bool = False
-    #: what switches tilted planes on
-    planes: str = ""
 
     def __init__(self, control: str, rotary: str = "") -> None:
         super().__init__(control, rotary)
         self.lexer = (_LinuxLexer if self.semicolon else _IsoLexer)(rotary, frozenset(word_table(control)["points"]))
-        self.quiet = frozenset({"M29"} if self.rigid else ())
+        known = [codes for on, codes in _PLANE_WORDS.items() if self.retracts and on in self.table.named]
+        self._planes = frozenset[float]().union(*known)
+        #: whether ``M29 S`` asks for taps that turn the spindle with the feed
+        self._rigid = "M29" in self.table.named
 
     def decimals(self, text: bytes) -> tuple[int, int | None]:
         """As `Dialect.decimals`: the angles of a tilted plane are no vectors, nor are the centres of arcs."""
@@ -59,50 +57,36 @@ class Iso(Dialect):
         text = _PLANE_LINE.sub(b"", text) if planes else text
         return super().decimals(_ARC_LINE.sub(lambda line: _CENTRE.sub(b"", line[0]), text))
 
-    def alone(self, line: Line, state: ModalState) -> Acts | None:
+    def alone(self, line: Line, state: Running) -> Acts | None:
         """As `Dialect.alone`: switched kinematics, positions of the machine, hole cycles, planes and dwells."""
         codes = {word.value for word in line.words if word.name == "G"}
         given = {word.name: word.value for word in line.words}
-        if self._switched(line, state):
-            return iter(())
         if codes & {*_TO_REFERENCE, _IN_MACHINE}:
             return self._to_machine(line, codes, state)
         if codes & _CYCLES.keys():
             return self._cycle(line, codes, state)
-        if codes & _PLANE_WORDS.get(self.planes, frozenset()):
+        if codes & self._planes:
             return self._plane(line, codes, state)
         if 4.0 in codes:
             time = self.dwell * given["P"] if "P" in given else 1000.0 * given.get("X", given.get("U", 0.0))
             return iter((Beside("G", 4.0, f"{time:.10g}"),))
         if _NO_CYCLE in codes:
             state.height, state.rigid = None, False
-        if 5.0 in codes:
-            state.high_speed = given.get("P", 0.0) >= 10000.0
-        state.rigid |= any(word.spelling in self.quiet for word in line.words)
+        state.rigid |= self._rigid and any(word.spelling == "M29" for word in line.words)
         return None
 
     def moves(self, word: Word) -> bool:
         """As `Dialect.moves`."""
         return word.value in MOTION_CODES if word.name == "G" else word.name in self.lexer.letters
 
-    def motion(self, given: dict[str, float], line: Line, state: ModalState) -> Acts:
+    def motion(self, given: dict[str, float], line: Line, state: Running) -> Acts:
         """As `Dialect.motion`."""
         if self.lexer.odd_vector(given.keys(), given.get("G")):
             raise refused(line, "I J K beside rotary words", "leave out --machine for a text with tool vectors")
-        of_length = any(word.name == "G" and self.effect(word).startswith("tool_length") for word in line.words)
+        of_length = any(word.name == "G" and self._effect(word, state).startswith("tool_length") for word in line.words)
         yield Move(given, later=of_length and not any(self.after_motion(*word[:2]) for word in line.words))
 
-    def _switched(self, line: Line, state: ModalState) -> bool:
-        """Take a block that switches tip control of the kinematics; return whether it is one."""
-        blocks = state.rotary.machine.tip_control if self.switches and state.rotary is not None else None
-        given = {(word.name, word.value) for word in line.words if word.name != "N"}
-        for block, on in zip(blocks or (), (True, False), strict=False):
-            if given == {(word[0], float(word[1:])) for word in block.split()}:
-                state.keeps_tip = on
-                return True
-        return False
-
-    def _cycle(self, line: Line, codes: set[float], state: ModalState) -> Acts:
+    def _cycle(self, line: Line, codes: set[float], state: Running) -> Acts:
         """A hole cycle, with G98: all that it takes stands in its block."""
         code, modal = next(iter(codes & _CYCLES.keys())), state.modal
         words = [word for word in line.words if word.name != "N"]
@@ -110,18 +94,18 @@ class Iso(Dialect):
         needed = {*"GXYZR", *("" if tap else _CYCLES[code])}
         if codes != {code, _BACK_TO_START} or len(given) + 1 != len(words):
             raise refused(line, f"G{code:g} beside other words", "give it G98 and nothing else")
-        if not needed <= given.keys() <= needed | {"F", *_CYCLES[code]} or self.cycles_in == "none":
+        if not needed <= given.keys() <= needed | {"F", *_CYCLES[code]} or not self.retracts:
             what, hint = f"G{code:g} with words that are missing or not understood", "give X Y Z R and F in its block"
             raise refused(line, what, hint)
-        if state.tip_control != self.cycles_in:
+        if state.tip_control != "G43":
             yield wrong("CS506", line, f"a hole cycle under {state.tip_control or 'no length of the tool'}")
-        if modal.inverse_time:
+        if (mode := state.machine.groups["feed"]) == "inverse":
             yield wrong("CS506", line, "a hole cycle at inverse time feed (G93)")
-        if tap and self.rigid and not state.rigid:
+        if tap and self._rigid and not state.rigid:
             yield wrong("CS506", line, "a tap without M29, which turns the spindle with the feed")
         state.height = modal.tip[2] if state.height is None else state.height
         feed = given.get("F", modal.feed)
-        pitch = (feed if modal.per_revolution else feed / state.speed) if tap else None
+        pitch = (feed if mode == "revolution" else feed / state.speed) if tap else None
         cycle = HoleCycle(
             state.height,
             given["R"],
@@ -133,10 +117,10 @@ class Iso(Dialect):
             feed_out=code in (85.0, 89.0),
             pitch=pitch,
         )
-        state.modal = modal.but(feed=feed)  # that of the blocks after it, too
+        state.modal = replace(modal, feed=feed)  # that of the blocks after it, too
         yield from drill(cycle, given["X"], given["Y"], line, state)
 
-    def _plane(self, line: Line, codes: set[float], state: ModalState) -> Acts:
+    def _plane(self, line: Line, codes: set[float], state: Running) -> Acts:
         """G68.2, G53.1 and G69, or G254 and G255."""
         given = {word.name: word for word in line.words if word.name not in "GN"}
         count = sum(word.name != "N" for word in line.words)
@@ -160,16 +144,15 @@ class Iso(Dialect):
                 raise refused(line, "G254 where the angles of the tables are not known", "name the machine")
             yield Tilt(TiltedPlane(frame, math.radians(state.rotary.angle_step), "G43"))
 
-    def _to_machine(self, line: Line, codes: set[float], state: ModalState) -> Acts:
+    def _to_machine(self, line: Line, codes: set[float], state: Running) -> Acts:
         """G91 G28 Z0. and the like: to the reference position without a detour; G53: in machine coordinates."""
-        incremental = 91.0 in codes or (state.incremental and 90.0 not in codes)
+        incremental = state.machine.groups["distance"] == "incremental"
         axes = self.machine_axes(line, {("G", code) for code in (*_TO_REFERENCE, _IN_MACHINE, 0.0, 90.0, 91.0)})
         for word in line.words:
             if word.name in axes and _IN_MACHINE not in codes and not (incremental and word.value == 0.0):
                 raise refused(line, f"{word.text} on the way to the reference position", "write G91 and zero")
         if _IN_MACHINE in codes and (incremental or 0.0 not in codes):
             raise refused(line, "G53 without G90 and G0", "write G90 before it, and G0")
-        state.incremental = incremental
         if 0.0 in codes:
             yield Move({"G": 0.0})
         yield ToMachine(axes)

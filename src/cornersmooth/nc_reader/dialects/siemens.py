@@ -10,7 +10,7 @@ import numpy as np
 
 from cornersmooth.control.lexer import NOT_NEGATIVE, NUMBER, POSITIVE, ZERO, Lexer, fixed, number_of
 from cornersmooth.control.words import BSPLINE, BY_WORD, POLY, Columns, Line, Word, refused
-from cornersmooth.nc_reader.acts import Acts, Beside, HoleCycle, ModalState, Move, Tilt, ToMachine, drill, wrong
+from cornersmooth.nc_reader.acts import Acts, Beside, HoleCycle, Move, Running, Tilt, ToMachine, drill, wrong
 from cornersmooth.nc_reader.dialects.base import Dialect
 from cornersmooth.nc_reader.planes import TiltedPlane, room_of, rotated_frame
 
@@ -34,7 +34,7 @@ _NUMBER_ONLY: Final = re.compile(NUMBER)
 #: G words of group 01 that are read
 _CODES = (0.0, 1.0, 2.0, 3.0)
 #: units of lengths, not of feeds
-_LENGTHS_ALONE = (70.0, 71.0)
+_LENGTHS_ALONE = ("G70", "G71")
 
 #: heights of hole cycles; what follows them, and how the manual calls that
 _ONE: Final = r"0*1(?:\.0*)?"
@@ -79,7 +79,7 @@ class Siemens(Dialect):
         super().__init__(control, rotary)
         self.lexer = _SiemensLexer(rotary)
 
-    def alone(self, line: Line, state: ModalState) -> Acts | None:
+    def alone(self, line: Line, state: Running) -> Acts | None:
         """As `Dialect.alone`: dwells, positions of the machine, hole cycles and planes."""
         words = [word for word in line.words if word.name != "N"]
         names, given = {word.name for word in words}, {word.name: word.value for word in words}
@@ -104,7 +104,7 @@ class Siemens(Dialect):
         """As `Dialect.event`."""
         return Beside("M", 19.0, word.text) if word.name == "SPOS" else Dialect.event(word)
 
-    def _cycle(self, words: Sequence[Word], line: Line, state: ModalState) -> Acts:
+    def _cycle(self, words: Sequence[Word], line: Line, state: Running) -> Acts:
         """CYCLE81 to CYCLE85, called where the tool stands."""
         name, text = next(word.name for word in words if word.name in _CYCLES), words[0].text
         pattern, arguments = _CYCLES[name]
@@ -145,10 +145,9 @@ class Siemens(Dialect):
         yield Move({"G": 0.0})
         yield ToMachine(axes)
 
-    def _mode(self, word: Word, line: Line, state: ModalState) -> Acts:
+    def _mode(self, word: Word, line: Line, state: Running) -> Acts:
         """As `Dialect._mode`."""
-        if word.name == "G" and word.value in _LENGTHS_ALONE:
-            name = word.spelling
+        if (name := word.spelling) in _LENGTHS_ALONE:
             text = f"feeds under {name}, whose units the machine's basic system says: {name}0 says them"
             yield wrong("", line, text)
         yield from super()._mode(word, line, state)
