@@ -15,8 +15,7 @@ from cornersmooth.kinematics.machine import Dynamics
 from cornersmooth.model import Move, Program, Statement
 from cornersmooth.nc import choose_form, fit_settings
 from cornersmooth.settings import Settings
-from cornersmooth.times import saving
-from cornersmooth.times.saving import Timing, faster_method, planned_saving, written_text
+from cornersmooth.times import Timing, faster_method, planned_saving, saving, written_text
 
 
 def winding(count: int) -> Program:

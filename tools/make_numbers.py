@@ -26,8 +26,8 @@ from cornersmooth.kinematics import load_machine
 from cornersmooth.model import Floats
 from cornersmooth.nc import choose_form, fit_settings, load_control
 from cornersmooth.pipeline import read_back
+from cornersmooth.times import written_text
 from cornersmooth.times.comparing import Row, Table, candidates, compare_programs
-from cornersmooth.times.saving import written_text
 
 ROOT = Path(__file__).resolve().parent.parent
 SAMPLES = ROOT / "samples"

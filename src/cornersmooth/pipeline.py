@@ -26,8 +26,7 @@ from cornersmooth.nc.program_frame import blend_word
 from cornersmooth.nc_reader import CONTROLS, NcProgram, read_nc
 from cornersmooth.nc_reader.elements import Element
 from cornersmooth.provenance import HEAD, Provenance, with_parts
-from cornersmooth.report import NcFile, report
-from cornersmooth.report.record import planned_times
+from cornersmooth.report import NcFile, planned_times, report
 from cornersmooth.report.verdict import Judgement, Saving, judge, trusted_blocks
 from cornersmooth.settings import Settings
 from cornersmooth.system.output import FAILED, Output, Target, check_output, open_output, path_of

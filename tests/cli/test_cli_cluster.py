@@ -166,7 +166,7 @@ def test_what_cannot_work_is_refused(folder: Path, tmp_path: Path, words: tuple[
 
 def test_workers_that_do_not_fit_say_so(tmp_path: Path) -> None:
     job = Job("a.cls", "out/a.nc", (), "a", Options(directory="out"), Settings(), choose_form(), Frame())
-    do = pytest.importorskip("cornersmooth.cli.cluster", reason="distributed is not installed").do
+    do = pytest.importorskip("cornersmooth.cli.batch", reason="distributed is not installed").do
     assert "does not see out" in do(job, "/", "out/none", __version__).message
     found = do(job, "/", "", "0.0")
     assert (found.status, found.message.startswith("a.cls: error: ")) == ("error", True)

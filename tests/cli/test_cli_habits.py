@@ -145,7 +145,7 @@ def test_time_takes_a_feed_where_the_file_has_none(tmp_path: Path) -> None:
 
 def test_what_is_missing_says_how_to_install_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
-    monkeypatch.delitem(sys.modules, "cornersmooth.cli.cluster", raising=False)
+    monkeypatch.delitem(sys.modules, "cornersmooth.cli.batch", raising=False)
     part = tmp_path / "part.cls"
     part.write_bytes(SMALL)
     result = run("smooth", part, "-d", tmp_path / "out", "CORNERSMOOTH_SCHEDULER=tcp://localhost:1")

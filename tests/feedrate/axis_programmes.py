@@ -17,7 +17,7 @@ from scipy.optimize import linprog
 from scipy.sparse import csr_array, diags_array, eye_array, hstack, vstack
 
 from cornersmooth.feedrate.intervals import path_limits
-from cornersmooth.feedrate.motion import shares_at
+from cornersmooth.feedrate.taylor import shares_at
 from cornersmooth.feedrate.timelaw import TimeLaw
 from cornersmooth.model import Floats
 from cornersmooth.settings import Limits

@@ -17,11 +17,10 @@ import numpy as np
 from scipy.optimize import linprog
 from scipy.sparse import csr_array, diags_array, vstack
 
-from cornersmooth.feedrate import scurve
+from cornersmooth.feedrate import timelaw
 from cornersmooth.feedrate.grid import make_grid
-from cornersmooth.feedrate.intervals import Intervals, path_limits
+from cornersmooth.feedrate.intervals import Intervals, Resolution, path_limits
 from cornersmooth.feedrate.path import Path
-from cornersmooth.feedrate.resolution import Resolution
 from cornersmooth.model import Floats
 from cornersmooth.settings import Limits
 
@@ -64,7 +63,7 @@ def reference_time(path: Path, limits: Limits, resolution: Resolution = FINE) ->
         if (bound == bound[0]).all():
             length = speed_limits.edge[end : end + 1] - speed_limits.edge[begin]
             speed = np.sqrt(bound[:1])
-            total += float(scurve.rest_to_rest(length, speed, np.array(accel), np.array(jerk))[0].sum())
+            total += float(timelaw.rest_to_rest(length, speed, np.array(accel), np.array(jerk))[0].sum())
         else:
             x = _nodes(speed_limits, run, resolution)
             total += fastest(x, node_caps(x, speed_limits.edge[begin : end + 1], bound), accel, jerk)[0]

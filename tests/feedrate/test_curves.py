@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cornersmooth.feedrate import Limits
-from cornersmooth.feedrate import rational_curves as curves
+from cornersmooth.feedrate import Limits, curves
 from cornersmooth.feedrate.intervals import path_limits
-from cornersmooth.feedrate.motion import poses
 from cornersmooth.feedrate.path import build_path
+from cornersmooth.feedrate.taylor import poses
 from cornersmooth.geometry import nurbs
 from cornersmooth.model import Program
 from cornersmooth.settings import Settings

@@ -7,7 +7,7 @@ import pytest
 
 import cornersmooth as cs
 from cornersmooth.feedrate import Limits, plan_text
-from cornersmooth.feedrate.even_ramps import ramp_times
+from cornersmooth.feedrate.parts import ramp_times
 from cornersmooth.feedrate.written import text_path
 from cornersmooth.nc_reader import read_nc
 

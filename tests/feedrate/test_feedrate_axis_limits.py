@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from cornersmooth.arrays.vectors import norm
-from cornersmooth.feedrate import Limits, plan, rational_curves, taylor
-from cornersmooth.feedrate.motion import poses, taylor_along
+from cornersmooth.feedrate import Limits, curves, plan, taylor
 from cornersmooth.feedrate.path import Path, build_path
+from cornersmooth.feedrate.taylor import poses, taylor_along
 from cornersmooth.feedrate.timelaw import TimeLaw
 from cornersmooth.model import Arcs, Floats, Ints, Move, Program
 from cornersmooth.settings import Settings
@@ -88,7 +88,7 @@ def test_derivatives_of_a_path(chain: Callable[[int], Program], weights: tuple[f
 def halves_way(path: Path, element: int, t: Floats, h: float) -> Floats:
     """Way between the parameters t − h and t + h of a half."""
     tip = np.repeat(path.curves.tip[path.row[[element]]], len(t), axis=0)
-    ends = rational_curves.evaluate(tip, np.stack((t - h, t + h), axis=1))
+    ends = curves.evaluate(tip, np.stack((t - h, t + h), axis=1))
     return np.linalg.norm(np.diff(ends, axis=1)[:, 0], axis=1)
 
 

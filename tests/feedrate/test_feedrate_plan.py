@@ -10,7 +10,7 @@ import pytest
 from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate import Limits, TimeLaw, between, direct, plan, planner
 from cornersmooth.feedrate.grid import make_grid
-from cornersmooth.feedrate.resolution import Resolution
+from cornersmooth.feedrate.intervals import Resolution
 from cornersmooth.model import Arcs, Move, Program, Statement
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth

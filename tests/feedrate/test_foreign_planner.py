@@ -13,7 +13,7 @@ import pytest
 
 from cornersmooth.cl import read
 from cornersmooth.feedrate import Limits, TimeLaw, plan
-from cornersmooth.feedrate.motion import poses, shares_at
+from cornersmooth.feedrate.taylor import poses, shares_at
 from cornersmooth.kinematics import load_machine
 from cornersmooth.model import Floats, Program
 from cornersmooth.settings import Settings

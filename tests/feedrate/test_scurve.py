@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cornersmooth.feedrate import scurve
+from cornersmooth.feedrate import timelaw
 
 #: mm and s at 30 mm/s, 1000 mm/s², 5000 mm/s³
 ORACLES = ((0.5, 0.147361), (2.0, 0.233921), (2.68, 0.257892), (10.0, 0.488253), (50.0, 1.821586))
@@ -24,7 +24,7 @@ def follow(duration: np.ndarray, jerk: np.ndarray) -> tuple[float, float, float,
 
 @pytest.mark.parametrize(("distance", "seconds"), ORACLES)
 def test_times_of_one_segment(distance: float, seconds: float) -> None:
-    duration, _, _ = scurve.rest_to_rest(np.array([distance]), 30.0, 1000.0, 5000.0)
+    duration, _, _ = timelaw.rest_to_rest(np.array([distance]), 30.0, 1000.0, 5000.0)
     assert duration.sum() == pytest.approx(seconds, rel=1e-5)
 
 
@@ -35,7 +35,7 @@ def random_cases(count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.nda
 
 def test_phases_arrive_within_the_limits() -> None:
     distance, speed, accel, jerk = random_cases(400)
-    duration, signed, peak = scurve.rest_to_rest(distance, speed, accel, jerk)
+    duration, signed, peak = timelaw.rest_to_rest(distance, speed, accel, jerk)
     assert (duration >= 0.0).all()
     for row in range(len(distance)):
         x, v, a, fastest, hardest = follow(duration[row], signed[row])
@@ -49,7 +49,7 @@ def test_phases_arrive_within_the_limits() -> None:
 def test_against_ruckig() -> None:
     ruckig = pytest.importorskip("ruckig")
     distance, speed, accel, jerk = random_cases(60)
-    ours = scurve.rest_to_rest(distance, speed, accel, jerk)[0].sum(axis=1)
+    ours = timelaw.rest_to_rest(distance, speed, accel, jerk)[0].sum(axis=1)
     for row in range(len(distance)):
         given = ruckig.InputParameter(1)
         given.current_position, given.target_position = [0.0], [float(distance[row])]
@@ -62,5 +62,5 @@ def test_against_ruckig() -> None:
 
 def test_stopping_distance_is_half_of_a_motion_without_cruise() -> None:
     speed = np.array([5.0, 30.0, 300.0])
-    way = scurve.stopping_distance(speed, 1000.0, 5000.0)
-    assert scurve.peak_speed(2.0 * way, 1e9, 1000.0, 5000.0) == pytest.approx(speed)
+    way = timelaw.stopping_distance(speed, 1000.0, 5000.0)
+    assert timelaw.peak_speed(2.0 * way, 1e9, 1000.0, 5000.0) == pytest.approx(speed)

@@ -19,7 +19,7 @@ from cornersmooth.kinematics import load_machine
 from cornersmooth.model import Program
 from cornersmooth.nc import choose_form
 from cornersmooth.settings import Settings
-from cornersmooth.times.saving import Timing
+from cornersmooth.times import Timing
 from nc.controller_table import CLOSE, LOOSE, ours, paths, unsmoothed
 from nc.linuxcnc_controller import MACHINE
 

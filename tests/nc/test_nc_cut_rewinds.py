@@ -20,7 +20,7 @@ from cornersmooth.nc_reader import read_nc, reader
 from cornersmooth.rotary import rewound_angles
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
-from cornersmooth.times.saving import planned_saving
+from cornersmooth.times import planned_saving
 from cornersmooth.verify import verify
 from oracle.share import share
 from page.making import page_of

@@ -12,7 +12,7 @@ import numpy as np
 from cornersmooth import Settings, read
 from cornersmooth.page import smoothed_page
 from cornersmooth.pipeline import Result, postprocess
-from cornersmooth.times.saving import planned_saving
+from cornersmooth.times import planned_saving
 
 #: a zigzag with corners of several kinds: rounded ones, a reversal, a turn of the axis alone
 PATH = """TOOL PATH/{name},TOOL,T

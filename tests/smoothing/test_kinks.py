@@ -12,8 +12,8 @@ import pytest
 from cornersmooth.cl import read
 from cornersmooth.errors import Verdict
 from cornersmooth.feedrate import Limits
-from cornersmooth.feedrate.motion import taylor_along
 from cornersmooth.feedrate.path import Kind
+from cornersmooth.feedrate.taylor import taylor_along
 from cornersmooth.feedrate.written import text_path
 from cornersmooth.model import Floats
 from cornersmooth.nc import choose_form

@@ -124,6 +124,7 @@ SURFACE = new_command(
     """,
     epilog="Exit codes: 0 the surface is within the tolerance; 1 it is not; 2 wrong usage or configuration; 3 an input "
     "cannot be read or is not valid; 4 output cannot be written.",
+    module="verify",
     reports="Write what was found: .json, .csv for a row per point, .html for a page to look at. May be repeated.",
 )
 
@@ -197,6 +198,7 @@ SETUP = new_command(
       cornersmooth setup part.cls --limits mill.toml --control siemens
       cornersmooth setup part.cls --limits table-ac --tilt 20 --json
     """,
+    module="compare",
     feed=FEED_OF_ALL,
     limits={
         "heading": "Everyday",

@@ -27,8 +27,7 @@ from cornersmooth.nc import Form
 from cornersmooth.nc_reader import Problem
 from cornersmooth.nc_reader.recognition import is_cl_file, names_tip_control, needs_its_control, recognise_control
 from cornersmooth.provenance import HEAD
-from cornersmooth.report import NcFile
-from cornersmooth.report.record import Kind, planned_times, record, sha256_of
+from cornersmooth.report import Kind, NcFile, planned_times, record, sha256_of
 from cornersmooth.report.verdict import Judgement, Saving
 from cornersmooth.settings import Settings
 from cornersmooth.system.output import FAILED, make_folder, open_output

@@ -216,7 +216,7 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> None:
     machine = result.form.machine if job.axes is None else job.axes
     timed_too = timed_too and with_dynamics(machine) is not None
     if timed_too and result.verdict in (Verdict.PASSED, Verdict.INCOMPLETE):
-        from cornersmooth.times.saving import planned_saving
+        from cornersmooth.times import planned_saving
 
         settings = result.smoothed.settings
         outcome.saving = planned_saving(program, settings, result.form, axes=job.axes, progress=progress)
@@ -236,7 +236,7 @@ def _settings_for(job: Job, program: Program) -> Settings:
     """Settings of a job; under limits those of the method whose lines are faster."""
     if job.axes is None or job.settings.method != AUTO or job.form.curves or job.plan_feeds is not None:
         return job.settings
-    from cornersmooth.times.saving import faster_method
+    from cornersmooth.times import faster_method
 
     return faster_method(program, settings=job.settings, form=job.form, axes=job.axes)
 

@@ -22,9 +22,9 @@ from cornersmooth.nc_reader import read_nc
 from cornersmooth.pipeline import read_back
 from cornersmooth.provenance import read_provenance
 from cornersmooth.report.verdict import limits_of, times_text
+from cornersmooth.times import Timing, without_holes, written_text
 from cornersmooth.times.comparing import law_of_lines
 from cornersmooth.times.laws import Comparison, compare, slowest, stops, turning_seconds
-from cornersmooth.times.saving import Timing, without_holes, written_text
 
 _TITLES = {
     "direct_exact_stop": "direct, exact stop",

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from cornersmooth.feedrate.planner import direct, plan
-from cornersmooth.feedrate.reached import limiting
-from cornersmooth.feedrate.timelaw import States, TimeLaw
+from cornersmooth.feedrate.timelaw import States, TimeLaw, limiting
 from cornersmooth.feedrate.written import BlockLimits, block_feeds, plan_text
 from cornersmooth.settings import Limits
 

@@ -21,10 +21,9 @@ import numpy as np
 
 from cornersmooth.feedrate.grid import Grid
 from cornersmooth.feedrate.interior_point import COLD, GAP, MAX_STEPS, WARM, solve
-from cornersmooth.feedrate.intervals import Intervals
-from cornersmooth.feedrate.resolution import Resolution
-from cornersmooth.feedrate.scurve import stopping_distance
+from cornersmooth.feedrate.intervals import Intervals, Resolution
 from cornersmooth.feedrate.speed_problem import CRAWLING, PLACES, Batch, around, problem_of
+from cornersmooth.feedrate.timelaw import stopping_distance
 from cornersmooth.model import Floats, Ints
 
 #: limits solved together, cells times rows: the arrays of one window stay in the processor's cache

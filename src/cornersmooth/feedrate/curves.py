@@ -3,32 +3,194 @@
 Halves of transitions (Boehm's knot insertion at u = ½ makes each a Bézier cubic) and pieces of runs are cubics; those
 of an NC program may be of a higher degree. Coordinates are relative to an origin of each, so that short curves far from
 that of the program keep their digits.
+
+All are rational polynomials over t ∈ [0, 1]. Written in powers of t they are evaluated by Horner's rule, every curve at
+parameters of its own.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from functools import cache
+from math import comb
 
 import numpy as np
 
-from cornersmooth.arrays.vectors import norm
-from cornersmooth.feedrate.rational_curves import (
-    STANDSTILL,
-    WHOLE,
-    evaluate,
-    groups,
-    interval_borders,
-    interval_lengths,
-    polynomial,
-    slowest,
-    turned_angle,
-)
+from cornersmooth.arrays.vectors import norm, unit
 from cornersmooth.geometry import nurbs
 from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.model import Bools, Corners, Floats, Ints, Program, Runs
 from cornersmooth.smoothing.runs.polylines import Pieces
 from cornersmooth.smoothing.runs.rows import polylines_of
+
+#: tip lengths up to this are no motion of the tip, mm
+STANDSTILL = 1e-7
+
+#: what stands for the half where a curve is no half of a transition
+WHOLE = 2
+
+#: curves worked on at once: their intermediate arrays fit the processor's cache
+TOGETHER = 512
+
+#: Bernstein coefficients of the five basis functions on the first half: Bézier point j is Σ w_i·P_i·_TO_BEZIER[j, i]
+_TO_BEZIER = np.array([[1, 0, 0, 0, 0], [0, 1, 0, 0, 0], [0, 0.5, 0.5, 0, 0], [0, 0.25, 0.5, 0.25, 0]])
+_HALVES = np.stack((_TO_BEZIER, _TO_BEZIER[::-1, ::-1]))
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
+_NODES, _WEIGHTS = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
+
+#: intervals of a half over which lengths are summed and curvature is bounded; shorter towards u = ½, where the curve
+#: turns most
+INTERVALS = 12
+_PROGRESS = 1.0 - np.linspace(1.0, 0.0, INTERVALS + 1) ** 1.7
+_NEWTON_STEPS = 3
+#: points among which the slowest of a curve is searched for, and rounds of closer search
+_SEARCHED, _ROUNDS = 25, 3
+#: parameter beside an end at which the tangent is taken where there is none at the end itself
+_BESIDE = 1e-3
+
+
+def polynomial(points: Floats, weights: Floats | None = None, half: Ints | None = None) -> Floats:
+    """Powers of t (g, d + 1, 4) of w·P and w; ``[:, k]`` belongs to t^k, the last coordinate is w.
+
+    Parameters
+    ----------
+    points : (g, d + 1, 3) float64
+        Bézier points, or the five control points of transitions (g, 5, 3).
+    weights : (g, d + 1) float64, optional
+        All 1 by default; w1 and w2 (g, 2) of transitions.
+    half : (g,) int64, optional
+        First (0) or second (1) halves of transitions; t runs with u on both.
+    """
+    if half is not None and weights is not None:
+        weights = nurbs.full_weights(weights)
+    w = np.ones(points.shape[:2]) if weights is None else weights
+    weighted = np.concatenate((points * w[..., None], w[..., None]), axis=-1)
+    convert = _to_powers(points.shape[1] - 1) if half is None else (_to_powers(3) @ _HALVES)[half]
+    return convert @ weighted
+
+
+@cache
+def _to_powers(degree: int) -> Floats:
+    """(d + 1, d + 1) coefficients of t^k in the Bernstein polynomials of a degree."""
+    return np.array(
+        [
+            [(-1) ** (k + i) * comb(degree, k) * comb(k, i) if i <= k else 0 for i in range(degree + 1)]
+            for k in range(degree + 1)
+        ],
+        np.float64,
+    )
+
+
+def evaluate(powers: Floats, t: Floats) -> Floats:
+    """(g, m, 3) points at the parameters t (g, m)."""
+    return np.moveaxis(_derivatives(powers, t, 0)[0], 0, -1)
+
+
+def end_tangents(powers: Floats, side: int) -> Floats:
+    """Unit tangents (g, 3) at the start (0) or end (1); where the curve comes to a stand there, a little inside."""
+    places = (0.0, _BESIDE) if side == 0 else (1.0, 1.0 - _BESIDE)
+    slopes = [np.moveaxis(_derivatives(powers, np.full((len(powers), 1), t), 1)[1], 0, -1)[:, 0] for t in places]
+    own, inside = (norm(slope)[:, None] for slope in slopes)
+    return unit(np.where(own > _BESIDE * inside, slopes[0], slopes[1]))
+
+
+def _derivatives(powers: Floats, t: Floats, order: int) -> list[Floats]:
+    """Point and derivatives by t up to `order`, (3, g, m) each: coordinates first, so that arrays run along t."""
+    by_coordinate = powers.transpose(2, 1, 0)[..., None]  # (4, power, g, 1)
+    factor = np.ones(powers.shape[1])
+    found: list[Floats] = []
+    weights: list[Floats] = []
+    rational = bool(by_coordinate[3, 1:].any())
+    if not rational:  # w is 1 throughout
+        by_coordinate = by_coordinate[:3]
+    for derivative in range(order + 1):
+        if derivative:
+            factor = factor[1:] * np.arange(1, len(factor))
+            by_coordinate = by_coordinate[:, 1:]
+        value = by_coordinate[:, -1] * factor[-1]
+        for k in range(len(factor) - 2, -1, -1):
+            value = value * t + by_coordinate[:, k] * factor[k]
+        if not rational:
+            found.append(np.broadcast_to(value, (3, *t.shape)))
+            continue
+        weights.append(value[3])
+        rest = value[:3]
+        for k in range(1, derivative + 1):  # Leibniz' rule for w·P
+            rest = rest - comb(derivative, k) * weights[k] * found[derivative - k]
+        found.append(rest / weights[0])
+    return found
+
+
+def taylor_series(powers: Floats, t: Floats, orders: int) -> Floats:
+    """Taylor coefficients (orders, g, 3) at one parameter (g,) of each curve."""
+    found = _derivatives(powers, t[:, None], orders - 1)
+    factorial = np.cumprod(np.maximum(np.arange(orders), 1))
+    return np.stack([order[..., 0].T / size for order, size in zip(found, factorial, strict=True)])
+
+
+def _size(vectors: Floats) -> Floats:
+    """Length of vectors whose coordinates come first."""
+    return np.sqrt(vectors[0] ** 2 + vectors[1] ** 2 + vectors[2] ** 2)
+
+
+def interval_borders(half: Ints) -> Floats:
+    """(g, INTERVALS + 1) parameters t that divide the halves, dense towards u = ½."""
+    borders: Floats = np.where(half[:, None] == 0, _PROGRESS, 1.0 - _PROGRESS[::-1])
+    borders[half == WHOLE] = np.linspace(0.0, 1.0, INTERVALS + 1)
+    return borders
+
+
+def interval_lengths(powers: Floats, borders: Floats) -> Floats:
+    """Arc lengths (g, p) between neighbouring parameters `borders` (g, p + 1), by Gauss-Legendre with 5 points."""
+    step = np.diff(borders, axis=1)
+    t = borders[:, :-1, None] + step[..., None] * _NODES
+    speed = _size(_derivatives(powers, t.reshape(len(t), -1), 1)[1]).reshape(t.shape)
+    return np.einsum("gpn,n->gp", speed, _WEIGHTS) * step
+
+
+def slowest(powers: Floats) -> Floats:
+    """Least speed (g,) of curves by their parameter, mm; sampled, and sampled again ever more closely."""
+    rows, low, high = np.arange(len(powers)), np.zeros(len(powers)), np.ones(len(powers))
+    for _ in range(_ROUNDS):
+        t = low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, _SEARCHED)
+        speed = np.broadcast_to(_size(_derivatives(powers, t, 1)[1]), t.shape)
+        at = speed.argmin(axis=1)
+        low, high = t[rows, np.maximum(at - 1, 0)], t[rows, np.minimum(at + 1, _SEARCHED - 1)]
+    return speed[rows, at]
+
+
+def parameters_at(powers: Floats, half: Ints, which: Ints, distance: Floats) -> Floats:
+    """Parameters t (q,) at arc length `distance` (q,) from the start of the halves `which` (q,)."""
+    borders = interval_borders(half)
+    lengths = np.concatenate((np.zeros((len(powers), 1)), np.cumsum(interval_lengths(powers, borders), axis=1)), axis=1)
+    interval = np.clip((lengths[which] <= distance[:, None]).sum(axis=1) - 1, 0, INTERVALS - 1)
+    low, high = borders[which, interval], borders[which, interval + 1]
+    missing = distance - lengths[which, interval]
+    whole = np.maximum(lengths[which, interval + 1] - lengths[which, interval], np.finfo(np.float64).tiny)
+    t = low + (high - low) * np.clip(missing / whole, 0.0, 1.0)
+    curves = powers[which]
+    for _ in range(_NEWTON_STEPS):
+        gone = interval_lengths(curves, np.stack((low, t), axis=1))[:, 0]
+        speed = _size(_derivatives(curves, t[:, None], 1)[1])[:, 0]
+        t = np.clip(t + (missing - gone) / np.maximum(speed, np.finfo(np.float64).tiny), low, high)
+    return t
+
+
+def turned_angle(tip: Floats, axis_point: Floats, half: Ints) -> Floats:
+    """Angle (g,) that the axis sweeps over each half, rad."""
+    borders = interval_borders(half)
+    lever = evaluate(axis_point, borders) - evaluate(tip, borders)
+    axis = lever / norm(lever)[..., None]
+    step = norm(np.diff(axis, axis=1))
+    return (2.0 * np.arcsin(np.minimum(0.5 * step, 1.0))).sum(axis=1)
+
+
+def groups(rows: Ints) -> list[Ints]:
+    """Rows in groups that are worked on at once."""
+    return [rows[at : at + TOGETHER] for at in range(0, len(rows), TOGETHER)]
+
 
 #: speed of the tip over that of the axis point below which the tip stands
 _STANDING = 3e-4

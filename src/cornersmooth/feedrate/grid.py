@@ -12,8 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cornersmooth.feedrate.intervals import Intervals
-from cornersmooth.feedrate.resolution import Resolution
+from cornersmooth.feedrate.intervals import Intervals, Resolution
 from cornersmooth.model import Bools, Floats, Ints
 
 #: smallest size of a cell over the length of the path: smaller ones would be lost in the digits of the coordinate

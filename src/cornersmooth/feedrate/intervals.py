@@ -12,13 +12,42 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cornersmooth.feedrate import rational_curves, taylor
+from cornersmooth.feedrate import taylor
+from cornersmooth.feedrate.curves import INTERVALS, groups, interval_borders, interval_lengths, taylor_series
 from cornersmooth.feedrate.machine_axes import MachineAxes
-from cornersmooth.feedrate.motion import curvature, taylor_along
 from cornersmooth.feedrate.path import Kind, Path, arc_series
-from cornersmooth.feedrate.resolution import FINER, Resolution
+from cornersmooth.feedrate.taylor import curvature, taylor_along
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.settings import Limits
+
+
+@dataclass(frozen=True)
+class Resolution:
+    """How fine intervals and cells are, and how near to the fastest profile a plan comes."""
+
+    part: float = 0.07  #: length of a cell at a change of the speed limit, over v·√(v/J)
+    growth: float = 0.12  #: growth of the cells per length
+    end: float = 0.7  #: length of the cell next to a stop, over the way covered while the jerk is constant there
+    fewest: int = 40  #: cells in a run at least
+    #: intervals of a curve to begin with, and of a line or arc
+    curve: int = 4
+    line: int = 2
+    #: an interval is halved where the middle of a derivative misses the mean of its ends by more than this part of a
+    #: limit, and where the part of a limit of speed that is used at one speed varies so much
+    even: float = 0.02
+    varied: float = 0.05
+    #: rounds of holding more quantities; after the last what is still beyond a limit is slowed down, but in no round
+    rounds: int = 6
+    gap: float = 2e-4  #: remaining duality gap over the time at which a profile is taken, and that of the first one
+    rough: float = 0.05
+
+
+PLAIN = Resolution()
+#: where more is limited than the way itself
+FINER = Resolution(part=0.03, growth=0.1)
+# coarse cells, and one round
+ROUGHLY = Resolution(0.2, 0.8, fewest=10, curve=2, line=1, even=0.1, varied=0.25, rounds=0, gap=5e-3, rough=0.2)
+
 
 #: the cone at the pole in which derivatives are cut off here, over the cone of the machine: smaller, to be safe
 WITHIN = 0.5
@@ -166,7 +195,7 @@ def _divided(
         element = np.flatnonzero(divisible & (path.bent == bent))
         borders = np.tile(np.linspace(0.0, 1.0, (resolution.curve if bent else resolution.line) + 1), (len(element), 1))
         if bent and not len(quantities):
-            borders = rational_curves.interval_borders(path.curves.half[path.row[element]])
+            borders = interval_borders(path.curves.half[path.row[element]])
         start.append((np.repeat(element, borders.shape[1] - 1), borders[:, :-1].ravel(), borders[:, 1:].ravel()))
     element, low, high = (np.concatenate(part) for part in zip(*start, strict=True))
     done = []
@@ -202,7 +231,7 @@ def _look(
     lengths = np.diff(shares, axis=1) * path.length[element][:, None]
     bent = path.bent[element]
     if bent.any():
-        lengths[bent] = rational_curves.interval_lengths(path.curves.tip[path.row[element[bent]]], shares[bent])
+        lengths[bent] = interval_lengths(path.curves.tip[path.row[element[bent]]], shares[bent])
     width = lengths.sum(axis=1)
     middle = np.divide(lengths[:, 0], width, out=np.full(len(width), 0.5), where=width > 0.0)
     derivatives, tip = quantities.at(np.repeat(element[:, None], 3, axis=1), shares)
@@ -210,7 +239,7 @@ def _look(
     most = _largest(kappa)
     most[_turns_back(tip[1]).any(axis=1)] = np.inf  # a cusp
     cap = np.where(bent, centripetal / np.clip(most, 1e-300, 1.0 / SMALLEST_RADIUS), np.inf)
-    bends = (np.ptp(kappa, axis=1) > _BENT * most) & (cap < fastest) & (high - low > 1.0 / rational_curves.INTERVALS)
+    bends = (np.ptp(kappa, axis=1) > _BENT * most) & (cap < fastest) & (high - low > 1.0 / INTERVALS)
     cap = np.minimum(cap, fastest)
     if not len(quantities):
         return width, middle, cap, np.full(len(width), np.inf), np.zeros(len(width), np.bool_)
@@ -229,11 +258,11 @@ def _look(
 def _curved(path: Path, most: float) -> Bools:
     """(m,) bool: curves whose curvature may ask for less than the feed, by a look at few places."""
     found = np.zeros(len(path), np.bool_)
-    for element in rational_curves.groups(np.flatnonzero(path.bent)):
+    for element in groups(np.flatnonzero(path.bent)):
         row = path.row[element]
-        borders = rational_curves.interval_borders(path.curves.half[row])
+        borders = interval_borders(path.curves.half[row])
         powers = np.repeat(path.curves.tip[row], borders.shape[1], axis=0)
-        tip = rational_curves.taylor_series(powers, borders.ravel(), 3)
+        tip = taylor_series(powers, borders.ravel(), 3)
         bend = curvature(tip).reshape(borders.shape).max(axis=1)
         back = _turns_back(tip[1].reshape(*borders.shape, 3)).any(axis=1)
         found[element] = (2.0 * bend * path.speed[element] ** 2 > most) | back

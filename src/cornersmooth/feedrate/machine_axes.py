@@ -18,9 +18,9 @@ import numpy as np
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate import taylor
-from cornersmooth.feedrate.motion import taylor_along
+from cornersmooth.feedrate.curves import WHOLE
 from cornersmooth.feedrate.path import Path
-from cornersmooth.feedrate.rational_curves import WHOLE
+from cornersmooth.feedrate.taylor import taylor_along
 from cornersmooth.kinematics import Machine
 from cornersmooth.kinematics.machine import PARALLEL
 from cornersmooth.kinematics.poses import continued

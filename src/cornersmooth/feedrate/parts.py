@@ -1,9 +1,14 @@
-"""The time of a long motion from plans of its parts, in bounded work.
+"""Times of long motions without a plan of the whole: from plans of parts in bounded work, or in closed form.
 
 What a plan does at a place depends on little around it: from a cut the motion comes up to speed within the distance
 that it needs to brake. So a path is cut into parts, and each is planned with its surroundings. Parts in random order
 are planned roughly, until the ratio of their times to those at the feed is known, and some of them as closely as a
 whole plan is, until the ratio of both is (ratio estimates: Cochran, Sampling Techniques, ch. 6).
+
+In closed form acceleration between speeds is even, that of an S-curve in the mean. An S-curve from rest to v within
+acceleration a and jerk J takes v/a + a/J, or 2·√(v/J) where it does not reach a. With that of each place v² rises and
+falls by 2·a·s at most, and its largest value at each border is a least sum forwards, and another one backwards. From
+rest to rest times are exact where the feed is reached. Where speeds change by less, they are a little too short.
 """
 
 from __future__ import annotations
@@ -12,12 +17,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cornersmooth.feedrate.machine_axes import MachineAxes
+from cornersmooth.feedrate.intervals import FINER, ROUGHLY, path_limits
+from cornersmooth.feedrate.machine_axes import MachineAxes, follow
 from cornersmooth.feedrate.path import Path
-from cornersmooth.feedrate.planner import Progress, plan_along
-from cornersmooth.feedrate.reached import limiting
-from cornersmooth.feedrate.resolution import FINER, ROUGHLY
-from cornersmooth.feedrate.scurve import stopping_distance
+from cornersmooth.feedrate.planner import Progress, passed, plan_along
+from cornersmooth.feedrate.timelaw import limiting, stopping_distance
+from cornersmooth.kinematics import Machine, endless
 from cornersmooth.model import Floats
 from cornersmooth.settings import Limits
 from cornersmooth.system.processes import map_in_processes
@@ -98,3 +103,33 @@ def _ratio(taken: Floats, known: Floats, count: int) -> tuple[float, float]:
     number, ratio = len(taken), float(taken.sum() / known.sum())
     spread = np.square(taken - ratio * known).sum() * number / max(number - 1, 1) * (1.0 - number / count)
     return ratio, float(np.sqrt(spread) / taken.sum())
+
+
+def ramp_times(path: Path, limits: Limits, machine: Machine) -> Floats:
+    """(m,) time of each element of a path, s; errors as `cornersmooth.feedrate.plan`."""
+    axes = follow(endless(machine), path)
+    path = passed(path, limits, axes)
+    found = path_limits(path, limits, axes, ROUGHLY)
+    width = np.diff(found.edge)
+    rate, bend, _ = found.derivatives(found.edge[:-1], width, np.array([0.5]))[..., 0]
+    _, most, jerks = found.quantities.bounds[..., None]
+    of_run = np.diff(found.run)
+    with np.errstate(divide="ignore"):
+        most_along = np.minimum(np.repeat(found.accel, of_run), (most / np.abs(rate)).min(axis=0))
+        jerk = np.minimum(np.repeat(found.jerk, of_run), (jerks / np.abs(rate)).min(axis=0))
+        cap = np.minimum(found.cap, (most / np.abs(bend)).min(axis=0))
+    room = jerk * path.speed[found.element]
+    reaches = room >= most_along**2
+    along = np.where(reaches, most_along / (1.0 + most_along**2 / room), np.sqrt(room) / 2.0)
+    at = np.minimum(np.append(cap, 0.0), np.append(0.0, cap))  # v² at borders
+    at[found.run] = 0.0
+    gain = np.append(0.0, np.cumsum(2.0 * along * width))
+    at = np.minimum.accumulate(at - gain) + gain
+    at = np.maximum(np.minimum.accumulate((at + gain)[::-1])[::-1] - gain, 0.0)
+    begin, end = at[:-1], at[1:]
+    peak = np.maximum(np.minimum(cap, along * width + (begin + end) / 2.0), np.maximum(begin, end))
+    ramps = (2.0 * np.sqrt(peak) - np.sqrt(begin) - np.sqrt(end)) / along
+    even = np.maximum(width - (2.0 * peak - begin - end) / (2.0 * along), 0.0) / np.sqrt(
+        np.where(peak > 0.0, peak, 1.0)
+    )
+    return np.bincount(found.element, ramps + even, len(path)).astype(np.float64)

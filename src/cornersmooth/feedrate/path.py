@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from cornersmooth.arrays.vectors import angle_between, dot, norm, unit
 from cornersmooth.errors import SettingsError
-from cornersmooth.feedrate.curves import Curves
-from cornersmooth.feedrate.rational_curves import STANDSTILL, WHOLE, end_tangents
+from cornersmooth.feedrate.curves import STANDSTILL, WHOLE, Curves, end_tangents
 from cornersmooth.model import Bools, Corners, FeedMode, Floats, Ints, Move, Program, Runs, Status
 from cornersmooth.settings import Limits, Settings
 from cornersmooth.smoothing.construction import find_neighbours

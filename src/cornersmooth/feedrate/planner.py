@@ -10,15 +10,13 @@ from typing import Literal
 
 import numpy as np
 
-from cornersmooth.feedrate import scurve
 from cornersmooth.feedrate.between import fastest
 from cornersmooth.feedrate.grid import make_grid
-from cornersmooth.feedrate.intervals import Intervals, path_limits
+from cornersmooth.feedrate.intervals import FINER, PLAIN, Intervals, Resolution, path_limits
 from cornersmooth.feedrate.machine_axes import MachineAxes, follow
 from cornersmooth.feedrate.path import Path, build_path
-from cornersmooth.feedrate.resolution import FINER, PLAIN, Resolution
 from cornersmooth.feedrate.speed_problem import around
-from cornersmooth.feedrate.timelaw import TimeLaw, crossing_time
+from cornersmooth.feedrate.timelaw import TimeLaw, crossing_time, rest_to_rest
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import Floats, Ints, Program, SmoothProgram
 from cornersmooth.settings import Limits, Settings
@@ -199,7 +197,7 @@ def _level_runs(limits: Intervals, runs: Ints) -> tuple[Floats | Ints, ...]:
     """Phases of runs with one speed limit: S-curves in closed form."""
     first = limits.run[runs]
     begin, end, limit = limits.edge[first], limits.edge[limits.run[runs + 1]], np.sqrt(limits.cap[first])
-    duration, signed, _ = scurve.rest_to_rest(end - begin, limit, limits.accel[runs], limits.jerk[runs])
+    duration, signed, _ = rest_to_rest(end - begin, limit, limits.accel[runs], limits.jerk[runs])
     way, speed, rising = np.empty_like(duration), np.empty_like(duration), np.empty_like(duration)
     x, v, a = begin, np.zeros(len(runs)), np.zeros(len(runs))
     for phase in range(duration.shape[1]):

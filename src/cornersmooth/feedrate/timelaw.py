@@ -1,4 +1,9 @@
-"""Where the tool is at any time: a time law of closed-form phases."""
+"""Where the tool is at any time: a time law of closed-form phases, and what it reaches of the limits.
+
+Where nothing else limits the motion, the phases are the seven of the S-curve: jerk J, 0, −J, cruise, −J, 0, J. With
+peak speed v each half takes T(v) = v/A + A/J, or 2·√(v/J) where the acceleration limit A is not reached (v < A²/J), and
+covers v·T(v)/2.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from cornersmooth.feedrate.machine_axes import MachineAxes
-from cornersmooth.feedrate.motion import poses, shares_at
 from cornersmooth.feedrate.path import Path
+from cornersmooth.feedrate.taylor import poses, shares_at
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.settings import Limits
 
@@ -236,3 +241,104 @@ def crossing_time(width: Floats, speeds: Floats, rate: Floats) -> Floats:
     factor = np.where(small, 1.0 + y / 3.0 + y * y / 5.0, np.where(y > 0.0, up, np.arctan(root) / safe))
     time: Floats = 2.0 * half * factor
     return time
+
+
+def ramp_time(speed: Floats, accel: Floats, jerk: Floats) -> Floats:
+    """Time from rest to `speed` with zero acceleration at both ends, s."""
+    return np.where(speed * jerk >= accel * accel, speed / accel + accel / jerk, 2.0 * np.sqrt(speed / jerk))
+
+
+def stopping_distance(speed: Floats, accel: Floats, jerk: Floats) -> Floats:
+    """Distance in which `speed` is reached from rest, or comes to rest, with zero acceleration at both ends."""
+    return 0.5 * speed * ramp_time(speed, accel, jerk)
+
+
+def peak_speed(distance: Floats, speed: Floats, accel: Floats, jerk: Floats) -> Floats:
+    """Largest speed of the fastest motion from rest to rest over `distance`, at most `speed`."""
+    triangular = np.cbrt(0.25 * distance * distance * jerk)  # acceleration limit not reached
+    corner = accel / jerk
+    trapezoidal = 0.5 * accel * (np.sqrt(corner * corner + 4.0 * distance / accel) - corner)
+    return np.minimum(speed, np.where(triangular * jerk >= accel * accel, trapezoidal, triangular))
+
+
+def rest_to_rest(distance: Floats, speed: Floats, accel: Floats, jerk: Floats) -> tuple[Floats, Floats, Floats]:
+    """Phases of the fastest motions from rest to rest.
+
+    Parameters
+    ----------
+    distance : (n,) float64
+        Greater than zero.
+    speed, accel, jerk : (n,) float64 or float
+        Limits, in units that agree with the distance.
+
+    Returns
+    -------
+    duration : (n, 7) float64, s
+        Phases that are not needed have zero duration.
+    signed_jerk : (n, 7) float64
+    peak : (n,) float64
+        Speed in the fourth phase.
+    """
+    distance = np.asarray(distance, np.float64)
+    speed, accel, jerk = (np.broadcast_to(np.asarray(x, np.float64), distance.shape) for x in (speed, accel, jerk))
+    peak = peak_speed(distance, speed, accel, jerk)
+    limited = peak * jerk >= accel * accel
+    jerk_phase = np.where(limited, accel / jerk, np.sqrt(peak / jerk))
+    steady = np.where(limited, np.maximum(peak / accel - accel / jerk, 0.0), 0.0)
+    ramp = 2.0 * jerk_phase + steady
+    cruise = np.maximum(distance / peak - ramp, 0.0)
+    duration = np.stack((jerk_phase, steady, jerk_phase, cruise, jerk_phase, steady, jerk_phase), axis=-1)
+    return duration, jerk[:, None] * np.array([1.0, 0.0, -1.0, 0.0, -1.0, 0.0, 1.0]), peak
+
+
+#: part of a limit from which it counts as reached
+_REACHED = 0.98
+
+#: times looked at, spread evenly over the motion: for each element, at least and at most
+_EACH, _FEWEST, _MOST = 64, 2_000, 20_000
+
+_ORDERS = ("speed", "acceleration", "jerk")
+
+
+def limiting(law: TimeLaw) -> list[tuple[str, float]]:
+    """Limits that are reached while the tool cuts, and the part of the cutting time, the longest first.
+
+    Several may be reached at once, so that the parts need not add up to 1. A limit counts from 98 % of it on.
+
+    Returns
+    -------
+    list of (str, float)
+        Such as ``("the programmed feed", 0.6)``, ``("acceleration of A", 0.2)``.
+    """
+    path = law.path
+    if not len(path) or law.total <= 0.0:
+        return []
+    times = np.linspace(0.0, law.total, min(max(_EACH * len(path), _FEWEST), _MOST))
+    states = law.at(times)
+    way = law.kinematics(times)[0]
+    element = np.clip(np.searchsorted(law.edge, way, side="right") - 1, 0, len(path) - 1)
+    cutting = ~path.rapid[element] & ~states.turning
+    if not cutting.any():
+        return []
+    limits = law.limits
+    fastest = states.v >= _REACHED * path.speed[element]
+    feed = path.program.feed_at(path.move) if limits.feed is None else np.full(len(path), limits.feed)
+    slower = (60.0 * path.speed < _REACHED * feed)[element]  # what the control makes of its blocks
+    reached: dict[str, Bools] = {
+        "the programmed feed": fastest & ~slower,
+        "block time or look-ahead": fastest & slower,
+        "acceleration along the path": _at(states.a, limits.accel),
+        "jerk along the path": _at(states.j, limits.jerk),
+        "acceleration across the path": _at(states.centripetal, limits.centripetal_accel),
+    }
+    if law.machine_axes is not None:
+        _, *orders = law.axes_at(times)
+        for word, values, most in zip(_ORDERS, orders, law.machine_axes.limits, strict=True):
+            for name, column, bound in zip(law.machine_axes.names, values.T, most, strict=True):
+                reached[f"{word} of {name}"] = _at(column, float(bound))
+    shares = ((name, float(rows[cutting].mean())) for name, rows in reached.items())
+    return sorted((pair for pair in shares if pair[1] > 0.0), key=lambda pair: -pair[1])
+
+
+def _at(values: Floats, limit: float) -> Bools:
+    return np.abs(values) >= _REACHED * limit

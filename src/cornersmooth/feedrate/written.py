@@ -9,14 +9,12 @@ import numpy as np
 
 from cornersmooth.arrays.vectors import dot, norm, unit
 from cornersmooth.errors import SettingsError
-from cornersmooth.feedrate import scurve
-from cornersmooth.feedrate.curves import Curves
+from cornersmooth.feedrate.curves import Curves, polynomial
+from cornersmooth.feedrate.intervals import Resolution
 from cornersmooth.feedrate.machine_axes import follow
 from cornersmooth.feedrate.path import Path, build_path
 from cornersmooth.feedrate.planner import Progress, plan_along
-from cornersmooth.feedrate.rational_curves import polynomial
-from cornersmooth.feedrate.resolution import Resolution
-from cornersmooth.feedrate.timelaw import TimeLaw
+from cornersmooth.feedrate.timelaw import TimeLaw, peak_speed
 from cornersmooth.kinematics import Machine, endless
 from cornersmooth.model import Arcs, Bools, FeedMode, Floats, Ints, Move, Program, Source, Statement
 from cornersmooth.nc_reader.curves import groups
@@ -206,7 +204,7 @@ def _stoppable(length: Floats, blocks: Floats, look_ahead: int, limits: Limits) 
     until = read[1:] + look_ahead
     ahead = np.interp(until, read, gone) - gone[1:]
     limitless, accel, jerk = (np.full(len(length), value) for value in (np.inf, limits.accel, limits.jerk))
-    speed = scurve.peak_speed(2.0 * np.maximum(ahead, np.finfo(np.float64).tiny), limitless, accel, jerk)
+    speed = peak_speed(2.0 * np.maximum(ahead, np.finfo(np.float64).tiny), limitless, accel, jerk)
     return np.where(until >= read[-1] - _PART_OF_A_BLOCK, np.inf, speed)
 
 

@@ -27,8 +27,8 @@ from cornersmooth.nc_reader.recognition import foreign_kind, is_cl_file
 from cornersmooth.provenance import HEAD
 from cornersmooth.settings import Settings
 from cornersmooth.system.processes import return_free_memory
+from cornersmooth.times import Timing
 from cornersmooth.times.comparing import MOST_POSES, Candidate, Row, Table, law_of_lines, with_rows
-from cornersmooth.times.saving import Timing
 
 #: the machine of a program that names no rotary axis
 THREE_AXES: Final = Machine("three axes", ())

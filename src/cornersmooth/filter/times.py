@@ -11,8 +11,8 @@ import numpy as np
 from cornersmooth.arrays.vectors import norm
 from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.feedrate import Limits
-from cornersmooth.feedrate.even_ramps import ramp_times
 from cornersmooth.feedrate.linuxcnc import axis_limits, line_times, program_lines
+from cornersmooth.feedrate.parts import ramp_times
 from cornersmooth.feedrate.written import text_path
 from cornersmooth.filter.checking import Place, motion_of, shared
 from cornersmooth.filter.motion import Job
@@ -20,7 +20,7 @@ from cornersmooth.filter.runs import NONE, Reading, Run
 from cornersmooth.kinematics import Machine, check_dynamics
 from cornersmooth.model import Floats
 from cornersmooth.nc_reader import NcProgram
-from cornersmooth.times.saving import LINUXCNC
+from cornersmooth.times import LINUXCNC
 
 
 @dataclass

@@ -13,7 +13,7 @@ from cornersmooth import nc
 from cornersmooth.arrays import some_poses
 from cornersmooth.errors import CornersmoothError, SettingsError, Verdict
 from cornersmooth.feedrate import BlockLimits
-from cornersmooth.feedrate.resolution import ROUGHLY, Resolution
+from cornersmooth.feedrate.intervals import ROUGHLY, Resolution
 from cornersmooth.kinematics import Machine, with_dynamics
 from cornersmooth.methods import CURVES_METHOD, DEFAULT_METHOD, PAPERS_METHOD
 from cornersmooth.model import Move, Program
@@ -21,7 +21,7 @@ from cornersmooth.nc import Control, Form, choose_form
 from cornersmooth.pipeline import postprocess
 from cornersmooth.settings import Settings
 from cornersmooth.system.processes import can_fork, map_in_processes, useful_processes
-from cornersmooth.times.saving import Timing, without_holes
+from cornersmooth.times import Timing, without_holes
 
 #: poses of a part that are looked at; of longer ones whole runs from the middle
 MOST_POSES = 2000

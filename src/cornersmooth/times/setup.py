@@ -33,7 +33,7 @@ from cornersmooth.pipeline import smooth
 from cornersmooth.rotary import rotary_angles
 from cornersmooth.settings import Settings
 from cornersmooth.system.processes import map_in_processes
-from cornersmooth.times.saving import Timing, without_holes
+from cornersmooth.times import Timing, without_holes
 
 #: degrees between the setups that are estimated first, and around the best of them
 COARSE, FINE = 15.0, 5.0
