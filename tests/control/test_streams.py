@@ -11,9 +11,8 @@ from pathlib import Path
 import pytest
 
 import cornersmooth as cs
-from cornersmooth.control.listing import listing
-from cornersmooth.control.program import Text
-from cornersmooth.control.word_tables import CONTROLS
+from cornersmooth.control.program import Text, listing
+from cornersmooth.control.table import CONTROLS
 from cornersmooth.filter.runs import ProgramReader
 from oracle.command import BAD_INPUT, DONE, USAGE, run
 

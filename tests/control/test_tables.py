@@ -10,12 +10,10 @@ from pathlib import Path
 import pytest
 
 import cornersmooth as cs
-from cornersmooth.control import word_tables
-from cornersmooth.control.listing import listing
-from cornersmooth.control.program import Act, Text, execute
+from cornersmooth.control import table as word_tables
+from cornersmooth.control.program import Act, Text, execute, listing
 from cornersmooth.control.state import Rows, State
-from cornersmooth.control.table import UNKNOWN, UNLISTED, Row, table_of
-from cornersmooth.control.word_tables import CONTROLS
+from cornersmooth.control.table import CONTROLS, UNKNOWN, UNLISTED, Row, table_of
 from cornersmooth.errors import InputError
 from cornersmooth.filter.runs import ProgramReader
 from cornersmooth.nc_reader import read_nc

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cornersmooth.nc_reader.curves import groups
 from cornersmooth.nc_reader.elements import Curves
+from cornersmooth.nc_reader.tool import groups
 from cornersmooth.verify.bending import arc_bend, curve_bend, turn_bend
 
 H, POINTS = 10.0, 401

@@ -19,7 +19,7 @@ import pytest
 
 from cornersmooth.cl import read
 from cornersmooth.errors import Verdict
-from cornersmooth.nc_reader.options import DIGITS_SAMPLE, Steps
+from cornersmooth.nc_reader.dialects import DIGITS_SAMPLE, Steps
 from cornersmooth.verify import verify
 from oracle.command import run
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from cornersmooth.cl import read
-from cornersmooth.control import word_tables
+from cornersmooth.control import table as word_tables
 from cornersmooth.control.table import table_of
 from cornersmooth.errors import Verdict
 from cornersmooth.kinematics import load_machine

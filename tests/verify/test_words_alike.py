@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from cornersmooth.control.table import table_of
-from cornersmooth.control.word_tables import CONTROLS
+from cornersmooth.control.table import CONTROLS, table_of
 from oracle.command import DONE, run
 
 FIVE = """LOAD/TOOL,3,ADJUST,3

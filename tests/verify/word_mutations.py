@@ -19,7 +19,7 @@ import numpy as np
 from cornersmooth.control.source import read_lines
 from cornersmooth.errors import InputError
 from cornersmooth.nc import fit_settings, write
-from cornersmooth.nc_reader.options import ReadingOptions
+from cornersmooth.nc_reader.dialects import ReadingOptions
 from cornersmooth.nc_reader.reader import Reader
 from cornersmooth.nc_words.check import WordCheck
 from cornersmooth.settings import Settings

@@ -14,8 +14,7 @@ from cornersmooth.cli import files, show
 from cornersmooth.cli.options import Options
 from cornersmooth.cli.shop import command_line, loosened
 from cornersmooth.cli.show import more
-from cornersmooth.control.listing import listing
-from cornersmooth.control.program import Text
+from cornersmooth.control.program import Text, listing
 from cornersmooth.errors import CornersmoothError, SettingsError, Verdict, command_text
 from cornersmooth.filter import Filtered, filter_program, verify_programs
 from cornersmooth.filter.checking import measure

@@ -2,8 +2,6 @@
 
 Unknown is a value of every group, and what each word without a row makes of all. `source` (bytes), `lexer` (one line),
 `line_patterns` (all lines of a kind at once) and `words` bring bytes to rows. `table` has what a word does, of
-`[words]` in ``word_lists``; `word_tables` has all keys. `state` executes one block, or a run of motion blocks by
-arrays.
-`program` has all blocks in order, which of them may be jumped to, and what no lexer knows; `listing` is what
-``cornersmooth explain --stream`` prints.
+`[words]` in ``word_lists``. `state` executes one block, or a run of motion blocks by arrays. `program` has all blocks
+in order, which of them may be jumped to, what no lexer knows, and what ``cornersmooth explain --stream`` prints.
 """

@@ -17,8 +17,8 @@ from cornersmooth.feedrate.planner import Progress, plan_along
 from cornersmooth.feedrate.timelaw import TimeLaw, peak_speed
 from cornersmooth.kinematics import Machine, endless
 from cornersmooth.model import Arcs, Bools, FeedMode, Floats, Ints, Move, Program, Source, Statement
-from cornersmooth.nc_reader.curves import groups
 from cornersmooth.nc_reader.elements import Element, Event, NcProgram
+from cornersmooth.nc_reader.tool import groups
 from cornersmooth.settings import Limits, Settings
 
 #: what a motion block does, as a move

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from cornersmooth.control.program import Stream, Text, line_of
 from cornersmooth.control.state import Rows, State
-from cornersmooth.control.table import FRAME, PRESET, UNKNOWN, table_of
-from cornersmooth.control.word_tables import CONTROLS
+from cornersmooth.control.table import CONTROLS, FRAME, PRESET, UNKNOWN, table_of
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import Bools, Floats
 from cornersmooth.nc_reader.dialects import dialect_of

@@ -17,12 +17,12 @@ event             a word that stands beside the motion
 Where is what:
 
 - bytes to tables: `control` (lines, words and what they mean), `dialects` (grammar), `acts` (what a block does)
-- tables to elements: `reader` goes through the text (`reading`: a whole one), `execution` executes: `arcs`, `splines`,
-  `rotary`; `needed_states` says which words want another state; `retracts` leads back from them, `planes` are tilted
-- what comes out: `elements`; `curves` evaluates, `tool` says where the tool is
+- tables to elements: `reader` goes through the text (`reading`: a whole one), `execution` executes, with `splines` and
+  `rotary`; `needed_states` says which words want another state; `retracts` leads back from them
+- what comes out: `elements`; `tool` says where the tool is
 """
 
-from cornersmooth.control.word_tables import CONTROLS
+from cornersmooth.control.table import CONTROLS
 from cornersmooth.nc_reader.elements import Event, NcProgram, Problem
 from cornersmooth.nc_reader.reading import read_nc
 

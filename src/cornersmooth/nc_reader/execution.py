@@ -11,9 +11,9 @@ import numpy as np
 from cornersmooth.control.state import State
 from cornersmooth.control.words import NURBS, Table, filled
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.nc_reader.arcs import circles
 from cornersmooth.nc_reader.elements import Curves, Element, Elements, NcArcs, Problem
 from cornersmooth.nc_reader.splines import Blocks, curves_of, cut_long
+from cornersmooth.nc_reader.tool import circles
 
 _TIP, _VECTOR, _POINT = "XYZ", "IJK", "UVW"
 

@@ -16,7 +16,8 @@ from cornersmooth.control.state import State
 from cornersmooth.control.words import MOTION_CODES, Line, Table, joined_tables, table_of
 from cornersmooth.errors import InputError
 from cornersmooth.model import MM_PER_UNIT, Floats, Units
-from cornersmooth.nc_reader.acts import Act, Beside, Move, Running, Tilt, ToMachine
+from cornersmooth.nc_reader.acts import ASIDE, NOT_ABOVE, Act, Beside, Move, Running, Tilt, TiltedPlane, ToMachine
+from cornersmooth.nc_reader.dialects import ReadingOptions, Steps
 from cornersmooth.nc_reader.elements import RETRACT, Element, Elements, Event, Problem, Second
 from cornersmooth.nc_reader.execution import Modal, execute, in_mm
 from cornersmooth.nc_reader.needed_states import (
@@ -28,8 +29,6 @@ from cornersmooth.nc_reader.needed_states import (
     kinematics_problems,
     plane_problems,
 )
-from cornersmooth.nc_reader.options import ReadingOptions, Steps
-from cornersmooth.nc_reader.planes import ASIDE, NOT_ABOVE, TiltedPlane
 from cornersmooth.nc_reader.retracts import Retracts
 from cornersmooth.nc_reader.rotary import MOST_LINES
 

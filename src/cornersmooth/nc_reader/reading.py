@@ -6,9 +6,9 @@ import os
 from typing import TYPE_CHECKING
 
 from cornersmooth.control.source import Source, readable_twice
-from cornersmooth.control.word_tables import word_table
+from cornersmooth.control.table import word_table
+from cornersmooth.nc_reader.dialects import DIGITS_SAMPLE, ReadingOptions
 from cornersmooth.nc_reader.elements import Elements, NcProgram
-from cornersmooth.nc_reader.options import DIGITS_SAMPLE, ReadingOptions
 from cornersmooth.nc_reader.reader import Reader
 
 if TYPE_CHECKING:

@@ -11,8 +11,7 @@ import numpy as np
 
 from cornersmooth.control.lexer import Lexer
 from cornersmooth.control.state import State
-from cornersmooth.control.table import UNLISTED, Row, any_of, shown, table_of
-from cornersmooth.control.word_tables import word_table
+from cornersmooth.control.table import UNLISTED, Row, any_of, shown, table_of, word_table
 from cornersmooth.control.words import Line, Table
 from cornersmooth.errors import InputError
 from cornersmooth.nc_words.blocks import NOT_LISTED, Block, WordRules

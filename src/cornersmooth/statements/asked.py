@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from cornersmooth.control.word_tables import Means
+from cornersmooth.control.table import Means
 from cornersmooth.model import Ints, Move, Program, Statement
 from cornersmooth.statements.tokens import SPEED_DECIMALS, Token, of_m
 from cornersmooth.statements.work_offsets import work_offset_of

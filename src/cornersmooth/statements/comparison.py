@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from itertools import zip_longest
 from typing import Final
 
-from cornersmooth.control.word_tables import Means
+from cornersmooth.control.table import Means
 from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.statements.tokens import ENDINGS, Token
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from cornersmooth.control.word_tables import Means
+from cornersmooth.control.table import Means
 from cornersmooth.nc_reader.elements import RETRACT, Event
 
 #: decimals of a spindle speed that count: FANUC's S takes whole numbers only

@@ -13,8 +13,8 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.model import Floats
-from cornersmooth.nc_reader.curves import CurveGroup
 from cornersmooth.nc_reader.elements import Second
+from cornersmooth.nc_reader.tool import CurveGroup
 
 #: A direction u = v / |v| has |u"| <= |v"| / |v| + (b² + 2 a b) / |v|², where a and b are the parts of v' along v and
 #: across it: from v" = |v|" u + 2 |v|' u' + |v| u", where |v|' = a, |v|" = u' v' + u v" and |u'| = b / |v|. And

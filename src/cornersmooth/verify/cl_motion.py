@@ -12,10 +12,8 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.model import Floats, Ints, Move, Program
-from cornersmooth.nc_reader.arcs import arc_points
-from cornersmooth.nc_reader.curves import CurveGroup
 from cornersmooth.nc_reader.elements import Problem
-from cornersmooth.nc_reader.tool import between, unit
+from cornersmooth.nc_reader.tool import CurveGroup, arc_points, between, unit
 from cornersmooth.settings import FLIP_ANGLE
 from cornersmooth.verify.bending import arc_bend, curve_bend, turn_bend
 

@@ -12,9 +12,8 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.nc_reader.curves import groups
 from cornersmooth.nc_reader.elements import Element, Elements
-from cornersmooth.nc_reader.tool import directions, written_at
+from cornersmooth.nc_reader.tool import directions, groups, written_at
 from cornersmooth.verify.bending import arc_bend, curve_bend, turn_bend, wound_bend
 from cornersmooth.verify.cl_motion import UNBOUND, divided, parts_of
 from cornersmooth.verify.task import ARITHMETIC, Task

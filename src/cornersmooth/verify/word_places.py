@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from cornersmooth.control.word_tables import Means
+from cornersmooth.control.table import Means
 from cornersmooth.model import Bools, Ints, Move
 from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem
 from cornersmooth.nc_reader.tool import leads_somewhere

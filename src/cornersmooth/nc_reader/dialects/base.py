@@ -7,8 +7,7 @@ from collections.abc import Container, Set
 from typing import Final
 
 from cornersmooth.control.lexer import Lexer
-from cornersmooth.control.table import table_of
-from cornersmooth.control.word_tables import word_table
+from cornersmooth.control.table import table_of, word_table
 from cornersmooth.control.words import Columns, Line, Word, refused, tools_first
 from cornersmooth.errors import InputError
 from cornersmooth.nc_reader.acts import Acts, Beside, Move, Running

@@ -8,9 +8,21 @@ from typing import Final
 
 from cornersmooth.control.lexer import NOT_NEGATIVE, NUMBER, POSITIVE, ZERO, Lexer, fixed, number_of
 from cornersmooth.control.words import SPL, Columns, Line, Word, refused
-from cornersmooth.nc_reader.acts import Acts, Beside, HoleCycle, Move, Running, Tilt, ToMachine, drill, wrong
+from cornersmooth.nc_reader.acts import (
+    Acts,
+    Beside,
+    HoleCycle,
+    Move,
+    Running,
+    Tilt,
+    TiltedPlane,
+    ToMachine,
+    drill,
+    room_of,
+    rotated_frame,
+    wrong,
+)
 from cornersmooth.nc_reader.dialects.base import Dialect, values
-from cornersmooth.nc_reader.planes import TiltedPlane, room_of, rotated_frame
 
 _VECTOR: Final = {"TX": "I", "TY": "J", "TZ": "K"}
 _PATHS: Final = ("L", "LN", "SPL")

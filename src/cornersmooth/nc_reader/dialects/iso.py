@@ -8,11 +8,24 @@ from collections.abc import Mapping, Set
 from dataclasses import replace
 
 from cornersmooth.control.lexer import NUMBER, Lexer, fixed, number_of
-from cornersmooth.control.word_tables import word_table
+from cornersmooth.control.table import word_table
 from cornersmooth.control.words import MOTION_CODES, NURBS, Columns, Line, Word, refused
-from cornersmooth.nc_reader.acts import Acts, Beside, HoleCycle, Move, Running, Tilt, ToMachine, drill, wrong
+from cornersmooth.nc_reader.acts import (
+    Acts,
+    Beside,
+    HoleCycle,
+    Move,
+    Running,
+    Tilt,
+    TiltedPlane,
+    ToMachine,
+    drill,
+    room_of,
+    rotated_frame,
+    turned_frame,
+    wrong,
+)
 from cornersmooth.nc_reader.dialects.base import Dialect
-from cornersmooth.nc_reader.planes import TiltedPlane, room_of, rotated_frame, turned_frame
 
 #: G words that send axes to positions of the machine
 _TO_REFERENCE = (28.0, 30.0)

@@ -10,9 +10,21 @@ import numpy as np
 
 from cornersmooth.control.lexer import NOT_NEGATIVE, NUMBER, POSITIVE, ZERO, Lexer, fixed, number_of
 from cornersmooth.control.words import BSPLINE, BY_WORD, POLY, Columns, Line, Word, refused
-from cornersmooth.nc_reader.acts import Acts, Beside, HoleCycle, Move, Running, Tilt, ToMachine, drill, wrong
+from cornersmooth.nc_reader.acts import (
+    Acts,
+    Beside,
+    HoleCycle,
+    Move,
+    Running,
+    Tilt,
+    TiltedPlane,
+    ToMachine,
+    drill,
+    room_of,
+    rotated_frame,
+    wrong,
+)
 from cornersmooth.nc_reader.dialects.base import Dialect
-from cornersmooth.nc_reader.planes import TiltedPlane, room_of, rotated_frame
 
 #: names of words of several letters: vectors are I J K, second points U V W, as in `motion`
 _NAMES: Final = {
