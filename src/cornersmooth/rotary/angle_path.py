@@ -31,6 +31,7 @@ from cornersmooth.rotary.branch_choice import (
     Stretches,
     WideSteps,
     choose,
+    first_outside,
     limit_error,
     meet_at_pole,
     parts_of_cut,
@@ -243,10 +244,9 @@ class _Steady:
         furthest, words = 0, self.unwrapped[members[0], 0]
         for branch, *turns in stuck.states:
             least, most = low[:, branch] + 360 * np.array(turns), high[:, branch] + 360 * np.array(turns)
-            below, above = least < limits[:, 0] - LIMIT_SLACK, most > limits[:, 1] + LIMIT_SLACK
-            first = int(np.argmax((below | above).any(axis=1)))
+            first = first_outside(least, most, limits)
             if first >= furthest:
-                furthest, words = first, np.where(below[first], least[first], most[first])
+                furthest, words = first, np.where(least[first] < limits[:, 0] - LIMIT_SLACK, least[first], most[first])
         pose = int(self.steady[members[furthest]])
         start = int(np.searchsorted(self.run, self.run[pose]))
         both = solutions(self.machine, self.axis[pose : pose + 1]).angles[0]

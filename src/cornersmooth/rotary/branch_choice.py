@@ -8,6 +8,7 @@ that no choice keeps inside the limits is divided into parts that can be kept: a
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -110,76 +111,45 @@ def search(stretches: Stretches, limits: Floats) -> tuple[Ints, Floats]:
     Returns and raises as `choose`, with turns 0 for axes without limits.
     """
     finite = np.isfinite(limits[:, 0]) & np.isfinite(limits[:, 1])
-    ranges = _turn_ranges(limits, finite)
-    start = (
-        (stretches.dislike + np.abs(stretches.first[0]).sum(axis=1))[:, None, None]
-        + START_TURN_COST * np.abs(ranges[0])[:, None]
-        + START_TURN_COST * np.abs(ranges[1])
-    )
-    shape = start.shape
-    size = max(1, CHUNK // start.size**2)
+    branch, turns = _states(limits, finite)
+    start = stretches.dislike[branch] + np.abs(stretches.first[0]).sum(axis=1)[branch]
+    size = max(1, CHUNK // (2 * len(branch) ** 2))
     origins: list[Ints] = []
-    best = entered = start.ravel()
+    best = entered = start + START_TURN_COST * np.abs(turns[:, 0]) + START_TURN_COST * np.abs(turns[:, 1])
     for begin in range(0, len(stretches), size):
-        end = min(begin + size, len(stretches))
-        allowed = _allowed(stretches, begin, end, ranges, limits)
-        steps = _steps(stretches, begin, end, ranges, finite)
-        for p in range(begin, end):
+        here = slice(begin, min(begin + size, len(stretches)))
+        low, high = (ends[here][:, branch] + 360 * turns for ends in (stretches.low, stretches.high))
+        inside = (low >= limits[:, 0] - LIMIT_SLACK) & (high <= limits[:, 1] + LIMIT_SLACK)
+        before = np.maximum(np.arange(here.start, here.stop) - 1, 0)  # the first stretch has none: its row is not used
+        # [stretch, from, to, axis]
+        off = stretches.first[here][:, None, branch] - stretches.last[before][:, branch, None]
+        nearest = -np.round(off / 360)
+        change = np.where(finite, turns - turns[:, None], nearest)
+        rewind = np.where(stretches.free[here], REWIND_COST, np.inf)[:, None, None, None]
+        steps = (np.abs(off + 360 * change) + np.where(change == nearest, 0.0, rewind)).sum(axis=3)
+        for p, (fits, step) in enumerate(zip(inside[..., 0] & inside[..., 1], steps, strict=True), begin):
             if p:
-                total = best[:, None] + steps[p - begin]
-                origin = total.argmin(axis=0)
-                entered = total[origin, np.arange(len(origin))]
-                origins.append(origin)
-            best = np.where(allowed[p - begin], entered, np.inf)
+                total = best[:, None] + step
+                origins.append(total.argmin(axis=0))
+                entered = total.min(axis=0)
+            best = np.where(fits, entered, np.inf)
             if best.min() == np.inf:
-                branch, turn0, turn1 = np.unravel_index(np.flatnonzero(np.isfinite(entered)), shape)
-                raise NoChoiceError(p, np.stack((branch, ranges[0][turn0], ranges[1][turn1]), axis=1).astype(np.int64))
+                open_ = np.isfinite(entered)
+                raise NoChoiceError(p, np.column_stack((branch, turns))[open_].astype(np.int64))
     path = [int(best.argmin())]
     for origin in reversed(origins):
         path.append(int(origin[path[-1]]))
-    branch, turn0, turn1 = np.unravel_index(np.array(path[::-1]), shape)
-    return branch.astype(np.int64), np.stack((ranges[0][turn0], ranges[1][turn1]), axis=1)
+    return branch[path[::-1]], turns[path[::-1]]
 
 
-def _turn_ranges(limits: Floats, finite: Bools) -> tuple[Floats, Floats]:
-    """Whole turns that bring an angle in (-180, 180] inside the limits, for either axis; 0 for one without."""
+def _states(limits: Floats, finite: Bools) -> tuple[Ints, Floats]:
+    """Branches (s,), and whole turns (s, 2) that bring angles in (-180, 180] inside the limits; 0 for axes without."""
     low = np.where(finite, np.ceil((np.where(finite, limits[:, 0], 0) - 180) / 360), 0)
     high = np.where(finite, np.floor((np.where(finite, limits[:, 1], 0) + 180) / 360), 0)
     if 2 * np.prod(high - low + 1) > MOST_STATES:
         low, high = np.maximum(low, -MANY_TURNS), np.minimum(high, MANY_TURNS)
-    return np.arange(low[0], high[0] + 1), np.arange(low[1], high[1] + 1)
-
-
-def _allowed(stretches: Stretches, begin: int, end: int, ranges: tuple[Floats, Floats], limits: Floats) -> Bools:
-    """Whether stretches stay inside the limits in each state: (stretches, states)."""
-    fits = []
-    for axis in (0, 1):
-        turned = 360 * ranges[axis]
-        low = stretches.low[begin:end, :, axis, None] + turned >= limits[axis, 0] - LIMIT_SLACK
-        fits.append(low & (stretches.high[begin:end, :, axis, None] + turned <= limits[axis, 1] + LIMIT_SLACK))
-    both: Bools = fits[0][:, :, :, None] & fits[1][:, :, None, :]
-    return both.reshape(end - begin, -1)
-
-
-def _steps(stretches: Stretches, begin: int, end: int, ranges: tuple[Floats, Floats], finite: Bools) -> Floats:
-    """Costs of the steps into stretches from all states before to all states: (stretches, states, states)."""
-    before = np.maximum(np.arange(begin, end) - 1, 0)  # the first stretch has none: its row is not used
-    step = stretches.first[begin:end, None, :, :] - stretches.last[before][:, :, None, :]  # [stretch, from, to, axis]
-    free = stretches.free[begin:end, None, None, None, None]
-    costs = []
-    for axis in (0, 1):
-        off = step[..., axis, None, None]
-        nearest = -np.round(off / 360)
-        if finite[axis]:
-            change = ranges[axis] - ranges[axis][:, None]
-            other = np.where(free, REWIND_COST, np.inf)
-            costs.append(np.abs(off + 360 * change) + np.where(change == nearest, 0.0, other))
-        else:
-            costs.append(np.abs(off + 360 * nearest))
-    # [stretch, from, to, old turn 0, new turn 0, old turn 1, new turn 1], then all of the old before all of the new
-    total: Floats = costs[0][..., None, None] + costs[1][:, :, :, None, None]
-    states = 2 * len(ranges[0]) * len(ranges[1])
-    return total.transpose(0, 1, 3, 5, 2, 4, 6).reshape(end - begin, states, states)
+    states = np.array([*product((0, 1), *(np.arange(least, most + 1) for least, most in zip(low, high, strict=True)))])
+    return states[:, 0].astype(np.int64), states[:, 1:]
 
 
 class CutTooFarError(Exception):
@@ -207,7 +177,7 @@ def parts_of_cut(angles: Floats, low: Floats, high: Floats, limits: Floats, stat
         reached = _farthest(angles[begin:], low[begin:], high[begin:], limits)
         if states is not None and not left:
             reached = max(
-                _first_outside(low[:, own] + 360 * turns, high[:, own] + 360 * turns, limits)
+                first_outside(low[:, own] + 360 * turns, high[:, own] + 360 * turns, limits)
                 for own, turns in zip(states[:, 0], states[:, 1:], strict=True)
             )
         if begin + reached == len(angles):
@@ -218,7 +188,7 @@ def parts_of_cut(angles: Floats, low: Floats, high: Floats, limits: Floats, stat
         left.append(begin)
 
 
-def _first_outside(low: Floats, high: Floats, limits: Floats) -> int:
+def first_outside(low: Floats, high: Floats, limits: Floats) -> int:
     """First row (m, 2) outside of the limits; the number of rows where none is."""
     beyond = np.maximum(limits[:, 0] - low, high - limits[:, 1]).max(axis=1) > LIMIT_SLACK
     return int(np.argmax(beyond)) if beyond.any() else len(low)

@@ -104,8 +104,8 @@ def insertions(
         open_, inserted = motion.divide(open_, parts)
         found.append(inserted)
     new = joined_rows((some_rows(open_, slice(0)), *found))
-    new = some_rows(new, np.lexsort((new.start, new.segment)))
-    segment, fraction, inner = new.segment, new.start, new.start_angles
+    new = some_rows(new, np.lexsort((new.share[:, 0], new.segment)))
+    segment, fraction, inner = new.segment, new.share[:, 0], new.angles[:, 0]
     limits = machine.limits
     inside = np.clip(inner, limits[:, 0], limits[:, 1])
     # At the pole the second axis may stop at its limit; anywhere else the way itself is outside.
@@ -138,18 +138,15 @@ def ruled(tip: Floats, axis: Floats, segment: Ints, fraction: Floats) -> tuple[F
 class Intervals:
     """Parts of segments: where they begin and end, with angles and branches."""
 
-    segment: Ints
-    start: Floats
-    end: Floats
-    start_angles: Floats
-    end_angles: Floats
-    start_branch: Ints
-    end_branch: Ints
+    segment: Ints  #: (p,)
+    share: Floats  #: (p, 2) of the segment
+    angles: Floats  #: (p, 2, 2) degrees
+    branch: Ints  #: (p, 2), -1 in the cone of the pole
 
     @property
     def turn(self) -> Floats:
         """(p, 2) degrees."""
-        return np.abs(self.end_angles - self.start_angles)
+        return np.abs(self.angles[:, 1] - self.angles[:, 0])
 
 
 @dataclass(frozen=True)
@@ -165,14 +162,14 @@ class RuledMotion:
 
     def segments(self, angles: Floats, segment: Ints, *, branches: bool) -> Intervals:
         """Whole segments, on request with the branches of their ends: -1 in the cone of the pole."""
-        branch = np.full((2, len(segment)), -1)
-        for side, pose in enumerate((segment, segment + 1) if branches else ()):
-            found = solutions(self.machine, self.axis[pose])
-            off = np.abs(wrap(found.angles - angles[pose, None, :])).sum(axis=2)
+        ends = np.stack((segment, segment + 1), axis=1)
+        branch = np.full(ends.shape, -1)
+        for side in (0, 1) if branches else ():
+            found = solutions(self.machine, self.axis[ends[:, side]])
+            off = np.abs(wrap(found.angles - angles[ends[:, side], None, :])).sum(axis=2)
             cone = self.tolerance[segment + 1] / 2
-            branch[side] = np.where(found.pole_distance <= cone, -1, np.argmin(off, axis=1))
-        ends = np.zeros(len(segment)), np.ones(len(segment))
-        return Intervals(segment, *ends, angles[segment], angles[segment + 1], *branch)
+            branch[:, side] = np.where(found.pole_distance <= cone, -1, np.argmin(off, axis=1))
+        return Intervals(segment, np.tile((0.0, 1.0), (len(segment), 1)), angles[ends], branch)
 
     def parts(self, intervals: Intervals) -> Ints:
         """Into how many parts each interval is to be divided: 1 where it is good as it is."""
@@ -216,7 +213,7 @@ class RuledMotion:
         """(3, p) how far intervals may leave their chords over the tolerances: real axis, ruled axis, tip."""
         turn = np.radians(part.turn)
         tolerance = np.radians(self.tolerance[part.segment + 1])
-        start, end = (self._lever(part.segment, fraction) for fraction in (part.start, part.end))
+        start, end = (self._lever(part.segment, share) for share in part.share.T)
         bends = np.zeros((3, len(turn)))
         bends[0] = axis_bend(self.machine, turn, unit(start), unit(end), tolerance) / (8 * tolerance)
         bends[1] = ruled_bend(start, end) / (8 * tolerance)
@@ -234,14 +231,13 @@ class RuledMotion:
         """Tip and linear words at both ends of each interval: four times (p, 3), mm; nothing where the tip is kept."""
         if self.tip_tolerance is None:
             return []
-        tips = [ruled(self.tip, self.axis, part.segment, share)[0] for share in (part.start, part.end)]
-        angles = part.start_angles, part.end_angles
-        return [*tips, *(machine_position(self.machine, *end) for end in zip(tips, angles, strict=True))]
+        tips = [ruled(self.tip, self.axis, part.segment, share)[0] for share in part.share.T]
+        return [*tips, *(machine_position(self.machine, tip, part.angles[:, end]) for end, tip in enumerate(tips))]
 
     def _errors(self, part: Intervals, ends: list[Floats], fraction: Floats) -> Iterator[tuple[Floats, Floats, Floats]]:
         """Errors at one share of each interval, the ruled motion paired with the real one in two ways."""
         share = fraction[:, None]
-        words = part.start_angles * (1 - share) + part.end_angles * share
+        words = part.angles[:, 0] * (1 - share) + part.angles[:, 1] * share
         axis = tool_axis(self.machine, words)
         nearest = self._swept(part, axis, fraction)
         if self.tip_tolerance is not None:
@@ -251,7 +247,7 @@ class RuledMotion:
             foot = dot(real, way) / np.where(square > 0, square, 1.0)
             nearest = np.where(square > 0, np.clip(foot, 0, 1), nearest)
         for along in (fraction, nearest):
-            _, wanted = ruled(self.tip, self.axis, part.segment, part.start + along * (part.end - part.start))
+            _, wanted = ruled(self.tip, self.axis, part.segment, part.share[:, 0] + along * np.diff(part.share)[:, 0])
             tip = np.zeros(len(along))
             if self.tip_tolerance is not None:
                 tip = np.linalg.norm(real - along[:, None] * way, axis=1) / self.tip_tolerance
@@ -263,7 +259,7 @@ class RuledMotion:
         along = fraction.copy()
         if len(still):
             some = some_rows(part, still)
-            start, end = self._lever(some.segment, some.start), self._lever(some.segment, some.end)
+            start, end = (self._lever(some.segment, share) for share in some.share.T)
             normal = np.cross(start, end)
             gone, left = (dot(np.cross(*pair), normal) for pair in ((start, axis[still]), (axis[still], end)))
             whole = gone + left
@@ -274,23 +270,18 @@ class RuledMotion:
     def divide(self, intervals: Intervals, count: Ints) -> tuple[Intervals, Intervals]:
         """Divide each interval into so many equal parts: the new intervals, and those that start with a new point."""
         owner, number = spread(count)
-        share = (number / count[owner])[:, None]
-        old = some_rows(intervals, owner)
-        start = old.start + (old.end - old.start) * share[:, 0]
-        words = old.start_angles * (1 - share) + old.end_angles * share
-        branch = old.start_branch.copy()
-        new = np.flatnonzero(number > 0)
+        divided, new = some_rows(intervals, owner), np.flatnonzero(number > 0)
+        at = some_rows(divided, new)
+        part = number[new] / count[owner[new]]
+        share = at.share[:, 0] + np.diff(at.share)[:, 0] * part
+        words = at.angles[:, 0] * (1 - part[:, None]) + at.angles[:, 1] * part[:, None]
         # A point between a pose in the cone and one outside is on the branch of the latter.
-        at = some_rows(old, new)
-        known = np.where(at.start_branch < 0, at.end_branch, at.start_branch)
-        known[(at.start_branch >= 0) & (at.end_branch >= 0) & (at.start_branch != at.end_branch)] = -1
-        _, axis = ruled(self.tip, self.axis, at.segment, start[new])
-        cone = self.tolerance[at.segment + 1] / 2
-        words[new], branch[new] = continued(self.machine, axis, words[new], known, cone)
-        last = number == count[owner] - 1
-        end, end_words, end_branch = old.end.copy(), old.end_angles.copy(), old.end_branch.copy()
-        end[~last], end_words[~last], end_branch[~last] = start[new], words[new], branch[new]
-        divided = Intervals(old.segment, start, end, words, end_words, branch, end_branch)
+        known = np.where(at.branch[:, 0] < 0, at.branch[:, 1], at.branch[:, 0])
+        known[(at.branch >= 0).all(axis=1) & (at.branch[:, 0] != at.branch[:, 1])] = -1
+        _, axis = ruled(self.tip, self.axis, at.segment, share)
+        words, known = continued(self.machine, axis, words, known, self.tolerance[at.segment + 1] / 2)
+        for values, point in ((divided.share, share), (divided.angles, words), (divided.branch, known)):
+            values[new, 0] = values[new - 1, 1] = point
         return divided, some_rows(divided, new)
 
 
