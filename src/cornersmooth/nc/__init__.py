@@ -31,7 +31,7 @@ from cornersmooth.nc.motion import Motion
 from cornersmooth.nc.planes import Planes, check_travel_of_words, plan_planes
 from cornersmooth.nc.program_frame import BLEND_STEP, POINT_APPROACH, Frame, Stream
 from cornersmooth.nc.rotary_words import rotary_way, within_reach
-from cornersmooth.nc.script import Holes, Script
+from cornersmooth.nc.script import Script
 from cornersmooth.nc.statement_writer import StatementWriter
 from cornersmooth.settings import FLIP_ANGLE, Settings
 from cornersmooth.smoothing.sampling import Rows, all_dense_rows, curve_rows, dense_rows
@@ -186,9 +186,7 @@ def write(
     blocks = Blocks(program, circles, modals, findings, usual_blend=usual_blend)
     approach = max(frame.approach, POINT_APPROACH) if chosen.orientation == "point" else frame.approach
     motion = Motion(program, tilting, modals, blocks, findings, approach, frame.retract)
-    script = Script(
-        statements, motion, Holes(motion, statements, drillings, skip=frame.skip_cycles, native=native), planes
-    )
+    script = Script(statements, motion, planes, drillings, frame.skip_cycles, native)
     text = frame.start(stream, chosen)
     motion.say(modals.start())
     for some in rows:

@@ -206,10 +206,9 @@ class Drillings:
     first: tuple[int, ...]  #: pose from which on each holds, ascending
     each: tuple[Drilling, ...]
 
-    def at(self, poses: Ints) -> tuple[list[Drilling], Ints]:
-        """What holds at poses (k,), each once, and the first of these for each."""
-        number, first = np.unique(np.searchsorted(self.first, poses, side="right") - 1, return_index=True)
-        return [self.each[one] for one in number.tolist()], poses[first]
+    def of(self, poses: Ints) -> Ints:
+        """(k,) place in `each` of what holds at poses."""
+        return np.searchsorted(self.first, poses, side="right") - 1
 
 
 def plan_drilling(program: Program, findings: Findings) -> Drillings:
@@ -277,11 +276,12 @@ def upright_poses(program: Program, form: Form, drillings: Drillings, *, drills:
 def has_cycles(program: Program, form: Form, part: slice, drillings: Drillings, *, drills: bool) -> bool:
     """Whether any hole of a part of the poses can be a cycle of the control; `drills` as in `upright_poses`."""
     poses = part.start + np.flatnonzero(program.kind[part] == Move.HOLE)
+    number, first = np.unique(drillings.of(poses), return_index=True)
     return any(
         one.cycle is not None
         and (one.clockwise if one.cycle.tap else drills)
-        and kind_of(one.cycle, form, program, pose[None])
-        for one, pose in zip(*drillings.at(poses), strict=True)
+        and kind_of(one.cycle, form, program, poses[k : k + 1])
+        for one, k in ((drillings.each[place], k) for place, k in zip(number, first, strict=True))
     )
 
 

@@ -14,7 +14,7 @@ Python runs per run of holes; per hole where the control has a cycle for it, or 
 
 from __future__ import annotations
 
-from dataclasses import KW_ONLY, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import accumulate, chain, pairwise, repeat, takewhile
 
@@ -33,7 +33,7 @@ from cornersmooth.nc.motion import NOWHERE, Motion
 from cornersmooth.nc.planes import Planes
 from cornersmooth.nc.program_frame import Stream
 from cornersmooth.nc.rotary_words import machine_of
-from cornersmooth.nc.statement_args import with_starts
+from cornersmooth.nc.statement_args import tool_starts, with_starts
 from cornersmooth.nc.statement_writer import StatementWriter
 from cornersmooth.smoothing.sampling import Rows
 from cornersmooth.text import format_number
@@ -44,226 +44,15 @@ _SAME_AXIS = 1e-9  #: axes whose directions differ by less, in the cosine, are t
 
 
 @dataclass
-class Holes:
-    """Writes the holes of a program."""
-
-    motion: Motion  #: what the moves over holes and into them are written by
-    statements: StatementWriter  #: writes dwells and comments, and knows how the spindle turns
-    drillings: Drillings
-    _: KW_ONLY
-    skip: bool = False  #: whether holes that cannot be written are left out with a warning
-    native: bool = False  #: whether holes are cycles of the control, where they can be
-    _left: tuple[int, Floats] = (-1, np.zeros(3))  #: the last hole, and the place (3,) above it where it was left, mm
-
-    @cached_property
-    def _approached(self) -> Ints:
-        """(n,) pose from which the run of holes is approached that each pose belongs to, -1 for none."""
-        kind = self.motion.program.kind
-        return np.maximum.accumulate(np.where(kind == Move.HOLE, -1, np.arange(len(kind))))
-
-    def write(self, rows: Rows) -> None:
-        """Write holes of one cycle, of the control or as plain moves; those left out are only approached."""
-        motion, poses = self.motion, rows.move
-        program, motion.return_to = motion.program, NOWHERE
-        said = self.drillings.at(poses[:1])[0][0]
-        travel, cycle = travel_height(program, poses, self._approached[poses]), said.cycle
-        kind, why = self._cycle_of_control(cycle, poses)
-        if cycle is None or (cycle.tap and not kind):
-            if not self.skip:
-                raise refused("CS342", program, said.line or int(program.line[poses[0]]), why=why)
-            motion.findings.note_each("CS315", program.line[poses], why=why)
-            cycle = None
-        else:
-            travel = np.maximum(travel, max(cycle.retract, cycle.clearance or 0.0))
-        clearance = np.full(len(poses), cycle.clearance) if cycle and cycle.clearance is not None else travel
-        if cycle is not None and kind:
-            self._cycles(cycle, kind, poses, travel, clearance)
-            return
-        if cycle is not None:
-            motion.findings.note_each("CS316", program.line[poses])
-            motion.note_holes(poses, -1 if motion.modals.comes_first else int(poses[0]) - 1, travel, clearance)
-        enter, leave = self._crossings(poses, travel)
-        hole, tip, rapid, dwell = hole_moves(cycle, program, poses, (enter, clearance, leave))
-        plain = BlockRows.straight(program, motion.ticks_at(rows, tip, hole), poses[hole])
-        plain = replace(plain, rapid=rapid, dwell=dwell)
-        if cycle is None:
-            for k, place in enumerate((program.tip[poses] / program.mm_per_unit).tolist()):
-                words = (
-                    f"{name}{format_number(x, motion.at.decimals[0])}" for name, x in zip("XYZ", place, strict=True)
-                )
-                motion.say(self.statements.warning_comment(f"NOT DRILLED: HOLE AT {' '.join(words)}"))
-                motion.emit_above(motion.moving(some_rows(plain, hole == k)))
-            return
-        feed, mode = hole_feeds(cycle, program, poses[hole])
-        plain = motion.moving(replace(plain, feed=feed, mode=mode))
-        per_turn = bool((plain.mode[~plain.rapid][-1:] == FeedMode.PER_REVOLUTION).all())
-        waits = plain.dwell is not None and plain.dwell.any()
-        motion.emit_above(plain, self.statements.dwell(cycle.dwell, said.line, per_turn=per_turn) if waits else ())
-
-    def _crossings(self, poses: Ints, travel: Floats) -> tuple[Floats, Floats]:
-        """Go up over the hole before, if there is one, where these are higher; heights as of `crossings`."""
-        motion, program, came = self.motion, self.motion.program, self._come_from(int(poses[0]), poses[-1], travel[-1])
-        if travel[0] > came and motion.position is not None:
-            up = motion.at.lifted(motion.position, float(travel[0]) - came)
-            motion.emit(motion.moving(BlockRows.straight(program, up[None], poses[:1], rapid=True)))
-        return crossings(program, poses, travel, came)
-
-    def _come_from(self, pose: int, next_last: int, above: float) -> float:
-        """Height over a hole, along its axis, at which the tool is over the one right before it, mm; NaN elsewhere."""
-        motion, program, (last, place) = self.motion, self.motion.program, self._left
-        self._left = int(next_last), program.tip[next_last] + above * program.axis[next_last]
-        away = motion.position is None or motion.modals["high"] or last != pose - 1
-        if away or dot(program.axis[last], program.axis[pose]) <= 1.0 - _SAME_AXIS:
-            return np.nan
-        return float((place - program.tip[pose]) @ program.axis[pose])
-
-    def _cycle_of_control(self, cycle: Cycle | None, poses: Ints) -> tuple[str, str]:
-        """Cycle of the control that drills holes, as `kind_of` names it; empty for none, and then why no tap can be."""
-        motion = self.motion
-        if cycle is None:
-            return "", "its words are not understood; numbers without words need --cycle-order"
-        kind = kind_of(cycle, motion.at.form, motion.program, poses)
-        if not kind:
-            return "", "a tap, and the control has no such cycle for it"
-        if cycle.tap and not (
-            self.statements.direction == "clockwise" and motion.modals.speed and motion.modals.turning
-        ):
-            return "", "a tap takes a spindle that turns clockwise at a known speed"
-        if motion.at.plane is None:
-            where = "the tool does not stay along Z between its changes, or nothing says that the rotary axes do"
-            if motion.at.form.orientation == "point":
-                where = "a tool of the program tilts, so all have axis points; lines (-f g1) need none"
-            return "", f"a tap, and {where}"
-        return kind if self.native or cycle.tap else "", ""
-
-    def _cycles(self, cycle: Cycle, kind: str, poses: Ints, travel: Floats, clearance: Floats) -> None:
-        """Write holes as cycles of the control, each from the height at which the tool goes from hole to hole."""
-        motion, program = self.motion, self.motion.program
-        lines, came = program.line[poses], self._come_from(int(poses[0]), poses[-1], travel[-1])
-        motion.findings.note_each("CS347", lines)
-        if kind == "tap":
-            motion.findings.note_each("CS348", lines)
-        motion.note_cut(int(poses[0]), turning=motion.modals.turning)
-        motion.say(motion.modals.set(plane=FIRST_PLANE))  # a cycle drills across the plane
-        at, speed, (feeds, modes) = motion.at, motion.modals.speed or 0.0, hole_feeds(cycle, program, poses)
-        table, frame, digits = (
-            at.form.table.cycles,
-            np.eye(3) if at.plane is None else at.plane.frame,
-            at.form.table.digits,
-        )
-        each: Blocks = getattr(table, kind)
-        once = next(
-            (k for k, block in enumerate(each) if "{x}" in block), 0
-        )  # those before are written where they change
-        over = at.ticks(program.tip[poses] + travel[:, None] * frame[:, 2], program.axis[poses])
-        words = [feed_digits(ticks, at) for ticks in feed_ticks(feeds, modes, program, at).tolist()]
-        turns = np.where((modes == FeedMode.PER_REVOLUTION) | (speed == 0.0), 1.0, speed)
-        written: Blocks = ()
-        for k, pose in enumerate(poses.tolist()):
-            if k == 0 or over[k, 2] != over[k - 1, 2]:
-                motion.say(table.off if written else ())
-                written, way = (), np.stack((over[k] if motion.position is None else motion.position, over[k], over[k]))
-                way[:2, 2] = way[:2, 2].max()
-                way = way if k or not np.isnan(came) else over[k][None]
-                motion.emit(motion.moving(BlockRows.straight(program, way, poses[[k] * len(way)], rapid=True)))
-                motion.say(motion.modals.go_on())
-                motion.say(motion.modals.set(feed_mode=int(modes[0])))
-            pitch = format_number(feeds[k] / program.mm_per_unit / turns[k], max(at.decimals[0], digits.most))
-            values = {"feed": words[k], "pitch": pitch}
-            values |= {"speed": format_number(speed, digits.speed, trim=True).rstrip(".")}
-            values |= _numbers(cycle, at, program, program.tip[pose] @ frame, (travel[k], clearance[k]))
-            blocks = tuple(block.format(**values) for block in each)
-            motion.say(blocks[once:] if written and written == blocks[:once] else blocks)
-            written = blocks[:once] or blocks
-            motion.stand(over[k])
-        motion.say(table.off)
-        motion.modals.now["feed"] = -1
-
-
-def _numbers(
-    cycle: Cycle, at: Coordinates, program: Program, top: Floats, above: tuple[float, float]
-) -> dict[str, str]:
-    """Numbers of a hole with its top, (3,) mm, travel and clearance above it; distances are of written heights."""
-    unit, decimals, plus = program.mm_per_unit, at.decimals[0], at.motion.signs
-
-    def rounded(value: float) -> float:
-        return float(format_number(value, decimals))
-
-    (x, y, z), (travel, clearance) = (top / unit).tolist(), above
-    places = {"x": x, "y": y, "top": rounded(z), "bottom": rounded(z - cycle.depth / unit)}
-    places |= {"travel": rounded(z + travel / unit), "clearance": rounded(z + clearance / unit)}
-    places |= {"setup": places["clearance"] - places["top"], "above": places["travel"] - places["top"]}
-    return {name: format_number(value, decimals, plus=plus) for name, value in places.items()} | {
-        "depth": format_number(places["top"] - places["bottom"], decimals),
-        "step": format_number(cycle.steps[0] / unit if cycle.steps else 0.0, decimals),
-        "milliseconds": str(cycle.dwell),
-        "seconds": format_number(cycle.dwell / 1000.0, 3, trim=True),
-    }
-
-
-def hole_moves(
-    cycle: Cycle | None, program: Program, poses: Ints, above: tuple[Floats, Floats, Floats]
-) -> tuple[Ints, Floats, Bools, Bools]:
-    """Plain moves for holes, or over them without a cycle: hole of each, its end (m, 3) mm, rapids, dwells after it.
-
-    Heights (h,) above the holes, mm: to which the tool comes, where feeding begins, and from which it goes.
-    """
-    enter, clearance, leave = above
-    moves = [(enter, True, False)]  # heights, whether in rapid, whether the tool waits there
-    if cycle is not None:
-        moves.append((clearance, True, False))
-        pecks = accumulate(chain(cycle.steps, repeat(cycle.steps[-1]))) if cycle.steps else ()
-        depths = (*takewhile(lambda depth: depth < cycle.depth - LEAST_PECK, pecks), cycle.depth)
-        for before, depth in pairwise((0.0, *depths)):
-            if before > 0.0:
-                moves += [(clearance, True, False)] * cycle.full_retract
-                moves.append((np.minimum(clearance, PECK_GAP - before), True, False))
-            moves.append((np.full(len(poses), -depth), False, depth == cycle.depth and cycle.dwell > 0))
-        moves += [(clearance, False, False)] * cycle.feed_out
-    moves.append((leave, True, False))
-    height = np.stack([height for height, _, _ in moves], axis=1)
-    tip = program.tip[poses][:, None, :] + height[..., None] * program.axis[poses][:, None, :]
-    rapid, waits = (np.tile([move[k] for move in moves], len(poses)) for k in (1, 2))
-    return np.repeat(np.arange(len(poses)), len(moves)), tip.reshape(-1, 3), rapid, waits
-
-
-def crossings(program: Program, poses: Ints, travel: Floats, came: float) -> tuple[Floats, Floats]:
-    """(h,) mm: heights over holes at which the tool comes to each and goes from it, between two at the higher travel.
-
-    It may come from a hole with the same axis, at a height over the first one of these; NaN where it does not.
-    """
-    tip, axis = program.tip[poses], program.axis[poses]
-    down = dot(tip[:-1] - tip[1:], axis[1:])  # to the next, along the tool
-    same = dot(axis[:-1], axis[1:]) > 1.0 - _SAME_AXIS
-    before = np.append(came, np.where(same, travel[:-1] + down, np.nan))
-    enter = np.fmax(travel, before)
-    leave = np.append(np.where(same, enter[1:] - down, travel[:-1]), travel[-1:])
-    return enter, leave
-
-
-def travel_height(program: Program, poses: Ints, approach: Ints) -> Floats:
-    """(h,) mm: height over each hole, along its axis, of the pose from which its run of holes is approached.
-
-    A hole with another axis has the height over the first one of its run, so that the tool turns as far from the part.
-    Zero where there is no such pose, or where it has another axis than that or lies lower.
-    """
-    known = np.maximum(approach, 0)
-    same = dot(program.axis[poses], program.axis[known]) > 1.0 - _SAME_AXIS
-    over = np.where(same, poses, np.minimum(known + 1, len(program) - 1))
-    axis = program.axis[over]
-    usable = (approach >= 0) & (dot(axis, program.axis[known]) > 1.0 - _SAME_AXIS)
-    height = dot(program.tip[known] - program.tip[over], axis)
-    return np.where(usable, np.maximum(height, 0.0), 0.0)
-
-
-@dataclass
 class Script:
     """Writes rows and statements in order."""
 
     statements: StatementWriter
     motion: Motion
-    holes: Holes
     planes: Planes
+    drillings: Drillings  #: what the holes are drilled with
+    skip: bool  #: whether holes that cannot be written are left out with a warning
+    native: bool  #: whether holes are cycles of the control, where they can be
     _coordinates: dict[tuple[bool, int | None], Coordinates] = field(default_factory=dict)  #: besides `Motion.tilting`
     _tilted: int = -1  #: tilted plane of the tool at hand
     _next: int = 0
@@ -320,7 +109,7 @@ class Script:
             part = slice(start + first, start + last)
             self._take_coordinates(int(poses[first]))
             if hole[first]:
-                self.holes.write(some_rows(rows, part))
+                self._drill(some_rows(rows, part))
             else:
                 self.motion.lines(some_rows(rows, part))
 
@@ -351,3 +140,180 @@ class Script:
                 at = replace(tilting, form=replace(form, machine=machine_of(form).with_tool(tool)))
             self._coordinates[key] = at
         return self._coordinates[key]
+
+    @cached_property
+    def _heights(self) -> tuple[Ints, Floats, Floats, Floats]:
+        """Holes (h,), and heights over them, mm: of travel, to which the tool comes, and from which it goes."""
+        program = self.motion.program
+        poses = np.flatnonzero(program.kind == Move.HOLE)
+        moves = np.where(program.kind == Move.HOLE, -1, np.arange(len(program)))
+        cycles = [one.cycle for one in self.drillings.each]
+        least = np.array([0.0 if one is None else max(one.retract, one.clearance or 0.0) for one in cycles])
+        travel = travel_height(program, poses, np.maximum.accumulate(moves)[poses])
+        travel = np.maximum(travel, least[self.drillings.of(poses)])
+        return poses, travel, *crossings(program, poses, travel)
+
+    def _drill(self, rows: Rows) -> None:
+        """Write holes of one cycle, of the control or as plain moves; those left out are only approached."""
+        motion, poses = self.motion, rows.move
+        program, motion.return_to = motion.program, NOWHERE
+        said = self.drillings.each[self.drillings.of(poses)[0]]
+        travel, enter, leave = (some[np.searchsorted(self._heights[0], poses)] for some in self._heights[1:])
+        cycle, (kind, why) = said.cycle, self._cycle_of_control(said.cycle, poses)
+        if cycle is None or (cycle.tap and not kind):
+            if not self.skip:
+                raise refused("CS342", program, said.line or int(program.line[poses[0]]), why=why)
+            motion.findings.note_each("CS315", program.line[poses], why=why)
+            cycle = None
+        clearance = np.full(len(poses), cycle.clearance) if cycle and cycle.clearance is not None else travel
+        if cycle is not None and kind:
+            self._cycles(cycle, kind, poses, travel, clearance)
+            return
+        hole, tip, rapid, dwell = hole_moves(cycle, program, poses, (enter, clearance, leave))
+        plain = BlockRows.straight(program, motion.ticks_at(rows, tip, hole), poses[hole])
+        plain = replace(plain, rapid=rapid, dwell=dwell)
+        if cycle is None:
+            for k, place in enumerate((program.tip[poses] / program.mm_per_unit).tolist()):
+                words = [word + format_number(x, motion.at.decimals[0]) for word, x in zip("XYZ", place, strict=True)]
+                motion.say(self.statements.warning_comment(f"NOT DRILLED: HOLE AT {' '.join(words)}"))
+                motion.emit_above(motion.moving(some_rows(plain, hole == k)))
+            return
+        motion.findings.note_each("CS316", program.line[poses])
+        motion.note_holes(poses, -1 if motion.modals.comes_first else int(poses[0]) - 1, travel, clearance)
+        feed, mode = hole_feeds(cycle, program, poses[hole])
+        plain = motion.moving(replace(plain, feed=feed, mode=mode))
+        per_turn = bool((plain.mode[~plain.rapid][-1:] == FeedMode.PER_REVOLUTION).all())
+        waits = plain.dwell is not None and plain.dwell.any()
+        motion.emit_above(plain, self.statements.dwell(cycle.dwell, said.line, per_turn=per_turn) if waits else ())
+
+    def _cycle_of_control(self, cycle: Cycle | None, poses: Ints) -> tuple[str, str]:
+        """Cycle of the control that drills holes, as `kind_of` names it; empty for none, and then why no tap can be."""
+        motion = self.motion
+        if cycle is None:
+            return "", "its words are not understood; numbers without words need --cycle-order"
+        kind = kind_of(cycle, motion.at.form, motion.program, poses)
+        if not kind:
+            return "", "a tap, and the control has no such cycle for it"
+        clockwise = self.statements.direction == "clockwise"
+        if cycle.tap and not (clockwise and motion.modals.speed and motion.modals.turning):
+            return "", "a tap takes a spindle that turns clockwise at a known speed"
+        if motion.at.plane is None:
+            where = "the tool does not stay along Z between its changes, or nothing says that the rotary axes do"
+            if motion.at.form.orientation == "point":
+                where = "a tool of the program tilts, so all have axis points; lines (-f g1) need none"
+            return "", f"a tap, and {where}"
+        return kind if self.native or cycle.tap else "", ""
+
+    def _cycles(self, cycle: Cycle, kind: str, poses: Ints, travel: Floats, clearance: Floats) -> None:
+        """Write holes as cycles of the control, each from the height at which the tool goes from hole to hole."""
+        motion, program, at = self.motion, self.motion.program, self.motion.at
+        motion.findings.note_each("CS347", program.line[poses])
+        if kind == "tap":
+            motion.findings.note_each("CS348", program.line[poses])
+        motion.note_cut(int(poses[0]), turning=motion.modals.turning)
+        motion.say(motion.modals.set(plane=FIRST_PLANE))  # a cycle drills across the plane
+        table, digits, speed = at.form.table.cycles, at.form.table.digits, motion.modals.speed or 0.0
+        (feeds, modes), frame = hole_feeds(cycle, program, poses), np.eye(3) if at.plane is None else at.plane.frame
+        texts: Blocks = getattr(table, kind)
+        once = next((k for k, block in enumerate(texts) if "{x}" in block), 0)  # so many are written where they change
+        over = at.ticks(program.tip[poses] + travel[:, None] * frame[:, 2], program.axis[poses])
+        words = [feed_digits(ticks, at) for ticks in feed_ticks(feeds, modes, program, at).tolist()]
+        turns = np.where((modes == FeedMode.PER_REVOLUTION) | (speed == 0.0), 1.0, speed)
+        beside = poses[0] > 0 and program.kind[poses[0] - 1] == Move.HOLE and not motion.modals["high"]
+        written: Blocks = ()
+        for k, pose in enumerate(poses.tolist()):
+            if k == 0 or over[k, 2] != over[k - 1, 2]:
+                motion.say(table.off if written else ())
+                written, way = (), over[[k]]
+                if motion.position is not None and (k or beside):
+                    way = np.stack((motion.position, over[k], over[k]))
+                    way[:2, 2] = way[:2, 2].max()
+                motion.emit(motion.moving(BlockRows.straight(program, way, poses[[k] * len(way)], rapid=True)))
+                motion.say(motion.modals.go_on())
+                motion.say(motion.modals.set(feed_mode=int(modes[0])))
+            pitch = format_number(feeds[k] / program.mm_per_unit / turns[k], max(at.decimals[0], digits.most))
+            values = {"feed": words[k], "pitch": pitch}
+            values |= {"speed": format_number(speed, digits.speed, trim=True).rstrip(".")}
+            values |= _numbers(cycle, at, program, program.tip[pose] @ frame, (travel[k], clearance[k]))
+            blocks = tuple(block.format(**values) for block in texts)
+            motion.say(blocks[once:] if written and written == blocks[:once] else blocks)
+            written = blocks[:once] or blocks
+            motion.stand(over[k])
+        motion.say(table.off)
+        motion.modals.now["feed"] = -1
+
+
+def _numbers(
+    cycle: Cycle, at: Coordinates, program: Program, top: Floats, above: tuple[float, float]
+) -> dict[str, str]:
+    """Numbers of a hole with its top, (3,) mm, travel and clearance above it; distances are of written heights."""
+    unit, decimals, plus = program.mm_per_unit, at.decimals[0], at.motion.signs
+
+    def rounded(value: float) -> float:
+        return float(format_number(value, decimals))
+
+    (x, y, z), (travel, clearance) = (top / unit).tolist(), above
+    places = {"x": x, "y": y, "top": rounded(z), "bottom": rounded(z - cycle.depth / unit)}
+    places |= {"travel": rounded(z + travel / unit), "clearance": rounded(z + clearance / unit)}
+    places |= {"setup": places["clearance"] - places["top"], "above": places["travel"] - places["top"]}
+    return {name: format_number(value, decimals, plus=plus) for name, value in places.items()} | {
+        "depth": format_number(places["top"] - places["bottom"], decimals),
+        "step": format_number(cycle.steps[0] / unit if cycle.steps else 0.0, decimals),
+        "milliseconds": str(cycle.dwell),
+        "seconds": format_number(cycle.dwell / 1000.0, 3, trim=True),
+    }
+
+
+def hole_moves(
+    cycle: Cycle | None, program: Program, poses: Ints, above: tuple[Floats, Floats, Floats]
+) -> tuple[Ints, Floats, Bools, Bools]:
+    """Plain moves for holes, or over them without a cycle: hole of each, its end (m, 3) mm, rapids, dwells after it.
+
+    Heights (h,) above the holes, mm: to which the tool comes, where feeding begins, and from which it goes.
+    """
+    enter, clearance, leave = above
+    moves = [(enter, True, False)]  # heights, whether in rapid, whether the tool waits there
+    if cycle is not None:
+        moves.append((clearance, True, False))
+        pecks = accumulate(chain(cycle.steps, repeat(cycle.steps[-1]))) if cycle.steps else ()
+        depths = (*takewhile(lambda depth: depth < cycle.depth - LEAST_PECK, pecks), cycle.depth)
+        for before, depth in pairwise((0.0, *depths)):
+            if before > 0.0:
+                moves += [(clearance, True, False)] * cycle.full_retract
+                moves.append((np.minimum(clearance, PECK_GAP - before), True, False))
+            moves.append((np.full(len(poses), -depth), False, depth == cycle.depth and cycle.dwell > 0))
+        moves += [(clearance, False, False)] * cycle.feed_out
+    moves.append((leave, True, False))
+    height = np.stack([height for height, _, _ in moves], axis=1)
+    tip = program.tip[poses][:, None, :] + height[..., None] * program.axis[poses][:, None, :]
+    rapid, waits = (np.tile([move[k] for move in moves], len(poses)) for k in (1, 2))
+    return np.repeat(np.arange(len(poses)), len(moves)), tip.reshape(-1, 3), rapid, waits
+
+
+def crossings(program: Program, poses: Ints, travel: Floats) -> tuple[Floats, Floats]:
+    """(h,) mm: heights over holes at which the tool comes to each and goes from it, between two at the higher travel.
+
+    So it is between holes with one axis that one tool drills one after the other.
+    """
+    tip, axis, enter, leave = program.tip[poses], program.axis[poses], travel.copy(), travel.copy()
+    down = dot(tip[:-1] - tip[1:], axis[1:])  # to the next, along the tool
+    same = (dot(axis[:-1], axis[1:]) > 1.0 - _SAME_AXIS) & (np.diff(poses) == 1)
+    same &= ~np.isin(poses[1:], tool_starts(program))
+    enter[1:] = np.where(same, np.maximum(travel[1:], travel[:-1] + down), travel[1:])
+    leave[:-1] = np.where(same, enter[1:] - down, travel[:-1])
+    return enter, leave
+
+
+def travel_height(program: Program, poses: Ints, approach: Ints) -> Floats:
+    """(h,) mm: height over each hole, along its axis, of the pose from which its run of holes is approached.
+
+    A hole with another axis has the height over the first one of its run, so that the tool turns as far from the part.
+    Zero where there is no such pose, or where it has another axis than that or lies lower.
+    """
+    known = np.maximum(approach, 0)
+    same = dot(program.axis[poses], program.axis[known]) > 1.0 - _SAME_AXIS
+    over = np.where(same, poses, np.minimum(known + 1, len(program) - 1))
+    axis = program.axis[over]
+    usable = (approach >= 0) & (dot(axis, program.axis[known]) > 1.0 - _SAME_AXIS)
+    height = dot(program.tip[known] - program.tip[over], axis)
+    return np.where(usable, np.maximum(height, 0.0), 0.0)
