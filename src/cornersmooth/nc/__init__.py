@@ -30,8 +30,9 @@ from cornersmooth.nc.modals import Modals
 from cornersmooth.nc.motion import Motion
 from cornersmooth.nc.planes import Planes, check_travel_of_words, plan_planes
 from cornersmooth.nc.program_frame import BLEND_STEP, POINT_APPROACH, Frame, Stream
-from cornersmooth.nc.rotary_words import rotary_way, within_reach
+from cornersmooth.nc.rotary_words import UPRIGHT, rotary_way, within_reach
 from cornersmooth.nc.script import Script
+from cornersmooth.nc.statement_args import tool_starts
 from cornersmooth.nc.statement_writer import StatementWriter
 from cornersmooth.settings import FLIP_ANGLE, Settings
 from cornersmooth.smoothing.sampling import Rows, all_dense_rows, curve_rows, dense_rows
@@ -212,6 +213,11 @@ def _add_warnings(form: Form, smoothed: SmoothProgram, circles: Circles, planes:
     if not form.rotary:  # rotary words say which way to turn; feed moves that turn so far are refused before
         poses, _ = program.axis_steps(rapid, FLIP_ANGLE)
         findings.note_each("CS326", program.line[poses], angle=FLIP_ANGLE)
+    if not form.rotary and "{rotary_zero}" in form.table.program.begin:  # and no words bring them back
+        tilted = np.logical_or.accumulate((program.kind != Move.FROM) & (program.axis[:, 2] < UPRIGHT))
+        moving = np.flatnonzero(program.kind != Move.FROM)
+        begins = moving[[k for k in np.searchsorted(moving, tool_starts(program)[1:]) if k < len(moving)]]
+        findings.note_each("CS358", program.line[begins[tilted[begins - 1] & (planes.of[begins] < 0)]])
     largest = form.mode.largest_feed
     beyond = ~rapid & (program.feed_mode == FeedMode.PER_MINUTE) & (program.feed > (largest or np.inf))
     findings.note_each("CS388", program.line[beyond], largest=largest)

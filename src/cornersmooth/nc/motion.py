@@ -49,8 +49,6 @@ class Motion:
     return_to: int = NOWHERE  #: first pose after a tool change, until it is reached
     _begun: int = -1  #: last move after a hole or a FROM that has been begun
     _noted: set[str] = field(default_factory=set)  #: codes of what is noted once, or once for each tool
-    _tilted: bool = False  #: whether a tool has been tilted, as far as was looked
-    _looked_until: int = 0
 
     def __post_init__(self) -> None:
         self.at = self.tilting
@@ -110,25 +108,15 @@ class Motion:
 
     def _go_back(self, move: int, near: Floats) -> None:
         """Go to the pose after a tool change even if it repeats the last one before, and so is no row."""
-        kind = self.program.kind
-        begin, self.return_to = self.return_to, NOWHERE
-        passed = begin + np.flatnonzero(kind[begin:move] != Move.FROM)
-        if self.last is None or not len(passed) or kind[begin - 1] == Move.HOLE:  # which none repeats
+        program, at, begin = self.program, self.at, self.return_to
+        self.return_to = NOWHERE
+        passed = begin + np.flatnonzero(program.kind[begin:move] != Move.FROM)[:1]
+        if self.last is None or not len(passed) or program.kind[begin - 1] == Move.HOLE:  # which none repeats
             return
-        self.emit(BlockRows.straight(self.program, self._again(self.last, passed[:1], near), np.array([move])))
-
-    def _again(self, last: Ints, pose: Ints, near: Floats) -> Ints:
-        """Ticks (1, c) of what was written last, a pose (1,), in the coordinates at hand."""
-        if self.last_at is self.at:
-            return last[None]
-        other, plane = self.program.axis[pose], None if self.last_at is None else self.last_at.plane
-        if self.at.form.rotary and plane is None:
-            other = self.at.angles(last[None])
-        elif self.at.form.rotary and plane is not None and plane.angles is not None:
-            other = plane.angles[None]
-        elif self.at.form.rotary:
-            other = continued(machine_of(self.at.form), other, near, np.array([-1]), 0.0)[0]
-        return self.at.ticks(self.program.tip[pose], other)
+        other = program.axis[passed]
+        if at.form.rotary:
+            other = continued(machine_of(at.form), other, near, np.array([-1]), 0.0)[0]
+        self.emit(BlockRows.straight(program, at.ticks(program.tip[passed], other), np.array([move])))
 
     def ticks_at(self, rows: Rows, tips: Floats, own: Ints) -> Ints:
         """Ticks of tips reached with the orientation of rows, which `own` names for each of them."""
@@ -174,8 +162,6 @@ class Motion:
         if modals.comes_first and not above:
             self._note_first(pose, rapid=bool(rows.rapid[0]))
         if not modals.begun:
-            if at is self.tilting:
-                self._note_tip_control(pose)
             self.say(modals.begin(self.rotary_blocks(first)))
         self.say(modals.go_on())
         if modals["high"]:
@@ -188,8 +174,6 @@ class Motion:
             self._once("CS334" if modals.tool is None else "CS382", pose)
         if not rows.rapid.all():
             self.note_cut(int(rows.move[np.argmin(rows.rapid)]), turning=bool(modals["spindle"]))
-        if at.form.rotary:
-            self._note_turns(rows)
         self.stand(rows.ticks[-1])
         self.last_at, modals.halted = at, False
         words, modals.waiting = modals.waiting, ""
@@ -294,30 +278,7 @@ class Motion:
         turned &= low | np.concatenate(([False], low[:-1]))
         self.findings.note_each("CS384", self.program.line[poses[turned]])
 
-    def _note_tip_control(self, pose: int) -> None:
-        """Say that a tilted tool has left the rotary axes anywhere, and no words bring them back."""
-        if self.at.form.rotary or "{rotary_zero}" not in self.at.form.table.program.begin:
-            return
-        since = slice(self._looked_until, pose)
-        moved = self.program.kind[since] != Move.FROM
-        self._tilted |= bool((moved & (self.program.axis[since, 2] < UPRIGHT)).any())
-        self._looked_until = pose
-        if self._tilted:
-            self.findings.note("CS358", int(self.program.line[pose]))
-
     def note_cut(self, pose: int, *, turning: bool) -> None:
         """Say that a tool cuts while the spindle stands."""
         if not turning:
             self._once("CS335b", pose)
-
-    def _note_turns(self, rows: BlockRows) -> None:
-        """Say that an endless axis gets words that some machines of the control refuse."""
-        form = self.at.form
-        if "CS346" in self._noted or form.mode.endless_words or form.machine is None:
-            return
-        axes = form.machine.axes[: len(form.machine.names)]
-        endless = [k for k, axis in enumerate(axes) if axis.limits is None and not axis.modulo]
-        angles = self.at.angles(rows.ticks)[:, endless]
-        beyond = np.flatnonzero(((angles < 0.0) | (angles >= 360.0)).any(axis=1))
-        if len(beyond):
-            self._once("CS346", int(rows.move[beyond[0]]), names=" and ".join(form.machine.names[k] for k in endless))

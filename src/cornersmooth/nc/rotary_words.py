@@ -75,6 +75,13 @@ def rotary_way(rows: Rows, smoothed: SmoothProgram, form: Form, findings: Findin
         path = rotary_angles(machine, tip, axis, **how)
     findings.add_all(path.findings)
     from_zero(form, program, axis, path.angles, move, rapid)
+    endless = [
+        k for k, each in enumerate(machine.axes[: len(machine.names)]) if each.limits is None and not each.modulo
+    ]
+    if not form.mode.endless_words:
+        words = np.round(path.angles[:, endless], form.table.digits.angle)
+        beyond = program.line[move[((words < 0.0) | (words >= 360.0)).any(axis=1)]]
+        findings.note_each("CS346", beyond[:1], names=" and ".join(machine.names[k] for k in endless))
     return_free_memory()  # rows are written while all of this is kept
     return RotaryWay(tip, axis, move, path.angles, rapid, left, tolerance)
 
