@@ -260,11 +260,13 @@ class Modals:
         own = [off for kind, off in words.coolant_off.items() if on and words.coolant.get(kind) == on]
         return own[0] if own else words.coolant.get("OFF", ())
 
-    def coolant_before(self, blocks: Blocks) -> Blocks:
-        """Blocks before those of another kind of coolant: where one of both has its own end, the other would go on."""
+    def flow(self, blocks: Blocks, *, off: bool = False) -> list[str]:
+        """Let another kind of coolant flow, or switch it `off`; one with its own end would go on beside another."""
         words, on = self.form.table.words, self.now["coolant"]
         own = {words.coolant.get(kind) for kind in words.coolant_off}
-        return self.coolant_end() if on not in ((), blocks) and {on, blocks} & own else ()
+        before = self.coolant_end() if on not in ((), blocks) and {on, blocks} & own else ()
+        self.switch("coolant", () if off else blocks)
+        return [*(block for block in before if block not in blocks), *blocks]
 
     def to_position(self, key: str, *, z: bool) -> list[str]:
         """Block that sends Z, or the other axes, to ``home`` or ``tool_change`` of the machine's file, where it has it.

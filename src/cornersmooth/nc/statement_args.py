@@ -12,7 +12,7 @@ from cornersmooth.kinematics import Machine, check_travel
 from cornersmooth.model import Floats, Ints, Move, Program, Statement
 
 _LONGEST = 86_400_000  #: longest dwell that is written, ms: one day
-_MM_PER_MINUTE = {"SMM": 1000.0, "SFM": 12.0 * 25.4}  #: cutting speeds in mm per minute
+_MM_PER_MINUTE = {"SFM": 12.0 * 25.4, "SMM": 1000.0}  #: cutting speeds in mm per minute
 _LIMITS = ("RANGE", "MAXRPM")  #: words of SPINDL whose number is no speed
 GEARS = frozenset(("RANGE", "MAXRPM", "HIGH", "LOW", "MEDIUM"))  #: words of SPINDL about gears and limits of the speed
 
@@ -80,47 +80,47 @@ def milliseconds(amount: float, in_revolutions: bool, speed: float | None) -> in
     return max(1, round(time)) if time > 0.0 else 0
 
 
-def spindle_args(statement: Statement) -> tuple[list[str], list[float]]:
-    """Words and numbers of SPINDL without gears and limits, which are the control's own affair."""
-    words, numbers = words_of(statement), numbers_of(statement)
-    for word in _LIMITS:
-        if word in words:
-            words = [other for other in words if other not in GEARS]
-            for number in number_after(statement, word):
-                numbers.remove(number)
-    return words, numbers
+def spindle_orders(program: Program) -> dict[int, tuple[str, float | None] | None]:
+    """What each SPINDL asks for, by its identity; None where it is not understood.
 
-
-def spindle_order(statement: Statement, diameter: float) -> tuple[str, float | None] | None:
-    """What SPINDL asks for: ORIENT, OFF, CLW, CCLW or ON, and the speed, rev/min; None where it is not understood.
-
-    A cutting speed counts at a diameter, mm.
+    That is ORIENT, OFF, CLW, CCLW or ON, and the speed, rev/min; a cutting speed counts at the cutter before it. Gears
+    and limits of the speed are the control's own affair.
     """
-    words, numbers = spindle_args(statement)
-    known = {"RPM", "CLW", "CCLW", "ON", "OFF", "SFM", "SMM", "LOCK", "ORIENT", "NOMORE"}.issuperset(words)
+    found, diameter = dict[int, tuple[str, float | None] | None](), 0.0
+    for statement in program.statements:
+        words, numbers = words_of(statement), numbers_of(statement)
+        if statement.word in ("CUTTER", "TLDATA"):
+            mill = statement.word == "CUTTER" or {"MILL", "DRILL"} & set(words)
+            diameter = numbers[0] * program.mm_per_unit if mill and numbers else 0.0
+        elif statement.word == "SPINDL":
+            found[id(statement)] = _spindle_order(statement, diameter)
+    return found
+
+
+def _spindle_order(statement: Statement, diameter: float) -> tuple[str, float | None] | None:
+    """What one SPINDL asks for, as of `spindle_orders`, at a diameter in mm."""
+    words, numbers = set(words_of(statement)), numbers_of(statement)
+    if words & set(_LIMITS):
+        words -= GEARS
+        for number in (value for word in _LIMITS for value in number_after(statement, word)):
+            numbers.remove(number)
+    known = words <= {"RPM", "CLW", "CCLW", "ON", "OFF", "SFM", "SMM", "LOCK", "ORIENT", "NOMORE"}
     if not known or len(numbers) > 1 or any(number < 0.0 for number in numbers):
         return None
-    if "LOCK" in words or "ORIENT" in words:
+    if words & {"LOCK", "ORIENT"}:
         return ("ORIENT", None) if numbers in ([], [0.0]) else None
-    if "OFF" in words or "NOMORE" in words or numbers == [0.0]:
+    if words & {"OFF", "NOMORE"} or numbers == [0.0]:
         return "OFF", None
-    unit = cutting_unit(words)
+    unit = cutting_unit(statement)
     if numbers and unit and not diameter > 0.0:
         return None
     speeds = [float(round(value * _MM_PER_MINUTE[unit] / (math.pi * diameter))) if unit else value for value in numbers]
     return next((word for word in ("CCLW", "CLW") if word in words), "ON"), next(iter(speeds), None)
 
 
-def cutter_diameter(statement: Statement, program: Program) -> float:
-    """Diameter of CUTTER/d,r,e,... or TLDATA/MILL,d,..., mm; 0 for none."""
-    numbers = numbers_of(statement)
-    mill = statement.word == "CUTTER" or {"MILL", "DRILL"} & set(words_of(statement))
-    return numbers[0] * program.mm_per_unit if mill and numbers else 0.0
-
-
-def cutting_unit(words: list[str]) -> str:
+def cutting_unit(statement: Statement) -> str:
     """Unit of a cutting speed; empty where the number is one of revolutions."""
-    return next((unit for unit in ("SFM", "SMM") if unit in words), "")
+    return next((unit for unit in _MM_PER_MINUTE if unit in statement.args), "")
 
 
 TOOL_WORDS: Final = frozenset({"LOADTL", "LOAD", "TURRET"})  #: words that load a tool

@@ -7,7 +7,6 @@ is not understood becomes a comment and a counted warning, never an NC word by g
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -22,12 +21,10 @@ from cornersmooth.nc.statement_args import (
     GEARS,
     TOOL_WORDS,
     ahead_of_tools,
-    cutter_diameter,
     cutting_unit,
     ends,
     milliseconds,
     numbers_of,
-    spindle_order,
     spoken_text,
     tool_loads,
     whole_number,
@@ -50,10 +47,10 @@ class StatementWriter:
     program: Program
     findings: Findings  #: takes what is noticed
     modals: Modals  #: what the control remembers
+    orders: dict[int, tuple[str, float | None] | None]  #: as of `spindle_orders`
     comments: bool = True  #: whether comments are written
     changed: bool = False  #: a tool change, or the way home, left the machine elsewhere
     direction: str = "clockwise"  #: field of the words for the way in which the spindle turns, as it was named last
-    _diameter: float = 0.0
     words: Words = field(init=False)
     _loads: dict[int, tuple[int, int]] = field(init=False)  #: tool and length register of statements, by identity
     _ahead_of_tools: frozenset[int] = field(init=False)
@@ -119,21 +116,12 @@ class StatementWriter:
         staged = self.words.tool_select if self.words.stage_tool and not selected else ()
         speed = None
         if any("{speed}" in block for block in self.words.tool_change):
-            speed = self._first_speed(between) or self.modals.speed
+            orders = (self.orders.get(id(one)) or ("", None) for one in between)
+            speed = next((speed for _, speed in orders if speed), self.modals.speed)
             if not speed:
                 raise refused("CS354", self.program, statement.line, tool=number)
         blocks = [block.format(tool=number, speed=self._speed_text(speed or 0.0)) for block in self.words.tool_change]
         return blocks + [block.format(tool=after) for block in staged]
-
-    def _first_speed(self, between: tuple[Statement, ...]) -> float | None:
-        """First speed that some statements give, rev/min."""
-        diameter = self._diameter
-        for statement in between:
-            if statement.word in ("CUTTER", "TLDATA"):
-                diameter = cutter_diameter(statement, self.program)
-            elif statement.word == "SPINDL" and (order := spindle_order(statement, diameter)) and order[1]:
-                return order[1]
-        return None
 
     def _speed_text(self, speed: float) -> str:
         return format_number(speed, self.form.table.digits.speed, trim=True).rstrip(".")
@@ -155,21 +143,16 @@ class StatementWriter:
         blocks = [block.format(tool=number) for block in self.words.tool_select]
         return blocks or self.comment(statement.text)
 
-    def cutter(self, statement: Statement) -> list[str]:
-        """CUTTER/d,r,e,... and TLDATA/MILL,d,...: the diameter is kept."""
-        self._diameter = cutter_diameter(statement, self.program)
-        return self.comment(statement.text)
-
     def spindle(self, statement: Statement) -> list[str] | None:
         """SPINDL in every order of its words."""
-        order = spindle_order(statement, self._diameter)
+        order = self.orders[id(statement)]
         if order is None or (order[0] == "ORIENT" and not self.words.spindle_orient):
             return None
         turn, speed = order
         if turn in ("ORIENT", "OFF"):
             self.modals.switch("spindle", ())
             return list(self.words.spindle_orient if turn == "ORIENT" else self.words.spindle_off) or None
-        if speed is not None and (unit := cutting_unit(words_of(statement))):
+        if speed is not None and (unit := cutting_unit(statement)):
             self.findings.note("CS322", statement.line, unit=unit)
         self.direction = {"CLW": "clockwise", "CCLW": "counterclockwise"}.get(turn, self.direction)
         direction = getattr(self.words, self.direction)
@@ -206,9 +189,7 @@ class StatementWriter:
             return None
         if not self.modals["coolant"] and id(statement) in self._ahead_of_tools:
             return self.modals.later("coolant", blocks)
-        before = self.modals.coolant_before(blocks)
-        self.modals.switch("coolant", blocks)
-        return [*before, *blocks]
+        return self.modals.flow(blocks)
 
     def halt(self, blocks: Blocks) -> list[str] | None:
         """STOP and OPSTOP; None where the control has no words for it."""
@@ -245,13 +226,6 @@ class StatementWriter:
         register = whole_number(numbers or [float(self.modals.offset)])
         if not side or len(names) > 2 or not set(names[1:]) <= _PLANES.keys() or register is None:
             return None
-        if words.compensation_entry:  # the control refuses a first move that is too short
-            pose, tips = statement.pose, self.program.tip
-            length = math.hypot(*(tips[pose] - tips[pose - 1])[:2]) if 0 < pose < len(tips) else math.inf
-            if not length > 0.0:
-                raise refused("CS344", self.program, statement.line)
-            if length <= self._diameter / 2.0:
-                self.findings.note("CS345", statement.line, length=length)
         tip = self.modals.mode is not self.form.upright and self.form.orientation not in ("fixed", "machine")
         also = "it may be used with tool tip control (--cycles native does without, along Z), and that " if tip else ""
         self.findings.note("CS319", statement.line, also=also)
@@ -287,9 +261,7 @@ class StatementWriter:
         off = {self.words.coolant.get("OFF"), *self.words.coolant_off.values()}
         if blocks not in off | set(self.words.coolant.values()):
             return list(blocks)
-        before = self.modals.coolant_before(blocks)
-        self.modals.switch("coolant", () if blocks in off else blocks)
-        return [*(block for block in before if block not in blocks), *blocks]
+        return self.modals.flow(blocks, off=blocks in off)
 
     def start(self, statement: Statement) -> list[str]:
         """FROM: a position that is stated; the tool is not sent there."""
@@ -304,8 +276,8 @@ _HANDLERS: dict[str, Handler] = {
     **dict.fromkeys(TOOL_WORDS, StatementWriter.load),
     "TOOLNO": StatementWriter.load,
     "SELECT": StatementWriter.select,
-    "CUTTER": StatementWriter.cutter,
-    "TLDATA": StatementWriter.cutter,
+    "CUTTER": lambda writer, statement: writer.comment(statement.text),
+    "TLDATA": lambda writer, statement: writer.comment(statement.text),
     "SPINDL": StatementWriter.spindle,
     "COOLNT": StatementWriter.coolant,
     "DELAY": StatementWriter.delay,
