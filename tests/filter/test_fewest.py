@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 from functools import cache
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from cornersmooth.filter.runs import ProgramReader
 from filter.fine_programs import HEAD, NAMES, made, program, relief
 from filter.foreign import by_rs274, by_words, difference
 from oracle.command import DONE, run
+from oracle.share import covering_share
 
 EPS = 0.01
 
@@ -48,8 +50,11 @@ def blocks(text: str | bytes) -> int:
     return len(re.findall(r"(?m)^(?:G1[789] )?(?:G[123] )?[XYZ].*$", data))
 
 
-@pytest.mark.parametrize("control", ["fanuc", "haas", "mitsubishi"])
-@pytest.mark.parametrize("name", [name for name in NAMES if name != "mould, turned"])  # all its arcs are steep
+#: all arcs of the turned mould are steep
+FEW = list(product([name for name in NAMES if name != "mould, turned"], ["fanuc", "haas", "mitsubishi"]))
+
+
+@pytest.mark.parametrize(("name", "control"), covering_share(FEW, 4))
 def test_few_blocks_say_the_same_motion(name: str, control: str) -> None:
     text = made(name)
     found = few(text, control)

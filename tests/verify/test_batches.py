@@ -235,7 +235,7 @@ def test_pass_that_runs_to_and_fro_is_cut(used):
 @pytest.mark.parametrize("processes", [1, forks])
 def test_a_wrong_guess_lets_nothing_pass(used, monkeypatch, processes):
     """Where a long stretch is cut the place is guessed."""
-    program = part(every=590)
+    program = part(150, every=140)
     text = text_of(program)
     right = verify(program, text, tolerance=TOLERANCE, processes=processes)
     assert right.passed

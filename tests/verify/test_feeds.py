@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from functools import cache
+from itertools import product
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from cornersmooth.settings import Settings
 from cornersmooth.verify import verify
 from nc.cases import Case
 from nc.promise import written
+from oracle.share import covering_share
 from verify.writing import HEAD, TAIL, encode
 
 CASES = (
@@ -56,8 +58,7 @@ def codes(name: str, case: Case, lines: list[str]) -> list[str]:
     return sorted({problem.code for problem in verify(program(name), text, tolerance=0.02, **how).problems})
 
 
-@pytest.mark.parametrize("name", CLS)
-@pytest.mark.parametrize("case", CASES, ids=str)
+@pytest.mark.parametrize(("case", "name"), covering_share(product(CASES, CLS), 2), ids=str)
 def test_the_feed_of_the_way_back_is_found(case: Case, name: str) -> None:
     lines = written(program(name), case.choose(), Settings(tolerance=0.02))[0].splitlines()
     assert codes(name, case, lines) == []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -38,20 +39,29 @@ ISO = ("fanuc", "haas", "mitsubishi")
 THREE_AXES = Path(__file__).parents[2] / "samples" / "machines" / "three-axis.toml"
 
 
+def options(control: str) -> tuple[str | Path, ...]:
+    """What the command is given."""
+    on = ("-e", "0.02", "--control", control)
+    return (*on, "--machine", THREE_AXES) if control in ("linuxcnc", "haas") else on
+
+
+@cache
+def right(control: str) -> str:
+    """The right program."""
+    made = run("smooth", "-", *options(control), data=CL.encode())
+    assert made.returncode == DONE, made.stderr
+    return made.stdout.decode()
+
+
 def judged(folder: Path, control: str, *edits: tuple[str, str]) -> str:
     """First line of ``verify`` for a program in which each of some patterns is replaced where it is found first."""
-    on: tuple[object, ...] = ("-e", 0.02, "--control", control)
-    if control in ("linuxcnc", "haas"):
-        on += ("--machine", THREE_AXES)
     (folder / "part.cls").write_text(CL)
-    made = run("smooth", "part.cls", *on, "-o", "part.nc", "--force", cwd=folder)
-    assert made.returncode == DONE, made.stderr
-    text = (folder / "part.nc").read_text()
+    text = right(control)
     for old, new in edits:
         text, count = re.subn(old, new, text, count=1, flags=re.MULTILINE)
         assert count
     (folder / "part.nc").write_text(text)
-    return run("verify", "part.cls", "part.nc", *on, cwd=folder).stdout.decode().splitlines()[0]
+    return run("verify", "part.cls", "part.nc", *options(control), cwd=folder).stdout.decode().splitlines()[0]
 
 
 @pytest.mark.parametrize("control", ["fanuc", "haas", "mitsubishi", "linuxcnc"])
