@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from cornersmooth import __version__
-from cornersmooth.provenance import Provenance, read_provenance
+from cornersmooth.frame import Provenance, read_provenance
 from oracle.command import DONE, SMALL, USAGE, run
 from oracle.messages import one_line
 

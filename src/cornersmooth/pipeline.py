@@ -19,16 +19,15 @@ import numpy as np
 from cornersmooth import __version__, nc, smoothing
 from cornersmooth.cl import read
 from cornersmooth.errors import Finding, InputError, SettingsError, Verdict, VerdictError
-from cornersmooth.methods import AUTO, CURVES_METHOD, DEFAULT_METHOD
+from cornersmooth.frame import HEAD, Provenance, with_parts
 from cornersmooth.model import Move, Program, SmoothProgram
 from cornersmooth.nc import Form, Frame, Written
 from cornersmooth.nc.program_frame import blend_word
 from cornersmooth.nc_reader import CONTROLS, NcProgram, read_nc
 from cornersmooth.nc_reader.elements import Element
-from cornersmooth.provenance import HEAD, Provenance, with_parts
 from cornersmooth.report import NcFile, planned_times, report
 from cornersmooth.report.verdict import Judgement, Saving, judge, trusted_blocks
-from cornersmooth.settings import Settings
+from cornersmooth.settings import AUTO, CURVES_METHOD, DEFAULT_METHOD, Settings
 from cornersmooth.system.output import FAILED, Output, Target, check_output, open_output, path_of
 from cornersmooth.system.processes import return_free_memory
 from cornersmooth.verify import Trust, Verification, Verifier, useful_processes

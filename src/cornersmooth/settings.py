@@ -1,17 +1,66 @@
-"""Every option of smoothing, of limits and of the frame of a program: name, unit, default, bounds, help.
+"""Every option of smoothing and of limits: name, unit, default, bounds, help. Methods of smoothing by name.
 
 No other module holds such a number. The command line, keys of ``cornersmooth.toml``, reports and their schema come from
 the one declaration here.
+
+How a method makes its curves is in a module of its own, which is imported when the method is used. To add one, write
+that module with a `cornersmooth.smoothing.construction.Construction` named ``CONSTRUCTION``, and an entry in `METHODS`.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
+from types import MappingProxyType
 from typing import Any, Literal, TypeVar
 
 from cornersmooth.errors import SettingsError, shown, wanted
-from cornersmooth.methods import AUTO, CURVES_METHOD, DEFAULT_METHOD, METHODS
+
+
+@dataclass(frozen=True)
+class Method:
+    """A way to make the pair of curves."""
+
+    name: str  #: As on the command line and in reports
+    summary: str  #: A few words for the help
+    module: str  #: Where its `CONSTRUCTION` is
+    #: Whether one parameter drives both curves. Only then do the errors at a common parameter bound the distances of
+    #: the paths, and can rotary words follow the curves.
+    one_parameter: bool = True
+    #: Settings that the method does not leave open.
+    prescribed: Mapping[str, object] = field(default_factory=lambda: MappingProxyType({}))
+
+
+#: in the order of tables, the oldest first
+METHODS: Mapping[str, Method] = MappingProxyType(
+    {
+        method.name: method
+        for method in (
+            Method("zhang2016", "the paper as published", "cornersmooth.smoothing.zhang2016", one_parameter=False),
+            Method(
+                "proportional",
+                "both segments cut at the same fraction, one parameter for both curves",
+                "cornersmooth.smoothing.proportional",
+            ),
+            Method(
+                "global",
+                "one pair of curves for a whole run of corners, as smooth as the tolerance allows",
+                "cornersmooth.smoothing.global_runs",
+                prescribed=MappingProxyType({"weights": (1.0, 1.0)}),
+            ),
+        )
+    }
+)
+
+#: what suits the form: see `Settings.with_method`
+AUTO = "auto"
+
+#: of lines, and of curves
+DEFAULT_METHOD, CURVES_METHOD = "proportional", "global"
+
+#: as published
+PAPERS_METHOD = "zhang2016"
 
 
 def option(
@@ -118,7 +167,7 @@ class Settings(OptionFields):
         unit="deg",
         bounds=(1e-4, 45.0),
     )
-    #: A name in `cornersmooth.methods.METHODS`, or "auto" for what suits the form: global in curves, if nothing that
+    #: A name in `cornersmooth.settings.METHODS`, or "auto" for what suits the form: global in curves, if nothing that
     #: is given is against it, else proportional.
     method: str = option(
         AUTO,
@@ -396,49 +445,3 @@ class Limits(OptionFields):
     def angular_limits(self) -> tuple[float, float, float]:
         """Speed, acceleration and jerk of pure rotations in rad/s, rad/s², rad/s³."""
         return math.radians(self.angular_feed), math.radians(self.angular_accel), math.radians(self.angular_jerk)
-
-
-@dataclass(frozen=True)
-class FrameSettings(OptionFields):
-    """Name, work offset, texts, retracts and holes of a program. Lengths in mm."""
-
-    #: None for that of the CL file, or of the control's table
-    program: str | None = option(
-        None, "Name or number of the NC program. [default: from the name of the CL file]", flags="--program-name"
-    )
-    block_numbers: bool = option(False, "Number the blocks.")
-    #: may have ``{program}``, ``{units}`` and ``{blend}``
-    header: tuple[str, ...] = option((), "Lines to write after the head; {program} and {units} are filled in.")
-    footer: tuple[str, ...] = option((), "Lines to write before the tail.")
-    comments: bool = option(True, "Leave out what the CL file says in words.", flags="--no-comments")
-    #: None for that of the control's table, empty for none
-    work_offset: str | None = option(
-        None,
-        "Work offset, such as G55, or the number of a preset; 'none' leaves it out. [default: G54, or preset 1]",
-    )
-    #: what the program is made of, for comments before the header
-    provenance: tuple[str, ...] = ()
-    #: name of the CL file without its ending, for `program`; empty for none
-    stem: str = ""
-    skip_cycles: bool = option(
-        False, "Leave out holes whose cycle cannot be written; the program says NOT DRILLED there. [default: an error]"
-    )
-    #: taps are the control's own cycles anyway
-    cycles: str = option(
-        "moves",
-        "Holes as plain moves, or as the control's own cycles where it has such and the tool stays along Z (or in a "
-        "tilted plane).",
-    )
-    #: 0 for neither. A form with a point on the axis comes down by 20 mm at least.
-    approach: float = option(
-        0.0,
-        "How far the tool comes down along its axis to the first position after a retract. [default: straight down]",
-        unit="mm",
-    )
-    retract: float = option(
-        0.0, "How far the tool goes back along its axis before it goes up. [default: straight up]", unit="mm"
-    )
-    modal: bool = option(False, "Leave out words that repeat from block to block, where the control keeps them.")
-    line_ends: str | None = option(
-        None, "What each line of the program ends with: lf or crlf. [default: that of the control's table, lf]"
-    )

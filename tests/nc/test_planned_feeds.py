@@ -12,12 +12,12 @@ import pytest
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate import Limits, block_feeds, plan_text
+from cornersmooth.frame import read_provenance
 from cornersmooth.kinematics import load_machine
 from cornersmooth.model import Program
 from cornersmooth.nc import Form, choose_form
 from cornersmooth.nc_reader import read_nc
 from cornersmooth.pipeline import postprocess, reading_back
-from cornersmooth.provenance import read_provenance
 from cornersmooth.settings import Settings
 from cornersmooth.verify import verify
 from oracle.share import covering_share

@@ -25,7 +25,7 @@ ALLOWED = (
     "cornersmooth.system.processes",  # who does the work, not how
     "cornersmooth.settings",
     "cornersmooth.text",
-    "cornersmooth.provenance",  # the head of a program, which both know
+    "cornersmooth.frame",  # the head of a program, which both know
     "cornersmooth.errors",  # a word, not a measure
     "cornersmooth.kinematics.machine",  # what a machine is; its kinematics are the verification's own
 )

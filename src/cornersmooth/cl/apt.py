@@ -30,9 +30,9 @@ from cornersmooth.cl.words import (
     near_motion_word,
 )
 from cornersmooth.errors import Finding
+from cornersmooth.frame import HEAD
 from cornersmooth.model import MM_PER_UNIT, Floats, Ints, Keep, Move, Program, Source, Units
 from cornersmooth.nc_reader.recognition import first_block
-from cornersmooth.provenance import HEAD
 
 HANDLERS: Final = motion_statements.HANDLERS | state_statements.FED | state_statements.KEPT
 

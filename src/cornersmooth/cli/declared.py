@@ -22,8 +22,8 @@ from cornersmooth.cli.parameters import (
     Spindle,
     ToolShape,
 )
-from cornersmooth.methods import AUTO, METHODS
-from cornersmooth.settings import FrameSettings, Limits, Settings
+from cornersmooth.frame import FrameSettings
+from cornersmooth.settings import AUTO, METHODS, Limits, Settings
 
 Count = Annotated[int, click.IntRange(min=1)]
 Units = Literal["mm", "inch"]

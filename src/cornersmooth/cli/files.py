@@ -59,7 +59,7 @@ def _reading(path: str) -> Iterator[None]:
 
 def read_head(nc: bytes | str | os.PathLike[str]) -> bytes:
     """Beginning of an NC program; empty where it cannot be read twice."""
-    from cornersmooth.provenance import HEAD
+    from cornersmooth.frame import HEAD
 
     if isinstance(nc, bytes):
         return nc[:HEAD]

@@ -21,11 +21,11 @@ from cornersmooth.filter.checking import measure
 from cornersmooth.filter.program import THREE_AXES, read_program, refuse_cl_file, refuse_no_program
 from cornersmooth.filter.runs import FILTERED, ProgramReader
 from cornersmooth.filter.times import Times
+from cornersmooth.frame import HEAD
 from cornersmooth.kinematics import Machine
 from cornersmooth.nc import Form
 from cornersmooth.nc_reader import Problem
 from cornersmooth.nc_reader.recognition import is_cl_file, names_tip_control, needs_its_control, recognise_control
-from cornersmooth.provenance import HEAD
 from cornersmooth.report import Kind, NcFile, planned_times, record, sha256_of
 from cornersmooth.report.verdict import Judgement, Saving
 from cornersmooth.settings import Settings

@@ -13,11 +13,11 @@ import click
 from cornersmooth.cli.files import read_head
 from cornersmooth.cli.options import Options, typed
 from cornersmooth.errors import SettingsError
+from cornersmooth.frame import read_provenance, weights_word
 from cornersmooth.kinematics import machine_names
 from cornersmooth.nc import control_names
 from cornersmooth.nc_reader import Problem
 from cornersmooth.nc_reader.recognition import recognise_control
-from cornersmooth.provenance import read_provenance, weights_word
 from cornersmooth.verify.task import length_of
 
 #: share by which numbers may differ that are alike

@@ -29,13 +29,12 @@ from cornersmooth.errors import (
     printable,
 )
 from cornersmooth.kinematics import Machine, with_dynamics
-from cornersmooth.methods import AUTO
 from cornersmooth.model import Program
 from cornersmooth.nc import Form, Frame
 from cornersmooth.pipeline import Progress, Result, postprocess, timed
 from cornersmooth.report import corners_csv
 from cornersmooth.report.verdict import Saving
-from cornersmooth.settings import TIMED_POSES, Settings
+from cornersmooth.settings import AUTO, TIMED_POSES, Settings
 from cornersmooth.system.output import ClosedPipe, make_folder, read_mark, write_mark
 from cornersmooth.system.processes import return_large_arrays
 

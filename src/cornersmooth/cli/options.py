@@ -99,8 +99,8 @@ class Options(Declared):
 
     def read(self) -> tuple[bytes, str, bool]:
         """Contents and name of the input, and whether it is an NC program; options of the other kind are refused."""
+        from cornersmooth.frame import HEAD
         from cornersmooth.nc_reader.recognition import first_block
-        from cornersmooth.provenance import HEAD
 
         data, name = read_input(self.source, size_limit=not self.no_size_limit)
         program = first_block(data[:HEAD]) is not None

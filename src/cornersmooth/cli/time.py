@@ -14,14 +14,14 @@ from cornersmooth.cli.options import Options
 from cornersmooth.cli.show import print_message, progress_bar, say
 from cornersmooth.errors import message
 from cornersmooth.feedrate import BlockLimits, limiting, plan_text
+from cornersmooth.frame import read_provenance
 from cornersmooth.kinematics import machine_names
-from cornersmooth.methods import METHODS
 from cornersmooth.model import Move, Program
 from cornersmooth.nc import fit_settings
 from cornersmooth.nc_reader import read_nc
 from cornersmooth.pipeline import read_back
-from cornersmooth.provenance import read_provenance
 from cornersmooth.report.verdict import limits_of, times_text
+from cornersmooth.settings import METHODS
 from cornersmooth.times import Timing, without_holes, written_text
 from cornersmooth.times.comparing import law_of_lines
 from cornersmooth.times.laws import Comparison, compare, slowest, stops, turning_seconds

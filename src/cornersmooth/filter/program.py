@@ -19,12 +19,12 @@ from cornersmooth.filter.runs import Left, ProgramReader, Reading
 from cornersmooth.filter.spelling import SAMPLE, Spelling
 from cornersmooth.filter.times import Times, by_own_law, least_time, no_runs
 from cornersmooth.filter.writing import smoothed
+from cornersmooth.frame import HEAD
 from cornersmooth.kinematics import Machine
 from cornersmooth.nc import fit_settings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc_reader import NcProgram
 from cornersmooth.nc_reader.recognition import foreign_kind, is_cl_file
-from cornersmooth.provenance import HEAD
 from cornersmooth.settings import Settings
 from cornersmooth.system.processes import return_free_memory
 from cornersmooth.times import Timing

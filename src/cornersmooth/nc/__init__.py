@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cornersmooth.errors import Finding, SettingsError
-from cornersmooth.methods import CURVES_METHOD, DEFAULT_METHOD
 from cornersmooth.model import FeedMode, Move, SmoothProgram, Units, rapid_moves
 from cornersmooth.nc.blocks import Blocks
 from cornersmooth.nc.circles import Circles, plan_circles
@@ -34,7 +33,7 @@ from cornersmooth.nc.rotary_words import UPRIGHT, rotary_way, within_reach
 from cornersmooth.nc.script import Script
 from cornersmooth.nc.statement_args import spindle_orders, tool_starts
 from cornersmooth.nc.statement_writer import StatementWriter
-from cornersmooth.settings import FLIP_ANGLE, Settings
+from cornersmooth.settings import CURVES_METHOD, DEFAULT_METHOD, FLIP_ANGLE, Settings
 from cornersmooth.smoothing.sampling import Rows, all_dense_rows, curve_rows, dense_rows
 
 __all__ = [

@@ -15,6 +15,7 @@ from typing import Protocol
 import numpy as np
 
 from cornersmooth.errors import OutputError, SettingsError
+from cornersmooth.frame import FrameSettings
 from cornersmooth.model import Floats, Ints, Move, Program
 from cornersmooth.nc.control import (
     INVERSE_TIME,
@@ -28,7 +29,7 @@ from cornersmooth.nc.control import (
 from cornersmooth.nc.control_tables import control_names, load_control
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.statement_args import tool_loads
-from cornersmooth.settings import FrameSettings, Settings
+from cornersmooth.settings import Settings
 from cornersmooth.statements.work_offsets import spellings, work_offset_of
 from cornersmooth.tables import filled as filled_in
 from cornersmooth.text import format_number

@@ -13,7 +13,6 @@ from cornersmooth.arrays.vectors import norm, unit
 from cornersmooth.geometry.ragged import spread
 from cornersmooth.kinematics import inverse_time, machine_position, tip_position, tool_axis
 from cornersmooth.kinematics.machine import LINEAR
-from cornersmooth.methods import METHODS
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program, SmoothProgram, rapid_moves
 from cornersmooth.nc.circles import ArcAngles
 from cornersmooth.nc.control import INVERSE_TIME_DECIMALS
@@ -22,7 +21,7 @@ from cornersmooth.nc.messages import Findings
 from cornersmooth.nc.rotary_words import RotaryWay, machine_of
 from cornersmooth.nc.statement_args import check_tool_travel
 from cornersmooth.rotary import FilledPath, fill, insertions
-from cornersmooth.settings import TIMED_POSES, Settings
+from cornersmooth.settings import METHODS, TIMED_POSES, Settings
 from cornersmooth.smoothing.blending import largest_blends
 from cornersmooth.smoothing.long_lines import LineLimits, Vertices, fewest_lines, segments_of_rows, vertices
 from cornersmooth.smoothing.outside_lines import faster_lines

@@ -22,7 +22,7 @@ from cornersmooth.control.state import CUTS, State
 from cornersmooth.control.table import FRAME, Row
 from cornersmooth.control.words import Line, Table
 from cornersmooth.control.words import table_of as table_of_rows
-from cornersmooth.provenance import PARTS, PARTS_WORD
+from cornersmooth.frame import PARTS, PARTS_WORD
 
 #: hexadecimal digits of a part
 _DIGITS: Final = 6

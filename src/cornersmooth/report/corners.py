@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from cornersmooth.arrays.vectors import angle_between, dot, norm, square, unit
 from cornersmooth.errors import InputError
 from cornersmooth.geometry import nurbs
-from cornersmooth.methods import METHODS
 from cornersmooth.model import Corners, Floats, Ints, LimitedBy, SmoothProgram, Status, Trait
+from cornersmooth.settings import METHODS
 from cornersmooth.smoothing.construction import RUN_CURVATURE, construction_of, legs_at
 from cornersmooth.smoothing.sampling import nodes
 from cornersmooth.smoothing.segments import lines_of

@@ -1,6 +1,6 @@
 """Where the path is rounded (docs/method.md), and what a method of smoothing has to be able to do.
 
-Corners are worked on in batches of whole arrays; `cornersmooth.methods` lists the methods.
+Corners are worked on in batches of whole arrays; `cornersmooth.settings` lists the methods.
 """
 
 from __future__ import annotations
@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 
 from cornersmooth.arrays.vectors import norm, unit
 from cornersmooth.geometry.ragged import ranges, starts
-from cornersmooth.methods import AUTO, DEFAULT_METHOD, METHODS
 from cornersmooth.model import Bools, Corners, FeedMode, Floats, Ints, Move, Program, SmoothProgram, Status
-from cornersmooth.settings import Settings
+from cornersmooth.settings import AUTO, DEFAULT_METHOD, METHODS, Settings
 
 if TYPE_CHECKING:
     from cornersmooth.smoothing.segments import Segments

@@ -14,9 +14,8 @@ import numpy as np
 
 from cornersmooth.arrays.vectors import norm, square
 from cornersmooth.geometry import nurbs
-from cornersmooth.methods import METHODS
 from cornersmooth.model import Bools, Floats, Ints, Move, Numbers, SmoothProgram, Status
-from cornersmooth.settings import FLIP_ANGLE, STANDING, Settings
+from cornersmooth.settings import FLIP_ANGLE, METHODS, STANDING, Settings
 from cornersmooth.smoothing.construction import legs_at
 
 #: exponent of the graded nodes s = (j/n)^(2/3)

@@ -18,12 +18,11 @@ from cornersmooth.feedrate.parts import time_of_parts
 from cornersmooth.feedrate.path import Path, build_path
 from cornersmooth.feedrate.written import text_path
 from cornersmooth.kinematics import Machine, endless, tool_axis, with_dynamics
-from cornersmooth.methods import AUTO, CURVES_METHOD, DEFAULT_METHOD
 from cornersmooth.model import Floats, Ints, Move, Program
 from cornersmooth.nc import Form
 from cornersmooth.pipeline import Progress, read_back, stage_of
 from cornersmooth.report.verdict import Saving
-from cornersmooth.settings import BOUNDS, Settings
+from cornersmooth.settings import AUTO, BOUNDS, CURVES_METHOD, DEFAULT_METHOD, Settings
 from cornersmooth.system.processes import useful_processes
 
 #: name of the law of LinuxCNC's planner in the tables of controls

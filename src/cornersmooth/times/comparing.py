@@ -15,11 +15,10 @@ from cornersmooth.errors import CornersmoothError, SettingsError, Verdict
 from cornersmooth.feedrate import BlockLimits
 from cornersmooth.feedrate.intervals import ROUGHLY, Resolution
 from cornersmooth.kinematics import Machine, with_dynamics
-from cornersmooth.methods import CURVES_METHOD, DEFAULT_METHOD, PAPERS_METHOD
 from cornersmooth.model import Move, Program
 from cornersmooth.nc import Control, Form, choose_form
 from cornersmooth.pipeline import postprocess
-from cornersmooth.settings import Settings
+from cornersmooth.settings import CURVES_METHOD, DEFAULT_METHOD, PAPERS_METHOD, Settings
 from cornersmooth.system.processes import can_fork, map_in_processes, useful_processes
 from cornersmooth.times import Timing, without_holes
 

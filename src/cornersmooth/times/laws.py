@@ -11,9 +11,8 @@ import numpy as np
 
 from cornersmooth.feedrate import TimeLaw, direct, plan
 from cornersmooth.kinematics import Machine
-from cornersmooth.methods import METHODS
 from cornersmooth.model import Program
-from cornersmooth.settings import Limits, Settings
+from cornersmooth.settings import METHODS, Limits, Settings
 from cornersmooth.smoothing import smooth
 
 SCHEMA = "cornersmooth-time/1"
