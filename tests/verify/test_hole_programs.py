@@ -11,6 +11,7 @@ from cornersmooth.smoothing import smooth
 from cornersmooth.verify import verify
 from oracle.share import share
 from verify.hole_programs import hole_trial
+from verify.random_programs import trial
 from verify.sweep import judged
 
 #: seeds of `hole_trial`, and what they have
@@ -80,6 +81,25 @@ REFUSED_ONCE = {
     1600475: "ten holes at one place, by another digit",
     1520289: "holes of two tools in one line",
     1005030: "the CL file's own rapid into a hole that is drilled behind it",
+    1700118: "taps of the control that end where the feed move before them does",
+    1700133: "GOHOME behind three tools, the last of them the first",
+    1600217: "two bores at one pose, coolant between them, and a feed move to where they are left",
+    1503308: "a tool that only stands over a tap that is left out",
+    1530027: "a hole behind a tool change for which the program has no way back",
+    1520304: "a stop between a bore and a tap that is left out, where the way up is the next rapid",
+}
+
+#: seeds of `random_programs.trial`, the same
+RANDOM_REFUSED_ONCE = {
+    8700253: "taps that are left out, and the same holes drilled behind another speed",
+    8601301: "words behind a tap that is left out, where the next rapid leads",
+}
+
+#: seeds that are refused still: a hole program, and programs at random
+KNOWN = {
+    1503284: "a feed move to where the tool has been before its change: what leads nowhere in the CL file has no feed",
+    8600559: "a dwell between poses that are a digit apart: the text passes them in one",
+    8601699: "coolant at the end of a run between poses that are a digit apart: the text passes them in one",
 }
 
 
@@ -87,6 +107,18 @@ REFUSED_ONCE = {
 def test_program_passes(seed: int):
     one = hole_trial(seed)
     assert judged(one, read(one.cl.encode(), name="holes.cls"), oracle=False) == ("passed", "")
+
+
+@pytest.mark.parametrize("seed", RANDOM_REFUSED_ONCE)
+def test_random_program_passes(seed: int):
+    one = trial(seed)
+    assert judged(one, read(one.cl.encode(), name="trial.cls"), oracle=False) == ("passed", "")
+
+
+@pytest.mark.parametrize("seed", KNOWN)
+def test_known_false_alarm(seed: int):
+    one = hole_trial(seed) if seed < 8_000_000 else trial(seed)
+    assert judged(one, read(one.cl.encode(), name="trial.cls"), oracle=False)[0] == "FALSE ALARM", "it is mended"
 
 
 HOLE = """UNITS/MM

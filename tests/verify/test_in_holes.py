@@ -40,3 +40,15 @@ def test_no_rapid_goes_back_into_a_hole(control: str, cycles: str) -> None:
     up = next(k for k, line in enumerate(lines) if re.match(r"G0 .*Z80", line))
     dip = [re.sub(r"Z80", f"Z{height}", lines[up]) for height in (-10, 50)]
     assert "CS563" in codes(CL, [*lines[:up], *dip, *lines[up:]], control)
+
+
+@pytest.mark.parametrize("control", ["fanuc", "siemens"])
+def test_a_dwell_is_at_the_bottom(control: str) -> None:
+    text = CL.replace("CLEAR,2", "CLEAR,2,DWELL,0.5")
+    lines = right(text, control, "moves")
+    bottom = [k for k, line in enumerate(lines) if line.startswith("G4 ")]
+    assert len(bottom) == 2
+    for k in bottom:
+        for place in (k - 1, k + 1):
+            others = [*lines[:k], *lines[k + 1 :]]
+            assert codes(text, [*others[:place], lines[k], *others[place:]], control) == {"CS556"}, place

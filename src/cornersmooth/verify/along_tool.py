@@ -56,7 +56,7 @@ class AlongTool:
         after = element + 1
         if self.next_retract(element) != element or not self._ahead.has(after) or not self._is(Element.RAPID, after):
             return False
-        return self.next_retract(after) != after and not (self._height(element, after) or self._height(after, element))
+        return self.next_retract(after) != after and not (self.height(element, after) or self.height(after, element))
 
     def stays(self, element: int) -> bool:
         """Whether an element is a rapid along the tool beside a retract; then it is put to where the tool stays."""
@@ -76,7 +76,7 @@ class AlongTool:
 
     def _left_at(self, element: int) -> int:
         """Element that a rapid before a retract is put to; the rapid itself if that is not along the tool."""
-        lift = self._height(element, element - 1)
+        lift = self.height(element, element - 1)
         if lift and not self._is(Element.RAPID, element - 1):
             self._left, self._lift = element + 1, lift
         return element - 1 if lift else element
@@ -84,7 +84,7 @@ class AlongTool:
     def _back_at(self, element: int) -> int:
         """Element that a rapid after a retract is put to; the rapid itself if what follows is not along the tool."""
         after = element + 1
-        height = self._height(element, after)
+        height = self.height(element, after)
         if not height or self._is(Element.RAPID, after):
             return after if height else element
         goes_on = element == self._left and self._is(Element.LINE, after) and self._is_where_left(after)
@@ -122,7 +122,7 @@ class AlongTool:
     def _is(self, kind: Element, element: int) -> bool:
         return bool(self._ahead.nc.kind[element - self._ahead.base] == kind)
 
-    def _height(self, above: int, below: int) -> float:
+    def height(self, above: int, below: int) -> float:
         """Height, mm, of one end over another where it is straight back along the tool with the same axis, or 0."""
         nc, base = self._ahead.nc, self._ahead.base
         if below < base:

@@ -147,6 +147,11 @@ class HoleLines:
         first, stop = (int(np.searchsorted(line, line[element - base], side=side)) for side in ("left", "right"))
         return range(base + first, base + stop)
 
+    def is_cycle(self, block: range) -> bool:
+        """Whether a block is a hole cycle of the control: the only ones that are rapids and feed moves."""
+        kinds = self.ahead.nc.kind[block.start - self.ahead.base : block.stop - self.ahead.base]
+        return len(block) > 1 and bool((kinds == Element.RAPID).any() and (kinds == Element.LINE).any())
+
     def is_straight(self, block: range) -> bool:
         """Whether the tip goes straight on elements, within the tolerance."""
         nc, own = self.ahead.nc, np.array(block) - self.ahead.base
@@ -185,7 +190,7 @@ class HoleLines:
         none = rises or turned > 2 * self.room or np.linalg.norm(way - along * axis) <= self.tolerance
         return 0.0 if none else max(abs(along) - self.tolerance - float(nc.tip_room[own].sum()), 0.0)
 
-    def _carries(self, element: int, feed: float, *, per_revolution: bool) -> bool:
+    def carries(self, element: int, feed: float, *, per_revolution: bool) -> bool:
         """Whether an element has a feed."""
         return bool(self.ahead.nc.carry(element - self.ahead.base, feed, per_revolution))
 
@@ -207,7 +212,7 @@ class HoleLines:
         def say(code: str, element: int, text: str, amount: float = math.nan) -> None:
             found.append(self.problem(code, move, element, text, amount))
 
-        tapped = bool(feeds) and self._carries(feeds[0], cycle.feed, per_revolution=True)
+        tapped = bool(feeds) and self.carries(feeds[0], cycle.feed, per_revolution=True)
         if math.isnan(cycle.depth) or (cycle.tap and not tapped):
             if feeds:
                 say("CS564", feeds[0], "the cycle does not say what is fed here")
@@ -257,7 +262,7 @@ class HoleLines:
             )
         for k, here in height.items():
             if self.feeds(k):
-                if not (math.isnan(cycle.feed) or self._carries(k, cycle.feed, per_revolution=cycle.per_revolution)):
+                if not (math.isnan(cycle.feed) or self.carries(k, cycle.feed, per_revolution=cycle.per_revolution)):
                     feed = self.ahead.nc.feed[k - self.ahead.base]
                     say("CS541", k, f"the feed is {feed:g}, the cycle says {cycle.feed:g}")
                 down = above > here

@@ -18,7 +18,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from cornersmooth.model import Move
-from cornersmooth.nc_reader.elements import Ahead, Event, Problem
+from cornersmooth.nc_reader.elements import Ahead, Element, Event, Problem
 from cornersmooth.nc_reader.tool import directions, moving_rapids
 from cornersmooth.verify.acts import Acts, Hole, Step, Stops, Words
 from cornersmooth.verify.along_tool import AlongTool
@@ -105,7 +105,12 @@ class Parse:
             if hole and met < 0 and lines.at(self._move[stop + 1] - 1, element - 1):
                 met = element
             end = int(min(ahead.count, element + TOGETHER, max(along.next_retract(element + 1), element + 1)))
-            rapids = moving_rapids(ahead.nc, max(element - ahead.base, 1), end - ahead.base) + ahead.base
+            if hole:
+                rapids = element + np.flatnonzero(
+                    ahead.nc.kind[element - ahead.base : end - ahead.base] == Element.RAPID
+                )
+            else:
+                rapids = moving_rapids(ahead.nc, max(element - ahead.base, 1), end - ahead.base) + ahead.base
             if not hole and len(rapids):
                 nearest = np.searchsorted(self._holes, stop + 1)
                 last = int(self._holes[nearest]) if nearest < len(self._holes) else len(self.moves)
@@ -126,7 +131,7 @@ class Parse:
             self._divide(stop, feeds_to if met < 0 else min(met, feeds_to))
             if len(rapids):
                 element = self._pass_idle(stop, feeds_to)
-                if element == feeds_to:
+                if element == feeds_to or (met == feeds_to and self._over(stop + 1, element)):
                     break
                 continue
             element = feeds_to
@@ -172,7 +177,7 @@ class Parse:
                 element += 1
             elif self._hole[following] and (
                 self._over(following, element)
-                or (self._may_be_left_out(following) and self._begins(following, element) is not None)
+                or (self._may_be_left_out(following) and self._begins(following, element))
             ):
                 break
             elif along.stays(element):
@@ -193,28 +198,43 @@ class Parse:
         return changed or not lines.stands(element)
 
     def _drill(self, stop: int, element: int) -> tuple[int, int]:
-        """Take a hole: it ends where it is done as its cycle says, and where what follows can begin."""
-        lines, move, end = self.lines, self._move[stop], element
+        """Take a hole: up to the end of a cycle of the control, or until it is done and what follows begins."""
+        lines, move, end, done = self.lines, self._move[stop], element, False
         cycle, lowest = self._cycles[move], math.inf  # of the feed moves
+        left = self._may_be_left_out(stop) and not self._is_tapped(stop, element)
         while self._over(stop, end) or (end > element and self._ahead.has(end) and lines.stands(end)):
+            feeds, height = lines.feeds(end), lines.height(move, end)
+            if left:
+                leads_away = height < -lines.room or (self._rises(stop, end) and not lines.at(move, end))
+                done = feeds or self._reaches(stop + 1, end) or (self._hole[stop + 1] and leads_away)
+            done |= lowest <= lines.room - cycle.depth and lines.height(move, end - 1) >= -lines.room
+            if done and (self._begins(stop, end) or (not left and self._hole[stop + 1] and self._has_words(end))):
+                break
+            block = lines.block(end)
+            native = not left and lines.is_cycle(block)
+            done |= native
+            lowest = min(lowest, height) if feeds else lowest
+            end = block.stop if native else end + 1
+        while not left and self._hole[stop + 1] and self._rises(stop, end):
             end += 1
-        late = -1 if self._hole[stop + 1] and not self._fed[stop] else 1
-        ends = [(2, True, 0, True, end, end)]
-        for one in range(element, end + 1):
-            if one > element and lines.feeds(one - 1):
-                lowest = min(lowest, lines.height(move, one - 1))
-            done = lowest <= lines.room - cycle.depth or (math.isinf(lowest) and self._may_be_left_out(stop))
-            whole = one == end or lines.block(one).start == one  # a cycle of the control is one block
-            lacks = self._begins(stop, one) if whole and (done or one == end) else None
-            if lacks is not None:
-                found, left = lines.check(move, range(element, self._end_of(stop, element, one)), cycle)
-                wrong = 2 if any(one.code != "CS541" for one in found) else int(bool(found))
-                words = late < 0 and one > element and self._has_words(one)  # are rather between holes than in one
-                tool = late > 0 and move + 1 < self._move[-1] and self._has_tool(move + 1, one)  # of the next move
-                ends.append((wrong, left, lacks, not (words or tool), late * one, one))
-        wrong, *_, best = min(ends)
-        doubt = self._doubt(stop, element) if wrong == 2 else None  # a wrong feed leaves none
-        return doubt or self._leave(stop, element, best)
+        behind = self._end_of(stop, element, end)
+        found, left = lines.check(move, range(element, behind), cycle)
+        # a wrong feed leaves no doubt
+        doubt = self._doubt(stop, element) if any(one.code != "CS541" for one in found) else None
+        return doubt or self._leave(stop, element, end)
+
+    def _rises(self, stop: int, element: int) -> bool:
+        """Whether a rapid goes up along the tool, and belongs to a hole rather than to the next."""
+        if not self._ahead.has(element) or self.lines.feeds(element) or not self._along.height(element, element - 1):
+            return False
+        return not (self._has_words(element) and self._over(stop + 1, element))
+
+    def _is_tapped(self, stop: int, element: int) -> bool:
+        """Whether the first feed move in the line of a hole is that of its tap."""
+        lines, cycle = self.lines, self._cycles[self._move[stop]]
+        while self._over(stop, element) and not lines.feeds(element):
+            element += 1
+        return cycle.tap and self._over(stop, element) and lines.carries(element, cycle.feed, per_revolution=True)
 
     def _end_of(self, stop: int, element: int, end: int) -> int:
         """First element that does not belong to a hole: the way up is the hole's, wherever else it leads."""
@@ -224,36 +244,23 @@ class Parse:
             return end + int(lines.height(move, end) > before)
         return end
 
-    def _begins(self, stop: int, element: int) -> int | None:
-        """How many holes and moves are left out if what follows a stop begins with an element; None if nothing does."""
+    def _begins(self, stop: int, element: int) -> bool:
+        """Whether what follows a stop begins with an element; holes may be left out, and what leads nowhere."""
         lines, following, has = self.lines, stop + 1, self._ahead.has(element)
-        inside = self._hole[stop] and lines.height(self._move[stop], element - 1) < -lines.room
-        at_feed = inside and self._cycles[self._move[stop]].feed_out  # the way out is the hole's
-        if self._fed[stop] and not at_feed and self._feeds_on(stop, element):
-            return 0
-        if self._fed[stop] and not self._done(stop, element):
-            return None
-        lacks = int(self._fed[stop])  # feed moves that lead nowhere
+        if self._fed[stop]:
+            if has and lines.feeds(element):
+                return True
+            if not self._done(stop, element):
+                return False
         if following == len(self.moves):
-            return None if has else lacks
+            return not has
         if self._hole[following]:
             below = lines.height(self._move[following], element - 1) < -lines.room  # from there no hole is fed
-            if not inside and self._over(following, element) and not (below and lines.feeds(element)):
-                return lacks
-            behind = self._begins(following, element) if self._may_be_left_out(following) else None
-            return None if behind is None else behind + 1 + lacks
-        if self._reaches(following, element):
-            return lacks
-        shared = self._begins(following, element) if element and lines.at(self._move[following], element - 1) else None
-        return None if shared is None else shared + lines.feeds(element - 1)  # a rapid is rather written as one
-
-    def _feeds_on(self, stop: int, element: int) -> bool:
-        """Whether feed moves from an element on may lead to the last pose before the next stop."""
-        move = self._move[stop + 1] - 1
-        for one in range(element, element + _AFTER_FAULT):
-            if not self._ahead.has(one) or not self.lines.feeds(one) or self.lines.at(move, one):
-                return self._ahead.has(one) and self.lines.feeds(one)
-        return True
+            if self._over(following, element) and not (below and lines.feeds(element)):
+                return True
+            return self._may_be_left_out(following) and self._begins(following, element)
+        there = element > 0 and lines.at(self._move[following], element - 1)
+        return self._reaches(following, element) or (there and self._begins(following, element))
 
     def _doubt(self, stop: int, element: int) -> tuple[int, int] | None:
         """Of holes above one another in one line nobody can tell which a move belongs to: NOT VERIFIED, not wrong.
@@ -279,7 +286,7 @@ class Parse:
             if not (lines.stands(end) or any(self._over(one, near) for one in alike for near in (end, end + 1))):
                 break
             end += 1
-        acts.holes.append(Hole(move[first], begin, end, None))
+        acts.holes.append(Hole(move[first], begin, end, end, None))
         acts.begins.extend((move[first], begin))
         return self._go_out(last, element, end)
 
@@ -301,7 +308,10 @@ class Parse:
         self._begin_hole(move, begin)
         behind = self._end_of(stop, begin, end)
         found, left = lines.check(move, range(begin, behind), self._cycles[move])
-        if self._along.next_retract(begin) != begin and (slant := lines.slant(move, begin)):
+        away = self._along.next_retract(begin) == begin or self._words.tool_changes(begin) > self._words.tool_changes(
+            begin - 1
+        )
+        if not away and (slant := lines.slant(move, begin)):
             text = f"a rapid goes aslant to a hole, {slant:.4f} mm: across at the higher level, then down"
             found.append(lines.problem("CS563", move, begin, text, slant))
         self.acts.problems += found
@@ -447,7 +457,8 @@ class Parse:
         holes = self.acts.holes
         if holes and (element <= holes[-1].leaves or lines.block(element).start <= holes[-1].leaves):
             return True
-        if self._has_words(element) or not (element == begin or lines.feeds(element - 1)):
+        left_out = self._move[first] in self.acts.moves_left_out
+        if self._has_words(element) or not (left_out or element == begin or lines.feeds(element - 1)):
             return False
         move, came_from = self._move[first], nc.tip[max(begin - 1 - self._ahead.base, 0)]
         highest = max(self._cycles[move].level, float((came_from - lines.tip[move]) @ lines.axis[move]))
@@ -461,8 +472,11 @@ class Parse:
             text = f"a hole of the CL file is not {'tapped' if cycle.tap else 'drilled'}"
             self.acts.left_out.append(lines.problem("CS561", move, group[0] if group else -1, text))
             self.acts.moves_left_out.add(move)
+            if group and self._words.tool_changes(group[0]) > self._words.tool_changes(group[0] - 1):
+                self.acts.begins.extend((move, group[0]))
         elif group:
             fed = [one for one in group if lines.feeds(one)]
+            deepest = min(fed, default=end, key=lambda one: lines.height(move, one))
             inside = [one + 1 for one in group if lines.height(move, one) < -lines.room] or fed[-1:] or group[:1]
-            self.acts.holes.append(Hole(move, group[0], min(inside[-1], end), cycle))
+            self.acts.holes.append(Hole(move, group[0], deepest + 1, min(inside[-1], end), cycle))
             self.acts.begins.extend((move, group[0]))
