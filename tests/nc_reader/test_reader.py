@@ -10,7 +10,7 @@ import pytest
 from cornersmooth.control import source
 from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.kinematics import load_machine
-from cornersmooth.nc_reader import read_nc, reading
+from cornersmooth.nc_reader import read_nc
 from cornersmooth.nc_reader.elements import Element
 from cornersmooth.nc_reader.rotary import MOST_LINES
 from cornersmooth.nc_reader.tool import written_at
@@ -236,7 +236,7 @@ def test_finer_digits_of_a_later_chunk_leave_the_tool_in_the_spindle(monkeypatch
     text += b"".join(b"X%d. A10.\n" % k for k in range(2, 60)) + b"X60.0001 A20.0001\n"
     whole = read_nc(text, machine=machine, tcp=False)
     monkeypatch.setattr(source, "CHUNK", 500)
-    monkeypatch.setattr(reading, "DIGITS_SAMPLE", 100)
+    monkeypatch.setattr("cornersmooth.nc_reader.DIGITS_SAMPLE", 100)
     cut = read_nc(text, machine=machine, tcp=False)
     assert cut.tip[-1].tolist() == whole.tip[-1].tolist()
 

@@ -19,8 +19,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.control.lexer import Lexer
-from cornersmooth.control.words import Word
+from cornersmooth.control.words import Lexer, Word
 from cornersmooth.errors import InputError
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.text.parse import DIGITS, LAST_DIGITS, Bytes, Words, join_digits, words_of

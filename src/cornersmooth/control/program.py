@@ -18,11 +18,10 @@ from typing import Final
 
 import numpy as np
 
-from cornersmooth.control.lexer import Lexer
 from cornersmooth.control.line_patterns import LinePatterns, Lines
 from cornersmooth.control.state import CUTS, Rows, State, execute_rows
 from cornersmooth.control.table import FRAME, UNKNOWN
-from cornersmooth.control.words import Line, Word
+from cornersmooth.control.words import Lexer, Line, Word
 from cornersmooth.errors import InputError
 from cornersmooth.model import Ints
 

@@ -14,9 +14,8 @@ from typing import BinaryIO, Final, Protocol
 
 import numpy as np
 
-from cornersmooth.control.lexer import Lexer
 from cornersmooth.control.line_patterns import LinePatterns, Lines
-from cornersmooth.control.words import Line, Table
+from cornersmooth.control.words import Lexer, Line, Table
 from cornersmooth.errors import InputError
 
 #: bytes read at a time

@@ -18,7 +18,7 @@ from cornersmooth.control.table import PRESET
 from cornersmooth.control.words import BY_WORD, NURBS, Table
 from cornersmooth.model import Bools, Floats
 from cornersmooth.nc_reader.acts import Running
-from cornersmooth.nc_reader.dialects.base import Dialect
+from cornersmooth.nc_reader.dialects import Dialect
 from cornersmooth.nc_reader.elements import Element, Elements, Problem
 from cornersmooth.nc_reader.execution import Modal
 from cornersmooth.nc_reader.rotary import Rotary, tool_vectors
@@ -128,7 +128,8 @@ def _words_for(kind: str, machine: State) -> str:
     if kind == "off":
         return "no tool tip control"
     system = "machine" if kind == "angles" else "part"
-    groups = ("tip", kind, "both"), ("coordinates", system), ("orientation", kind)
+    both = ("both",) * (kind == "angles" or "orientation" in machine.groups)
+    groups = ("tip", kind, *both), ("coordinates", system), ("orientation", kind)
     words = [" or ".join(machine.table.words(*group)) for group in groups]
     return " ".join(filter(None, words)) if words[0] else "tool tip control for them"
 

@@ -33,7 +33,7 @@ from cornersmooth.nc_reader.retracts import Retracts
 from cornersmooth.nc_reader.rotary import MOST_LINES
 
 #: groups that are known where the tool moves
-_HOLDS: Final = ("units", "feed", "distance", "plane", "tip", "tool_length", "orientation", "coordinates", "way")
+_HOLDS: Final = tuple("units feed distance plane tip tool_length orientation coordinates way smoothing".split())
 
 #: share of the tolerance, at the axis point, that a tool without words for its axis may lean
 FIXED_SHARE: Final = 0.1

@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Final
 
-from cornersmooth.control.lexer import Lexer
 from cornersmooth.control.table import UNLISTED, Row, Table, any_of, shown
-from cornersmooth.control.words import Line
+from cornersmooth.control.words import Lexer, Line
 from cornersmooth.nc_reader.elements import Problem
 
 #: words of a block, or the block as a whole, with their rows

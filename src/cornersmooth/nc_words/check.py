@@ -9,10 +9,9 @@ from typing import Final
 
 import numpy as np
 
-from cornersmooth.control.lexer import Lexer
 from cornersmooth.control.state import State
 from cornersmooth.control.table import UNLISTED, Row, any_of, shown, table_of, word_table
-from cornersmooth.control.words import Line, Table
+from cornersmooth.control.words import Lexer, Line, Table
 from cornersmooth.errors import InputError
 from cornersmooth.nc_words.blocks import NOT_LISTED, Block, WordRules
 from cornersmooth.nc_words.machine_positions import MachinePositions

@@ -17,10 +17,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
-from cornersmooth.control.lexer import Lexer
 from cornersmooth.control.state import CUTS, State
 from cornersmooth.control.table import FRAME, Row
-from cornersmooth.control.words import Line, Table
+from cornersmooth.control.words import Lexer, Line, Table
 from cornersmooth.control.words import table_of as table_of_rows
 from cornersmooth.frame import PARTS, PARTS_WORD
 

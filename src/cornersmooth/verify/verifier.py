@@ -15,11 +15,11 @@ import numpy as np
 from cornersmooth.control.source import Source, readable_twice
 from cornersmooth.errors import SettingsError
 from cornersmooth.model import Program
+from cornersmooth.nc_reader import program_of
 from cornersmooth.nc_reader.dialects import DIGITS_SAMPLE, ReadingOptions
 from cornersmooth.nc_reader.elements import Element, Elements, Event, NcProgram, Problem
 from cornersmooth.nc_reader.needed_states import CONTROL_WORDS
 from cornersmooth.nc_reader.reader import Reader
-from cornersmooth.nc_reader.reading import program_of
 from cornersmooth.nc_reader.rotary import sagitta
 from cornersmooth.nc_words.check import WordCheck
 from cornersmooth.nc_words.machine_positions import MachinePositions

@@ -3,17 +3,188 @@
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Container, Set
 from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Final
 
-from cornersmooth.control.table import CONTROLS, Table, word_table
-from cornersmooth.errors import SettingsError
-from cornersmooth.nc_reader.dialects.base import Dialect
+from cornersmooth.control.table import CONTROLS, Table, table_of, word_table
+from cornersmooth.control.words import Columns, Lexer, Line, Word, refused, tools_first
+from cornersmooth.errors import InputError, SettingsError
+from cornersmooth.nc_reader.acts import Acts, Beside, Move, Running
 from cornersmooth.nc_reader.rotary import Rotary
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine
+
+#: effects of words that are read: those of groups whatever their known value, or the effect as a whole
+_READ: Final = frozenset("plane units feed tip tool_length orientation coordinates way compensation".split())
+_SILENT: Final = frozenset("nothing distance=absolute offset=. path=. smoothing=. smoothing=off cycles=off".split())
+
+
+class Dialect:
+    """A control's way to say things; nothing in it changes while a text is read.
+
+    Parameters
+    ----------
+    control : str
+        One of `CONTROLS`.
+    rotary : str
+        Addresses of the rotary axes; empty without a machine.
+    """
+
+    lexer: Lexer
+    #: decimals of F are worth so much
+    feed_step = 1e-4
+    #: inches per minute that F counts in, in a text in inches
+    inch_feed = 1.0
+    #: whether texts can send the tool up, so that rotary axes turn there: the neutral form has no words for the machine
+    retracts: bool = True
+    #: whether a modulo axis goes the shorter way by `BY_WORD`; else by a word that is in force, or by a parameter
+    by_word: bool = False
+    #: what must be in force for curves; empty for nothing
+    curves_need: str = ""
+    #: whether tip control is switched by blocks that the machine's file names
+    switches: bool = False
+    #: names of words whose events stand beside the motion, and of those that say nothing here
+    beside: Set[str] = frozenset("MTS")
+    others: Container[str] = "DN%"
+    quiet: Set[str] = frozenset()  #: words that are no events
+    #: the first letter, or letters, of tip and second triple in the lexer, with their decimals
+    digits: re.Pattern[bytes] = re.compile(rb"(?:([XYZ])|([IJUVW]))[-+]?\d*\.(\d*)")
+
+    def __init__(self, control: str, rotary: str = "") -> None:
+        table = word_table(control)
+        for key, value in table["grammar"].items():
+            setattr(self, key, value)
+        self.switches, self.rotary, self.control = table.get("switches", False), rotary, control
+        self.table = table_of(control)
+        self.means = self.table.means
+        if rotary:
+            self.digits = re.compile(
+                rb"(?<!K\d)(?:([XYZ])|(?<![A-Z0-9])([%b])(?:=DC\()?)[-+]?\d*\.(\d*)" % rotary.encode()
+            )
+
+    @property
+    def asks_tip(self) -> bool:
+        """Whether words of the tool axis need tip control that words of the control switch on."""
+        return self.retracts and not self.switches
+
+    def after_motion(self, letter: str, value: float) -> bool:
+        """Whether a word acts after the motion of its block: M words that stop, end or switch off."""
+        kind, stated = self.means.get(f"M{value:g}", ("", "")) if letter == "M" else ("", "")
+        return kind in ("stop", "end") or stated == "OFF"
+
+    def row(self, line: Line) -> dict[str, float] | None:
+        """Words of a motion block; None where the line is something else."""
+        columns = self.lexer.motion(line)
+        return None if columns is None else values(columns)
+
+    def acts(self, line: Line, state: Running) -> Acts:
+        """Give out what a line that is no motion block does; each act is carried out before the next is wanted.
+
+        Raises
+        ------
+        InputError
+            CS503 for words that make it impossible to tell where the tool is.
+        """
+        alone = self.alone(line, state)
+        if alone is not None:
+            yield from alone
+            return
+        motion: dict[str, float] = {}
+        for word in tools_first(line.words):
+            if self.moves(word):
+                motion[word.name] = word.value
+            elif word.name in self.beside and self._is_event(word, state):
+                yield self.event(word)
+            elif word.name not in self.others and word.spelling not in self.quiet:
+                yield from self._mode(word, line, state)
+        yield from self.motion(motion, line, state)
+
+    def alone(self, line: Line, state: Running) -> Acts | None:
+        """What a line does whose words mean something together, as those of cycles do; None for all others."""
+        raise NotImplementedError
+
+    def moves(self, word: Word) -> bool:
+        """Whether a word is one of the motion."""
+        raise NotImplementedError
+
+    @staticmethod
+    def event(word: Word) -> Beside:
+        """What a word says beside the motion."""
+        return Beside(word.name, word.value, word.text)
+
+    def motion(self, given: dict[str, float], line: Line, state: Running) -> Acts:
+        """What the words of the motion of a line do."""
+        yield Move(given)
+
+    def _mode(self, word: Word, line: Line, state: Running) -> Acts:
+        """Look at a word that changes what holds from block to block: the machine has taken it."""
+        group, _, value = (effect := self._effect(word, state)).partition("=")
+        if effect == "feed=inverse" and state.rotary is None:
+            what = "inverse time feed (G93) without rotary words"
+            raise InputError("CS503", what, "name the machine with --machine", line=line.number)
+        if effect not in _SILENT and (group not in _READ or value == "?"):
+            if word.name not in "GM":
+                raise self.not_understood(line, word.name, word.text)
+            hint = "only absolute milling with tool vectors, axis points or rotary words is read"
+            raise refused(line, f"{word.spelling} is not understood", hint)
+        if group in ("tool_length", "compensation"):
+            yield Beside("G", word.value, word.spelling)
+
+    @staticmethod
+    def _is_event(word: Word, state: Running) -> bool:
+        """Whether a word says something of the machine: not an M word that verification accepts as it is."""
+        row = state.machine.table.row(word.spelling)
+        return word.name != "M" or row.compared or not (row.listed or "machine" in row.does)
+
+    @staticmethod
+    def _effect(word: Word, state: Running) -> str:
+        """What a word does in the first place; what is beside it in its row follows from that."""
+        name = word.spelling if word.name in "GM" else word.name
+        return next(iter(state.machine.table.row(name).effects), "unknown")
+
+    def machine_axes(self, line: Line, beside: Set[tuple[str, float]]) -> str:
+        """Axes that a block sends to positions of the machine; refuses words beside them but for some."""
+        axes = ("X", "Y", "Z", *self.rotary)
+        for name, value, text, *_ in line.words:
+            if name not in (*axes, "N") and (name, value) not in beside:
+                raise refused(line, f"{text} beside a position of the machine", "give it a block of its own")
+        return "".join(word.name for word in line.words if word.name in axes)
+
+    @staticmethod
+    def not_understood(line: Line, name: str, text: str) -> InputError:
+        """Error for a word that is not understood."""
+        if name in "ABC":
+            return refused(line, f"{text}: rotary words", "name the machine they are for, with --machine")
+        return refused(line, f"{text} is not understood here", "see that the control is the one the text is for")
+
+    def decimals(self, text: bytes) -> tuple[int, int | None]:
+        """Decimals of the tip and of the second triple, from a sample of the text; None without any."""
+        tip, second = 0, None
+        shapes = set(text.upper().translate(_ONE_DIGIT).split(b"\n"))  # many lines differ in nothing but their digits
+        for _, other, fraction in self.digits.findall(_COMMENT.sub(b"", b"\n".join(shapes))):
+            if other:
+                second = max(second or 0, len(fraction))
+            else:
+                tip = max(tip, len(fraction))
+        for fraction in _VECTOR_K.findall(b"\n".join(shapes)) if b"IJ" in self.digits.pattern else ():
+            second = max(second or 0, len(fraction))
+        return tip, second
+
+
+_COMMENT = re.compile(rb"\([^)\n]*\)|;[^\n]*")
+#: K of a vector; alone it is a knot
+_VECTOR_K = re.compile(rb"J[-+]?\d*\.?\d*[ ]*K[-+]?\d*\.(\d*)")
+_ONE_DIGIT = bytes.maketrans(b"0123456789", b"0" * 10)
+
+
+def values(columns: Columns) -> dict[str, float]:
+    """Numbers of a single motion block."""
+    return {name: word if isinstance(word, float) else word.value for name, word in columns.items()}
+
 
 #: classes of the modules of these names, each of which is loaded when a program in its words is read
 _SPELLINGS: Final = {"iso": "Iso", "siemens": "Siemens", "heidenhain": "Heidenhain"}

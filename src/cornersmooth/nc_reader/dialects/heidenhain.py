@@ -6,8 +6,20 @@ import re
 from collections.abc import Mapping
 from typing import Final
 
-from cornersmooth.control.lexer import NOT_NEGATIVE, NUMBER, POSITIVE, ZERO, Lexer, fixed, number_of
-from cornersmooth.control.words import SPL, Columns, Line, Word, refused
+from cornersmooth.control.words import (
+    NOT_NEGATIVE,
+    NUMBER,
+    POSITIVE,
+    SPL,
+    ZERO,
+    Columns,
+    Lexer,
+    Line,
+    Word,
+    fixed,
+    number_of,
+    refused,
+)
 from cornersmooth.nc_reader.acts import (
     Acts,
     Beside,
@@ -22,7 +34,7 @@ from cornersmooth.nc_reader.acts import (
     rotated_frame,
     wrong,
 )
-from cornersmooth.nc_reader.dialects.base import Dialect, values
+from cornersmooth.nc_reader.dialects import Dialect, values
 
 _VECTOR: Final = {"TX": "I", "TY": "J", "TZ": "K"}
 _PATHS: Final = ("L", "LN", "SPL")
@@ -161,7 +173,7 @@ class Heidenhain(Dialect):
             yield Tilt(None)
         elif text == "STOP":
             yield Beside("M", 0.0, text)
-        elif not text.startswith(_SILENT) and dict(state.machine.table.row(text).sets).get("tip") is None:
+        elif not text.startswith(_SILENT) and "tip" not in dict(state.machine.table.row(text).sets):
             raise refused(line, f"{text} is not understood", "see that the control is the one the text is for")
 
 

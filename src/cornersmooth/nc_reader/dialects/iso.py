@@ -7,9 +7,19 @@ import re
 from collections.abc import Mapping, Set
 from dataclasses import replace
 
-from cornersmooth.control.lexer import NUMBER, Lexer, fixed, number_of
 from cornersmooth.control.table import word_table
-from cornersmooth.control.words import MOTION_CODES, NURBS, Columns, Line, Word, refused
+from cornersmooth.control.words import (
+    MOTION_CODES,
+    NUMBER,
+    NURBS,
+    Columns,
+    Lexer,
+    Line,
+    Word,
+    fixed,
+    number_of,
+    refused,
+)
 from cornersmooth.nc_reader.acts import (
     Acts,
     Beside,
@@ -25,7 +35,7 @@ from cornersmooth.nc_reader.acts import (
     turned_frame,
     wrong,
 )
-from cornersmooth.nc_reader.dialects.base import Dialect
+from cornersmooth.nc_reader.dialects import Dialect
 
 #: G words that send axes to positions of the machine
 _TO_REFERENCE = (28.0, 30.0)

@@ -8,8 +8,22 @@ from typing import Final
 
 import numpy as np
 
-from cornersmooth.control.lexer import NOT_NEGATIVE, NUMBER, POSITIVE, ZERO, Lexer, fixed, number_of
-from cornersmooth.control.words import BSPLINE, BY_WORD, POLY, Columns, Line, Word, refused
+from cornersmooth.control.words import (
+    BSPLINE,
+    BY_WORD,
+    NOT_NEGATIVE,
+    NUMBER,
+    POLY,
+    POSITIVE,
+    ZERO,
+    Columns,
+    Lexer,
+    Line,
+    Word,
+    fixed,
+    number_of,
+    refused,
+)
 from cornersmooth.nc_reader.acts import (
     Acts,
     Beside,
@@ -24,7 +38,7 @@ from cornersmooth.nc_reader.acts import (
     rotated_frame,
     wrong,
 )
-from cornersmooth.nc_reader.dialects.base import Dialect
+from cornersmooth.nc_reader.dialects import Dialect
 
 #: names of words of several letters: vectors are I J K, second points U V W, as in `motion`
 _NAMES: Final = {
