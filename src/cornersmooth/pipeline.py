@@ -163,6 +163,7 @@ def postprocess(
     verify: bool = True,
     strict: bool = False,
     force: bool | None = False,
+    continuity: bool = True,
     processes: int | None = None,
     progress: Progress | None = None,
 ) -> Result:
@@ -190,6 +191,8 @@ def postprocess(
         Whether any verdict but PASSED is an error.
     force : bool or None
         Whether an existing file may be replaced; None for not, but it may stay if it is the same.
+    continuity : bool
+        Whether verification looks for the shortest block and the largest change of direction, too; NaN where not.
     processes : int, optional
         Processes to smooth and to verify with; by default as many as are useful. The result does not depend on it.
     progress : callable, optional
@@ -253,6 +256,7 @@ def postprocess(
                 axis_length=smoothed.settings.axis_length,
                 axis_tolerance=smoothed.settings.axis_tolerance,
                 trust=trust,
+                continuity=continuity,
                 processes=processes,
                 **back,
             )

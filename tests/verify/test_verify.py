@@ -240,6 +240,17 @@ def test_dict_is_json_and_has_no_nan():
     assert back["problems"]
 
 
+def test_continuity_is_measured_where_it_is_wanted() -> None:
+    program = corner_program()
+    text = g1(program, [(-10, 0, 0), (0, 0, 0), (0, 10, 0)])
+    whole, rest = (verify(program, text, tolerance=0.01, continuity=wanted).to_dict() for wanted in (True, False))
+    names = "max_tangent_jump_deg", "shortest_block_mm"
+    assert [whole.pop(name) for name in names] == pytest.approx([90.0, 10.0])
+    assert [rest.pop(name) for name in names] == [None, None]
+    assert {one: whole["where"].pop(one) != rest["where"].pop(one) for one in names} == dict.fromkeys(names, True)
+    assert rest == whole
+
+
 def test_nothing_to_compare():
     program = corner_program()
     found = verify(program, b"%\nO1\nG21\nG91 G28 Z0.\nG90\nM30\n%\n", tolerance=0.01)

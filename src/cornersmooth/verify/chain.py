@@ -92,6 +92,7 @@ class Window:
     way: Floats
     inverse: Floats  #: 1 / |way|²
     length: Floats  #: (w + 1,)
+    sharp: Bools  #: (w + 1,): whether the path turns by a right angle or more at their ends
 
     @classmethod
     def of(cls, path: Path, low: float, high: float) -> Window:
@@ -109,7 +110,9 @@ class Window:
             number, start, way, size = number[kept], start[:, kept], way[:, kept], size[kept]
             length = np.append(length[kept], length[-1])
         inverse = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0.0)
-        return cls(number, start, way, inverse, length)
+        sharp = np.zeros(len(number) + 1, np.bool_)
+        sharp[1:-1] = np.einsum("ij,ij->j", way[:, 1:], way[:, :-1]) <= 0.0
+        return cls(number, start, way, inverse, length, sharp)
 
     def segment_at(self, length: Floats) -> Ints:
         """Segment, counted in the window, at path lengths."""
@@ -126,9 +129,12 @@ class Window:
         k = self.segment_at(self.length[k] + ahead * (self.length[k + 1] - self.length[k]))
         at, square, farthest = self._on(points, k)
         place = at + self.number.take(k)
-        nearer_end = np.where(at < 0.5, -1, 1)
-        for beyond, limit in ((nearer_end, 0.0), (-nearer_end, radius)):
-            rows = np.flatnonzero(farthest > limit * limit)
+        # beyond the nearer end nothing is nearer to what is farther from it than from the segment, but at sharp turns
+        behind = at >= 0.5
+        nearer_end, along = np.where(behind, 1, -1), np.where(behind, 1.0 - at, at)
+        beyond_end = (along * along <= square * self.inverse.take(k)) | self.sharp.take(k + behind)
+        for beyond, wanted in ((nearer_end, beyond_end), (-nearer_end, farthest > radius * radius)):
+            rows = np.flatnonzero(wanted)
             j = np.clip(k.take(rows) + beyond.take(rows), 0, self.way.shape[1] - 1)
             at, other, other_farthest = self._on(points.take(rows, axis=1), j)
             better = np.flatnonzero(other < square.take(rows))
@@ -223,7 +229,9 @@ def chain(own: Floats, bend: Floats, path: Path, radius: float, sections: Sectio
         far = away_square > radius * radius
         least = np.sqrt(beside_square) - 4.0 * bend[rows] * share * (1.0 - share)
         far[rows[least > radius] + 1] = True
-        bad |= _bent(bend, path, radius, place, (rows, vertices, share), (away, -beside))
+        farthest = np.maximum(away_square[:-1], away_square[1:])
+        np.maximum.at(farthest, rows, beside_square)
+        bad |= _bent(bend, path, radius, place, (rows, vertices, share), (away, -beside), farthest)
     bad[~inside] = False
     firsts = sections.first[1:]
     bad[firsts] = largest_square(away[:, firsts]) > radius * radius  # the step to it is none of its section
@@ -286,40 +294,50 @@ def _bent(
     place: Floats,
     passing: tuple[Ints, Ints, Floats],
     differences: tuple[Floats, Floats],
+    farthest: Floats,
 ) -> Bools:
-    """Whether the bends let the motion leave the radius on the step to each row."""
+    """Whether the bends let the motion leave the radius on the step to each row.
+
+    The chords of each step keep within the square of `farthest` (n - 1,), and it leaves them by no more than its bends.
+    """
     rows, vertices, share = passing
-    count, more = len(place), len(rows)
-    before = np.searchsorted(rows, np.arange(count), side="left")  # vertices passed before each row
-    at_rows, at_vertices = np.arange(count) + before, np.arange(more) + rows + 1
-    away = np.empty((len(differences[0]), count + more))
-    away[:, at_rows], away[:, at_vertices] = differences
-    step = np.empty(count + more, np.int64)  # the step that leads from each pair on
-    on_own, on_path = np.zeros(count + more), np.empty(count + more)
-    step[at_rows], step[at_vertices], on_own[at_vertices] = np.arange(count), rows, share
-    on_path[at_rows], on_path[at_vertices] = place, vertices
-    # from pair to pair: fractions of the step, and of the segment, on which both run
-    step = step[:-1]
-    on_row = np.zeros(count + more, np.bool_)
-    on_row[at_rows] = True
-    one, other = on_own[:-1], np.where(on_row[1:], 1.0, on_own[1:])
-    segment = np.minimum(on_path[:-1].astype(np.int64), path.segments - 1)
-    low, high = on_path[:-1] - segment, np.minimum(on_path[1:] - segment, 1.0)
+    bad, segment = np.zeros(len(place), np.bool_), np.minimum(place.astype(np.int64), path.segments - 1)
+    most = np.maximum(path.bend[segment[:-1]], path.bend[segment[1:]])
+    np.maximum.at(most, rows, path.bend[np.minimum(vertices, path.segments - 1)])
+    near = np.sqrt(farthest) + most + bend > radius
+    steps, passed_there = np.flatnonzero(near), np.flatnonzero(near[rows])
+    rows, vertices, share = rows[passed_there], vertices[passed_there], share[passed_there]
+    # from pair to pair: the first is a row or a vertex that is passed on its step, the second the next of these
+    before = np.searchsorted(rows, steps)
+    at_vertices, at_rows = np.arange(len(rows)) + np.searchsorted(steps, rows) + 1, np.arange(len(steps)) + before
+    count = len(steps) + len(rows)
+    to_rows = np.append(at_rows[1:], count)[: len(steps)] - 1
+    pairs = np.empty((2, len(differences[0]), count))
+    pairs[0][:, at_rows], pairs[1][:, to_rows] = (differences[0].take(steps + k, axis=1) for k in (0, 1))
+    pairs[0][:, at_vertices] = pairs[1][:, at_vertices - 1] = differences[1].take(passed_there, axis=1)
+    step = np.empty(count, np.int64)
+    step[at_rows], step[at_vertices] = steps, rows
+    # fractions of the step, and places on the path
+    one, other, on_path, to_path = np.zeros(count), np.ones(count), np.empty(count), np.empty(count)
+    one[at_vertices] = other[at_vertices - 1] = share
+    on_path[at_vertices] = to_path[at_vertices - 1] = vertices
+    on_path[at_rows], to_path[to_rows] = place[steps], place[steps + 1]
+    segment = np.minimum(on_path.astype(np.int64), path.segments - 1)
+    low, high = on_path - segment, np.minimum(to_path - segment, 1.0)
     mine, cl_side = bend[step], path.bend[segment]
     off_one = 4.0 * (mine * one * (1.0 - one) + cl_side * low * (1.0 - low))
     off_other = 4.0 * (mine * other * (1.0 - other) + cl_side * high * (1.0 - high))
     between = mine * (other - one) ** 2 + cl_side * (high - low) ** 2
-    wrong = np.zeros(len(step), np.bool_)
-    for c in range(0, len(away), 3):
-        size = np.sqrt(np.einsum("ij,ij->j", away[c : c + 3], away[c : c + 3]))
-        apart = away[c : c + 3, 1:] - away[c : c + 3, :-1]
-        apart_size = np.maximum(np.sqrt(np.einsum("ij,ij->j", apart, apart)) - off_one - off_other, 0.0)
-        alpha = radius * radius - (size[:-1] + off_one) ** 2
-        beta = radius * radius - (size[1:] + off_other) ** 2
-        gamma = 8.0 * between * radius + 4.0 * between * between - apart_size * apart_size
+    wrong = np.zeros(count, np.bool_)
+    for c in range(0, pairs.shape[1], 3):
+        start, end = pairs[:, c : c + 3]
+        size, end_size, apart = (np.sqrt(np.einsum("ij,ij->j", off, off)) for off in (start, end, end - start))
+        apart = np.maximum(apart - off_one - off_other, 0.0)
+        alpha = radius * radius - (size + off_one) ** 2
+        beta = radius * radius - (end_size + off_other) ** 2
+        gamma = 8.0 * between * radius + 4.0 * between * between - apart * apart
         room = np.sqrt(np.maximum(alpha, 0.0)) + np.sqrt(np.maximum(beta, 0.0))
         bent = (mine > 0.0) | (cl_side > 0.0)
         wrong |= bent & ((alpha < 0.0) | (beta < 0.0) | (gamma > room * room))
-    bad = np.zeros(count, np.bool_)
     bad[step[wrong] + 1] = True
     return bad

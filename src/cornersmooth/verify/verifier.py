@@ -45,13 +45,12 @@ from cornersmooth.verify.word_places import WordPlaces
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine
 
-#: what every batch goes through, in this order
+#: what every batch goes through, in this order; `measure_continuity` besides, where that is wanted
 CHECKS: Final[tuple[Callable[[Match, Findings], None], ...]] = (
     check_breaks,
     measure_written,
     measure_original,
     check_feeds,
-    measure_continuity,
 )
 
 #: what the message has of a text without feeds, which both files may agree on
@@ -88,6 +87,8 @@ class Verifier:
         As in `read_nc`.
     trust : Trust
         What is not compared, or may be otherwise.
+    continuity : bool
+        Whether the shortest block and the largest change of direction are looked for; NaN where not.
     processes : int
         Processes to work on long texts with, where the system can fork; the result does not depend on it.
 
@@ -111,6 +112,7 @@ class Verifier:
         machine: Machine | None = None,
         tcp: bool = True,
         trust: Trust = TRUST,
+        continuity: bool = True,
         processes: int = 1,
     ) -> None:
         self._axis_tolerance = axis_tolerance
@@ -119,6 +121,7 @@ class Verifier:
             axis_length = length_of(tolerance, axis_tolerance)
         _check_bounds(tolerance=tolerance, axis_length=axis_length)
         self._program, self._trust, self._machine = program, trust, machine
+        self._continuity = continuity
         self._processes = processes if can_fork() and len(program) >= _LONG else 1
         self._options = ReadingOptions.of(control, machine, tcp=tcp, tolerance=tolerance, axis_length=axis_length)
         self._text = nc if isinstance(nc, NcProgram) else Source(readable_twice(nc))
@@ -217,6 +220,11 @@ class Verifier:
     ) -> Verification:
         """Measure all that is read, and put everything together; `said`: of the text and its curves, then."""
         program, batches, findings = self._program, Batches(task, events, retracts), Findings()
+        checks = CHECKS
+        if self._continuity:
+            checks += (measure_continuity,)
+        else:
+            findings.worst |= dict.fromkeys(("tangent_jump", "shortest"), Where(math.nan))
         places = WordPlaces(batches, events)
         poses = np.empty((4, len(program)))
         if self._trust.slower:
@@ -233,7 +241,7 @@ class Verifier:
             batch, found = item[0], Findings(item[1])
             if batch is not None:
                 match = Match.of(task, batch, item[2])
-                for check in CHECKS:
+                for check in checks:
                     check(match, found)
             return found
 
