@@ -100,11 +100,11 @@ def test_what_gains_nothing_is_left(part: Path) -> None:
     """A straight cut is as fast unsmoothed."""
     straight = "".join(f"GOTO/{2.0 * k},0.0,0.0,0.0,0.0,1.0\n" for k in range(5))
     part.write_text(PART.replace(CUT, straight))
-    given = ("--control", "siemens", "--limits", "table-ac")
+    given = ("--control", "linuxcnc", "--machine", "xyzac-trt")
     done = run("compare", part, *given)
     assert done.returncode == 0, done.stderr
     assert "\nleave it as it is: no program takes less time than the unsmoothed lines\n" in done.stdout.decode()
-    done = run("smooth", part, *given, "-o", part.with_suffix(".mpf"))
+    done = run("smooth", part, *given, "-o", part.with_suffix(".ngc"))
     assert done.returncode == 0, done.stderr
     assert "no time is gained, leave the program as it was" in done.stderr.decode()
 

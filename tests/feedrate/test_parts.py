@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -26,12 +28,19 @@ def rows(poses: int) -> Path:
     return build_path(Program.from_poses(tip, axis, feed=3000.0), None, Settings(), LIMITS)
 
 
+@cache
+def whole() -> float:
+    """Seconds of a plan of all rows."""
+    path = rows(200)
+    return plan_along(path, LIMITS, follow(load_machine("table-ac"), path)).total
+
+
 @pytest.mark.parametrize("enough", [1e-3, 0.04])
 def test_parts_take_what_the_whole_takes(monkeypatch: pytest.MonkeyPatch, enough: float) -> None:
     """All parts planned roughly and half of them closely, or no more than a looser error asks for."""
     path = rows(200)
     axes = follow(load_machine("table-ac"), path)
-    whole, some = plan_along(path, LIMITS, axes).total, enough > 1e-3
+    some = enough > 1e-3
     changed = {"PART": 12, "SHORTEST": 12, "ENOUGH": enough, "_ROUGHLY": (3, 9), "_CLOSELY": (2, 4), "_MOST_CLOSELY": 8}
     for name, value in changed.items():
         monkeypatch.setattr(parts, name, value)
@@ -39,9 +48,9 @@ def test_parts_take_what_the_whole_takes(monkeypatch: pytest.MonkeyPatch, enough
     found = parts.time_of_parts(path, LIMITS, axes, progress=lambda done, total: planned.append((done, total)))
     assert (path.junction_speed == speeds).all()  # cuts are made in copies
     assert (planned[-1][0] < planned[-1][1]) == some
-    assert found.seconds == pytest.approx(whole, rel=0.1 if some else 0.005)
-    assert abs(found.seconds - whole) < 3.0 * found.error + 0.003 * whole
-    assert found.error < (0.1 if some else 0.005) * whole
+    assert found.seconds == pytest.approx(whole(), rel=0.1 if some else 0.005)
+    assert abs(found.seconds - whole) < 3.0 * found.error + 0.003 * whole()
+    assert found.error < (0.1 if some else 0.005) * whole()
     assert found.limiting
     if some:
         assert found == parts.time_of_parts(path, LIMITS, axes, processes=2)

@@ -21,7 +21,8 @@ from verify.sweep import judged
 
 #: whose plans, or paths to and fro, take a second each
 LONG = ("coolant_at_holes_left_out", "planned_turn_about_the_tool", "tip_and_axis_point_far_apart")
-FILES = sorted((Path(__file__).parent / "right").glob("*.cls"))
+FOLDER = Path(__file__).parent / "right"
+FILES = sorted(FOLDER.glob("*.cls"))
 
 
 def load(path: Path) -> Trial:
