@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields
+from functools import cached_property
 from importlib import import_module
 from types import NoneType
-from typing import Any, Final, Literal, get_args, get_origin, get_type_hints
+from typing import Any, Final, Literal, get_args, get_origin
 
 import click
 
@@ -26,8 +27,8 @@ EXIT_CODES_OF_READERS: Final = EXIT_CODES.replace("; 4", "; 3 input cannot be re
 EXIT_CODES_OF_WRITERS: Final = EXIT_CODES_OF_READERS.replace(
     "0 done;", "0 done; 1 the program FAILED, or is not PASSED under --strict;"
 )
-#: what options may be
-_TYPES: Final = get_type_hints(Declared, include_extras=True)
+#: fields of all options; the type of each says what it may be
+_FIELDS: Final = {item.name: item for item in fields(Declared)}
 
 #: options of a command whose short help has all of them
 _SHORT: Final = 16
@@ -51,7 +52,20 @@ _ARGUMENTS: Final[dict[str, tuple[str, dict[str, Any]]]] = {
 
 
 class Command(click.Command):
-    """A command whose help has its options under headings: those of every day, or all of them."""
+    """A command whose help has its options under headings: those of every day, or all of them.
+
+    Arguments and options are made when they are asked for: a run needs those of one command.
+    """
+
+    def __init__(self, name: str, make: Callable[[], list[click.Parameter]], **given: Any) -> None:
+        super().__init__(name, **given)
+        self._make = make
+        del self.params
+
+    @cached_property
+    def params(self) -> list[click.Parameter]:  # type: ignore[override]
+        """Arguments and options."""
+        return self._make()
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Read the shop settings that go with the input, then the options."""
@@ -146,33 +160,33 @@ def new_command(
     reads_cl = "dialect" in options.split()
     settings += " no_size_limit" * reads_cl
     epilog = epilog or (EXIT_CODES_OF_READERS if reads_cl else EXIT_CODES)
-    params: list[click.Parameter] = []
-    for metavar in arguments.split():
-        field, more = _ARGUMENTS[metavar]
-        params.append(click.Argument([field], **{"metavar": metavar, **more}))
-    for kind, names in ((_Option, options), (_Setting, settings)):
-        for field in dict.fromkeys(names.split()):
-            change = changes.get(field, {})
-            params.append(_option(kind, field, {"help": change} if isinstance(change, str) else change))
 
-    if sum(isinstance(param, _Option) for param in params) > _SHORT:
-        params.append(_HELP_ALL)
+    def params() -> list[click.Parameter]:
+        made: list[click.Parameter] = []
+        for metavar in arguments.split():
+            field, more = _ARGUMENTS[metavar]
+            made.append(click.Argument([field], **{"metavar": metavar, **more}))
+        for kind, names in ((_Option, options), (_Setting, settings)):
+            for field in dict.fromkeys(names.split()):
+                change = changes.get(field, {})
+                made.append(_option(kind, field, {"help": change} if isinstance(change, str) else change))
+        return made + [_HELP_ALL] * (sum(isinstance(param, _Option) for param in made) > _SHORT)
 
     def called(**given: Any) -> int:
         run = getattr(import_module(f"cornersmooth.cli.{module or name}"), f"run_{name}")
         return int(run(Options(**{key: value for key, value in given.items() if value is not None})))
 
-    return Command(name, params=params, callback=called, help=help, epilog=epilog)
+    return Command(name, params, callback=called, help=help, epilog=epilog)
 
 
 def _option(kind: type[_Option], name: str, changes: Mapping[str, Any]) -> click.Option:
     """Option of a field: its type says what it may be."""
-    item = next(item for item in fields(Declared) if item.name == name)
+    item = _FIELDS[name]
     given = dict(item.metadata) | dict(changes)
     for word in given.pop("spelled").split():
         if not word.startswith("-"):
             given["metavar"] = word
-    hint: Any = _TYPES[name]
+    hint: Any = item.type
     if NoneType in get_args(hint):
         hint = get_args(hint)[0]
     if get_origin(hint) is tuple:

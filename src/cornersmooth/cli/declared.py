@@ -1,9 +1,8 @@
 """Every option of every command, once: what it is called, what it may be, and what its help says.
 
-Those of smoothing, limits and the frame of a program are declared in `cornersmooth.settings`, and only named here.
+Those of smoothing and limits are declared in `cornersmooth.settings`, those of the frame of a program in
+`cornersmooth.frame`, and only named here. Annotations are types here and no texts: options are made of them.
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
 from functools import partial
