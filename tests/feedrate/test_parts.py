@@ -49,7 +49,7 @@ def test_parts_take_what_the_whole_takes(monkeypatch: pytest.MonkeyPatch, enough
     assert (path.junction_speed == speeds).all()  # cuts are made in copies
     assert (planned[-1][0] < planned[-1][1]) == some
     assert found.seconds == pytest.approx(whole(), rel=0.1 if some else 0.005)
-    assert abs(found.seconds - whole) < 3.0 * found.error + 0.003 * whole()
+    assert abs(found.seconds - whole()) < 3.0 * found.error + 0.003 * whole()
     assert found.error < (0.1 if some else 0.005) * whole()
     assert found.limiting
     if some:
