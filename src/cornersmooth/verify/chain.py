@@ -221,7 +221,7 @@ def chain(own: Floats, bend: Floats, path: Path, radius: float, sections: Sectio
     away_square = largest_square(away)
     bad = away_square > radius * radius
     rows, vertices, share = passed(own, step, path.points, place)
-    beside = path.points[vertices].T - own[:, rows] - share * step[:, rows]
+    beside = path.points.take(vertices, axis=0).T - own.take(rows, axis=1) - share * step.take(rows, axis=1)
     beside_square = largest_square(beside)
     bad[rows[beside_square > radius * radius] + 1] = True
     far = bad
@@ -279,9 +279,9 @@ def passed(own: Floats, step: Floats, path: Floats, place: Floats) -> tuple[Ints
     """
     vertex = np.arange(int(place[0]) + 1, int(place[-1]) + 1)
     row = np.clip(np.searchsorted(place, vertex, side="left") - 1, 0, max(len(place) - 2, 0))
-    way = step[:, row]
+    way = step.take(row, axis=1)
     size = np.einsum("ij,ij->j", way, way)
-    share = np.einsum("ij,ij->j", path[vertex].T - own[:, row], way)
+    share = np.einsum("ij,ij->j", path.take(vertex, axis=0).T - own.take(row, axis=1), way)
     share = np.clip(np.divide(share, size, out=np.zeros_like(size), where=size > 0.0), 0.0, 1.0)
     share = np.clip(np.maximum.accumulate(row + share) - row, 0.0, 1.0) if len(row) else share
     return row, vertex, share

@@ -49,9 +49,9 @@ class Gap:
 
     @classmethod
     def of(cls, task: Task, away: Floats) -> Gap:
-        """That of differences (k, 6) of tips and axis points."""
-        turned = away[:, 3:] if task.own_axis else away[:, 3:] - away[:, :3]
-        tip, axis_point, turn = (np.sqrt(np.einsum("ij,ij->i", off, off)) for off in (away[:, :3], away[:, 3:], turned))
+        """That of differences (6, k) of tips and axis points."""
+        turned = away[3:] if task.own_axis else away[3:] - away[:3]
+        tip, axis_point, turn = (np.sqrt(np.einsum("ij,ij->j", off, off)) for off in (away[:3], away[3:], turned))
         return cls(tip, axis_point, 2.0 * np.arcsin(np.minimum(turn / (2.0 * task.axis_length), 1.0)))
 
 
@@ -69,7 +69,7 @@ def of_written(match: Match) -> Reached:
     """Every written vertex that has a place, against the polyline of the original there."""
     vertex = np.flatnonzero(match.on)
     place = match.place[vertex]
-    away = match.six[vertex] - points_at(match.path.points, place).T
+    away = match.columns.take(vertex, axis=1) - points_at(match.path.points, place)
     return Reached(vertex, Gap.of(match.task, away), place, True)
 
 
@@ -83,7 +83,7 @@ def of_original(match: Match) -> Reached:
         low = row[far].astype(np.float64)
         place[far], _ = _least(lambda where: _written(match, where), point[far], COLUMNS["both"], low, low + 1.0)
         away[far] = _written(match, place[far]) - point[far]
-    return Reached(vertex, Gap.of(match.task, away), place, False)
+    return Reached(vertex, Gap.of(match.task, away.T), place, False)
 
 
 def nearest(match: Match, reached: Reached, rows: Ints, metric: Metric) -> Floats:
@@ -148,7 +148,7 @@ def _say(match: Match, found: Findings, metric: Metric, one: Break) -> None:
         k = int(np.argmax(distance > limit)) if off[name] > limit else int(distance.argmax())  # there it begins
         where = _lines(match, float(place[k]), int(row[k]))
         if name == "both":
-            gap = Gap.of(task, _written(match, step) - match.path.at(place))
+            gap = Gap.of(task, (_written(match, step) - match.path.at(place)).T)
             around.note(match, found, gap, row)
             farthest = int(distance[: len(around.rows)].argmax())
             turned = float(gap.angle[farthest])
@@ -252,8 +252,7 @@ def _nearest(point: Floats, vertices: Floats, segments: Ints, columns: slice) ->
 def measure_written(match: Match, found: Findings) -> None:
     """Take down how far written vertices are from the original."""
     reached = of_written(match)
-    lines = match.cl_lines(reached.place), match.nc_lines(reached.vertex)
-    _largest(match, found, reached, lines)
+    _largest(match, found, reached, lambda k: (match.cl_lines(reached.place[k]), match.nc_lines(reached.vertex[k])))
 
 
 def measure_original(match: Match, found: Findings) -> None:
@@ -263,26 +262,30 @@ def measure_original(match: Match, found: Findings) -> None:
     pose = original.pose[original.trail.owner[reached.vertex]]
     row = np.minimum(reached.place.astype(np.int64) + 1, len(match.six) - 1)
     nc_line = match.nc_lines(row)
-    _largest(match, found, reached, (original.program.line[pose], nc_line))
+    _largest(match, found, reached, lambda k: (original.program.line[pose[k]], nc_line[k]))
     gap, whole = reached.gap, original.trail.fraction[reached.vertex] == 1
     columns: Floats = np.array((pose, gap.tip, gap.axis_point, gap.angle, nc_line))
     found.poses.append(columns[:, whole])
     _check_exact_poses(match, found, reached.vertex[whole], row[whole])
 
 
-def _largest(match: Match, found: Findings, reached: Reached, lines: tuple[Ints, Ints]) -> None:
-    """Take what the vertices of one of the two motions found; only the largest are looked at closely."""
+def _largest(match: Match, found: Findings, reached: Reached, lines: Callable[[Ints], tuple[Ints, Ints]]) -> None:
+    """Take what the vertices of one of the two motions found; only the largest are looked at closely.
+
+    `lines` of rows: those of the CL file and of the text.
+    """
     gap = reached.gap
-    found.note("together_tip", gap.tip, *lines)
-    found.note("together_axis_point", gap.axis_point, *lines)
-    found.note("orientation", gap.angle, *lines)
+    together = {"together_tip": gap.tip, "together_axis_point": gap.axis_point, "orientation": gap.angle}
+    for name, values in together.items() if len(gap.tip) else ():
+        row = np.array([values.argmax()])
+        found.note(name, values[row], *lines(row))
     alone: tuple[tuple[Metric, Floats], ...] = (("tip", gap.tip), ("axis_point", gap.axis_point))
     for name, known in alone:
         rows, some = np.flatnonzero(known > found.worst[name].value), _SOME
         while len(rows):
             first = rows[np.argpartition(-known[rows], some)[:some]] if len(rows) > some else rows
             off = np.minimum(nearest(match, reached, first, name), known[first])
-            found.note(name, off, lines[0][first], lines[1][first])
+            found.note(name, off, *lines(first))
             rows = np.setdiff1d(rows[known[rows] > found.worst[name].value], first, assume_unique=True)
             some *= 4
 

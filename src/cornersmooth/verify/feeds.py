@@ -109,13 +109,13 @@ def reach(task: Task, six: Floats, place: Floats, limits: tuple[Ints, Ints], way
 
     Forward or back, as `way` is 1 or -1; `limits`: the first and the last segment (k,) that may be reached.
     """
-    points, radius = task.path.points, task.radius + task.path.bend  # the path leaves its chords by that
+    points, bend = task.path.points, task.path.bend  # the path leaves its chords by that
     found, rows = place.copy(), np.arange(len(place))
     segment = place.astype(np.int64) if way > 0 else np.ceil(place).astype(np.int64) - 1
     segment = np.clip(segment, np.minimum(*limits), limits[1])
     while len(rows):
         start = points[segment].T
-        low, high = free_interval(six[rows].T, start, points[segment + 1].T - start, radius[segment])
+        low, high = free_interval(six[rows].T, start, points[segment + 1].T - start, task.radius + bend[segment])
         share = np.clip(found[rows] - segment, 0.0, 1.0)
         free = (low <= share + _HAIR) & (share - _HAIR <= high)
         end = np.clip(high, share, 1.0) if way > 0 else np.clip(low, 0.0, share)

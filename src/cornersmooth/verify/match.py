@@ -78,6 +78,11 @@ class Match(Batch):
         """(v, 6) vertices: tip and axis point."""
         return self.motion.six
 
+    @cached_property
+    def columns(self) -> Floats:
+        """(6, v) the same, each number of all vertices side by side."""
+        return np.ascontiguousarray(self.six.T)
+
     @property
     def original(self) -> Original:
         """The CL motion."""
@@ -162,7 +167,7 @@ class Match(Batch):
         on = np.flatnonzero(self.on)
         if len(on) < 2:
             return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)
-        own, place = np.ascontiguousarray(self.six[on].T), self.place[on]
+        own, place = self.columns.take(on, axis=1), self.place[on]
         row, vertex, share = passed(own, own[:, 1:] - own[:, :-1], self.path.points, place)
         row = on[row]
         inside = self.step[row]
