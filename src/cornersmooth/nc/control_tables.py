@@ -7,9 +7,10 @@ keys are those of the tables in the folder ``controls``.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields, replace
 from functools import lru_cache, partial
+from itertools import product
 from pathlib import Path
 from typing import Any, get_args
 
@@ -236,26 +237,27 @@ def own_words(table: Control) -> tuple[str, ...]:
 
 def _blocks(table: Control) -> dict[str, Blocks]:
     """Blocks of a table by their place; the direction of the spindle and the units put in."""
-    words, found = table.words, dict[str, list[str]]()
-    for name in ("start", "begin", "tool_end", "between_tools", "end", "retract", "work_offset_block"):
-        found[f"program.{name}"] = list(getattr(table.program, name))
+    words, units = table.words, tuple(table.layout.units.values())
+    found = {
+        f"program.{name}": _put("{units}", units, getattr(table.program, name))
+        for name in ("start", "begin", "tool_end", "between_tools", "end", "retract", "work_offset_block")
+    }
     for item in fields(words):
-        found[f"words.{item.name}"] = list(_texts(getattr(words, item.name)))
-    for form in table.forms.values():
-        for turn in _MODES:
-            mode = getattr(form, turn)
-            for name in ("on", "off", "within_on", "within_off", "begin", "tool_end") if mode else ():
+        turns = (words.clockwise, words.counterclockwise)
+        found[f"words.{item.name}"] = _put("{direction}", turns, _texts(getattr(words, item.name)))
+    for form, turn in product(table.forms.values(), _MODES):
+        if mode := getattr(form, turn):
+            for name in ("on", "off", "within_on", "within_off", "begin", "tool_end"):
                 blocks = getattr(mode, name)  # None is what the program says
                 kind = "others" if turn in ("upright", "plane") else "modes"
-                found[f"{kind}.{form.name}.{turn}.{name}"] = [f"{{{name}}}"] if blocks is None else list(blocks)
-    found["extras"] = [block for extra in table.extras.values() for block in (*extra.on, *extra.off)]
-    put = {"{direction}": (words.clockwise, words.counterclockwise), "{units}": tuple(table.layout.units.values())}
-    for brace, values in put.items():
-        found = {
-            key: [block.replace(brace, value) for block in some for value in (values if brace in block else values[:1])]
-            for key, some in found.items()
-        }
-    return {key: tuple(some) for key, some in found.items()}
+                found[f"{kind}.{form.name}.{turn}.{name}"] = (f"{{{name}}}",) if blocks is None else blocks
+    found["extras"] = tuple(block for extra in table.extras.values() for block in (*extra.on, *extra.off))
+    return found
+
+
+def _put(brace: str, values: Blocks, blocks: Iterable[str]) -> Blocks:
+    """Blocks with each of some values in place of a brace."""
+    return tuple(block.replace(brace, value) for block in blocks for value in (values if brace in block else ("",)))
 
 
 def _texts(value: object) -> Iterator[str]:

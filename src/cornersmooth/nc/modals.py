@@ -22,8 +22,13 @@ from cornersmooth.text import format_number
 RotaryBlocks = Mapping[str, Blocks]
 _NO_ROTARY: RotaryBlocks = {}
 #: steps that change groups, and those of them that a tool leaves as they are where it only goes home
-_STEPS = {
-    f"{{{name}}}" for name in "retract tip_control_on functions_off tip_control_off spindle_off coolant_off".split()
+_STEPS: dict[str, tuple[str, Any]] = {
+    "{retract}": ("high", True),
+    "{tip_control_on}": ("tip", True),
+    "{tip_control_off}": ("tip", False),
+    "{functions_off}": ("functions", False),
+    "{spindle_off}": ("spindle", ()),
+    "{coolant_off}": ("coolant", ()),
 }
 _RUNNING_ON = {"{spindle_off}", "{coolant_off}"}
 
@@ -73,8 +78,8 @@ class Modals:
         blocks = []
         for group, value in wanted.items():
             if self.now[group] != value:
-                self.now[group] = value
                 blocks += self.say(group, value)
+                self.now[group] = value
         return blocks
 
     def say(self, group: str, value: Any) -> list[str]:
@@ -99,6 +104,9 @@ class Modals:
                 return self.to_position("home", z=True) or retract
             case "held", _:
                 return [hold if value else turn for hold, turn in self.clamps]
+            case "spindle" | "coolant", _:
+                self._stopped[group] = self.now[group]
+                return list(words.spindle_off if group == "spindle" else self.coolant_end())
             case "compensation", _:
                 return list(value or words.compensation_off)
             case "plane" | "feed_mode", _:
@@ -119,31 +127,12 @@ class Modals:
         for step in steps:
             name = step.strip("{}")
             if step in _STEPS:
-                blocks += self._step(name)
+                group, value = _STEPS[step]
+                blocks += self.set(**{group: self.can_rewind if group == "high" else value})
             elif name in STEPS and name != step:
                 blocks += given.get(name, ())
             else:
                 blocks.append(step.format(**self.values))
-        return blocks
-
-    def _step(self, name: str) -> list[str]:
-        if name == "retract":
-            blocks = self.set(high=True)
-            self.now["high"] = self.can_rewind
-            return blocks
-        if name == "tip_control_on":
-            self.now |= {"tip": False, "functions": False}  # it is given for each tool
-            return self.set(tip=True)
-        if name == "functions_off":
-            return self.set(functions=False)
-        if name == "tip_control_off":
-            self.begun = False
-            return self.set(tip=False)
-        what = name.removesuffix("_off")
-        if not self.now[what]:
-            return []
-        blocks = list(self.form.table.words.spindle_off if what == "spindle" else self.coolant_end())
-        self._stopped[what], self.now[what] = self.now[what], ()
         return blocks
 
     def start(self) -> list[str]:
@@ -159,6 +148,7 @@ class Modals:
         self.now |= self._stopped
         self._halted -= self._stopped.keys()
         self._stopped = {}
+        self.now |= {"tip": False, "functions": False}  # they are given for each tool
         steps = self.form.table.program.begin if self.mode.begin is None else self.mode.begin
         blocks += [*self.set(held=False), *self._expand(steps, rotary if self.now["high"] else _NO_ROTARY)]
         return blocks + (self.set(held=True) if self.mode is not self.form.mode else [])
@@ -184,7 +174,7 @@ class Modals:
         """
         self._moved = self.begun = False
         back = self._back() if along else []
-        return [*back, *self._expand([step for step in self._tool_end if step in _STEPS - _RUNNING_ON])]
+        return [*back, *self._expand([step for step in self._tool_end if step in _STEPS.keys() - _RUNNING_ON])]
 
     def _back(self) -> list[str]:
         """Blocks along the tool, where it is not high up anyway."""
@@ -212,6 +202,7 @@ class Modals:
         """
         if self.now["tip"] and self.mode is self.form.plane:
             return self.go_home()
+        self.begun = False
         return self._expand(("{functions_off}", "{tip_control_off}"))
 
     def end(self, rotary: RotaryBlocks) -> list[str]:

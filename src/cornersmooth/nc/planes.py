@@ -170,12 +170,9 @@ def tilting_angles(rotations: str, axis: Floats) -> tuple[float, float, float]:
 
 def rotations_frame(rotations: str, degrees: list[float]) -> Floats:
     """(3, 3) frame, columns X' Y' Z', that three rotations make, each about an axis of the frame before it."""
-    frame = np.eye(3)
-    for name, angle in zip(rotations, degrees, strict=True):
-        cosine, sine = math.cos(math.radians(angle)), math.sin(math.radians(angle))
-        unit = _UNIT[name]
-        across = np.cross(unit, np.eye(3)).T  # unit × v
-        frame = frame @ (cosine * np.eye(3) + sine * across + (1.0 - cosine) * np.outer(unit, unit))
+    from scipy.spatial.transform import Rotation  # long to load
+
+    frame: Floats = Rotation.from_euler(rotations.upper(), degrees, degrees=True).as_matrix()
     return frame
 
 
