@@ -188,7 +188,7 @@ def write(
     motion = Motion(program, tilting, modals, blocks, findings, approach, frame.retract)
     script = Script(statements, motion, planes, drillings, frame.skip_cycles, native)
     text = frame.start(stream, chosen)
-    motion.say(modals.start())
+    motion.say(modals.expand(chosen.table.program.start))
     for some in rows:
         script.run(some)
         script.hand_on(text)

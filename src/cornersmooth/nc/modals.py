@@ -96,9 +96,9 @@ class Modals:
                 self.waiting = ""
                 return [*self.set(functions=False), *self.mode.off, *self._extras("off", outside=True)]
             case "functions", True:
-                return [*self._expand(self.mode.within_on), *self._extras("on", outside=False)]
+                return [*self.expand(self.mode.within_on), *self._extras("on", outside=False)]
             case "functions", False:
-                return [*self._extras("off", outside=False), *self._expand(self.mode.within_off)]
+                return [*self._extras("off", outside=False), *self.expand(self.mode.within_off)]
             case "high", True:
                 retract = [block.format(**self.values) for block in table.program.retract]
                 return self.to_position("home", z=True) or retract
@@ -121,7 +121,7 @@ class Modals:
         blocks = (block for extra in extras if extra.outside is outside for block in getattr(extra, side))
         return [block.format(**self.values) for block in blocks]
 
-    def _expand(self, steps: Sequence[str], rotary: RotaryBlocks = _NO_ROTARY) -> list[str]:
+    def expand(self, steps: Sequence[str], rotary: RotaryBlocks = _NO_ROTARY) -> list[str]:
         """Blocks of steps; what is no step is a block itself."""
         given, blocks = {**self.texts, **rotary}, list[str]()
         for step in steps:
@@ -135,10 +135,6 @@ class Modals:
                 blocks.append(step.format(**self.values))
         return blocks
 
-    def start(self) -> list[str]:
-        """Blocks before everything else."""
-        return self._expand(self.form.table.program.start)
-
     def begin(self, rotary: RotaryBlocks) -> list[str]:
         """Blocks before the next motion of a tool; what a tool change stopped goes on again."""
         self._moved = self._used = self.begun = True
@@ -150,7 +146,7 @@ class Modals:
         self._stopped = {}
         self.now |= {"tip": False, "functions": False}  # they are given for each tool
         steps = self.form.table.program.begin if self.mode.begin is None else self.mode.begin
-        blocks += [*self.set(held=False), *self._expand(steps, rotary if self.now["high"] else _NO_ROTARY)]
+        blocks += [*self.set(held=False), *self.expand(steps, rotary if self.now["high"] else _NO_ROTARY)]
         return blocks + (self.set(held=True) if self.mode is not self.form.mode else [])
 
     @property
@@ -165,7 +161,7 @@ class Modals:
         if self._used and another and not self.halted:
             steps = (*steps, *self.form.table.program.between_tools)
         self._moved = self._used = False
-        return [*self._back(), *self.set(plane=FIRST_PLANE), *self._expand(steps)]
+        return [*self._back(), *self.set(plane=FIRST_PLANE), *self.expand(steps)]
 
     def go_home(self, *, along: bool = True) -> list[str]:
         """Blocks that bring the tool to the height of the retract with spindle and coolant on.
@@ -174,7 +170,7 @@ class Modals:
         """
         self._moved = self.begun = False
         back = self._back() if along else []
-        return [*back, *self._expand([step for step in self._tool_end if step in _STEPS.keys() - _RUNNING_ON])]
+        return [*back, *self.expand([step for step in self._tool_end if step in _STEPS.keys() - _RUNNING_ON])]
 
     def _back(self) -> list[str]:
         """Blocks along the tool, where it is not high up anyway."""
@@ -203,7 +199,7 @@ class Modals:
         if self.now["tip"] and self.mode is self.form.plane:
             return self.go_home()
         self.begun = False
-        return self._expand(("{functions_off}", "{tip_control_off}"))
+        return self.expand(("{functions_off}", "{tip_control_off}"))
 
     def end(self, rotary: RotaryBlocks) -> list[str]:
         """Blocks after everything else."""
@@ -217,7 +213,7 @@ class Modals:
             zero = (*self.set(held=False), *zero, *self.set(held=True))
         else:
             blocks += self.set(held=True)
-        return [*blocks, *home, *self._expand(steps, {**rotary, "rotary_zero": zero})]
+        return [*blocks, *home, *self.expand(steps, {**rotary, "rotary_zero": zero})]
 
     @property
     def turning(self) -> bool:

@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cornersmooth.arrays import some_rows
-from cornersmooth.arrays.vectors import dot
 from cornersmooth.kinematics.poses import continued, nose_position
 from cornersmooth.model import Floats, Ints, Move, Program
 from cornersmooth.nc.blocks import Blocks
@@ -24,8 +23,6 @@ from cornersmooth.nc.rotary_words import UPRIGHT, check_first_block, machine_of,
 from cornersmooth.smoothing.sampling import Rows
 
 NOWHERE = 1 << 62  #: a pose that no program has
-#: cosine of the angle from hole to hole beyond which the tool turns between them
-_TURNED = float(np.cos(np.radians(1.0)))
 
 
 @dataclass
@@ -264,19 +261,6 @@ class Motion:
         if not rapid:
             where = "down from the height of the retract" if form.table.program.retract else "from where the machine is"
             self.findings.note("CS333", line, where=where)
-
-    def note_holes(self, poses: Ints, before: int, travel: Floats, clearance: Floats) -> None:
-        """Say that the tool turns on its way to holes right above them: what lies there, the CL file does not say.
-
-        It comes from a pose, -1 for none. Heights (h,) over the holes, mm: to which it comes, and from which it feeds.
-        """
-        axis = self.program.axis[poses]
-        come = self.program.axis[np.concatenate(([max(before, 0)], poses[:-1]))]
-        turned = dot(axis, come) < _TURNED
-        turned[0] &= before >= 0
-        low = travel <= clearance
-        turned &= low | np.concatenate(([False], low[:-1]))
-        self.findings.note_each("CS384", self.program.line[poses[turned]])
 
     def note_cut(self, pose: int, *, turning: bool) -> None:
         """Say that a tool cuts while the spindle stands."""

@@ -61,7 +61,7 @@ def rotary_rows(
         return
     program, settings = smoothed.program, smoothed.settings
     machine = machine_of(form).with_longest_tool()
-    max_step = largest_turn(settings)
+    max_step = min(settings.axis_step or LARGEST_TURN, LARGEST_TURN)
     limits = line_limits(settings, form, max_step)
     # lines are placed where it is known when the control reaches their ends; in long programs that takes too long
     known = form.table.lines.rounding and form.table.lines.planner and limits.tip_of is None
@@ -126,11 +126,6 @@ def arc_angles(way: RotaryWay, program: Program, form: Form) -> ArcAngles:
     stand[arc[turns[rows]]] = False
     angles[arc] = way.angles[rows]
     return ArcAngles(angles, stand)
-
-
-def largest_turn(settings: Settings) -> float:
-    """Degrees that a rotary axis may turn in one block of a cut."""
-    return min(settings.axis_step or LARGEST_TURN, LARGEST_TURN)
 
 
 @dataclass(frozen=True)

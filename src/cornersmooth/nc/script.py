@@ -40,6 +40,8 @@ from cornersmooth.text import format_number
 
 PECK_GAP = 0.5  #: mm left above the last depth before feeding goes on, and moved up to break a chip
 LEAST_PECK = 0.01  #: mm: the last peck takes what would be left; a tool only rubs there
+#: cosine of the angle from hole to hole beyond which the tool turns between them
+_TURNED = float(np.cos(np.radians(1.0)))
 _SAME_AXIS = 1e-9  #: axes whose directions differ by less, in the cosine, are the same for the height of travel
 
 
@@ -179,7 +181,11 @@ class Script:
                 motion.emit_above(motion.moving(some_rows(plain, hole == k)))
             return
         motion.findings.note_each("CS316", program.line[poses])
-        motion.note_holes(poses, -1 if motion.modals.comes_first else int(poses[0]) - 1, travel, clearance)
+        # where the tool turns right above holes, what lies on its way there the CL file does not say
+        come = program.axis[np.concatenate(([max(int(poses[0]) - 1, 0)], poses[:-1]))]
+        turned, low = dot(program.axis[poses], come) < _TURNED, travel <= clearance
+        turned[0] &= poses[0] > 0 and not motion.modals.comes_first
+        motion.findings.note_each("CS384", program.line[poses[turned & (low | np.append(False, low[:-1]))]])
         feed, mode = hole_feeds(cycle, program, poses[hole])
         plain = motion.moving(replace(plain, feed=feed, mode=mode))
         per_turn = bool((plain.mode[~plain.rapid][-1:] == FeedMode.PER_REVOLUTION).all())
