@@ -313,3 +313,11 @@ def test_holes_that_return_to_the_controls_own_height_are_verified(cycles: str) 
     )
     assert result.verification is not None
     assert result.verification.problems == ()
+
+
+def test_the_tool_leaves_a_hole_at_the_height_at_which_it_comes_to_the_next_one_of_another_cycle() -> None:
+    """A clamp between them may be as high as the second cycle says: up at once, then across."""
+    first, second = ("CYCLE/DRILL,FEDTO,{},RAPTO,3,RTRCTO,{},MMPM,250".format(*one) for one in ((10, 20), (8, 50)))
+    holes = f"{first}\nGOTO/0,0,0\n{second}\nGOTO/20,0,0\nCYCLE/OFF\n"
+    found, _ = heights(f"{PLAIN}LOADTL/1\nSPINDL/900,CLW\nRAPID\nGOTO/0,0,30,0,0,1\n{holes}FINI\n")
+    assert found[found.index("G0 3") :] == ["G0 3", "G1 -10", "G0 50", "G0 50", "G0 3", "G1 -8", "G0 50"]

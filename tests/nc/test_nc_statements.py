@@ -40,6 +40,7 @@ def said(cl: str, *, start: str = "UNITS/MM\n") -> tuple[list[str], dict[str, in
         ("SPINDL/1200,CCLW\nSPINDL/OFF\nSPINDL/ON", ["S1200 M4", "M5", "M4"]),
         ("SPINDL/0,RPM", ["M5"]),
         ("SPINDL/1200,RPM,CLW,RANGE,2", ["S1200 M3", "(SPINDL/1200,RPM,CLW,RANGE,2)"]),  # what no block says
+        ("SPINDL/1200,CLW,RANGE,2,MAXRPM,5000", ["S1200 M3", "(SPINDL/1200,CLW,RANGE,2,MAXRPM,5000)"]),
         ("SPINDL/RANGE,HIGH,1200,RPM", ["S1200 M3", "(SPINDL/RANGE,HIGH,1200,RPM)"]),
         ("SPINDL/LOCK", ["M19"]),
         ("SPINDL/LOCK,0.0", ["M19"]),
