@@ -9,17 +9,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from cornersmooth.cl import read
 from cornersmooth.errors import CornersmoothError
 from cornersmooth.model import Program
 from cornersmooth.nc import choose_form, fit_settings, write
 from cornersmooth.nc_reader import read_nc
+from cornersmooth.nc_reader.elements import Element
+from cornersmooth.nc_reader.tool import written_at
 from cornersmooth.report import report
 from cornersmooth.report.corners import path_distances
+from cornersmooth.report.paths import deviation_along
 from cornersmooth.settings import LARGEST_CHORD, Settings
 from cornersmooth.smoothing import smooth
 from cornersmooth.verify import verify
+from cornersmooth.verify.task import Task
 from oracle.share import covering_share, how_many, share
 
 SAMPLES = Path(__file__).parents[2] / "samples"
@@ -130,3 +135,24 @@ def _path(smoothed, row: int, dense: bool):  # type: ignore[no-untyped-def]
         axes = np.concatenate([a + share * (b - a) for a, b in pairwise(axes)])
         axes /= np.linalg.norm(axes, axis=1)[:, None]
     return tips, tips + 10.0 * axes
+
+
+def test_what_is_farthest_between_the_vertices_of_a_curve_is_measured() -> None:
+    """Curves are divided for the proof alone: their parts may bend by an eighth of ε."""
+    program = read((SAMPLES / "impeller.cls").read_bytes(), name="impeller.cls")
+    chosen = choose_form("fanuc", "g6.2")
+    smoothed = smooth(program, fit_settings(Settings(method="global"), chosen, program.units))
+    stream = io.BytesIO()
+    write(smoothed, stream, form=chosen)
+    text, task = read_nc(stream.getvalue()), Task.of(program, 0.01, 10.0)
+    curves = np.flatnonzero(text.kind == Element.CURVE)
+    along = np.linspace(0.0, 1.0, 301)
+    written = task.six(*written_at(text, np.repeat(curves, len(along)), np.tile(along, len(curves))))
+    place = np.interp(np.arange(0.0, task.path.length[-1], 0.001), task.path.length, np.arange(len(task.path.length)))
+    apart, _ = cKDTree(task.path.at(place)[:, 3:]).query(written[:, 3:], distance_upper_bound=0.02)
+    measured = verify(program, stream.getvalue(), tolerance=0.01, axis_length=10.0)
+    # where both are within ε at one moment, no amount at a common pose is beyond
+    together = deviation_along(program, text, tolerance=0.01)
+    assert max(together.tip.max(), together.axis_point.max()) <= 0.01 + 1e-6
+    assert measured.together_axis_point.value <= 0.01 + 1e-6
+    assert measured.max_axis_point_deviation_mm >= apart[np.isfinite(apart)].max() - 2e-5

@@ -16,7 +16,7 @@ from cornersmooth.model import Bools, Floats, Ints, Move, Program
 from cornersmooth.nc_reader.elements import Element, NcProgram
 from cornersmooth.nc_reader.tool import written_at
 from cornersmooth.verify.batches import Batches
-from cornersmooth.verify.deviation import Gap, of_original
+from cornersmooth.verify.deviation import Gap, of_original, together
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.nearest import nearest_places
 from cornersmooth.verify.task import Task
@@ -97,9 +97,10 @@ def _of_elements(match: Match, offset: int, samples: int) -> Distribution:
     middle = np.clip(place.astype(np.int64), *limits)
     six = match.task.six(tip, axis)
     place = nearest_places(six, match.path.points, middle, _REACH, *limits)
+    place, _ = together(match, six, place, vertex)
+    gap = Gap.of(match.task, (six - match.path.at(place)).T)
     original = match.original
     owner, fraction = original.move_at(place)
-    gap = Gap.of(match.task, six - match.task.six(*original.at(owner, fraction)))
     way = match.path.lengths_at(place)
     pose = original.pose[owner]
     places = pose, element + offset, original.program.line[pose], match.nc.line[element]

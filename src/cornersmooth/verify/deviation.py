@@ -35,6 +35,9 @@ _SHARES, _ROUNDS = np.linspace(0.0, 1.0, 17), 10
 #: rows for which tip and axis point are looked at each on its own at a time: only the largest are wanted
 _SOME: Final = 16
 
+#: where a bent step is looked at between its ends: what quarters miss is a 16th of its bend, so less than ε / 100
+_INSIDE: Final = np.arange(1, 4) / 4
+
 #: vertices and segments around a break that are looked at for what the message has of it
 _MOST_ROWS, _MOST_SEGMENTS = 256, 4096
 
@@ -57,20 +60,55 @@ class Gap:
 
 @dataclass(frozen=True)
 class Reached:
-    """What vertices of one motion find on the other, k rows."""
+    """What vertices of one motion find on the other, or points of the steps behind them, k rows."""
 
     vertex: Ints  #: (k,): the vertices
+    six: Floats  #: (k, 6): tips and axis points
     gap: Gap  #: at a common pose
     place: Floats  #: (k,): where on the other polyline: segment plus fraction
-    mine: bool  #: whether they are written vertices
+    mine: bool  #: whether they are written
 
 
 def of_written(match: Match) -> Reached:
     """Every written vertex that has a place, against the polyline of the original there."""
     vertex = np.flatnonzero(match.on)
-    place = match.place[vertex]
-    away = match.columns.take(vertex, axis=1) - points_at(match.path.points, place)
-    return Reached(vertex, Gap.of(match.task, away), place, True)
+    six = match.six[vertex]
+    place, away = together(match, six, match.place[vertex], vertex)
+    return Reached(vertex, six, Gap.of(match.task, away), place, True)
+
+
+def of_bent_steps(match: Match, ends: Reached, least: float) -> Reached:
+    """What written steps have between their ends, which may be more than `least`: by their bend more than at these."""
+    most = np.zeros(len(match.six))
+    most[ends.vertex] = np.maximum(ends.gap.tip, ends.gap.axis_point)
+    bend = match.motion.bend
+    step = np.flatnonzero(match.step & (bend > 0.0) & (np.maximum(most[:-1], most[1:]) + bend > least))
+    number = (step[:, None] + _INSIDE).ravel()
+    vertex = number.astype(np.int64)
+    six = inner_points(match.nc, match.motion, match.task, number, match.first)
+    start = match.place[vertex]
+    place, away = together(match, six, start + (number - vertex) * (match.place[vertex + 1] - start), vertex)
+    return Reached(vertex, six, Gap.of(match.task, away), place, True)
+
+
+def together(match: Match, six: Floats, place: Floats, vertex: Ints) -> tuple[Floats, Floats]:
+    """Common poses (k,) on the CL path of written points (k, 6), around places near them, and differences (6, k).
+
+    The sum of both squares is least at the places; where that is not enough, the larger of both is. The points are in
+    the stretches of written vertices (k,).
+    """
+    away = six.T - points_at(match.path.points, place)
+    if len(far := np.flatnonzero(largest_square(away) > match.task.radius**2)):
+        place, near = place.copy(), np.arange(-_REACH, _REACH + 1)  # segment by segment: at corners it falls twice
+        segment = place[far].astype(np.int64)[:, None] + near
+        segment = np.clip(segment, match.low[vertex[far], None], match.high[vertex[far], None]).astype(np.float64)
+        ends, points = segment.ravel(), np.repeat(six[far], len(near), axis=0)
+        found, off = (
+            one.reshape(segment.shape) for one in _least(match.path.at, points, COLUMNS["both"], ends, ends + 1.0)
+        )
+        place[far] = found[np.arange(len(far)), off.argmin(axis=1)]
+        away[:, far] = (six[far] - match.path.at(place[far])).T
+    return place, away
 
 
 def of_original(match: Match) -> Reached:
@@ -80,27 +118,26 @@ def of_original(match: Match) -> Reached:
     away = _written(match, place) - point
     # the sum of both squares is least there, and where that is not enough the larger of both has to be
     if len(far := np.flatnonzero(largest_square(away.T) > match.task.radius**2)):
-        low = row[far].astype(np.float64)
-        place[far], _ = _least(lambda where: _written(match, where), point[far], COLUMNS["both"], low, low + 1.0)
+        first, last = match.runs
+        ends = np.maximum(row[far] - 1.0, first[row[far]]), np.minimum(row[far] + 2.0, last[row[far]])
+        place[far], _ = _least(lambda where: _written(match, where), point[far], COLUMNS["both"], *ends)
         away[far] = _written(match, place[far]) - point[far]
-    return Reached(vertex, Gap.of(match.task, away.T), place, False)
+    return Reached(vertex, point, Gap.of(match.task, away.T), place, False)
 
 
 def nearest(match: Match, reached: Reached, rows: Ints, metric: Metric) -> Floats:
     """(k,) distances of some rows from the nearest place of the other motion: of tips, or of axis points."""
-    vertex = reached.vertex[rows]
+    vertex, six, middle = reached.vertex[rows], reached.six[rows], reached.place[rows].astype(np.int64)
     if reached.mine:
-        own, other, middle = match.six, match.path.points, match.segment[vertex]
-        low, high = match.low[vertex], match.high[vertex]
+        other, low, high = match.path.points, match.low[vertex], match.high[vertex]
     else:
-        own, other = match.path.points, match.six
-        middle = np.minimum(reached.place[rows].astype(np.int64), len(other) - 2)
+        other, middle = match.six, np.minimum(middle, len(match.six) - 2)
         first, last = match.runs
         low, high = first[middle], last[middle] - 1
-    best = nearest_places(own[vertex], other, middle, _REACH, low, high, metric)
+    best = nearest_places(six, other, middle, _REACH, low, high, metric)
     ends = np.maximum(best - 0.5, low), np.minimum(best + 0.5, high + 1.0)
     at = match.path.at if reached.mine else lambda where: _written(match, where)
-    return _least(at, own[vertex], COLUMNS[metric], *ends)[1]
+    return _least(at, six, COLUMNS[metric], *ends)[1]
 
 
 def _least(
@@ -253,6 +290,8 @@ def measure_written(match: Match, found: Findings) -> None:
     """Take down how far written vertices are from the original."""
     reached = of_written(match)
     _largest(match, found, reached, lambda k: (match.cl_lines(reached.place[k]), match.nc_lines(reached.vertex[k])))
+    inner = of_bent_steps(match, reached, min(found.worst[name].value for name in ("tip", "axis_point")))
+    _largest(match, found, inner, lambda k: (match.cl_lines(inner.place[k]), match.nc_lines(inner.vertex[k] + 1)))
 
 
 def measure_original(match: Match, found: Findings) -> None:
