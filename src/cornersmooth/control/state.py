@@ -112,6 +112,25 @@ class State:
         path = self.groups.get("path")
         return "" if path in (None, PRESET) else path
 
+    def tip_suits(self, kind: str) -> bool | None:
+        """Whether tip control is on, or off, as words of a kind want it; None where machine data decide.
+
+        Kinds are those of tip control, and "points" on the tool axis. Where it is on for all of them, other words say
+        how the axis is interpolated, and in which coordinates.
+        """
+        groups, system, last = self.groups, "machine" if kind == "angles" else "part", self.last_words.get("tip")
+        if last is not None and last.odd:
+            return False
+        if kind == "points" and "orientation" not in groups:  # FANUC: words of G6.2, under the length of the tool
+            return True
+        if kind == "off" or groups["tip"] != "both":
+            return groups["tip"] == kind
+        law, place = groups.get("orientation", PRESET), groups.get("coordinates", PRESET)
+        if (law, place) == (kind, system) or (kind == "angles" and "orientation" not in groups):
+            return True
+        open_laws = {"vectors": (kind, "planes", PRESET), "angles": (kind, PRESET)}.get(kind, (kind,))
+        return None if law in open_laws and place in (system, PRESET) else False
+
     def but(self, **groups: str | None) -> State:
         """Return the same state with some groups set otherwise."""
         return replace(self, groups=self.groups | groups)

@@ -62,6 +62,11 @@ def tools_first(words: Iterable[Word]) -> list[Word]:
 Columns = dict[str, Word | float]
 
 
+def numbers(columns: Columns) -> dict[str, float]:
+    """Numbers of a single motion block."""
+    return {name: word if isinstance(word, float) else word.value for name, word in columns.items()}
+
+
 @dataclass(frozen=True)
 class Table:
     """A run of motion blocks: one column per letter, NaN where a block has no such word."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from cornersmooth.control.program import Stream, Text, line_of
 from cornersmooth.control.state import Rows, State
-from cornersmooth.control.table import CONTROLS, FRAME, PRESET, UNKNOWN, table_of
+from cornersmooth.control.table import CONTROLS, FRAME, UNKNOWN, table_of
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import Bools, Floats
 from cornersmooth.nc_reader.dialects import dialect_of
@@ -26,9 +26,6 @@ FILTERED: Final = tuple(control for control in CONTROLS if control != "generic")
 
 #: how messages call the words of the tool axis
 _TOLD: Final = {ANGLES: "rotary words", VECTOR: "tool vectors", "both": "rotary words and tool vectors"}
-
-#: interpolation, and coordinates, of the tool axis under which it runs as its words say
-_EVEN: Final = {VECTOR: ("vectors", "planes", "part", PRESET), ANGLES: ("angles", "machine", PRESET)}
 
 #: degrees that a rotary word may change by in a cut: from half a turn on controls do not agree on the way
 _HALF_TURN: Final = 180.0
@@ -298,8 +295,7 @@ class ProgramReader:
                 if tip == NONE
                 else f"tool tip control is for {_TOLD[str(tip)]}, not for {_TOLD[wanted]}"
             )
-        even = all(groups.get(group, PRESET) in _EVEN.get(wanted, ()) for group in ("orientation", "coordinates"))
-        if not even and wanted in (ANGLES, VECTOR):
+        if wanted in (ANGLES, VECTOR) and state.tip_suits(wanted) is False:
             return f"the control turns the tool by a law of its own between {_TOLD[wanted]}"
         if groups["compensation"] != "OFF":
             return "the radius of the cutter is taken account of"

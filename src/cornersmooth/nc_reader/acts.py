@@ -245,8 +245,3 @@ def drill(cycle: HoleCycle, x: float, y: float, line: Line, state: Running) -> A
     state.modal = replace(state.modal, code=math.nan, feed=feed_before)
     if cycle.pitch is not None:
         state.machine = machine
-
-
-def numbers(text: str) -> list[float | None]:
-    """Arguments of a call, None for those that are left out; raises ValueError for what is no number."""
-    return [float(part) if part.strip() else None for part in text.split(",")]

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from cornersmooth.control.state import State
-from cornersmooth.control.table import PRESET
 from cornersmooth.control.words import BY_WORD, NURBS, Table
 from cornersmooth.model import Bools, Floats
 from cornersmooth.nc_reader.acts import Running
@@ -95,32 +94,13 @@ def control_problems(run: Run) -> Iterator[Problem]:
     if dialect.curves_need and state.machine.groups["smoothing"] != dialect.curves_need:
         text = f"a curve where {dialect.curves_need} must be in force"
         yield from Problem.at(CONTROL_WORDS, table.column("G") == NURBS, table.line, text, most=1)
-    if dialect.asks_tip and not (holds := _holds_for(kind, state.machine)):
+    if dialect.asks_tip and not (holds := state.machine.tip_suits(kind)):
         line = table.line[table.rows_with(letters, run.before.code)]
         turned = [] if state.rotary is None else list(run.approach)
         if len(line := line[~np.isin(line, turned)]):
             here, need = state.tip_control or "no tool tip control", _words_for(kind, state.machine)
             text = f"{_KINDS[kind]} under {here}, where {need} must be in force"
             yield Problem("" if holds is None else CONTROL_WORDS, 0, int(line[0]), text)
-
-
-def _holds_for(kind: str, machine: State) -> bool | None:
-    """Whether tip control is on, or off, as words of a kind want it; None where machine data decide.
-
-    Where it is on for all kinds, other words say how the axis is interpolated, and in which coordinates.
-    """
-    groups, system = machine.groups, "machine" if kind == "angles" else "part"
-    if (last := machine.last_words.get("tip")) is not None and last.odd:
-        return False
-    if kind == "points" and "orientation" not in groups:  # FANUC: words of G6.2, under the length of the tool
-        return True
-    if kind == "off" or groups["tip"] != "both":
-        return groups["tip"] == kind
-    law, place = groups.get("orientation", PRESET), groups.get("coordinates", PRESET)
-    if (law, place) == (kind, system) or (kind == "angles" and "orientation" not in groups):
-        return True
-    open_laws = {"vectors": (kind, "planes", PRESET), "angles": (kind, PRESET)}.get(kind, (kind,))
-    return None if law in open_laws and place in (system, PRESET) else False
 
 
 def _words_for(kind: str, machine: State) -> str:

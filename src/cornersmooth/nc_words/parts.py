@@ -19,7 +19,7 @@ from typing import Final
 
 from cornersmooth.control.state import CUTS, State
 from cornersmooth.control.table import FRAME, Row
-from cornersmooth.control.words import Lexer, Line, Table
+from cornersmooth.control.words import Lexer, Line, Table, numbers
 from cornersmooth.control.words import table_of as table_of_rows
 from cornersmooth.frame import PARTS, PARTS_WORD
 
@@ -90,8 +90,7 @@ class Parts:
         """Take any other line; the machine is before it, and `after` it."""
         columns = self._lexer.motion(line)
         if columns is not None:  # a motion block with a comment
-            numbers = {name: word if isinstance(word, float) else word.value for name, word in columns.items()}
-            self.table(table_of_rows([(line.number, numbers)]), machine)
+            self.table(table_of_rows([(line.number, numbers(columns))]), machine)
             return
         rows = machine.rows(line.words)
         does = {effect for _, _, row in rows for effect in row.does}

@@ -10,7 +10,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Final
 
 from cornersmooth.control.table import CONTROLS, Table, table_of, word_table
-from cornersmooth.control.words import Columns, Lexer, Line, Word, refused, tools_first
+from cornersmooth.control.words import Lexer, Line, Word, numbers, refused, tools_first
 from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.nc_reader.acts import Acts, Beside, Move, Running
 from cornersmooth.nc_reader.rotary import Rotary
@@ -79,7 +79,7 @@ class Dialect:
     def row(self, line: Line) -> dict[str, float] | None:
         """Words of a motion block; None where the line is something else."""
         columns = self.lexer.motion(line)
-        return None if columns is None else values(columns)
+        return None if columns is None else numbers(columns)
 
     def acts(self, line: Line, state: Running) -> Acts:
         """Give out what a line that is no motion block does; each act is carried out before the next is wanted.
@@ -179,11 +179,6 @@ _COMMENT = re.compile(rb"\([^)\n]*\)|;[^\n]*")
 #: K of a vector; alone it is a knot
 _VECTOR_K = re.compile(rb"J[-+]?\d*\.?\d*[ ]*K[-+]?\d*\.(\d*)")
 _ONE_DIGIT = bytes.maketrans(b"0123456789", b"0" * 10)
-
-
-def values(columns: Columns) -> dict[str, float]:
-    """Numbers of a single motion block."""
-    return {name: word if isinstance(word, float) else word.value for name, word in columns.items()}
 
 
 #: classes of the modules of these names, each of which is loaded when a program in its words is read

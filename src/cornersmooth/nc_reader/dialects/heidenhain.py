@@ -18,6 +18,7 @@ from cornersmooth.control.words import (
     Word,
     fixed,
     number_of,
+    numbers,
     refused,
 )
 from cornersmooth.nc_reader.acts import (
@@ -34,7 +35,7 @@ from cornersmooth.nc_reader.acts import (
     rotated_frame,
     wrong,
 )
-from cornersmooth.nc_reader.dialects import Dialect, values
+from cornersmooth.nc_reader.dialects import Dialect
 
 _VECTOR: Final = {"TX": "I", "TY": "J", "TZ": "K"}
 _PATHS: Final = ("L", "LN", "SPL")
@@ -110,7 +111,7 @@ class Heidenhain(Dialect):
             if columns is None:
                 hint = "give L, LN or SPL what belongs to it"
                 raise refused(line, "words that this kind of block does not take", hint)
-            yield Move(values(columns))
+            yield Move(numbers(columns))
         if any(word[:2] == ("M", 99.0) for word in line.words):  # calls the cycle that was defined last, at the end
             if state.cycle is None:
                 raise refused(line, "M99 without a cycle before it", "define the cycle that it calls")
