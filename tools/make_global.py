@@ -20,7 +20,7 @@ from cornersmooth.kinematics import Machine, load_machine
 from cornersmooth.kinematics.machine import machine_table, parse_machine
 from cornersmooth.nc import choose_form
 from cornersmooth.nc_reader import read_nc
-from cornersmooth.times.laws import compare
+from cornersmooth.times import compare
 
 ROOT = Path(__file__).resolve().parent.parent
 PATHS = {

@@ -55,11 +55,11 @@ if TYPE_CHECKING:
     from cornersmooth.pipeline import postprocess as postprocess
     from cornersmooth.pipeline import smooth as smooth
     from cornersmooth.report import report as report
-    from cornersmooth.report.corners import corner_table as corner_table
+    from cornersmooth.report.tables import corner_table as corner_table
     from cornersmooth.settings import Settings as Settings
     from cornersmooth.smoothing.sampling import PathPoints as PathPoints
     from cornersmooth.smoothing.sampling import sample as sample
-    from cornersmooth.times.laws import compare as compare
+    from cornersmooth.times import compare as compare
     from cornersmooth.verify import Verification as Verification
     from cornersmooth.verify import verify as verify
 
@@ -81,9 +81,9 @@ _HOME = {
         "smoothing.sampling": "PathPoints sample",
         "pipeline": "Result postprocess smooth",
         "report": "report",
-        "report.corners": "corner_table",
+        "report.tables": "corner_table",
         "settings": "Settings",
-        "times.laws": "compare",
+        "times": "compare",
         "verify": "Verification verify",
     }.items()
     for name in names.split()

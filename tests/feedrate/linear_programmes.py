@@ -18,9 +18,9 @@ from scipy.optimize import linprog
 from scipy.sparse import csr_array, diags_array, vstack
 
 from cornersmooth.feedrate import timelaw
-from cornersmooth.feedrate.grid import make_grid
 from cornersmooth.feedrate.intervals import Intervals, Resolution, path_limits
 from cornersmooth.feedrate.path import Path
+from cornersmooth.feedrate.speed_problem import make_grid
 from cornersmooth.model import Floats
 from cornersmooth.settings import Limits
 

@@ -15,7 +15,7 @@ from cornersmooth.feedrate import Limits, TimeLaw, direct, plan
 from cornersmooth.model import Program
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
-from cornersmooth.times.laws import compare, slowest
+from cornersmooth.times import compare, slowest
 from oracle.share import share
 
 TABLE_1 = Path(__file__).resolve().parents[2] / "samples" / "paper_table1.csv"

@@ -13,10 +13,10 @@ import pytest
 from cornersmooth.cl import read
 from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.feedrate import Limits, direct, plan, planner
-from cornersmooth.feedrate.grid import make_grid
 from cornersmooth.feedrate.intervals import FINER, path_limits
 from cornersmooth.feedrate.machine_axes import MachineAxes, follow
 from cornersmooth.feedrate.path import Path, build_path
+from cornersmooth.feedrate.speed_problem import make_grid
 from cornersmooth.feedrate.taylor import poses, shares_at
 from cornersmooth.feedrate.timelaw import TimeLaw, rest_to_rest
 from cornersmooth.kinematics import Dynamics, Machine, load_machine, machine_position, solutions, tool_axis

@@ -9,8 +9,8 @@ import pytest
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate import Limits, TimeLaw, between, direct, plan, planner
-from cornersmooth.feedrate.grid import make_grid
 from cornersmooth.feedrate.intervals import Resolution
+from cornersmooth.feedrate.speed_problem import make_grid
 from cornersmooth.model import Arcs, Move, Program, Statement
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth

@@ -109,13 +109,13 @@ def test_a_program_without_corners_has_an_empty_report():
 @pytest.mark.parametrize("count", [3, 22, 60])
 def test_the_worst_corners_are_found_some_at_a_time(monkeypatch, count):
     """By the distances of all corners."""
-    from cornersmooth.report import corners
-    from cornersmooth.report.corners import path_distances
+    from cornersmooth.report import tables
+    from cornersmooth.report.tables import path_distances
 
-    monkeypatch.setattr(corners, "_TOGETHER", 3)
+    monkeypatch.setattr(tables, "_TOGETHER", 3)
     steps = np.random.default_rng(count).normal(size=(count, 3))
     smoothed = smooth(Program.from_poses(np.cumsum(steps, axis=0), np.tile([0.0, 0, 1], (count, 1))))
-    worst, rows = corners.worst_corners(smoothed), np.flatnonzero(smoothed.corners.rounded)
+    worst, rows = tables.worst_corners(smoothed), np.flatnonzero(smoothed.corners.rounded)
     tip, axis_point = path_distances(smoothed, rows, dense=True)
     larger = np.maximum(tip, axis_point)
     assert worst.tip_error == tip.max()

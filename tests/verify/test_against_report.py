@@ -19,8 +19,8 @@ from cornersmooth.nc_reader import read_nc
 from cornersmooth.nc_reader.elements import Element
 from cornersmooth.nc_reader.tool import written_at
 from cornersmooth.report import report
-from cornersmooth.report.corners import path_distances
 from cornersmooth.report.paths import deviation_along
+from cornersmooth.report.tables import path_distances
 from cornersmooth.settings import LARGEST_CHORD, Settings
 from cornersmooth.smoothing import smooth
 from cornersmooth.verify import verify

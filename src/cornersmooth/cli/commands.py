@@ -225,6 +225,7 @@ INFO = new_command(
       cornersmooth info part.ncl -e 0.05 -H 25
       cornersmooth info part.cls --json > part.json
     """,
+    module="lookup",
 )
 
 CONTROLS = new_command(

@@ -302,7 +302,7 @@ def options_for(data: bytes, name: str, given: Options) -> Options:
 
     Raises SettingsError CS267: no control is named, and FANUC would take the program for something else.
     """
-    from cornersmooth.cli.head import recognised
+    from cornersmooth.cli.options import recognised
 
     if is_cl_file(data[:HEAD]):  # who reads it will say so
         return given

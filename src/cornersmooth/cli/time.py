@@ -22,9 +22,8 @@ from cornersmooth.nc_reader import read_nc
 from cornersmooth.pipeline import read_back
 from cornersmooth.report.verdict import limits_of, times_text
 from cornersmooth.settings import METHODS
-from cornersmooth.times import Timing, without_holes, written_text
+from cornersmooth.times import Comparison, Timing, compare, slowest, stops, turning_seconds, without_holes, written_text
 from cornersmooth.times.comparing import law_of_lines
-from cornersmooth.times.laws import Comparison, compare, slowest, stops, turning_seconds
 
 _TITLES = {
     "direct_exact_stop": "direct, exact stop",

@@ -12,8 +12,7 @@ import click
 from cornersmooth.cl import read
 from cornersmooth.cli import files
 from cornersmooth.cli.files import STANDARD, check_pair, read_input, write_reports
-from cornersmooth.cli.head import take_head
-from cornersmooth.cli.options import Options
+from cornersmooth.cli.options import Options, take_head
 from cornersmooth.cli.shop import command_line, loosened
 from cornersmooth.cli.show import more, print_line, print_message, say, say_json, say_line, show_findings, warn
 from cornersmooth.control.source import readable_twice

@@ -19,10 +19,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from cornersmooth.feedrate.grid import Grid
 from cornersmooth.feedrate.interior_point import COLD, GAP, MAX_STEPS, WARM, solve
 from cornersmooth.feedrate.intervals import Intervals, Resolution
-from cornersmooth.feedrate.speed_problem import CRAWLING, PLACES, Batch, around, problem_of
+from cornersmooth.feedrate.speed_problem import CRAWLING, PLACES, Batch, Grid, around, problem_of
 from cornersmooth.feedrate.timelaw import stopping_distance
 from cornersmooth.model import Floats, Ints
 

@@ -11,11 +11,10 @@ from typing import Literal
 import numpy as np
 
 from cornersmooth.feedrate.between import fastest
-from cornersmooth.feedrate.grid import make_grid
 from cornersmooth.feedrate.intervals import FINER, PLAIN, Intervals, Resolution, path_limits
 from cornersmooth.feedrate.machine_axes import MachineAxes, follow
 from cornersmooth.feedrate.path import Path, build_path
-from cornersmooth.feedrate.speed_problem import around
+from cornersmooth.feedrate.speed_problem import around, make_grid
 from cornersmooth.feedrate.timelaw import TimeLaw, crossing_time, rest_to_rest
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import Floats, Ints, Program, SmoothProgram

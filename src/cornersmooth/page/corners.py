@@ -10,7 +10,7 @@ import numpy as np
 from cornersmooth.arrays import some_rows
 from cornersmooth.arrays.vectors import angle_between
 from cornersmooth.model import Bools, Floats, Ints, LimitedBy, Program, SmoothProgram, Status
-from cornersmooth.report.corners import corner_table
+from cornersmooth.report.tables import corner_table
 from cornersmooth.smoothing.sharp import other_corners, sharp_rows
 from cornersmooth.verify import Verification
 

@@ -16,14 +16,13 @@ from cornersmooth.errors import Finding, InputError
 from cornersmooth.geometry.arcs import arc_radii
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import Floats, Ints, Move, Program, SmoothProgram, Status, rapid_moves
-from cornersmooth.report.corners import corner_table, counts_of, worst_corners
+from cornersmooth.report.tables import Columns, corner_table, counts_of, csv_text, worst_corners
 from cornersmooth.report.verdict import Judgement, Saving, judge, sharp_corners
 from cornersmooth.smoothing.construction import construction_of
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics import Machine
     from cornersmooth.nc import Form
-    from cornersmooth.report.tables import Columns
     from cornersmooth.verify import Verification
 
 
@@ -116,8 +115,6 @@ def report(
 
 def corners_csv(smoothed: SmoothProgram, *, dense: bool = True) -> Iterator[str]:
     """The table of corners as CSV text, a block of rows at a time; `dense` as for `report`."""
-    from cornersmooth.report.tables import csv_text
-
     count = len(smoothed.corners)
 
     def columns(part: slice) -> Columns:

@@ -16,7 +16,7 @@ from cornersmooth.geometry.tool import tools_of
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import Bools, Corners, FeedMode, Floats, Move, Program, Status
 from cornersmooth.report import rotary_marks
-from cornersmooth.report.corners import counts_of
+from cornersmooth.report.tables import counts_of
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import axis_step_findings
 from cornersmooth.smoothing.construction import construction_of

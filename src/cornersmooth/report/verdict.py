@@ -10,7 +10,7 @@ import numpy as np
 
 from cornersmooth.errors import Finding, Verdict
 from cornersmooth.model import SmoothProgram, Status
-from cornersmooth.report.corners import corner_table
+from cornersmooth.report.tables import corner_table
 from cornersmooth.smoothing.construction import STRAIGHT_ON
 from cornersmooth.smoothing.sharp import other_corners, sharp_rows
 
