@@ -35,7 +35,7 @@ from cornersmooth.kinematics import machine_position, tool_axis
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.messages import Findings
-from cornersmooth.nc.statement_args import ends, milliseconds, spindle_orders, tool_starts, words_of
+from cornersmooth.nc.statement_args import ends, milliseconds, orders_at_cutters, tool_starts, words_of
 
 _MOST_PECKS = 1000  #: more pecks in one hole are a misunderstanding
 _KINDS = {"DRILL", "FACE", "SPOT", "CSINK", "REAM", "BORE", "DEEP", "DEEP2", "BRKCHP", "TAP"}
@@ -214,7 +214,7 @@ class Drillings:
 def plan_drilling(program: Program, findings: Findings) -> Drillings:
     """Go through the statements about cycles, and about the spindle, whose turns a dwell may count."""
     given: Given | None = (set(), {})
-    drills, now, speed, orders = False, Drilling(), None, spindle_orders(program)
+    drills, now, speed, (orders, _) = False, Drilling(), None, orders_at_cutters(program)
     first, each = [0], [now]
     for statement in program.statements:
         if statement.word == "SPINDL":

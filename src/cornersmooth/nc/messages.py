@@ -51,6 +51,10 @@ WARNINGS: Final = {
     "CS332b": "GOHOME without coordinates is written as the retract of the control's table",
     "CS335": "the spindle is started without a speed: a control takes the one that holds from before",
     "CS335b": "the spindle is not started before the first cut of a tool; put SPINDL before it",
+    "CS345": (
+        "cutter compensation begins on a move of {length:g} mm in the plane: the control refuses it where the register "
+        "holds the whole radius of the tool"
+    ),
     "CS359": "AUXFUN/{number} clamps a rotary axis or lets it turn: left out, the machine's file says where",
     "CS383": "a dwell under feed per revolution: it counts turns of the spindle {where}",
     # tools
@@ -128,6 +132,10 @@ REFUSALS: Final[dict[str, tuple[str, str]]] = {
     "CS343b": (
         "feed per revolution while no spindle speed is given: controls stop there or stand still",
         "give the spindle its speed in the CL file",
+    ),
+    "CS344": (
+        "cutter compensation begins on a move without any way in the plane, which the control refuses",
+        "let the CAM system lead in on a line, or put the cutter's radius into the path",
     ),
     "CS354": (
         "the tool change of the control table has {{speed}}, and the CL file gives tool {tool} none",

@@ -80,13 +80,13 @@ def milliseconds(amount: float, in_revolutions: bool, speed: float | None) -> in
     return max(1, round(time)) if time > 0.0 else 0
 
 
-def spindle_orders(program: Program) -> dict[int, tuple[str, float | None] | None]:
-    """What each SPINDL asks for, by its identity; None where it is not understood.
+def orders_at_cutters(program: Program) -> tuple[dict[int, tuple[str, float | None] | None], dict[int, float]]:
+    """What each SPINDL asks for, None where it is not understood, and the cutter's diameter at each CUTCOM, mm.
 
-    That is ORIENT, OFF, CLW, CCLW or ON, and the speed, rev/min; a cutting speed counts at the cutter before it. Gears
-    and limits of the speed are the control's own affair.
+    Both are by identity. SPINDL asks for ORIENT, OFF, CLW, CCLW or ON, and the speed, rev/min; a cutting speed counts
+    at the cutter before it. Gears and limits of the speed are the control's own affair.
     """
-    found, diameter = dict[int, tuple[str, float | None] | None](), 0.0
+    found, diameter, diameters = dict[int, tuple[str, float | None] | None](), 0.0, dict[int, float]()
     for statement in program.statements:
         words, numbers = words_of(statement), numbers_of(statement)
         if statement.word in ("CUTTER", "TLDATA"):
@@ -94,11 +94,13 @@ def spindle_orders(program: Program) -> dict[int, tuple[str, float | None] | Non
             diameter = numbers[0] * program.mm_per_unit if mill and numbers else 0.0
         elif statement.word == "SPINDL":
             found[id(statement)] = _spindle_order(statement, diameter)
-    return found
+        elif statement.word == "CUTCOM":
+            diameters[id(statement)] = diameter
+    return found, diameters
 
 
 def _spindle_order(statement: Statement, diameter: float) -> tuple[str, float | None] | None:
-    """What one SPINDL asks for, as of `spindle_orders`, at a diameter in mm."""
+    """What one SPINDL asks for, as of `orders_at_cutters`, at a diameter in mm."""
     words, numbers = set(words_of(statement)), numbers_of(statement)
     if words & set(_LIMITS):
         words -= GEARS

@@ -7,6 +7,7 @@ is not understood becomes a comment and a counted warning, never an NC word by g
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -25,6 +26,7 @@ from cornersmooth.nc.statement_args import (
     ends,
     milliseconds,
     numbers_of,
+    orders_at_cutters,
     spoken_text,
     tool_loads,
     whole_number,
@@ -47,17 +49,19 @@ class StatementWriter:
     program: Program
     findings: Findings  #: takes what is noticed
     modals: Modals  #: what the control remembers
-    orders: dict[int, tuple[str, float | None] | None]  #: as of `spindle_orders`
     comments: bool = True  #: whether comments are written
     changed: bool = False  #: a tool change, or the way home, left the machine elsewhere
     direction: str = "clockwise"  #: field of the words for the way in which the spindle turns, as it was named last
     words: Words = field(init=False)
+    _orders: dict[int, tuple[str, float | None] | None] = field(init=False)  #: as of `orders_at_cutters`
+    _diameters: dict[int, float] = field(init=False)  #: the same
     _loads: dict[int, tuple[int, int]] = field(init=False)  #: tool and length register of statements, by identity
     _ahead_of_tools: frozenset[int] = field(init=False)
     _unknown: frozenset[int] = field(init=False)  #: statements that are not understood, by identity
 
     def __post_init__(self) -> None:
         self.words = self.form.table.words
+        self._orders, self._diameters = orders_at_cutters(self.program)
         self._loads = {id(statement): tool for statement, tool in tool_loads(self.program)}
         self._ahead_of_tools = ahead_of_tools(self.program)
         self._unknown = frozenset(map(id, statements_not_understood(self.program)))
@@ -116,7 +120,7 @@ class StatementWriter:
         staged = self.words.tool_select if self.words.stage_tool and not selected else ()
         speed = None
         if any("{speed}" in block for block in self.words.tool_change):
-            orders = (self.orders.get(id(one)) or ("", None) for one in between)
+            orders = (self._orders.get(id(one)) or ("", None) for one in between)
             speed = next((speed for _, speed in orders if speed), self.modals.speed)
             if not speed:
                 raise refused("CS354", self.program, statement.line, tool=number)
@@ -145,7 +149,7 @@ class StatementWriter:
 
     def spindle(self, statement: Statement) -> list[str] | None:
         """SPINDL in every order of its words."""
-        order = self.orders[id(statement)]
+        order = self._orders[id(statement)]
         if order is None or (order[0] == "ORIENT" and not self.words.spindle_orient):
             return None
         turn, speed = order
@@ -226,6 +230,13 @@ class StatementWriter:
         register = whole_number(numbers or [float(self.modals.offset)])
         if not side or len(names) > 2 or not set(names[1:]) <= _PLANES.keys() or register is None:
             return None
+        if words.compensation_entry:  # the control refuses a first move that is too short
+            pose, tips = statement.pose, self.program.tip
+            length = math.hypot(*(tips[pose] - tips[pose - 1])[:2]) if 0 < pose < len(tips) else math.inf
+            if not length > 0.0:
+                raise refused("CS344", self.program, statement.line)
+            if length <= self._diameters[id(statement)] / 2.0:
+                self.findings.note("CS345", statement.line, length=length)
         tip = self.modals.mode is not self.form.upright and self.form.orientation not in ("fixed", "machine")
         also = "it may be used with tool tip control (--cycles native does without, along Z), and that " if tip else ""
         self.findings.note("CS319", statement.line, also=also)
