@@ -193,10 +193,12 @@ def test_help_waits_for_nothing_it_does_not_need(args: list[str]) -> None:
     assert not {"numpy", "scipy", "rich", "matplotlib", "difflib", "multiprocessing", "asyncio"} & modules
 
 
-def test_smoothing_alone_waits_for_no_planner(small: Path, tmp_path: Path) -> None:
-    modules = modules_of(["smooth", str(small), "-q", "-o", str(tmp_path / "out.nc")])
+def test_smoothing_alone_waits_for_nothing_it_does_not_call(small: Path, tmp_path: Path) -> None:
+    """Without limits of axes there is no time to plan, and without a machine no rotary axis."""
+    modules = modules_of(["smooth", str(small), "-o", str(tmp_path / "out.nc")])
     assert "cornersmooth.verify" in modules
-    assert not {"scipy", "cornersmooth.feedrate", "cornersmooth.page", "rich"} & modules
+    unused = {f"cornersmooth.{name}" for name in "feedrate times rotary filter page surface cli.batch".split()}
+    assert not (unused | {"scipy", "rich", "concurrent.futures", "cornersmooth.smoothing.given_curves"}) & modules
 
 
 def test_version() -> None:
