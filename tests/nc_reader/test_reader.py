@@ -300,6 +300,13 @@ def test_a_word_beside_a_dwell_changes_what_holds():
     assert (found.code, found.nc_line) == ("CS506", 6)
 
 
+@pytest.mark.parametrize("block", ["A3=1", "G1 B3=1 C3=1", "X2 A3=1 B3=0"])
+def test_a_vector_beside_points_on_the_tool_axis_is_not_read_over(block):
+    text = f"TRAORI\nORIWKS ORICURVE\nG0 X0 Y0 Z0 XH=0 YH=0 ZH=10\nG1 X1 F100\n{block}\nX3 XH=3\n".encode()
+    found = read_nc(text, control="siemens").problems
+    assert ("CS503", 5, "a tool vector beside points on the tool axis") in {(p.code, p.nc_line, p.text) for p in found}
+
+
 @pytest.mark.parametrize("word", ["M98", "M60"])
 def test_motion_behind_a_word_that_may_change_what_holds_was_not_looked_at(word):
     text = f"G21 G90 G94 G17\nG0 X0. Y0. Z0.\nG1 X1. F100.\n{word}\nX2.\n{word}\nM30\n".encode()

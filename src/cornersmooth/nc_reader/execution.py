@@ -216,6 +216,10 @@ def _check(
     given = [~np.isnan(table.columns[name]) for name in names if name in table.columns]
     text = "curve blocks without what begins a curve before them"
     problems += Problem.at("CS511", straight & np.any(given, axis=0), table.line, text, most=1) if given else []
+    if modal.points:  # I J are no vector there, nor A3 B3; on arcs they are the centre
+        vector = ~np.isnan([table.column(letter) for letter in "IJ"]).all(axis=0) & (code != 2) & (code != 3)
+        text = "a tool vector beside points on the tool axis"
+        problems += Problem.at("CS503", vector, table.line, text, most=1)
     if len(run.curves):  # first control points are where the tool is, digit for digit (FANUC alarm PS1009)
         exact = own[run.curves.element] == NURBS
         element = run.curves.element[exact]
