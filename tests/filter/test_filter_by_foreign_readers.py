@@ -15,7 +15,7 @@ from filter.foreign import by_rs274, by_words, difference
 from filter.programs import PROGRAMS
 from filter.test_filter import form_of
 from oracle.interpreter import RefusedError
-from oracle.share import how_many
+from oracle.share import how_many, share
 
 EPS = 0.02
 THREE_AXES = Path(__file__).parents[2] / "samples" / "machines" / "three-axis.toml"
@@ -221,15 +221,16 @@ def seeded_iso(seed: int) -> str:
     return "\n".join([*lines, "G0 Z25.", "M30", "%"]) + "\n"
 
 
-@pytest.mark.parametrize("control", ["fanuc", "haas", "mitsubishi"])
-def test_plain_readers_find_the_same_outside_of_runs_in_seeded_programs(control: str) -> None:
+@pytest.mark.parametrize(("number", "control"), [(0, "fanuc"), (1, "haas"), (2, "mitsubishi")])
+def test_plain_readers_find_the_same_outside_of_runs_in_seeded_programs(number: int, control: str) -> None:
+    """By default each program for one of the controls."""
     changed = 0
-    for seed in range(how_many(60, 1000)):
+    for seed in share(range(how_many(60, 1000)), 3, number):
         text = seeded_iso(seed).encode()
         new = three_axes(text, control)
         assert difference(by_words(text), by_words(new), EPS) == "", seed
         changed += new != text
-    assert changed >= 15
+    assert changed >= 5
 
 
 @pytest.mark.parametrize("name", [name for name in PROGRAMS if "linuxcnc" not in name])
