@@ -118,7 +118,7 @@ def drilling(args: tuple[float | str, ...], program: Program, speed: float = 0.0
         pecking, breaks = bool(kinds & _PECKING), "BRKCHP" in kinds
         return replace(found, feed_out=bool(kinds & _AT_FEED), steps=steps, pecking=pecking, breaks_chips=breaks)
     if len(kinds) > 1 or steps or math.isnan(feed) or not (per_revolution or speed):
-        return Drilling()
+        return Drilling(clearance=above, retract=retract)
     return replace(found, feed=feed if per_revolution else feed / speed, per_revolution=True, tap=True, feed_out=True)
 
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Generator, Iterator, Sequence
+from itertools import count, takewhile
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -205,8 +206,13 @@ class Parse:
         while self._over(stop, end) or (end > element and self._ahead.has(end) and lines.stands(end)):
             feeds, height = lines.feeds(end), lines.height(move, end)
             if left:
-                leads_away = height < -lines.room or (self._rises(stop, end) and not lines.at(move, end))
-                done = feeds or self._reaches(stop + 1, end) or (self._hole[stop + 1] and leads_away)
+                done = feeds or self._reaches(stop + 1, end)
+                if self._hole[stop + 1]:
+                    highest = max(cycle.level, cycle.clearance) + lines.room
+                    done |= height < -lines.room or (self._rises(stop, end) and height > highest)
+                elif not done:
+                    behind = takewhile(lambda one: self._ahead.has(one) and not lines.feeds(one), count(end + 1))
+                    done = not any(self._reaches(stop + 1, one) for one in behind)
             done |= lowest <= lines.room - cycle.depth and lines.height(move, end - 1) >= -lines.room
             if done and (self._begins(stop, end) or (not left and self._hole[stop + 1] and self._has_words(end))):
                 break
@@ -217,11 +223,7 @@ class Parse:
             end = block.stop if native else end + 1
         while not left and self._hole[stop + 1] and self._rises(stop, end):
             end += 1
-        behind = self._end_of(stop, element, end)
-        found, left = lines.check(move, range(element, behind), cycle)
-        # a wrong feed leaves no doubt
-        doubt = self._doubt(stop, element) if any(one.code != "CS541" for one in found) else None
-        return doubt or self._leave(stop, element, end)
+        return self._leave(stop, element, end)
 
     def _rises(self, stop: int, element: int) -> bool:
         """Whether a rapid goes up along the tool, and belongs to a hole rather than to the next."""
@@ -262,33 +264,12 @@ class Parse:
         there = element > 0 and lines.at(self._move[following], element - 1)
         return self._reaches(following, element) or (there and self._begins(following, element))
 
-    def _doubt(self, stop: int, element: int) -> tuple[int, int] | None:
-        """Of holes above one another in one line nobody can tell which a move belongs to: NOT VERIFIED, not wrong.
-
-        None where there is no doubt: a hole that is alone in its line, or a cycle of the control, which is one block.
-        """
-        lines, move, acts, first, last = self.lines, self._move, self.acts, stop, stop
-        while self._hole[last + 1] and self._are_alike(last, last + 1):
-            last += 1
-        while first > 0 and self._hole[first - 1] and self._are_alike(first - 1, first):
-            first -= 1
-        alike = range(first, last + 1)
+    def _is_in_doubt(self, stop: int, element: int) -> bool:
+        """Whether nobody can tell which of holes in one line an element belongs to: a cycle of the control tells."""
+        lines, others = self.lines, (one for one in (stop - 1, stop + 1) if one >= 0 and self._hole[one])
         fed = next((one for one in range(element, self._ahead.count) if lines.feeds(one)), element)
-        if len(alike) == 1 or not self._over(stop, element) or len(lines.block(fed)) > 1:
-            return None
-        acts.unlooked.append((lines.nc_line(element), "holes above one another in one line"))
-        self._begin_hole(move[stop], element)
-        begin, end = element, element
-        while acts.holes and acts.holes[-1].move >= move[first]:  # those before are in doubt, too
-            begin = acts.holes.pop().first
-            del acts.begins[-2:]
-        while self._ahead.has(end) and not self._reaches(last + 1, end):
-            if not (lines.stands(end) or any(self._over(one, near) for one in alike for near in (end, end + 1))):
-                break
-            end += 1
-        acts.holes.append(Hole(move[first], begin, end, end, None))
-        acts.begins.extend((move[first], begin))
-        return self._go_out(last, element, end)
+        alike = any(self._are_alike(stop, one) for one in others)
+        return alike and self._over(stop, element) and not lines.is_cycle(lines.block(fed))
 
     def _are_alike(self, one: int, other: int) -> bool:
         """Whether two holes are in one line, for the same tool."""
@@ -296,22 +277,19 @@ class Parse:
         loads = {bisect_right(self._loads, self._task.original.pose[move]) for move in moves}
         return len(loads) == 1 and self.lines.in_line(*moves)
 
-    def _begin_hole(self, move: int, element: int) -> None:
-        """End the run of feed moves that leads to a hole."""
-        if self._begun >= 0:
-            self._steps.append(Step(move, element, False, -1))
-        self._end_run(move, element)
-
     def _leave(self, stop: int, begin: int, end: int) -> tuple[int, int]:
         """Take down a hole that some elements belong to."""
         lines, move = self.lines, self._move[stop]
-        self._begin_hole(move, begin)
+        if self._begun >= 0:
+            self._steps.append(Step(move, begin, False, -1))
+        self._end_run(move, begin)
         behind = self._end_of(stop, begin, end)
         found, left = lines.check(move, range(begin, behind), self._cycles[move])
-        away = self._along.next_retract(begin) == begin or self._words.tool_changes(begin) > self._words.tool_changes(
-            begin - 1
-        )
-        if not away and (slant := lines.slant(move, begin)):
+        if any(one.code != "CS541" for one in found) and self._is_in_doubt(stop, begin):
+            self.acts.unlooked.append((lines.nc_line(begin), "holes above one another in one line"))
+            found = []
+        away = self._words.tool_changes(begin) > self._words.tool_changes(begin - 1)
+        if not away and self._along.next_retract(begin) != begin and (slant := lines.slant(move, begin)):
             text = f"a rapid goes aslant to a hole, {slant:.4f} mm: across at the higher level, then down"
             found.append(lines.problem("CS563", move, begin, text, slant))
         self.acts.problems += found
