@@ -308,10 +308,10 @@ def test_a_vector_beside_points_on_the_tool_axis_is_not_read_over(block):
 
 
 @pytest.mark.parametrize("word", ["M98", "M60"])
-def test_motion_behind_a_word_that_may_change_what_holds_was_not_looked_at(word):
+def test_motion_after_a_word_that_may_change_what_holds_was_not_looked_at(word):
     text = f"G21 G90 G94 G17\nG0 X0. Y0. Z0.\nG1 X1. F100.\n{word}\nX2.\n{word}\nM30\n".encode()
     found = read_nc(text)
-    assert found.unlooked == ((5, f"motion behind {word}, which may change what holds"),)
+    assert found.unlooked == ((5, f"motion after {word}, which may change what holds"),)
     assert found.tip[-1].tolist() == [2.0, 0.0, 0.0]
 
 

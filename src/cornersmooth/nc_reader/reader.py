@@ -296,7 +296,7 @@ class Reader:
     def _execute(self, table: Table) -> None:
         state, before = self.state, self.state.modal
         if self._lost:
-            self.unlooked.append((int(table.line[0]), f"motion behind {self._lost}, which may change what holds"))
+            self.unlooked.append((int(table.line[0]), f"motion after {self._lost}, which may change what holds"))
             self._lost = ""
         if state.machine.groups["distance"] == "incremental":
             what, hint = "motion in incremental words (G91)", "write G90 after a position of the machine"
