@@ -156,3 +156,19 @@ def test_what_is_farthest_between_the_vertices_of_a_curve_is_measured() -> None:
     assert max(together.tip.max(), together.axis_point.max()) <= 0.01 + 1e-6
     assert measured.together_axis_point.value <= 0.01 + 1e-6
     assert measured.max_axis_point_deviation_mm >= apart[np.isfinite(apart)].max() - 2e-5
+
+
+#: the tip hardly moves where the tool turns: lines there are a hundredth of ε long
+STANDING = """FEDRAT/MMPM,4000
+GOTO/26.819958,12.220369,17.425087,-0.007309,-0.588412,0.808528
+GOTO/27.602362,14.518102,20.454959,0.089116,-0.591095,0.801664
+GOTO/27.602275,14.520865,20.453433,-0.046852,-0.539243,0.840846
+GOTO/24.439343,15.685060,18.339468,0.046646,-0.565454,0.823460
+GOTO/24.439659,15.685810,18.339610,0.032832,-0.560673,0.827386
+GOTO/27.891213,19.944442,12.876121,0.046080,-0.572239,0.818791
+"""
+
+
+def test_the_nearest_place_is_found_many_lines_away() -> None:
+    tip, axis_point, step = differences(read(STANDING.encode(), name="p.cls"), "g1", 0.02, 10.0)
+    assert max(abs(tip), abs(axis_point)) <= room(step), (tip, axis_point)

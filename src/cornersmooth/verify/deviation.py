@@ -135,6 +135,9 @@ def nearest(match: Match, reached: Reached, rows: Ints, metric: Metric) -> Float
         first, last = match.runs
         low, high = first[middle], last[middle] - 1
     best = nearest_places(six, other, middle, _REACH, low, high, metric)
+    while len(far := np.flatnonzero(np.abs(best.astype(np.int64) - middle) >= _REACH)):  # lines much shorter than ε
+        middle[far] = np.clip(best[far].astype(np.int64), low[far], high[far])
+        best[far] = nearest_places(six[far], other, middle[far], _REACH, low[far], high[far], metric)
     ends = np.maximum(best - 0.5, low), np.minimum(best + 0.5, high + 1.0)
     at = match.path.at if reached.mine else lambda where: _written(match, where)
     return _least(at, six, COLUMNS[metric], *ends)[1]
