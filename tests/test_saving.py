@@ -15,7 +15,7 @@ from cornersmooth.kinematics.machine import Dynamics
 from cornersmooth.model import Move, Program, Statement
 from cornersmooth.nc import choose_form, fit_settings
 from cornersmooth.settings import Settings
-from cornersmooth.times import Timing, faster_method, planned_saving, saving, written_text
+from cornersmooth.times import Timing, faster_method, planned_saving, written_text
 
 
 def winding(count: int) -> Program:
@@ -144,5 +144,5 @@ def test_lines_have_the_method_whose_program_is_faster(monkeypatch: pytest.Monke
     assert faster_method(row_of_bends(4001), Settings(), form, axes).method == "auto"
     of_linuxcnc = choose_form("linuxcnc", machine=load_machine("xyzac-trt"))
     assert faster_method(program, Settings(), of_linuxcnc, axes).method == "auto"
-    monkeypatch.setattr(saving, "_FASTER", 0.5)
+    monkeypatch.setattr("cornersmooth.times._FASTER", 0.5)
     assert faster_method(program, Settings(), form, axes).method == "auto"
