@@ -371,7 +371,8 @@ def _remarks(program: Program, settings: Settings) -> Iterator[Finding]:
     if not cuts.any():
         yield Finding("CS181", "warning", 0, "there is no feed move from one pose to another: nothing is cut")
         return
-    extent = float(np.linalg.norm(np.ptp(program.tip[cuts | np.roll(cuts, -1)], axis=0)))
+    ends = cuts | np.roll(cuts, -1)
+    extent = float(np.linalg.norm([np.ptp(column[ends]) for column in program.tip.T]))
     if settings.tolerance > extent and np.ptp(program.axis[cuts], axis=0).max() == 0.0:
         yield Finding("CS182", "warning", 0, f"the tolerance {settings.tolerance:g} mm is larger than the whole path")
 
