@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 
 import pytest
 
@@ -557,3 +558,17 @@ def test_a_short_lead_in_under_cutter_compensation_is_said() -> None:
         program = read(cl.format(length).encode(), name="part.cls")
         written = write(smooth(program, fit_settings(Settings(), form, "mm")), io.BytesIO(), form=form)
         assert ("CS345" in {finding.code for finding in written.findings}) == said_so
+
+
+@pytest.mark.parametrize(
+    ("control", "form"), [("fanuc", "g1"), ("fanuc", "g6.2"), ("siemens", "bspline"), ("heidenhain", "g1")]
+)
+def test_a_tool_begins_at_a_pose_that_repeats_the_last_one_with_its_tool_axis(control: str, form: str) -> None:
+    """The pose is no motion in the CL file; the new tool must go there all the same."""
+    there = "GOTO/40,0,0,0.2,0.1,0.97467943\n"
+    head = "UNITS/MM\nLOADTL/1\nSPINDL/900,CLW\nFEDRAT/300,MMPM\nRAPID\nGOTO/0,0,30,0.1,0,0.99498744\nGOTO/0,0,0\n"
+    cl = f"{head}{there}LOADTL/2\nSPINDL/800,CLW\n{there}GOTO/60,5,0\nFINI\n"
+    words = r"X\+?40\.0+ Y\+?0\.0+ Z\+?0\.0+ (\S+ \S+ [^ ]*[\d.]+)"
+    found = [axis[1] for line in lines_of(choose_form(control, form), cl) if (axis := re.search(words, line))]
+    assert len(found) > 1
+    assert len(set(found)) == 1

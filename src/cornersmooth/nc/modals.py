@@ -128,7 +128,8 @@ class Modals:
             name = step.strip("{}")
             if step in _STEPS:
                 group, value = _STEPS[step]
-                blocks += self.set(**{group: self.can_rewind if group == "high" else value})
+                blocks += self.set(**{group: value})
+                self.now["high"] &= self.can_rewind
             elif name in STEPS and name != step:
                 blocks += given.get(name, ())
             else:

@@ -110,10 +110,13 @@ class Motion:
         passed = begin + np.flatnonzero(program.kind[begin:move] != Move.FROM)[:1]
         if self.last is None or not len(passed) or program.kind[begin - 1] == Move.HOLE:  # which none repeats
             return
-        other = program.axis[passed]
-        if at.form.rotary:
-            other = continued(machine_of(at.form), other, near, np.array([-1]), 0.0)[0]
-        self.emit(BlockRows.straight(program, at.ticks(program.tip[passed], other), np.array([move])))
+        ticks = self.last[None]
+        if self.last_at is not at:
+            other = program.axis[passed]
+            if at.form.rotary:
+                other = continued(machine_of(at.form), other, near, np.array([-1]), 0.0)[0]
+            ticks = at.ticks(program.tip[passed], other)
+        self.emit(BlockRows.straight(program, ticks, np.array([move])))
 
     def ticks_at(self, rows: Rows, tips: Floats, own: Ints) -> Ints:
         """Ticks of tips reached with the orientation of rows, which `own` names for each of them."""
