@@ -22,11 +22,12 @@ from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.geometry.ragged import starts
 from cornersmooth.kinematics import Machine, check_travel, solutions, tool_axis
 from cornersmooth.kinematics.poses import angle_between, nose_position
-from cornersmooth.model import Bools, Floats, Ints, Program, Runs, SmoothProgram, rapid_moves, still_poses
+from cornersmooth.model import Bools, Floats, Ints, Move, Program, Runs, SmoothProgram, rapid_moves, still_poses
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.messages import Findings
 from cornersmooth.nc.planes import turned_part
 from cornersmooth.nc.statement_args import tool_starts
+from cornersmooth.rotary.angle_path import reach_error
 from cornersmooth.smoothing.sampling import Rows, all_dense_rows
 from cornersmooth.system.processes import return_free_memory
 
@@ -60,6 +61,10 @@ def rotary_way(rows: Rows, smoothed: SmoothProgram, form: Form, findings: Findin
     tip, axis, move = rows.tip, rows.other, rows.move
     tolerance = form.rotary_tolerance(settings.tolerance, settings.axis_scale)
     rapid, file = rapid_moves(program.kind)[move], program.source.name
+    if len(machine.names) < 2:  # a pose that an axis is missing for is named, not a place on the way to it
+        beyond = np.where(program.kind == Move.FROM, 0.0, solutions(machine, program.axis).beyond)
+        for pose in np.flatnonzero(beyond > tolerance)[:1].tolist():
+            raise reach_error(machine, program.axis[pose], float(beyond[pose]), int(program.line[pose]), file)
     how: dict[str, Any] = {"tolerance": tolerance, "rapid": rapid, "line": program.line[move], "file": file}
     how |= {"still": still_poses(program.kind)[move], "still_tolerance": form.angle_rounding}
     left = np.zeros(len(move), np.bool_)
