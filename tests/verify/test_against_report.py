@@ -172,3 +172,25 @@ GOTO/27.891213,19.944442,12.876121,0.046080,-0.572239,0.818791
 def test_the_nearest_place_is_found_many_lines_away() -> None:
     tip, axis_point, step = differences(read(STANDING.encode(), name="p.cls"), "g1", 0.02, 10.0)
     assert max(abs(tip), abs(axis_point)) <= room(step), (tip, axis_point)
+
+
+#: the tip stands where the tool turns by 20 degrees and more
+TURNING = """FEDRAT/MMPM,777
+GOTO/-0.2421,5.7117,-3.0528,-0.127379,-0.165692,0.977917
+GOTO/-0.2421,5.7117,-3.0528,-0.228651,0.204438,0.951800
+GOTO/2.1285,7.3622,-0.9342,-0.034548,-0.362621,0.931296
+GOTO/-0.0490,6.7864,-0.5560,0.153040,0.199291,0.967916
+GOTO/-0.0490,6.7864,-0.5560,-0.085638,0.129161,0.987919
+GOTO/-1.1191,6.8765,0.6386,-0.022422,-0.133096,0.990850
+GOTO/-5.5138,3.9047,-0.4580,-0.298700,0.212609,0.930363
+"""
+
+
+def test_two_curves_on_their_own_state_no_more_than_they_keep() -> None:
+    program, chosen = read(TURNING.encode(), name="p.cls"), choose_form("fanuc", "g1")
+    stream = io.BytesIO()
+    settings = Settings(tolerance=0.5, method="zhang2016")
+    write(smooth(program, fit_settings(settings, chosen, program.units)), stream, form=chosen)
+    measured = verify(program, stream.getvalue(), tolerance=0.5, axis_length=10.0)
+    assert measured.passed
+    assert measured.max_tip_deviation_mm <= 0.5

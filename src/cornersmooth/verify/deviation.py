@@ -138,6 +138,13 @@ def nearest(match: Match, reached: Reached, rows: Ints, metric: Metric) -> Float
     while len(far := np.flatnonzero(np.abs(best.astype(np.int64) - middle) >= _REACH)):  # lines much shorter than ε
         middle[far] = np.clip(best[far].astype(np.int64), low[far], high[far])
         best[far] = nearest_places(six[far], other, middle[far], _REACH, low[far], high[far], metric)
+    reach = _REACH
+    while match.task.apart and reach < _MOST_SEGMENTS:  # where each is run on its own, a tip that stands is passed
+        off = largest_square((six.T - points_at(other, best))[COLUMNS[metric]])
+        if not len(far := np.flatnonzero(off > match.tolerance**2)):
+            break
+        reach *= 4
+        best[far] = nearest_places(six[far], other, middle[far], reach, low[far], high[far], metric)
     ends = np.maximum(best - 0.5, low), np.minimum(best + 0.5, high + 1.0)
     at = match.path.at if reached.mine else lambda where: _written(match, where)
     return _least(at, six, COLUMNS[metric], *ends)[1]
