@@ -366,9 +366,9 @@ def _name(word: str) -> str:
 def _frames(text: Text, rng: np.random.Generator, each: int) -> Iterator[Mutant]:
     lines, end = text.lines, len(text.lines)
     if lines[0] == "%":
-        yield Mutant("first % lost", lines[1:], (1, 1))
+        yield Mutant("first % lost", lines[1:], None)  # many controls show a program without its marks of the transfer
         yield Mutant("first % moved", [lines[1], lines[0], *lines[2:]], (1, 2))
-        yield Mutant("last % lost", lines[:-1], (end - 2, end))
+        yield Mutant("last % lost", lines[:-1], None)
         yield Mutant("number of the program lost", [lines[0], *lines[2:]], (2, 2))
     if text.family == "heidenhain":
         yield Mutant("BEGIN PGM lost", lines[1:], (1, 1))
