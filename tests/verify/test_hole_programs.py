@@ -93,12 +93,16 @@ REFUSED_ONCE = {
 RANDOM_REFUSED_ONCE = {
     8700253: "taps that are left out, and the same holes drilled behind another speed",
     8601301: "words behind a tap that is left out, where the next rapid leads",
+    8800022: "a bore whose way up ends where the next tool begins",
+    8800032: "taps left out, and the same holes drilled from where the tool was before them",
 }
 
 #: seeds that are refused still: a hole program, and programs at random
 KNOWN = {
     1503284: "a feed move to where the tool has been before its change: what leads nowhere in the CL file has no feed",
+    1710186: "two optional stops around a tool that does nothing",
     8600559: "a dwell between poses that are a digit apart: the text passes them in one",
+    8800136: "a dwell between poses that are a digit apart, the same",
     8601699: "coolant at the end of a run between poses that are a digit apart: the text passes them in one",
 }
 

@@ -36,7 +36,7 @@ class Hole(NamedTuple):
     first: int  #: the first element that belongs to it
     bottom: int  #: the element behind its deepest feed move: it may wait before that
     leaves: int  #: the element with which the tool leaves it
-    cycle: Drilling | None  #: None where it cannot be told from others in its line
+    cycle: Drilling
 
 
 @dataclass

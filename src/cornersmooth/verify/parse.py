@@ -200,7 +200,7 @@ class Parse:
 
     def _drill(self, stop: int, element: int) -> tuple[int, int]:
         """Take a hole: up to the end of a cycle of the control, or until it is done and what follows begins."""
-        lines, move, end, done = self.lines, self._move[stop], element, False
+        lines, move, end, done, other_tool = self.lines, self._move[stop], element, False, 0
         cycle, lowest = self._cycles[move], math.inf  # of the feed moves
         left = self._may_be_left_out(stop) and not self._is_tapped(stop, element)
         while self._over(stop, end) or (end > element and self._ahead.has(end) and lines.stands(end)):
@@ -209,18 +209,23 @@ class Parse:
                 done = feeds or self._reaches(stop + 1, end)
                 if self._hole[stop + 1]:
                     highest = max(cycle.level, cycle.clearance) + lines.room
-                    done |= height < -lines.room or (self._rises(stop, end) and height > highest)
+                    away = height < -lines.room or (self._rises(stop, end) and height > highest)
+                    done |= away and self._over(stop + 1, end)
                 elif not done:
                     behind = takewhile(lambda one: self._ahead.has(one) and not lines.feeds(one), count(end + 1))
                     done = not any(self._reaches(stop + 1, one) for one in behind)
             done |= lowest <= lines.room - cycle.depth and lines.height(move, end - 1) >= -lines.room
             if done and (self._begins(stop, end) or (not left and self._hole[stop + 1] and self._has_words(end))):
-                break
+                if not self._reaches(stop + 1, end) or self._has_tool(self._move[stop + 1], end):
+                    break
+                other_tool = other_tool or end
             block = lines.block(end)
             native = not left and lines.is_cycle(block)
             done |= native
             lowest = min(lowest, height) if feeds else lowest
             end = block.stop if native else end + 1
+        else:
+            end = end if self._begins(stop, end) else other_tool or end
         while not left and self._hole[stop + 1] and self._rises(stop, end):
             end += 1
         return self._leave(stop, element, end)

@@ -106,7 +106,7 @@ class WordPlaces:
         cl_places = np.array(sorted({one.place for one in cl_tokens} | homes), np.int64)
         nc_places = np.array(sorted({one.place for one in nc_tokens}), np.int64)
         # both are compared at acts that words are in front of, and where one of them has words within a run alone
-        in_cycles = [first for first, one in holes.items() if one.cycle and (within[first] or one.cycle.says)]
+        in_cycles = [first for first, one in holes.items() if within[first] or one.cycle.says]
         numbers = np.searchsorted(acts[:, 1], np.array(in_cycles, np.int64)).tolist()
         rows = {(act, 2, *acts[act].tolist()) for act in numbers}
         uncertain = set(np.searchsorted(acts[:, 0], missed, side="right").tolist())
@@ -129,7 +129,8 @@ class WordPlaces:
             if not homes.isdisjoint(range(before[0] + 1, move + 1)):
                 at_home |= {one.line for one in events if before[1] < one.element <= element}
             before = move, element
-            if kind == 2 and element in holes and (cycle := holes[element].cycle) is not None and act + 1 < len(acts):
+            if kind == 2 and element in holes and act + 1 < len(acts):
+                cycle = holes[element].cycle
                 line = int(program.line[original.pose[holes[element].move]])
                 comparison.in_hole(line, within[element], cycle.dwell, tap=cycle.tap)
         hidden = changed_unseen(requested, leading, beyond) if batches.acts.moves_left_out else ""
