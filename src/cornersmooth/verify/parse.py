@@ -223,9 +223,10 @@ class Parse:
             native = not left and lines.is_cycle(block)
             done |= native
             lowest = min(lowest, height) if feeds else lowest
-            end = block.stop if native else end + 1
+            end = max(end + 1, native * block.stop)
         else:
-            end = end if self._begins(stop, end) else other_tool or end
+            if other_tool and not self._begins(stop, end):
+                end = other_tool
         while not left and self._hole[stop + 1] and self._rises(stop, end):
             end += 1
         return self._leave(stop, element, end)
