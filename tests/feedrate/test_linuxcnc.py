@@ -161,7 +161,19 @@ def test_a_program_begins_in_g64() -> None:
 
 
 @pytest.mark.parametrize(
-    "line", ["o100 sub", "N5 o<hole> call", "#1=3", "X#1", "Z[1+1]", "o110 while [#5 lt 10]", "M98 P100", "G90.1"]
+    "line",
+    [
+        "o100 sub",
+        "N5 o<hole> call",
+        "#1=3",
+        "X#1",
+        "Z[1+1]",
+        "o110 while [#5 lt 10]",
+        "M98 P100",
+        "G90.1",
+        "G3 X9",
+        "G2 X9 I0",
+    ],
 )
 def test_what_the_text_does_not_say_has_no_time(line: str) -> None:
     with pytest.raises(InputError, match="CS264") as error:

@@ -343,6 +343,9 @@ def program_lines(text: str, name: str | None = None) -> Lines:
         if begins == ends and not round_:
             continue
         arc = _arc(begins, ends, given, plane, clockwise=code == 2.0) if round_ else [np.nan] * 12
+        if arc[1] == 0.0:
+            what = "an arc has neither a radius nor a centre away from where it begins"
+            raise InputError("CS264", what, "give it one", file=name, line=number)
         if code == 0.0:
             speed = np.inf
         elif timed:
