@@ -14,7 +14,7 @@ import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple, Self
 
 import numpy as np
 
@@ -43,6 +43,13 @@ class TiltedPlane:
     turned: bool = True  #: whether the rotary axes have been sent to it
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)  #: its zero in the part, in units of the text
 
+    @classmethod
+    def by(cls, turns: Sequence[tuple[str, float]], numbers: Sequence[str], **more: Any) -> Self:
+        """Plane by turns about its own axes, one after another, by degrees that are printed as numbers."""
+        return cls(
+            _rotated_frame(turns), math.radians(10.0 ** -min(len(one.partition(".")[2]) for one in numbers)), **more
+        )
+
     @property
     def tool(self) -> Floats:
         """(3,) unit vector of the tool."""
@@ -65,7 +72,7 @@ class TiltedPlane:
         return replace(modal, tip=tuple(known.tolist()), second=second)
 
 
-def rotated_frame(turns: Sequence[tuple[str, float]]) -> Floats:
+def _rotated_frame(turns: Sequence[tuple[str, float]]) -> Floats:
     """(3, 3) frame after turns by degrees about its own axes, one after another, as columns."""
     axes = [np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])]
     for name, degrees in turns:
@@ -86,11 +93,6 @@ def turned_frame(rotary: Rotary, angles: Sequence[float]) -> Floats | None:
     degrees = np.tile(np.array(angles[:2]), (3, 1))
     frame: Floats = rotary.carried(np.eye(3), degrees).T
     return frame
-
-
-def room_of(numbers: Sequence[str]) -> float:
-    """Radians that a step of the last printed digit of angles is."""
-    return math.radians(10.0 ** -min(len(number.partition(".")[2]) for number in numbers))
 
 
 #: share of a peck that the tool stays above the last depth when it comes back

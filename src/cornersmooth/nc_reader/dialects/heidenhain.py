@@ -31,8 +31,6 @@ from cornersmooth.nc_reader.acts import (
     TiltedPlane,
     ToMachine,
     drill,
-    room_of,
-    rotated_frame,
     wrong,
 )
 from cornersmooth.nc_reader.dialects import Dialect
@@ -169,7 +167,7 @@ class Heidenhain(Dialect):
         elif match := _SPATIAL.fullmatch(text):
             angles = match.groups()
             turns = [(axis, float(angle)) for axis, angle in zip("ZYX", angles[::-1], strict=True)]
-            yield Tilt(TiltedPlane(rotated_frame(turns), room_of(angles)))
+            yield Tilt(TiltedPlane.by(turns, angles))
         elif text == "PLANE RESET STAY":
             yield Tilt(None)
         elif text == "STOP":

@@ -30,8 +30,6 @@ from cornersmooth.nc_reader.acts import (
     TiltedPlane,
     ToMachine,
     drill,
-    room_of,
-    rotated_frame,
     turned_frame,
     wrong,
 )
@@ -157,9 +155,8 @@ class Iso(Dialect):
             if given.keys() != set("XYZIJK"):
                 raise refused(line, "G68.2 in another form", "give its zero X Y Z and the Euler angles I J K")
             turns = [(axis, given[name].value) for axis, name in zip("ZXZ", "IJK", strict=True)]
-            room = room_of([given[name].text for name in "IJK"])
-            origin = given["X"].value, given["Y"].value, given["Z"].value
-            yield Tilt(TiltedPlane(rotated_frame(turns), room, "G43", turned=False, origin=origin))
+            numbers, origin = [given[name].text for name in "IJK"], tuple(given[name].value for name in "XYZ")
+            yield Tilt(TiltedPlane.by(turns, numbers, needs="G43", turned=False, origin=origin))
         else:
             angles = state.modal.second[:2]
             frame = turned_frame(state.rotary, angles) if state.rotary is not None else None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -34,8 +35,6 @@ from cornersmooth.nc_reader.acts import (
     TiltedPlane,
     ToMachine,
     drill,
-    room_of,
-    rotated_frame,
     wrong,
 )
 from cornersmooth.nc_reader.dialects import Dialect
@@ -158,10 +157,10 @@ class Siemens(Dialect):
             if mode > 0b111111 or 0 in axes or axes[0] == axes[1] or axes[1] == axes[2]:
                 raise refused(line, f"CYCLE800 in the mode {mode}", "use 57: axis by axis about X, Y, Z")
             turns = [("XYZ"[axis - 1], float(angle)) for axis, angle in zip(axes, angles, strict=True)]
-            frame = rotated_frame(turns)
+            plane = TiltedPlane.by(turns, angles)
             before, behind = (list(map(float, match[name].split(","))) for name in ("before", "behind"))
-            x, y, z = (np.array(before) + frame @ behind).tolist()
-            yield Tilt(TiltedPlane(frame, room_of(angles), origin=(x, y, z)))
+            x, y, z = (np.array(before) + plane.frame @ behind).tolist()
+            yield Tilt(replace(plane, origin=(x, y, z)))
 
     def _to_machine(self, line: Line) -> Acts:
         """SUPA: a rapid in machine coordinates, without frames."""
