@@ -310,3 +310,13 @@ def test_missing_file_and_folder_as_input(tmp_path: Path) -> None:
         assert name in message(result.stderr)
         assert quiet(result.stderr)
     assert "smooth takes folders with -d" in message(run("info", ".", cwd=tmp_path).stderr)
+
+
+def test_the_object_on_the_screen_is_that_of_the_file(small: Path, tmp_path: Path) -> None:
+    """Nothing is left out of it that a report in a file has."""
+    args = ("smooth", str(small), "--force", "-o", str(tmp_path / "out.nc"))
+    shown = json.loads(run(*args, "--json").stdout)
+    run(*args, "-q", "--report", str(tmp_path / "out.json"))
+    kept = json.loads((tmp_path / "out.json").read_text())
+    assert shown["verification"] == kept["verification"]
+    assert shown["verification"]["max_tangent_jump_deg"] is not None

@@ -196,7 +196,7 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> None:
             verify=not given.no_verify,
             strict=given.strict,
             force=force,
-            continuity=bool(job.reports),
+            continuity=bool(job.reports) or given.as_json,
             processes=None if job.alone else 1,
             progress=progress,
         )
