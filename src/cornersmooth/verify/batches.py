@@ -25,7 +25,7 @@ from cornersmooth.verify.parse import BEFORE, Parse, Part
 from cornersmooth.verify.passage import AROUND, LONGER
 from cornersmooth.verify.task import ARITHMETIC, Task
 
-#: elements in a batch
+#: elements in a batch; half as many where there are curves, which have more vertices
 BATCH: Final = 1 << 15
 
 #: a stretch, see `Batch.stretches`
@@ -54,6 +54,10 @@ class Batches:
         self._told = False  # whether a lack of motion between its stops has been written
         self._ratio = 1.0  # how long the CL path is beside the written one, of the last batch that was cut
         self._pending: list[_Row] = []
+
+    @property
+    def _most(self) -> int:
+        return BATCH // 2 if len(self._ahead.nc.curves) else BATCH
 
     def of(self, chunks: Iterable[Elements]) -> Iterator[Batch]:
         """Give out all batches of a text."""
@@ -86,7 +90,7 @@ class Batches:
             else:
                 yield from self._flush()
                 self._move = -1
-        if self._move >= 0 and part.stop - 1 - self._element > BATCH + BATCH // 2:
+        if self._move >= 0 and part.stop - 1 - self._element > self._most + self._most // 2:
             yield from self._cut_open(part.stop - 1)
         wanted = [part.stop - BEFORE, *(one[0] - 2 for one in self._pending[:1])]
         self._ahead.forget(min([*wanted, self._element - 2] if self._move >= 0 else wanted))
@@ -116,10 +120,10 @@ class Batches:
         if not (cl_moves and nc_moves):
             return
         stop = int(self.task.original.trail.last[move_last])
-        while element_last - self._element > BATCH + BATCH // 2:
-            yield from self._cut(self._element + BATCH, stop)
+        while element_last - self._element > self._most + self._most // 2:
+            yield from self._cut(self._element + self._most, stop)
         waiting = self._pending
-        if waiting and (element_last - waiting[0][0] > BATCH or stop - waiting[0][2][0] > 2 * BATCH):
+        if waiting and (element_last - waiting[0][0] > self._most or stop - waiting[0][2][0] > 2 * self._most):
             yield from self._flush()
         start, end = np.minimum(self._place, stop), np.full(3, float(stop))
         self._pending.append((self._element, element_last, start, end, stop, self._guessed))
@@ -127,8 +131,8 @@ class Batches:
     def _cut_open(self, last: int) -> Iterator[Batch]:
         """Give out what is kept of a stretch whose end is not known yet, but its last element."""
         if self._move < self._move_last:
-            while last - self._element > BATCH + BATCH // 2:
-                yield from self._cut(self._element + BATCH, int(self.task.original.trail.last[self._move_last]))
+            while last - self._element > self._most + self._most // 2:
+                yield from self._cut(self._element + self._most, int(self.task.original.trail.last[self._move_last]))
             return
         # nothing of the CL path is left for what is kept: it may only stay where it is
         yield from self._flush()
