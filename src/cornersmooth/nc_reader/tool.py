@@ -147,20 +147,6 @@ def basis(knot: Floats, order: int, u: Floats) -> Floats:
     return values
 
 
-def basis_derivative(knot: Floats, order: int, u: Floats, times: int = 1) -> Floats:
-    """(k, p) derivatives of the basis functions with respect to u, of first or higher order."""
-    if times == 0:
-        return basis(knot, order, u)
-    points = len(knot) - order
-    if order < 2:
-        return np.zeros((len(u), points))
-    lower = np.pad(basis_derivative(knot[1:-1], order - 1, u, times - 1), ((0, 0), (1, 1)))
-    width = knot[order - 1 : order + points] - knot[: points + 1]
-    # the quotient with an empty knot interval counts as zero
-    share = (order - 1) * np.divide(lower, width, out=np.zeros_like(lower), where=width > 0)
-    return share[:, :-1] - share[:, 1:]
-
-
 @dataclass(frozen=True)
 class CurveGroup:
     """Curves with the same order and knots, k of them, with p control points each."""
@@ -199,9 +185,9 @@ class CurveGroup:
             points /= (self.weight @ values.T)[:, :, None]
         return points
 
-    def _combine(self, values: Floats, columns: slice = slice(None)) -> Floats:
+    def _combine(self, values: Floats) -> Floats:
         """(k, r, 6) sums of the weighted control points with the coefficients (r, p), most of which are zero."""
-        own = self._columns[:, columns]
+        own = self._columns
         result = np.zeros((len(values), *own.shape[1:]))
         for r, p in zip(*np.nonzero(values), strict=True):
             result[r] += values[r, p] * own[p]
@@ -214,19 +200,6 @@ class CurveGroup:
         if not self.plain:
             point /= np.einsum("ri,ri->r", value, self.weight[rows])[:, None]
         return point
-
-    def jet(self, u: float, columns: slice = slice(None)) -> tuple[Floats, Floats, Floats]:
-        """Points, first and second derivatives (k, 6) of all curves at one parameter, or some of their columns."""
-        at = np.array([u])
-        values = np.concatenate([basis_derivative(self.knot, self.order, at, times) for times in range(3)])
-        both = self._combine(values, columns)
-        point, slope, bend = both[:, 0], both[:, 1], both[:, 2]
-        if self.plain:
-            return point, slope, bend
-        below, fall, curl = (self.weight @ values.T).T[:, :, None]
-        point = point / below
-        slope = (slope - fall * point) / below
-        return point, slope, (bend - curl * point - 2 * fall * slope) / below
 
     def bezier(self, k: int) -> tuple[Floats, Floats]:
         """Control points (k, order, 6) and weights (k, order) of the k-th knot interval alone.
