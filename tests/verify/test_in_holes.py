@@ -52,3 +52,10 @@ def test_a_dwell_is_at_the_bottom(control: str) -> None:
         for place in (k - 1, k + 1):
             others = [*lines[:k], *lines[k + 1 :]]
             assert codes(text, [*others[:place], lines[k], *others[place:]], control) == {"CS556"}, place
+
+
+def test_a_feed_move_out_of_a_hole_ends_at_its_pose() -> None:
+    text = CL.replace("CYCLE/OFF", "CYCLE/OFF\nFEDRAT/MMPM,200\nGOTO/40,0,12")
+    lines = right(text, "fanuc", "native")
+    out = next(k for k, line in enumerate(lines) if line.startswith("G1") and "Z12." in line)
+    assert codes(text, [*lines[:out], lines[out].replace("Z12.", "Z13."), *lines[out + 1 :]])

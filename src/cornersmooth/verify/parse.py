@@ -256,7 +256,7 @@ class Parse:
         """Whether what follows a stop begins with an element; holes may be left out, and what leads nowhere."""
         lines, following, has = self.lines, stop + 1, self._ahead.has(element)
         if self._fed[stop]:
-            if has and lines.feeds(element):
+            if self._feeds_on(stop, element):
                 return True
             if not self._done(stop, element):
                 return False
@@ -269,6 +269,14 @@ class Parse:
             return self._may_be_left_out(following) and self._begins(following, element)
         there = element > 0 and lines.at(self._move[following], element - 1)
         return self._reaches(following, element) or (there and self._begins(following, element))
+
+    def _feeds_on(self, stop: int, element: int) -> bool:
+        """Whether feed moves from an element on may lead to the last pose before the next stop."""
+        move = self._move[stop + 1] - 1
+        for one in range(element, element + _AFTER_FAULT):
+            if not self._ahead.has(one) or not self.lines.feeds(one) or self.lines.at(move, one):
+                return self._ahead.has(one) and self.lines.feeds(one)
+        return True
 
     def _is_in_doubt(self, stop: int, element: int) -> bool:
         """Whether nobody can tell which of holes in one line an element belongs to: a cycle of the control tells."""
