@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import cornersmooth
-from cornersmooth.arrays.vectors import unit
+from cornersmooth.arrays import unit
 from cornersmooth.feedrate import Limits, direct
 from cornersmooth.kinematics import load_machine
 from cornersmooth.kinematics.machine import Dynamics

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from cornersmooth.arrays.vectors import norm
+from cornersmooth.arrays import norm
 from cornersmooth.feedrate import Limits, curves, plan, taylor
 from cornersmooth.feedrate.path import Path, build_path
 from cornersmooth.feedrate.taylor import poses, taylor_along

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
+from cornersmooth.arrays import ranges, search, spread, starts
 from cornersmooth.geometry.bsplines import Splines
-from cornersmooth.geometry.ragged import ranges, search, spread, starts
 
 SIZES = (2, 9, 3)
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cornersmooth import Program, Settings, SmoothProgram, read
-from cornersmooth.arrays.vectors import unit
+from cornersmooth.arrays import unit
 from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.model import Floats
 from cornersmooth.smoothing import smooth

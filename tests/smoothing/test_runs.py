@@ -15,7 +15,7 @@ from scipy.interpolate import BSpline
 from scipy.optimize import NonlinearConstraint, minimize
 
 from cornersmooth import Limits, Program, Settings, postprocess, read, smooth
-from cornersmooth.arrays.vectors import unit
+from cornersmooth.arrays import unit
 from cornersmooth.feedrate import plan_text
 from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.kinematics import load_machine

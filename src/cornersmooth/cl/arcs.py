@@ -25,7 +25,7 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.arrays.vectors import dot, norm
+from cornersmooth.arrays import dot, norm
 from cornersmooth.cl.grammar import Record, number
 from cornersmooth.cl.messages import error, finding
 from cornersmooth.cl.poses import Vector, check_range, triple

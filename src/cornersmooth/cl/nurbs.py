@@ -37,8 +37,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.arrays import joined_rows
-from cornersmooth.arrays.vectors import unit
+from cornersmooth.arrays import joined_rows, unit
 from cornersmooth.cl.poses import AXIS_NOISE, System
 from cornersmooth.model import Curves, Floats, Ints, Move, Runs
 

@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from cornersmooth.arrays.vectors import norm
+from cornersmooth.arrays import norm
 from cornersmooth.cl.bulk import FARTHEST
 from cornersmooth.cl.dialects import Dialect
 from cornersmooth.cl.messages import error, finding

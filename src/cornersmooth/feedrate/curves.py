@@ -17,7 +17,7 @@ from math import comb
 
 import numpy as np
 
-from cornersmooth.arrays.vectors import norm, unit
+from cornersmooth.arrays import norm, unit
 from cornersmooth.geometry import nurbs
 from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.model import Bools, Corners, Floats, Ints, Program, Runs

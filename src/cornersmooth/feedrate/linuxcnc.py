@@ -26,7 +26,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cornersmooth.arrays.vectors import dot, norm, unit
+from cornersmooth.arrays import dot, norm, unit
 from cornersmooth.errors import InputError
 from cornersmooth.kinematics import Machine, check_dynamics
 from cornersmooth.model import MM_PER_UNIT, Bools, Floats, Ints

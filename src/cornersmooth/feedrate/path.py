@@ -14,7 +14,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.arrays.vectors import angle_between, dot, norm, unit
+from cornersmooth.arrays import angle_between, dot, norm, unit
 from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate.curves import STANDSTILL, WHOLE, Curves, end_tangents
 from cornersmooth.model import Bools, Corners, FeedMode, Floats, Ints, Move, Program, Runs, Status

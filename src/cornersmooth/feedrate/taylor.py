@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cornersmooth.arrays.vectors import norm
+from cornersmooth.arrays import norm
 from cornersmooth.feedrate.curves import parameters_at, taylor_series
 from cornersmooth.feedrate.path import Kind, Path, arc_series
 from cornersmooth.model import Floats, Ints

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cornersmooth.arrays.vectors import dot, norm, unit
+from cornersmooth.arrays import dot, norm, unit
 from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate.curves import Curves, polynomial
 from cornersmooth.feedrate.intervals import Resolution

@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from cornersmooth.arrays.vectors import square, unit
+from cornersmooth.arrays import square, unit
 from cornersmooth.control.source import CHUNK
 from cornersmooth.control.state import State
 from cornersmooth.filter.motion import Job, says_motion

@@ -8,7 +8,7 @@ from itertools import compress
 
 import numpy as np
 
-from cornersmooth.arrays.vectors import norm
+from cornersmooth.arrays import norm
 from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.feedrate import Limits
 from cornersmooth.feedrate.linuxcnc import axis_limits, line_times, program_lines

@@ -11,8 +11,7 @@ import math
 
 import numpy as np
 
-from cornersmooth.arrays.vectors import dot, norm
-from cornersmooth.geometry.ragged import spread
+from cornersmooth.arrays import dot, norm, spread
 from cornersmooth.model import Floats, Ints, Program
 from cornersmooth.settings import Settings
 

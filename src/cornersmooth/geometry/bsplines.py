@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from cornersmooth.geometry.ragged import ranges, search, spread, starts
+from cornersmooth.arrays import ranges, search, spread, starts
 from cornersmooth.model import Floats, Ints
 
 

@@ -15,7 +15,7 @@ from typing import Annotated, Any, Final, Literal, TypeVar
 
 import numpy as np
 
-from cornersmooth.arrays.vectors import unit as unit_vector
+from cornersmooth.arrays import unit as unit_vector
 from cornersmooth.errors import SettingsError
 from cornersmooth.model import Floats
 from cornersmooth.tables import Shelf, Table

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cornersmooth.arrays.vectors import dot, norm
+from cornersmooth.arrays import dot, norm
 from cornersmooth.errors import InputError
 from cornersmooth.kinematics.machine import LINEAR, PARALLEL, Machine
 from cornersmooth.model import Bools, Floats, Ints

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cornersmooth.arrays.vectors import norm
+from cornersmooth.arrays import norm
 from cornersmooth.geometry.arcs import arc_lines, arc_points, arc_radii, arc_weights, curve_deviation, divided
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Keep, Program
 from cornersmooth.nc.form import Form

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.arrays.vectors import unit
+from cornersmooth.arrays import unit
 from cornersmooth.kinematics import machine_position, tool_axis
 from cornersmooth.model import MM_PER_UNIT, Bools, Floats, Ints, Program, Units
 from cornersmooth.nc.control import INVERSE_TIME, Motion

@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.arrays import some_rows
+from cornersmooth.arrays import ranges, some_rows
 from cornersmooth.geometry.bsplines import Splines
-from cornersmooth.geometry.ragged import ranges
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc.circles import Circles
 from cornersmooth.nc.coordinates import BlockRows, Coordinates

@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from cornersmooth.arrays.vectors import norm
+from cornersmooth.arrays import norm
 from cornersmooth.errors import SettingsError
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import MM_PER_UNIT, Move, Program, Units

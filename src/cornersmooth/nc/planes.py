@@ -18,7 +18,7 @@ from typing import Final
 
 import numpy as np
 
-from cornersmooth.arrays.vectors import norm
+from cornersmooth.arrays import norm
 from cornersmooth.errors import InputError
 from cornersmooth.geometry.arcs import poses_and_arcs
 from cornersmooth.kinematics import Machine, machine_position, solutions, tool_axis

@@ -8,9 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cornersmooth.arrays import some_rows
-from cornersmooth.arrays.vectors import norm, unit
-from cornersmooth.geometry.ragged import spread
+from cornersmooth.arrays import norm, some_rows, spread, unit
 from cornersmooth.kinematics import inverse_time, machine_position, tip_position, tool_axis
 from cornersmooth.kinematics.machine import LINEAR
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program, SmoothProgram, rapid_moves

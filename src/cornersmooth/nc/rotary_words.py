@@ -17,9 +17,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from cornersmooth.arrays.vectors import norm
+from cornersmooth.arrays import norm, starts
 from cornersmooth.errors import InputError, SettingsError
-from cornersmooth.geometry.ragged import starts
 from cornersmooth.kinematics import Machine, check_travel, solutions, tool_axis
 from cornersmooth.kinematics.poses import angle_between, nose_position
 from cornersmooth.model import Bools, Floats, Ints, Move, Program, Runs, SmoothProgram, rapid_moves, still_poses

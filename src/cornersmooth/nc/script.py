@@ -20,8 +20,7 @@ from itertools import accumulate, chain, pairwise, repeat, takewhile
 
 import numpy as np
 
-from cornersmooth.arrays import some_rows
-from cornersmooth.arrays.vectors import dot
+from cornersmooth.arrays import dot, some_rows
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program, Statement
 from cornersmooth.nc.blocks import feed_digits, feed_ticks
 from cornersmooth.nc.circles import FIRST_PLANE

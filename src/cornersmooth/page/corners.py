@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cornersmooth.arrays import some_rows
-from cornersmooth.arrays.vectors import angle_between
+from cornersmooth.arrays import angle_between, some_rows
 from cornersmooth.model import Bools, Floats, Ints, LimitedBy, Program, SmoothProgram, Status
 from cornersmooth.report.tables import corner_table
 from cornersmooth.smoothing.sharp import other_corners, sharp_rows

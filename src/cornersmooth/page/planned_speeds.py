@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cornersmooth.arrays.vectors import norm
+from cornersmooth.arrays import norm
 from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.feedrate import Limits, TimeLaw, direct, plan_text
 from cornersmooth.feedrate.written import written_motion

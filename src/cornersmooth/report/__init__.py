@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
-from cornersmooth.arrays.vectors import dot, norm
+from cornersmooth.arrays import dot, norm
 from cornersmooth.errors import Finding, InputError
 from cornersmooth.geometry.arcs import arc_radii
 from cornersmooth.kinematics import Machine

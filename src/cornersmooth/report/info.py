@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from cornersmooth.arrays.vectors import angle_between, dot, norm
+from cornersmooth.arrays import angle_between, dot, norm
 from cornersmooth.cl.operations import Operation, find_operations
 from cornersmooth.geometry.arcs import arc_radii
 from cornersmooth.geometry.tool import tools_of

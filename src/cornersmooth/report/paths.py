@@ -9,8 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cornersmooth.arrays import joined_rows, some_rows
-from cornersmooth.arrays.vectors import angle_between, dot, norm
+from cornersmooth.arrays import angle_between, dot, joined_rows, norm, some_rows
 from cornersmooth.geometry.arcs import poses_and_arcs
 from cornersmooth.model import Bools, Floats, Ints, Move, Program
 from cornersmooth.nc_reader.elements import Element, NcProgram

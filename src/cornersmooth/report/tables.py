@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.arrays.vectors import angle_between, dot, norm, square, unit
+from cornersmooth.arrays import angle_between, dot, norm, square, unit
 from cornersmooth.errors import InputError
 from cornersmooth.geometry import nurbs
 from cornersmooth.kinematics.machine import LINEAR

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.arrays import joined_rows
-from cornersmooth.arrays.vectors import norm
+from cornersmooth.arrays import joined_rows, norm
 from cornersmooth.errors import Finding, InputError
 from cornersmooth.kinematics.machine import Machine
 from cornersmooth.kinematics.poses import (

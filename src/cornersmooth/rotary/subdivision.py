@@ -17,9 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cornersmooth.arrays import joined_rows, some_rows
-from cornersmooth.arrays.vectors import dot, norm, unit
-from cornersmooth.geometry.ragged import spread
+from cornersmooth.arrays import dot, joined_rows, norm, some_rows, spread, unit
 from cornersmooth.kinematics.machine import Machine
 from cornersmooth.kinematics.poses import (
     angle_between,

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cornersmooth.arrays import some_rows
-from cornersmooth.arrays.vectors import norm
+from cornersmooth.arrays import norm, some_rows
 from cornersmooth.model import Floats, Ints
 from cornersmooth.smoothing.long_lines import LineLimits, Vertices
 

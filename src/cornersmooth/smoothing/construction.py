@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.arrays.vectors import norm, unit
-from cornersmooth.geometry.ragged import ranges, starts
+from cornersmooth.arrays import norm, ranges, starts, unit
 from cornersmooth.model import Bools, Corners, FeedMode, Floats, Ints, Move, Program, SmoothProgram, Status
 from cornersmooth.settings import AUTO, DEFAULT_METHOD, METHODS, Settings
 

@@ -21,8 +21,7 @@ from typing import Final
 
 import numpy as np
 
-from cornersmooth.arrays.vectors import dot, norm, unit
-from cornersmooth.geometry.ragged import split, spread, starts
+from cornersmooth.arrays import dot, norm, split, spread, starts, unit
 from cornersmooth.model import Bools, Floats, Ints
 
 #: rad; by how much pieces may turn where they meet and the polyline does not

@@ -9,10 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from cornersmooth.arrays import joined_rows, some_runs
-from cornersmooth.arrays.vectors import angle_between, norm, unit
+from cornersmooth.arrays import angle_between, joined_rows, norm, some_runs, spread, starts, unit
 from cornersmooth.geometry.bsplines import Splines
-from cornersmooth.geometry.ragged import spread, starts
 from cornersmooth.model import Bools, Floats, Ints, Keep, LimitedBy, Program, Runs, SmoothProgram, Status
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.construction import RUN_CURVATURE, STRAIGHT_ON, find_neighbours

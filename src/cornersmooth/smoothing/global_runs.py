@@ -7,10 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cornersmooth.arrays import joined_rows, some_runs
-from cornersmooth.arrays.vectors import angle_between
+from cornersmooth.arrays import angle_between, batches, joined_rows, ranges, some_runs, spread, starts
 from cornersmooth.errors import Finding
-from cornersmooth.geometry.ragged import batches, ranges, spread, starts
 from cornersmooth.model import Bools, Corners, Floats, Ints, LimitedBy, Program, Runs, SmoothProgram, Status, Trait
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.construction import RUN_CURVATURE, Progress, find_neighbours, place_corners

@@ -16,8 +16,7 @@ from functools import partial
 
 import numpy as np
 
-from cornersmooth.arrays.vectors import dot, norm, square
-from cornersmooth.geometry.ragged import split, spread, starts
+from cornersmooth.arrays import dot, norm, split, spread, square, starts
 from cornersmooth.model import Bools, Floats, Ints, Move, SmoothProgram, Status, Trait
 
 #: rows after which a line ends in any case; so many parts are worked on side by side

@@ -17,8 +17,7 @@ from functools import partial
 
 import numpy as np
 
-from cornersmooth.arrays import Bools, Floats, Ints, some_rows
-from cornersmooth.arrays.vectors import norm, square
+from cornersmooth.arrays import Bools, Floats, Ints, norm, some_rows, square
 from cornersmooth.smoothing.long_lines import LANE, LineLimits, Vertices, farthest, fewest_lines, without_lag
 
 #: times the limits that chords may be off: moving their ends does not balance them perfectly

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.arrays.vectors import dot, norm, square, unit
+from cornersmooth.arrays import dot, norm, square, unit
 from cornersmooth.geometry import nurbs
 from cornersmooth.model import Floats, Ints, LimitedBy, SmoothProgram, Status
 from cornersmooth.settings import Settings

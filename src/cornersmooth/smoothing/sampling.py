@@ -12,11 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.arrays import joined_rows, some_rows
-from cornersmooth.arrays.vectors import unit
+from cornersmooth.arrays import joined_rows, ranges, some_rows, starts, unit
 from cornersmooth.geometry import nurbs
 from cornersmooth.geometry.arcs import arc_curves, arc_lines, arc_points, arc_weights, divided
-from cornersmooth.geometry.ragged import ranges, starts
 from cornersmooth.model import Bools, Floats, Ints, Numbers, SmoothProgram
 from cornersmooth.smoothing.construction import construction_of
 from cornersmooth.smoothing.runs.rows import NO_ROWS, SectionRows, run_lines, section_rows, some_at_once

@@ -12,7 +12,7 @@ from functools import cache
 
 import numpy as np
 
-from cornersmooth.arrays.vectors import norm, square
+from cornersmooth.arrays import norm, square
 from cornersmooth.geometry import nurbs
 from cornersmooth.model import Bools, Floats, Ints, Move, Numbers, SmoothProgram, Status
 from cornersmooth.settings import FLIP_ANGLE, METHODS, STANDING, Settings

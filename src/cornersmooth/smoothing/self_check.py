@@ -14,8 +14,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from cornersmooth.arrays import some_rows
-from cornersmooth.arrays.vectors import angle_between, norm, square, unit
+from cornersmooth.arrays import angle_between, norm, some_rows, square, unit
 from cornersmooth.geometry import nurbs
 from cornersmooth.model import Floats, Ints
 from cornersmooth.settings import Settings

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.arrays.vectors import angle_between
+from cornersmooth.arrays import angle_between
 from cornersmooth.geometry.arcs import arc_tangents
 from cornersmooth.model import Floats, Ints, Move, Program, SmoothProgram, Status, Trait
 from cornersmooth.smoothing.construction import BATCH, STRAIGHT_ON, legs_at

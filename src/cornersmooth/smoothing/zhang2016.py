@@ -7,8 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from cornersmooth.arrays import some_rows
-from cornersmooth.arrays.vectors import angle_between, dot, norm, unit
+from cornersmooth.arrays import angle_between, dot, norm, some_rows, unit
 from cornersmooth.geometry import nurbs
 from cornersmooth.model import Corners, Floats, Ints, LimitedBy, Program, SmoothProgram, Status
 from cornersmooth.settings import Settings

@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from cornersmooth.arrays import some_rows
-from cornersmooth.arrays.vectors import dot, norm, square, unit
+from cornersmooth.arrays import dot, norm, some_rows, square, unit
 from cornersmooth.errors import SettingsError
 from cornersmooth.geometry.tool import Tool
 from cornersmooth.model import Bools, Floats, Ints, Program

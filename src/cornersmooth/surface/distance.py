@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from cornersmooth.arrays.vectors import dot, norm
+from cornersmooth.arrays import dot, norm
 from cornersmooth.geometry.tool import Tool
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.surface.motion import Parts, RuledMotion

@@ -17,9 +17,8 @@ from functools import cached_property
 
 import numpy as np
 
-from cornersmooth.arrays.vectors import dot, norm, unit
+from cornersmooth.arrays import dot, norm, spread, unit
 from cornersmooth.geometry.arcs import divided, poses_and_arcs
-from cornersmooth.geometry.ragged import spread
 from cornersmooth.geometry.tool import Tool
 from cornersmooth.model import Bools, Floats, Ints, Move, Program
 from cornersmooth.nc_reader import NcProgram

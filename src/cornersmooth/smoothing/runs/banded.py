@@ -9,8 +9,8 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csc_array, csr_array
 
+from cornersmooth.arrays import ranges, spread, starts
 from cornersmooth.geometry.bsplines import Splines
-from cornersmooth.geometry.ragged import ranges, spread, starts
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.system.lapack import dpbsv
 

@@ -16,10 +16,8 @@ from functools import cached_property
 
 import numpy as np
 
-from cornersmooth.arrays import some_rows
-from cornersmooth.arrays.vectors import dot, norm
+from cornersmooth.arrays import dot, norm, ranges, some_rows, spread, starts
 from cornersmooth.geometry.bsplines import Splines
-from cornersmooth.geometry.ragged import ranges, spread, starts
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.smoothing.runs.banded import TAPS, Gather, Windows
 from cornersmooth.smoothing.runs.fitting import holding_poses

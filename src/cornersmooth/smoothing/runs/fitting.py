@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from cornersmooth.arrays import some_rows
+from cornersmooth.arrays import ranges, some_rows, spread
 from cornersmooth.geometry.bsplines import Splines
-from cornersmooth.geometry.ragged import ranges, spread
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.smoothing.runs.banded import Gather, Windows, applied, near_spans, solve_scalar
 from cornersmooth.smoothing.runs.polylines import Pieces, Polylines, Samples

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cornersmooth.arrays import search, spread, starts
 from cornersmooth.geometry.bsplines import Splines
-from cornersmooth.geometry.ragged import search, spread, starts
 from cornersmooth.model import Floats, Ints
 
 #: steps of the shortest segment: knots lie between its ends

@@ -16,10 +16,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.arrays import some_runs
-from cornersmooth.arrays.vectors import angle_between, norm, unit
+from cornersmooth.arrays import angle_between, batches, norm, search, some_runs, spread, starts, unit
 from cornersmooth.geometry.bsplines import Splines
-from cornersmooth.geometry.ragged import batches, search, spread, starts
 from cornersmooth.model import Floats, Ints, Numbers, Program, Runs
 from cornersmooth.settings import STANDING, Settings
 from cornersmooth.smoothing.runs.polylines import Pieces, Polylines

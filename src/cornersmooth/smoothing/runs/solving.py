@@ -17,9 +17,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cornersmooth.arrays.vectors import angle_between, norm
+from cornersmooth.arrays import angle_between, batches, norm, spread, starts
 from cornersmooth.geometry.bsplines import Splines
-from cornersmooth.geometry.ragged import batches, spread, starts
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.smoothing.runs.banded import Windows, near_spans
 from cornersmooth.smoothing.runs.batches import Problem, solve_windows
