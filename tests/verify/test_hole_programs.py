@@ -82,10 +82,8 @@ REFUSED_ONCE = {
     1520289: "holes of two tools in one line",
     1005030: "the CL file's own rapid into a hole that is drilled behind it",
     1700118: "taps of the control that end where the feed move before them does",
-    1700133: "GOHOME behind three tools, the last of them the first",
     1600217: "two bores at one pose, coolant between them, and a feed move to where they are left",
     1503308: "a tool that only stands over a tap that is left out",
-    1530027: "a hole behind a tool change for which the program has no way back",
     1520304: "a stop between a bore and a tap that is left out, where the way up is the next rapid",
 }
 
@@ -99,6 +97,8 @@ RANDOM_REFUSED_ONCE = {
 
 #: seeds that are refused still: a hole program, and programs at random
 KNOWN = {
+    1530027: "a rapid aslant to a hole behind a tool change for which the program has no way back: it may collide",
+    1700133: "GOHOME behind three tools, the last of them the first: another speed holds on the way home",
     1503284: "a feed move to where the tool has been before its change: what leads nowhere in the CL file has no feed",
     1710186: "two optional stops around a tool that does nothing",
     8600559: "a dwell between poses that are a digit apart: the text passes them in one",

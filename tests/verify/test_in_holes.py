@@ -59,3 +59,26 @@ def test_a_feed_move_out_of_a_hole_ends_at_its_pose() -> None:
     lines = right(text, "fanuc", "native")
     out = next(k for k, line in enumerate(lines) if line.startswith("G1") and "Z12." in line)
     assert codes(text, [*lines[:out], lines[out].replace("Z12.", "Z13."), *lines[out + 1 :]])
+
+
+def test_a_dwell_within_a_hole_is_not_that_behind_it() -> None:
+    text = CL.replace("DRILL,DEPTH,15,MMPM,100,CLEAR,2", "DEEP,DEPTH,15,MMPM,100,CLEAR,2,STEP,4")
+    text = text.replace("CYCLE/OFF", "CYCLE/OFF\nDELAY/0.5")
+    lines = right(text, "fanuc", "moves")
+    dwell = next(k for k, line in enumerate(lines) if line.startswith("G4 "))
+    others = [*lines[:dwell], *lines[dwell + 1 :]]
+    within = [k for k in range(dwell) if re.match(r"G1 .*Z-", others[k]) and "X40." in others[k]]
+    assert len(within) == 4
+    for k in within:
+        for place in (k, k + 1):
+            assert codes(text, [*others[:place], lines[dwell], *others[place:]]) == {"CS556"}, place
+
+
+AFTER_A_TOOL = CL.replace("GOTO/40,0,0", "LOADTL/4\nGOTO/40,0,-30")
+
+
+def test_a_rapid_goes_across_at_the_higher_level_behind_a_tool_change_without_way_back() -> None:
+    lines = right(AFTER_A_TOOL, "generic", "moves")
+    change = next(k for k, line in enumerate(lines) if line.startswith("T4"))
+    across = next(k for k in range(change, len(lines)) if lines[k].startswith("G0 "))
+    assert codes(AFTER_A_TOOL, [*lines[:across], *lines[across + 1 :]], "generic") == {"CS563"}

@@ -81,7 +81,6 @@ class _Side:
     unsure: set[str] = field(default_factory=set)
     read: int = 0
     line: int = 0  #: of the last word that has been read
-    tools: int = 0  #: how often the tool has changed
     #: spindle and coolant that are on with a tool since the last motion, and the words that do it
     running: dict[Key, Token] = field(default_factory=dict)
 
@@ -98,11 +97,9 @@ class _Side:
             token = self.tokens[self.read]
             self.read, self.line = self.read + 1, token.line or self.line
             if token.kind in _ACTIONS:
-                values = {kind: self.value(kind) for kind in _AT_PAUSES if kind not in self.unsure}
-                done.append((token, values | {"tool": self.tools} if token.kind == "home" else values))
+                done.append((token, {kind: self.value(kind) for kind in _AT_PAUSES if kind not in self.unsure}))
                 continue
             changes, self.held[token.kind] = token.value != self.value(token.kind), token
-            self.tools += changes and token.kind == "tool"
             self.unsure.discard(token.kind)
             if token.kind == "tool" and self.stops:
                 self.held |= {kind: Token(kind, "OFF", token.place, 0) for kind in _STOPPED}

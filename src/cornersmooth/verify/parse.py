@@ -302,8 +302,7 @@ class Parse:
         if any(one.code != "CS541" for one in found) and self._is_in_doubt(stop, begin):
             self.acts.unlooked.append((lines.nc_line(begin), "holes above one another in one line"))
             found = []
-        away = self._words.tool_changes(begin) > self._words.tool_changes(begin - 1)
-        if not away and self._along.next_retract(begin) != begin and (slant := lines.slant(move, begin)):
+        if self._along.next_retract(begin) != begin and (slant := lines.slant(move, begin)):
             text = f"a rapid goes aslant to a hole, {slant:.4f} mm: across at the higher level, then down"
             found.append(lines.problem("CS563", move, begin, text, slant))
         self.acts.problems += found

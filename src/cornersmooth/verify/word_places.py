@@ -92,15 +92,11 @@ class WordPlaces:
         # that of those no element names is written
         missed = [int(original.trail.owner[int(one.place)]) for one in found.violations if one.code == "CS524"]
         holes = {self._moving(one.first): one for one in batches.acts.holes}
-        within = {
-            first: [
-                token
-                for token in _within(nc_tokens, first, one.leaves)
-                if token.kind != "dwell" or token.place == self._moving(one.bottom)
-            ]
-            for first, one in holes.items()
-        }
+        within = {first: _within(nc_tokens, first, one.leaves) for first, one in holes.items()}
         inside = {id(one) for some in within.values() for one in some if one.kind in ("dwell", "tap")}
+        for first, one in holes.items():  # a dwell elsewhere in a hole is neither the hole's nor DELAY
+            bottom = self._moving(one.bottom)
+            within[first] = [token for token in within[first] if token.kind != "dwell" or token.place == bottom]
         comparison = Comparison(cl_tokens, [one for one in nc_tokens if id(one) not in inside], means, own)
         acts = self._acts(leading)
         cl_places = np.array(sorted({one.place for one in cl_tokens} | homes), np.int64)
