@@ -321,3 +321,24 @@ def test_the_tool_leaves_a_hole_at_the_height_at_which_it_comes_to_the_next_one_
     holes = f"{first}\nGOTO/0,0,0\n{second}\nGOTO/20,0,0\nCYCLE/OFF\n"
     found, _ = heights(f"{PLAIN}LOADTL/1\nSPINDL/900,CLW\nRAPID\nGOTO/0,0,30,0,0,1\n{holes}FINI\n")
     assert found[found.index("G0 3") :] == ["G0 3", "G1 -10", "G0 50", "G0 50", "G0 3", "G1 -8", "G0 50"]
+
+
+def test_moves_behind_a_cycle_of_the_control_go_up_before_they_go_across() -> None:
+    """The cycle ends at its own height of travel, the hole after it lies higher: straight up, then straight across."""
+    tap, drill = "CYCLE/TAP,FEDTO,4,RAPTO,3,RTRCTO,3,MMPM,100", "CYCLE/DRILL,FEDTO,4,RAPTO,3,RTRCTO,3,MMPM,250"
+    holes = f"{tap}\nGOTO/0,0,0\n{drill}\nGOTO/20,0,40\nCYCLE/OFF\n"
+    cl = f"{PLAIN}LOADTL/1\nSPINDL/900,CLW\nRAPID\nGOTO/0,0,30,0,0,1\n{holes}FINI\n"
+    lines, _ = text_of_cl(cl)
+    cycle = next(k for k, line in enumerate(lines) if "G84" in line)
+    behind = [line for line in lines[cycle:] if line.startswith(("G0 ", "G1 "))]
+    places = [tuple(float(x) for x in re.findall(r"[XZ](-?[\d.]+)", line)) for line in behind]
+    assert places == [(0.0, 43.0), (20.0, 43.0), (20.0, 36.0), (20.0, 43.0)]
+
+
+@pytest.mark.parametrize("heights_of_return", [(50, 80), (80, 50)])
+def test_holes_before_and_behind_the_way_home_have_heights_of_their_cycles(heights_of_return: tuple[int, int]) -> None:
+    first, second = (f"CYCLE/DRILL,FEDTO,10,RAPTO,3,RTRCTO,{one},MMPM,250" for one in heights_of_return)
+    holes = f"{first}\nGOTO/0,0,0\nGOHOME\n{second}\nGOTO/20,0,0\nCYCLE/OFF\n"
+    found, _ = heights(f"{PLAIN}LOADTL/1\nSPINDL/900,CLW\nRAPID\nGOTO/0,0,30,0,0,1\n{holes}FINI\n")
+    drilled = [[f"G0 {one}", "G0 3", "G1 -10", f"G0 {one}"] for one in heights_of_return]
+    assert [line for line in found if " X" not in line][-8:] == drilled[0] + drilled[1]

@@ -14,6 +14,7 @@ Python runs per run of holes; per hole where the control has a cycle for it, or 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import accumulate, chain, pairwise, repeat, takewhile
@@ -152,7 +153,8 @@ class Script:
         least = np.array([0.0 if one is None else max(one.retract, one.clearance or 0.0) for one in cycles])
         travel = travel_height(program, poses, np.maximum.accumulate(moves)[poses])
         travel = np.maximum(travel, least[self.drillings.of(poses)])
-        return poses, travel, *crossings(program, poses, travel)
+        homes = [one.pose for one in program.statements if one.word == "GOHOME" and self.motion.modals.can_rewind]
+        return poses, travel, *crossings(program, poses, travel, [*tool_starts(program), *homes])
 
     def _drill(self, rows: Rows) -> None:
         """Write holes of one cycle, of the control or as plain moves; those left out are only approached."""
@@ -168,7 +170,7 @@ class Script:
             cycle = None
         clearance = np.full(len(poses), cycle.clearance) if cycle and cycle.clearance is not None else travel
         if cycle is not None and kind:
-            self._cycles(cycle, kind, poses, travel, clearance)
+            self._cycles(cycle, kind, poses, (travel, clearance, leave))
             return
         hole, tip, rapid, dwell = hole_moves(cycle, program, poses, (enter, clearance, leave))
         plain = BlockRows.straight(program, motion.ticks_at(rows, tip, hole), poses[hole])
@@ -209,9 +211,13 @@ class Script:
             return "", f"a tap, and {where}"
         return kind if self.native or cycle.tap else "", ""
 
-    def _cycles(self, cycle: Cycle, kind: str, poses: Ints, travel: Floats, clearance: Floats) -> None:
-        """Write holes as cycles of the control, each from the height at which the tool goes from hole to hole."""
+    def _cycles(self, cycle: Cycle, kind: str, poses: Ints, above: tuple[Floats, Floats, Floats]) -> None:
+        """Write holes as cycles of the control, each from its height of travel; the last is left as `crossings` plans.
+
+        Heights (h,) above the holes, mm: of travel, where feeding begins, and from which the tool goes.
+        """
         motion, program, at = self.motion, self.motion.program, self.motion.at
+        travel, clearance, leave = above
         motion.findings.note_each("CS347", program.line[poses])
         if kind == "tap":
             motion.findings.note_each("CS348", program.line[poses])
@@ -246,6 +252,8 @@ class Script:
             motion.stand(over[k])
         motion.say(table.off)
         motion.modals.now["feed"] = -1
+        left = at.ticks(program.tip[poses[-1:]] + leave[-1] * frame[:, 2], program.axis[poses[-1:]])
+        motion.emit(motion.moving(BlockRows.straight(program, left, poses[-1:], rapid=True)))
 
 
 def _numbers(
@@ -295,15 +303,15 @@ def hole_moves(
     return np.repeat(np.arange(len(poses)), len(moves)), tip.reshape(-1, 3), rapid, waits
 
 
-def crossings(program: Program, poses: Ints, travel: Floats) -> tuple[Floats, Floats]:
+def crossings(program: Program, poses: Ints, travel: Floats, starts: Sequence[int]) -> tuple[Floats, Floats]:
     """(h,) mm: heights over holes at which the tool comes to each and goes from it, between two at the higher travel.
 
-    So it is between holes with one axis that one tool drills one after the other.
+    So it is between holes with one axis, one after the other, unless the tool comes from elsewhere: at poses `starts`.
     """
     tip, axis, enter, leave = program.tip[poses], program.axis[poses], travel.copy(), travel.copy()
     down = dot(tip[:-1] - tip[1:], axis[1:])  # to the next, along the tool
     same = (dot(axis[:-1], axis[1:]) > 1.0 - _SAME_AXIS) & (np.diff(poses) == 1)
-    same &= ~np.isin(poses[1:], tool_starts(program))
+    same &= ~np.isin(poses[1:], starts)
     enter[1:] = np.where(same, np.maximum(travel[1:], travel[:-1] + down), travel[1:])
     leave[:-1] = np.where(same, enter[1:] - down, travel[:-1])
     return enter, leave
