@@ -26,7 +26,6 @@ from cornersmooth.nc.form import Form
 from cornersmooth.nc.messages import Findings
 from cornersmooth.nc.planes import turned_part
 from cornersmooth.nc.statement_args import tool_starts
-from cornersmooth.rotary.angle_path import reach_error
 from cornersmooth.smoothing.sampling import Rows, all_dense_rows
 from cornersmooth.system.processes import return_free_memory
 
@@ -54,7 +53,7 @@ def rotary_way(rows: Rows, smoothed: SmoothProgram, form: Form, findings: Findin
 
     Raises InputError where the machine cannot follow the path.
     """
-    from cornersmooth.rotary import rewound_angles, rotary_angles
+    from cornersmooth.rotary import reach_error, rewound_angles, rotary_angles
 
     program, settings, machine = smoothed.program, smoothed.settings, machine_of(form).with_longest_tool()
     tip, axis, move = rows.tip, rows.other, rows.move
