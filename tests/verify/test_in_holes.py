@@ -52,6 +52,8 @@ def test_a_dwell_is_at_the_bottom(control: str) -> None:
         for place in (k - 1, k + 1):
             others = [*lines[:k], *lines[k + 1 :]]
             assert codes(text, [*others[:place], lines[k], *others[place:]], control) == {"CS556"}, place
+        for place in (k, k + 1):  # the last block again, in front of the dwell and behind it
+            assert not codes(text, [*lines[:place], lines[k - 1], *lines[place:]], control), place
 
 
 def test_a_feed_move_out_of_a_hole_ends_at_its_pose() -> None:

@@ -467,7 +467,9 @@ class Parse:
                 self.acts.begins.extend((move, group[0]))
         elif group:
             fed = [one for one in group if lines.feeds(one)]
-            deepest = min(fed, default=end, key=lambda one: lines.height(move, one))
+            bottom = 1 + min(fed, default=end, key=lambda one: lines.height(move, one))
+            while bottom < end and lines.stands(bottom):  # a block may be there twice
+                bottom += 1
             inside = [one + 1 for one in group if lines.height(move, one) < -lines.room] or fed[-1:] or group[:1]
-            self.acts.holes.append(Hole(move, group[0], deepest + 1, min(inside[-1], end), cycle))
+            self.acts.holes.append(Hole(move, group[0], bottom, min(inside[-1], end), cycle))
             self.acts.begins.extend((move, group[0]))
