@@ -90,6 +90,12 @@ def test_limits_of_axes_leave_the_words_as_they_are(program):
     assert found.limits[0][1] <= 1.0
 
 
+def test_linuxcnc_without_tip_control_has_no_time(program):
+    # words of the axes were compared with tips: both times came out as 0.0 s
+    form = choose_form("linuxcnc", machine=load_machine("xyzac-trt"), tcp=False)
+    assert planned_saving(program, fitted(form), form) is None
+
+
 def test_linuxcnc_takes_the_time_of_its_own_planner():
     """Of two lines of 10 mm, each from rest to rest, the second begins below the blend speed."""
     limits = replace(MACHINE, dynamics=tuple(Dynamics(name, 6e5, 1000.0, 1e6) for name in "XYZAC"))

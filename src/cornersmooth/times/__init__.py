@@ -60,9 +60,12 @@ class Timing:
         axes: Machine | None = None,
         blocks: BlockLimits | None = None,
     ) -> Timing | None:
-        """Give the limits of the axes of `axes`, else of the machine of the form; None where no axis has any."""
+        """Give the limits of the axes of `axes`, else of the machine of the form; None where no axis has any.
+
+        None for LinuxCNC without tip control, too: its unsmoothed lines would not keep the tip, so nobody runs them.
+        """
         machine = with_dynamics(form.machine if axes is None else axes)
-        if machine is None or (_linuxcnc(form) and form.machine is None):
+        if machine is None or (_linuxcnc(form) and (form.machine is None or form.orientation == "machine")):
             return None
         machine = endless(machine) if form.rewind else machine
         return cls(form, settings, limits or Limits(), machine, blocks or BlockLimits())
