@@ -35,7 +35,7 @@ from cornersmooth.kinematics import machine_position, tool_axis
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.messages import Findings
-from cornersmooth.nc.statement_args import ends, milliseconds, orders_at_cutters, tool_starts, words_of
+from cornersmooth.nc.statement_args import Orders, ends, milliseconds, tool_starts, words_of
 
 _MOST_PECKS = 1000  #: more pecks in one hole are a misunderstanding
 _KINDS = {"DRILL", "FACE", "SPOT", "CSINK", "REAM", "BORE", "DEEP", "DEEP2", "BRKCHP", "TAP"}
@@ -211,14 +211,14 @@ class Drillings:
         return np.searchsorted(self.first, poses, side="right") - 1
 
 
-def plan_drilling(program: Program, findings: Findings) -> Drillings:
+def plan_drilling(program: Program, orders: Orders, findings: Findings) -> Drillings:
     """Go through the statements about cycles, and about the spindle, whose turns a dwell may count."""
     given: Given | None = (set(), {})
-    drills, now, speed, (orders, _) = False, Drilling(), None, orders_at_cutters(program)
+    drills, now, speed = False, Drilling(), None
     first, each = [0], [now]
     for statement in program.statements:
         if statement.word == "SPINDL":
-            order = orders[id(statement)] or ("", None)
+            order = orders.spindle[id(statement)] or ("", None)
             speed, now = order[1] or speed, replace(now, clockwise=order[0] in ("CLW", "ON"))
         elif statement.word == "CYCLE" and ends(statement):
             drills = False

@@ -161,7 +161,9 @@ class Script:
         motion, poses = self.motion, rows.move
         program, motion.return_to = motion.program, NOWHERE
         said = self.drillings.each[self.drillings.of(poses)[0]]
-        travel, enter, leave = (some[np.searchsorted(self._heights[0], poses)] for some in self._heights[1:])
+        all_holes, *heights = self._heights
+        number = np.searchsorted(all_holes, poses)
+        travel, enter, leave = (some[number] for some in heights)
         cycle, (kind, why) = said.cycle, self._cycle_of_control(said.cycle, poses)
         if cycle is None or (cycle.tap and not kind):
             if not self.skip:

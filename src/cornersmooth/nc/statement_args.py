@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -80,27 +80,32 @@ def milliseconds(amount: float, in_revolutions: bool, speed: float | None) -> in
     return max(1, round(time)) if time > 0.0 else 0
 
 
-def orders_at_cutters(program: Program) -> tuple[dict[int, tuple[str, float | None] | None], dict[int, float]]:
-    """What each SPINDL asks for, None where it is not understood, and the cutter's diameter at each CUTCOM, mm.
+class Orders(NamedTuple):
+    """What statements ask for at the cutter before them, by their identity."""
 
-    Both are by identity. SPINDL asks for ORIENT, OFF, CLW, CCLW or ON, and the speed, rev/min; a cutting speed counts
-    at the cutter before it. Gears and limits of the speed are the control's own affair.
-    """
-    found, diameter, diameters = dict[int, tuple[str, float | None] | None](), 0.0, dict[int, float]()
-    for statement in program.statements:
-        words, numbers = words_of(statement), numbers_of(statement)
-        if statement.word in ("CUTTER", "TLDATA"):
-            mill = statement.word == "CUTTER" or {"MILL", "DRILL"} & set(words)
-            diameter = numbers[0] * program.mm_per_unit if mill and numbers else 0.0
-        elif statement.word == "SPINDL":
-            found[id(statement)] = _spindle_order(statement, diameter)
-        elif statement.word == "CUTCOM":
-            diameters[id(statement)] = diameter
-    return found, diameters
+    #: of SPINDL: ORIENT, OFF, CLW, CCLW or ON, and the speed, rev/min; None where it is not understood. A cutting speed
+    #: counts at the cutter; gears and limits of the speed are the control's own affair
+    spindle: dict[int, tuple[str, float | None] | None]
+    diameters: dict[int, float]  #: of the cutter at each CUTCOM, mm
+
+    @classmethod
+    def of(cls, program: Program) -> Orders:
+        """Go through the statements of a program."""
+        found, diameter = cls({}, {}), 0.0
+        for statement in program.statements:
+            if statement.word in ("CUTTER", "TLDATA"):
+                numbers = numbers_of(statement)
+                mill = statement.word == "CUTTER" or {"MILL", "DRILL"} & set(words_of(statement))
+                diameter = numbers[0] * program.mm_per_unit if mill and numbers else 0.0
+            elif statement.word == "SPINDL":
+                found.spindle[id(statement)] = _spindle_order(statement, diameter)
+            elif statement.word == "CUTCOM":
+                found.diameters[id(statement)] = diameter
+        return found
 
 
 def _spindle_order(statement: Statement, diameter: float) -> tuple[str, float | None] | None:
-    """What one SPINDL asks for, as of `orders_at_cutters`, at a diameter in mm."""
+    """What one SPINDL asks for, as of `Orders`, at a diameter in mm."""
     words, numbers = set(words_of(statement)), numbers_of(statement)
     if words & set(_LIMITS):
         words -= GEARS

@@ -21,12 +21,12 @@ from cornersmooth.nc.program_frame import comment_lines
 from cornersmooth.nc.statement_args import (
     GEARS,
     TOOL_WORDS,
+    Orders,
     ahead_of_tools,
     cutting_unit,
     ends,
     milliseconds,
     numbers_of,
-    orders_at_cutters,
     spoken_text,
     tool_loads,
     whole_number,
@@ -49,19 +49,17 @@ class StatementWriter:
     program: Program
     findings: Findings  #: takes what is noticed
     modals: Modals  #: what the control remembers
+    orders: Orders
     comments: bool = True  #: whether comments are written
     changed: bool = False  #: a tool change, or the way home, left the machine elsewhere
     direction: str = "clockwise"  #: field of the words for the way in which the spindle turns, as it was named last
     words: Words = field(init=False)
-    _orders: dict[int, tuple[str, float | None] | None] = field(init=False)  #: as of `orders_at_cutters`
-    _diameters: dict[int, float] = field(init=False)  #: the same
     _loads: dict[int, tuple[int, int]] = field(init=False)  #: tool and length register of statements, by identity
     _ahead_of_tools: frozenset[int] = field(init=False)
     _unknown: frozenset[int] = field(init=False)  #: statements that are not understood, by identity
 
     def __post_init__(self) -> None:
         self.words = self.form.table.words
-        self._orders, self._diameters = orders_at_cutters(self.program)
         self._loads = {id(statement): tool for statement, tool in tool_loads(self.program)}
         self._ahead_of_tools = ahead_of_tools(self.program)
         self._unknown = frozenset(map(id, statements_not_understood(self.program)))
@@ -120,7 +118,7 @@ class StatementWriter:
         staged = self.words.tool_select if self.words.stage_tool and not selected else ()
         speed = None
         if any("{speed}" in block for block in self.words.tool_change):
-            orders = (self._orders.get(id(one)) or ("", None) for one in between)
+            orders = (self.orders.spindle.get(id(one)) or ("", None) for one in between)
             speed = next((speed for _, speed in orders if speed), self.modals.speed)
             if not speed:
                 raise refused("CS354", self.program, statement.line, tool=number)
@@ -149,7 +147,7 @@ class StatementWriter:
 
     def spindle(self, statement: Statement) -> list[str] | None:
         """SPINDL in every order of its words."""
-        order = self._orders[id(statement)]
+        order = self.orders.spindle[id(statement)]
         if order is None or (order[0] == "ORIENT" and not self.words.spindle_orient):
             return None
         turn, speed = order
@@ -235,7 +233,7 @@ class StatementWriter:
             length = math.hypot(*(tips[pose] - tips[pose - 1])[:2]) if 0 < pose < len(tips) else math.inf
             if not length > 0.0:
                 raise refused("CS344", self.program, statement.line)
-            if length <= self._diameters[id(statement)] / 2.0:
+            if length <= self.orders.diameters[id(statement)] / 2.0:
                 self.findings.note("CS345", statement.line, length=length)
         tip = self.modals.mode is not self.form.upright and self.form.orientation not in ("fixed", "machine")
         also = "it may be used with tool tip control (--cycles native does without, along Z), and that " if tip else ""

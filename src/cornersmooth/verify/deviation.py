@@ -324,8 +324,10 @@ def _largest(match: Match, found: Findings, reached: Reached, lines: Callable[[I
     `lines` of rows: those of the CL file and of the text.
     """
     gap = reached.gap
+    if not len(gap.tip):
+        return
     together = {"together_tip": gap.tip, "together_axis_point": gap.axis_point, "orientation": gap.angle}
-    for name, values in together.items() if len(gap.tip) else ():
+    for name, values in together.items():
         row = np.array([values.argmax()])
         found.note(name, values[row], *lines(row))
     alone: tuple[tuple[Metric, Floats], ...] = (("tip", gap.tip), ("axis_point", gap.axis_point))

@@ -274,8 +274,9 @@ class Parse:
         """Whether feed moves from an element on may lead to the last pose before the next stop."""
         move = self._move[stop + 1] - 1
         for one in range(element, element + _AFTER_FAULT):
-            if not self._ahead.has(one) or not self.lines.feeds(one) or self.lines.at(move, one):
-                return self._ahead.has(one) and self.lines.feeds(one)
+            feeds = self._ahead.has(one) and self.lines.feeds(one)
+            if not feeds or self.lines.at(move, one):
+                return feeds
         return True
 
     def _is_in_doubt(self, stop: int, element: int) -> bool:
