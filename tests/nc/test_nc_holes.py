@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import re
-from itertools import chain
+from itertools import chain, pairwise
 
 import numpy as np
 import pytest
@@ -342,3 +342,18 @@ def test_holes_before_and_behind_the_way_home_have_heights_of_their_cycles(heigh
     found, _ = heights(f"{PLAIN}LOADTL/1\nSPINDL/900,CLW\nRAPID\nGOTO/0,0,30,0,0,1\n{holes}FINI\n")
     drilled = [[f"G0 {one}", "G0 3", "G1 -10", f"G0 {one}"] for one in heights_of_return]
     assert [line for line in found if " X" not in line][-8:] == drilled[0] + drilled[1]
+
+
+@pytest.mark.parametrize("heights_of_return", [(20, 50), (50, 20)])
+@pytest.mark.parametrize("between", ["LOADTL/2\nSPINDL/900,CLW", "GOHOME"])
+def test_without_a_retract_the_tool_goes_across_at_the_higher_level(
+    between: str, heights_of_return: tuple[int, int]
+) -> None:
+    """Neither a tool change nor GOHOME leads anywhere there: a rapid aslant to the next hole might collide."""
+    first, second = (f"CYCLE/DRILL,FEDTO,10,RAPTO,3,RTRCTO,{one},MMPM,250" for one in heights_of_return)
+    holes = f"{first}\nGOTO/0,0,0\n{between}\n{second}\nGOTO/20,0,0\nCYCLE/OFF\n"
+    cl = f"{PLAIN}LOADTL/1\nSPINDL/900,CLW\nRAPID\nGOTO/0,0,10,0,0,1\n{holes}FINI\n"
+    lines = lines_of(choose_form("generic"), cl)
+    rapids = [tuple(float(x) for x in re.findall(r"[XZ](-?[\d.]+)", line)) for line in lines if line[:3] == "G0 "]
+    across = [(before[1], after[1]) for before, after in pairwise(rapids) if before[0] != after[0]]
+    assert across == [(50.0, 50.0)]

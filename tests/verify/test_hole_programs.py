@@ -85,6 +85,9 @@ REFUSED_ONCE = {
     1600217: "two bores at one pose, coolant between them, and a feed move to where they are left",
     1503308: "a tool that only stands over a tap that is left out",
     1520304: "a stop between a bore and a tap that is left out, where the way up is the next rapid",
+    1530027: "a tool change for which the program has no way back: across at the higher level there, too",
+    1700274: "the same, a tap that is left out behind it",
+    1760354: "the same with a tilted tool",
 }
 
 #: seeds of `random_programs.trial`, the same
@@ -97,7 +100,6 @@ RANDOM_REFUSED_ONCE = {
 
 #: seeds that are refused still: a hole program, and programs at random
 KNOWN = {
-    1530027: "a rapid aslant to a hole behind a tool change for which the program has no way back: it may collide",
     1700133: "GOHOME behind three tools, the last of them the first: another speed holds on the way home",
     1503284: "a feed move to where the tool has been before its change: what leads nowhere in the CL file has no feed",
     1710186: "two optional stops around a tool that does nothing",

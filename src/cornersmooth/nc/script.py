@@ -153,8 +153,10 @@ class Script:
         least = np.array([0.0 if one is None else max(one.retract, one.clearance or 0.0) for one in cycles])
         travel = travel_height(program, poses, np.maximum.accumulate(moves)[poses])
         travel = np.maximum(travel, least[self.drillings.of(poses)])
-        homes = [one.pose for one in program.statements if one.word == "GOHOME" and self.motion.modals.can_rewind]
-        return poses, travel, *crossings(program, poses, travel, [*tool_starts(program), *homes])
+        homes = [one.pose for one in program.statements if one.word == "GOHOME"]
+        # without a retract nothing says that the tool is elsewhere
+        elsewhere = [*tool_starts(program), *homes] if self.motion.modals.can_rewind else []
+        return poses, travel, *crossings(program, poses, travel, elsewhere)
 
     def _drill(self, rows: Rows) -> None:
         """Write holes of one cycle, of the control or as plain moves; those left out are only approached."""
