@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cornersmooth.cl import read
-from cornersmooth.errors import InputError, Verdict
+from cornersmooth.errors import Verdict
 from cornersmooth.kinematics import Machine, parse_machine
 from cornersmooth.nc import Frame, choose_form
 from cornersmooth.pipeline import Result, postprocess
@@ -160,11 +160,10 @@ def test_a_block_that_may_come_from_below_its_end_is_a_warning(control: str, mor
     assert "CS392" not in codes(post(part(axis(20)), control, None, machine)[1])
 
 
-def test_it_is_none_where_the_part_is_not_turned_or_x_and_y_are_known() -> None:
+def test_it_is_none_where_the_part_is_not_turned_before() -> None:
+    """A head turns the tool; FANUC's tables stand at zero until tool tip control is on."""
     assert "CS392" not in codes(post(part(axis(85)), "siemens", None, machine_of("head-ac"))[1])
-    for place, below in (("Y = 190", False), ("Y = -190", True)):
-        own = machine_of("table-ac", TRAVEL + f"[tool_change]\nX = 0\n{place}\n")
-        assert ("CS392" in codes(post(part(axis(0), axis(60)), "siemens", None, own)[1])) is below
+    assert "CS392" not in codes(post(part(axis(85)), "fanuc", None, machine_of("table-ac", TRAVEL))[1])
 
 
 @pytest.mark.parametrize("control", ["siemens", "fanuc"])
@@ -173,17 +172,6 @@ def test_planes_come_in_one_block_too(control: str) -> None:
     on = next(k for k, line in enumerate(lines) if re.match(r"CYCLE800\(0|G53\.1", line))
     assert {"X", "Y", "Z"} <= words(lines[motions(lines, on)[0]]).keys()
     assert "CS392" in codes(result)
-
-
-def test_a_block_in_which_the_axes_turn_is_compared_with_the_travel() -> None:
-    """FANUC's axes stand at zero where tip control comes on; C turns by half a turn in the block."""
-    assert "CS391" in codes(post(part(axis(60)), "fanuc", None, machine_of("table-ac", TRAVEL))[1])
-    assert "CS391" not in codes(post(part(axis(60)), "haas", None, machine_of("table-ac", TRAVEL))[1])
-    narrow = TRAVEL.replace("Y = [-200, 200]", "Y = [-80, 80]").replace("X = [-300, 300]", "X = [-60, 60]")
-    post(part(axis(60)), "haas", None, machine_of("table-ac", narrow))  # its ends are within, and it runs straight
-    with pytest.raises(InputError, match=r"first block of a tool.*X of .* would have to go") as refused:
-        post(part(axis(60)), "fanuc", None, machine_of("table-ac", narrow))
-    assert (refused.value.code, refused.value.line) == ("CS374", 5)
 
 
 def test_an_endless_axis_goes_home_to_the_nearest_full_turn() -> None:

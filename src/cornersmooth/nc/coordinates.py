@@ -168,11 +168,6 @@ class Coordinates:
             axis = tool_axis(machine, self.angles(ticks[None]))[0]
         return axis
 
-    def tip(self, ticks: Ints) -> Floats:
-        """(3,) tip in the part, mm, of a row of ticks under tool tip control or in a tilted plane."""
-        tip: Floats = ticks[:3].astype(np.float64) * self.form.rounding(self.units)
-        return tip if self.plane is None else self.plane.frame @ tip
-
     def lifted(self, ticks: Ints, distance: float) -> Ints:
         """Row of ticks so many mm back along the tool axis; a point on the axis moves as the tip does."""
         step = distance / MM_PER_UNIT[self.units] * self._back(ticks)

@@ -90,13 +90,9 @@ WARNINGS: Final = {
         "the cut is left along the tool and gone on with where {name} has turned by {turn:.4g} deg above the retract: "
         "expect a mark on the part"
     ),
-    "CS391": (
-        "the first block of a tool leaves the travel from some places of X and Y at the height of the retract; move X "
-        "and Y near the position before, or give [tool_change] X and Y in the machine file"
-    ),
     "CS392": (
         "the first block of a tool may come from below its end, as the part is turned far; see that table and fixture "
-        "are clear of it, or bring X and Y near before"
+        "are clear of it"
     ),
 }
 NOTES: Final = {

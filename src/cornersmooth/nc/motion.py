@@ -11,7 +11,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cornersmooth.arrays import some_rows
-from cornersmooth.kinematics.poses import continued, nose_position
+from cornersmooth.kinematics import solutions
+from cornersmooth.kinematics.poses import continued
 from cornersmooth.model import Floats, Ints, Move, Program
 from cornersmooth.nc.blocks import Blocks
 from cornersmooth.nc.control import INVERSE_TIME
@@ -19,10 +20,13 @@ from cornersmooth.nc.coordinates import BlockRows, Coordinates
 from cornersmooth.nc.curves import bezier_points
 from cornersmooth.nc.messages import Findings, refused
 from cornersmooth.nc.modals import Modals
-from cornersmooth.nc.rotary_words import UPRIGHT, check_first_block, machine_of, rows_that_swing
+from cornersmooth.nc.planes import turned_part
+from cornersmooth.nc.rotary_words import UPRIGHT, machine_of, rows_that_swing
 from cornersmooth.smoothing.sampling import Rows
 
 NOWHERE = 1 << 62  #: a pose that no program has
+#: Z of a turned part for each mm of Z of the machine, below which a block from the retract may come from below its end
+_FLAT = 0.7
 
 
 @dataclass
@@ -167,7 +171,7 @@ class Motion:
         if modals["high"]:
             modals.now["high"] = False
             height = above or self.approach * bool(rows.rapid[0])
-            self._look_at_first(at.lifted(first, height), pose)
+            self._note_tilted(first, pose)
             self._approach_first(first, height)
             rows = rows if above else rows.with_programmed_feed(self.program)
         if not modals.tool:
@@ -218,35 +222,30 @@ class Motion:
         """Bring the tool over its first position, and to where it comes down along its axis."""
         at, down = self.at, bool(above) and self.modals.can_rewind
         start = at.lifted(first, above) if down else first
-        # a tilted tool under tool tip control, or in a tilted plane, goes there in one block (`first_block`), and so do
-        # words of a second point, which would turn the tool elsewhere without Z
+        # a tilted tool under tool tip control, or in a tilted plane, goes there in one block: X Y alone would run in
+        # the plane of the part, which tables have tilted, far aside or down. So do words of a second point, which
+        # would turn the tool elsewhere without Z
         if at.form.orientation != "point" and at.tool_axis(start)[2] >= UPRIGHT:
             self.say([at.rapid(start, chosen=np.arange(len(start)) != 2)])
         if down:
             words, self.modals.waiting = self.modals.waiting, ""
             self.say([at.rapid(start, words)])
 
-    def _look_at_first(self, end: Ints, move: int) -> None:
-        """Look at the block that leads a tilted tool to its first position from the height of the retract."""
-        at, form, axis = self.at, self.at.form, self.at.tool_axis(end)
-        if form.orientation not in ("angles", "fixed") or axis[2] >= UPRIGHT or not self.modals.can_rewind:
-            return
-        machine = None if form.machine is None else form.machine.with_tool(self.modals.tool)
-        angles = at.plane.angles if at.plane is not None else at.angles(end[None])[0] if form.rotary else None
-        where = self.program.source.name, int(self.program.line[move])
-        check_first_block(form, machine, at.tip(end), axis, angles, self._nose(), where, self.findings)
+    def _note_tilted(self, first: Ints, pose: int) -> None:
+        """Warn where the block that leads a tilted tool from the retract may come from below its end (CS392).
 
-    def _nose(self) -> Floats | None:
-        """(2,) mm, where the retract has left X and Y of the spindle nose; None where that is not known."""
-        at, machine = self.last_at, self.at.form.machine
-        if machine is None:
-            return None
-        change = dict(machine.tool_change)
-        if self.position is None and {"X", "Y"} <= change.keys():
-            return np.array((change["X"], change["Y"]))
-        if at is None or self.last is None or not at.form.rotary or {"X", "Y"} & change.keys():
-            return None
-        return nose_position(machine, at.tip(self.last)[None], at.angles(self.last[None]))[0, :2]
+        Tables have turned the part: for each mm of Z of the machine it goes up by less, and maybe aside by more.
+        """
+        at, form, axis = self.at, self.at.form, self.at.tool_axis(first)
+        if form.orientation not in ("angles", "fixed") or axis[2] >= UPRIGHT or "{rotary_zero}" in form.begin:
+            return
+        rise = float(axis[2])
+        if form.machine is not None:
+            known = at.angles(first[None])[0] if at.plane is None else at.plane.angles
+            ways = solutions(form.machine, axis[None]).angles[0] if known is None else [known]
+            rise = min(float(turned_part(form.machine, angles)[2, 2]) for angles in ways)
+        if rise < _FLAT:
+            self.findings.note("CS392", int(self.program.line[pose]))
 
     def _once(self, code: str, pose: int, **values: object) -> None:
         if code not in self._noted:

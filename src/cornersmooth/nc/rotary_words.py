@@ -2,15 +2,10 @@
 
 Both ends of a rapid hold the tool where it should be, but between them it may stand elsewhere: a table that turns back
 by 300 degrees leads a tool that leans by 30 degrees all the way round. The tool goes up first, and turns there.
-
-The block that leads a tilted tool from the height of the retract to its first position has X Y Z, as tool tip control
-is on. X Y alone would be a motion in the plane of the part, which tables have tilted: the axes would go far aside, or
-down. A tool along Z goes over its position first: there both planes are one.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Final
@@ -19,12 +14,11 @@ import numpy as np
 
 from cornersmooth.arrays import norm, starts
 from cornersmooth.errors import InputError, SettingsError
-from cornersmooth.kinematics import Machine, check_travel, solutions, tool_axis
-from cornersmooth.kinematics.poses import angle_between, nose_position
+from cornersmooth.kinematics import Machine, solutions, tool_axis
+from cornersmooth.kinematics.poses import angle_between
 from cornersmooth.model import Bools, Floats, Ints, Move, Program, Runs, SmoothProgram, rapid_moves, still_poses
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.messages import Findings
-from cornersmooth.nc.planes import turned_part
 from cornersmooth.nc.statement_args import tool_starts
 from cornersmooth.smoothing.sampling import Rows, all_dense_rows
 from cornersmooth.system.processes import return_free_memory
@@ -139,10 +133,6 @@ LONGEST_DETOUR: Final = 30.0  #: degrees by which the way of the tool axis may b
 _PARALLEL: Final = 1e-9
 _PLACES: Final = np.linspace(0.0, 1.0, 10)[1:-1]  #: places between both ends that are looked at
 UPRIGHT: Final = 1.0 - 1e-6  #: cosine of the angle from Z beyond which a tool is tilted
-_WAY: Final = np.linspace(0.0, 1.0, 65)  #: places on the way that are looked at
-#: Where X Y stand before, the program does not always say: as far aside as the tool is above, at most, is a fair guess.
-_FLAT: Final = math.cos(math.radians(45.0))
-_BELOW: Final = 1e-3  #: mm by which the start may be below the position: digits
 
 
 def swinging(machine: Machine, before: Floats, after: Floats) -> Bools:
@@ -193,64 +183,3 @@ def from_zero(form: Form, program: Program, axis: Floats, angles: Floats, move: 
             angles[row:end, 0] += np.clip(0.0, *machine.limits[0]) - first[0]
             whole = endless & (False, True)
         angles[row:end, whole] += -360.0 * np.round(first[whole] / 360.0)
-
-
-def check_first_block(
-    form: Form,
-    machine: Machine | None,
-    tip: Floats,
-    axis: Floats,
-    angles: Floats | None,
-    place: Floats | None,
-    where: tuple[str | None, int],
-    findings: Findings,
-) -> None:
-    """Refuse the first block of a tool, or warn of it; `where` is file and line of its CL statement.
-
-    It ends with the tip (3,), mm, and the tool axis (3,) in the part and the rotary words (2,), degrees, if there are
-    any. `place` (2,) mm is where X and Y of the spindle nose stand before, if known; the machine has the length of the
-    tool. CS374: it leaves the travel from wherever it starts. CS391: whether it stays within the travel depends on that
-    place. CS392: it comes from below its end; tables and fixtures are below the part, and turned beside the tool.
-    """
-    before = angles
-    if machine is not None and angles is not None and "{rotary_zero}" in form.begin:
-        before = np.clip(0.0, *machine.limits.T)
-    places = np.zeros((0, 3)) if machine is None or before is None else _starts(machine, tip, before, place)
-    if machine is None or before is None or angles is None or not len(places):
-        rise = float(axis[2])  # Z of the part for each mm of Z of the machine, at the least; tables may have turned it
-        if machine is not None:
-            ways = solutions(machine, axis[None]).angles[0] if before is None else before[None]
-            rise = min(float(turned_part(machine, one)[2, 2]) for one in ways)
-        if rise < _FLAT:
-            findings.note("CS392", where[1])
-        return
-    turned = before + _WAY[:, None] * (angles - before)
-    frame = turned_part(machine, before)
-    zero = nose_position(machine, np.zeros((1, 3)), before[None])[0]
-    tips = [frame @ (start - zero) for start in places]
-    refused: list[InputError] = []
-    for start in tips:
-        way = start + _WAY[:, None] * (tip - start)
-        try:
-            check_travel(machine, way, turned, np.full(len(way), where[1]), where[0])
-        except InputError as error:
-            refused.append(error)
-    if len(refused) == len(tips):
-        what = f"in the first block of a tool, from the height of the retract: {refused[0].what}"
-        raise InputError(refused[0].code, what, refused[0].hint, file=where[0], line=where[1])
-    if refused:
-        findings.note("CS391", where[1])
-    if any(start[2] < tip[2] - _BELOW for start in tips):
-        findings.note("CS392", where[1])
-
-
-def _starts(machine: Machine, tip: Floats, before: Floats, place: Floats | None) -> Floats:
-    """Where the spindle nose may stand before, (k, 3) mm; none where the machine's file does not say enough."""
-    travel = {item.name: (item.low, item.high) for item in machine.travel}
-    nowhere = (math.nan, math.nan)
-    top = dict(machine.home).get("Z", travel.get("Z", nowhere)[1])
-    over = nose_position(machine, tip[None], before[None])[0, :2]
-    ends = np.array([(x, y) for x in travel.get("X", nowhere) for y in travel.get("Y", nowhere)])
-    places = np.vstack((ends, ends.mean(axis=0), over)) if place is None else place[None]
-    starts = np.column_stack((places, np.full(len(places), top)))
-    return starts[~np.isnan(starts).any(axis=1)]
