@@ -81,7 +81,6 @@ def fit_settings(settings: Settings, form: Form, units: Units) -> Settings:
     SettingsError
         The form cannot hold what the settings ask for.
     """
-    tolerance = settings.tolerance
     if form.curve in _POLYNOMIAL and settings.weights != (1.0, 1.0):
         raise SettingsError(
             "CS217",
@@ -104,7 +103,7 @@ def fit_settings(settings: Settings, form: Form, units: Units) -> Settings:
     return settings.with_method(curves=form.curves).but(
         lines=lines,
         block_time=block_time,
-        tip_resolution=form.tip_resolution(units, tolerance),
+        tip_resolution=form.tip_resolution(units, settings),
         axis_point_resolution=form.axis_point_resolution(units, settings),
         round_feed_changes=settings.round_feed_changes and not form.curves,
     )

@@ -20,13 +20,15 @@ from cornersmooth.model import MM_PER_UNIT, Move, Program, Units
 from cornersmooth.nc.control import Blocks, Control, CurveStyle, Extra, FormTable, Mode, Orientation
 from cornersmooth.nc.control_tables import load_control
 from cornersmooth.nc.statement_args import tool_loads
-from cornersmooth.settings import Settings
+from cornersmooth.settings import METHODS, Settings
 from cornersmooth.tables import closest
 
 ROTARY_SHARE = 0.1  #: share of ε, at the axis point, that rotary axes may take between and at the written words
 TIP_SHARE = 0.1  #: share of ε that the tip may leave its line where the control knows nothing of the tip
 #: share of ε that verification takes off for the lines that stand for blocks of rotary words, and for its proof
 LINE_SHARE = 0.005
+#: share of ε that it takes off for bends where tips and axis points are compared apart: 0.0001 for each of both motions
+BEND_SHARE = 2e-4
 
 
 @dataclass(frozen=True)
@@ -95,10 +97,12 @@ class Form:
         """Step of the written coordinates, mm."""
         return float(MM_PER_UNIT[units] * 10.0 ** -self.tip_decimals(units))
 
-    def tip_resolution(self, units: Units, tolerance: float) -> float:
+    def tip_resolution(self, units: Units, settings: Settings) -> float:
         """What is to be taken off ε at the tip, as a step of its coordinates: half of it per axis, mm."""
-        share = {"machine": TIP_SHARE + LINE_SHARE, "angles": LINE_SHARE}.get(self.orientation, 0.0)
-        return self.rounding(units) + 2.0 / math.sqrt(3.0) * share * tolerance
+        apart = settings.method in METHODS and not METHODS[settings.method].one_parameter
+        otherwise = BEND_SHARE if apart else 0.0
+        share = {"machine": TIP_SHARE + LINE_SHARE, "angles": LINE_SHARE}.get(self.orientation, otherwise)
+        return self.rounding(units) + 2.0 / math.sqrt(3.0) * share * settings.tolerance
 
     def axis_point_resolution(self, units: Units, settings: Settings) -> float:
         """What the orientation is worth at the axis point, as a step in mm.

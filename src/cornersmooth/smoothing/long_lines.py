@@ -67,6 +67,10 @@ class LineLimits:
     tip_of: Callable[[Floats, Floats], Floats] | None = None
     rotary: bool = False  #: whether words are angles: the tool axis then does not run evenly with them
 
+    def used(self, tip: Floats, axis_point: Floats, original_tip: Floats, original_axis_point: Floats) -> Floats:
+        """(m,) share of the limits in use where tips and axis points (m, 3) are compared with the original, mm."""
+        return np.maximum(norm(tip - original_tip) / self.tip, norm(axis_point - original_axis_point) / self.axis_point)
+
 
 def segments_of_rows(move: Ints, begin: int, end: int) -> tuple[Ints, Bools]:
     """Pose that the segment of each row starts from, -1 before the first, and whether it is the last row of its move.
@@ -136,7 +140,8 @@ def fewest_lines(rows: Vertices, limits: LineLimits, lane: int = LANE) -> Ints:
         return np.arange(count)
     ends = rows.fixed.copy()
     ends[::lane] = True
-    return without_lag(rows, limits, farthest(ends, partial(_reaches, rows, limits)))
+    between = halfway(rows, limits) if limits.rotary else None
+    return without_lag(rows, limits, farthest(ends, partial(_reaches, rows, between, limits)))
 
 
 def farthest(ends: Bools, reaches: Callable[[Ints, Ints], Bools]) -> Ints:
@@ -197,23 +202,43 @@ def without_lag(rows: Vertices, limits: LineLimits, kept: Ints) -> Ints:
     return kept
 
 
-def _reaches(rows: Vertices, limits: LineLimits, start: Ints, end: Ints) -> Bools:
-    """(q,) bool: whether lines from some rows to others keep the limits."""
+def halfway(rows: Vertices, limits: LineLimits) -> Vertices:
+    """(r − 1) vertices between those given: rotary words bend tool axis and tip there the most."""
+
+    def mean(values: Floats) -> Floats:
+        return (values[:-1] + values[1:]) / 2.0
+
+    tip = mean(rows.original_tip)
+    lever = mean(rows.original_axis_point) - tip
+    lever *= (limits.axis_length / np.maximum(norm(lever), np.finfo(np.float64).tiny))[:, None]
+    return Vertices(
+        mean(rows.tip),
+        mean(rows.words),
+        tip,
+        tip + lever,
+        mean(rows.parameter),
+        np.zeros(len(tip), np.bool_),
+        None if rows.position is None else mean(rows.position),
+        None if rows.room is None else mean(rows.room),
+    )
+
+
+def _reaches(rows: Vertices, between: Vertices | None, limits: LineLimits, start: Ints, end: Ints) -> Bools:
+    """(q,) bool: whether lines from some rows to others keep the limits, at rows and at vertices between them."""
     good = np.abs(rows.words[end] - rows.words[start]).max(axis=1) <= limits.turn
     good |= end == start + 1
     long_enough = np.flatnonzero(good & (end > start + 1))
     for part in split(long_enough, (end - start - 1)[long_enough], _TOGETHER):
-        good[part] = _keeps(rows, limits, start[part], end[part])
+        good[part] = _keeps(rows, between, limits, start[part], end[part])
     return good
 
 
-def _keeps(rows: Vertices, limits: LineLimits, start: Ints, end: Ints) -> Bools:
-    inner = end - start - 1
-    kept = _off(rows, limits, start, end, inner, halves=False) <= _USED
-    if limits.rotary:  # between rotary words tool axis and tip run on bows, largest about halfway between rows
+def _keeps(rows: Vertices, between: Vertices | None, limits: LineLimits, start: Ints, end: Ints) -> Bools:
+    kept = _off(rows, rows, limits, start, end, start + 1) <= _USED
+    if between is not None:
         left = np.flatnonzero(kept)
         if len(left):
-            kept[left] = _off(rows, limits, start[left], end[left], inner[left] + 1, halves=True) <= _USED
+            kept[left] = _off(rows, between, limits, start[left], end[left], start[left]) <= _USED
     if rows.position is not None:
         kept &= _in_order(rows, limits, start, end)
     return kept
@@ -229,21 +254,15 @@ def _in_order(rows: Vertices, limits: LineLimits, start: Ints, end: Ints) -> Boo
     return np.bincount(line[1:][back], minlength=len(start)) == 0
 
 
-def _off(rows: Vertices, limits: LineLimits, start: Ints, end: Ints, count: Ints, *, halves: bool) -> Floats:
-    """(q,) largest share of the limits in use, at the `count` rows inside lines or halfway between rows."""
+def _off(rows: Vertices, seen: Vertices, limits: LineLimits, start: Ints, end: Ints, first: Ints) -> Floats:
+    """(q,) largest share of the limits in use on lines between rows, at those `seen` from the first (q,) to the end."""
+    count = end - first
     line, place = spread(count)
-    row = place + start[line] + (not halves)
-
-    def at(values: Floats) -> Floats:
-        return (values[row] + values[row + 1]) / 2.0 if halves else values[row]
-
-    tip, axis_point = _on_lines(rows, limits, start, end, line, at(rows.parameter))
-    original_tip = at(rows.original_tip)
-    lever = at(rows.original_axis_point) - original_tip
-    lever *= (limits.axis_length / np.maximum(norm(lever), np.finfo(np.float64).tiny))[:, None]
-    off = np.maximum(norm(tip - original_tip) / limits.tip, norm(axis_point - original_tip - lever) / limits.axis_point)
-    if rows.room is not None:
-        off /= at(rows.room)
+    row = place + first[line]
+    tip, axis_point = _on_lines(rows, limits, start, end, line, seen.parameter[row])
+    off = limits.used(tip, axis_point, seen.original_tip[row], seen.original_axis_point[row])
+    if seen.room is not None:
+        off /= seen.room[row]
     return np.maximum.reduceat(off, starts(count)[:-1])
 
 

@@ -17,8 +17,8 @@ from functools import partial
 
 import numpy as np
 
-from cornersmooth.arrays import Bools, Floats, Ints, norm, some_rows, square
-from cornersmooth.smoothing.long_lines import LANE, LineLimits, Vertices, farthest, fewest_lines, without_lag
+from cornersmooth.arrays import Bools, Floats, Ints, some_rows, square
+from cornersmooth.smoothing.long_lines import LANE, LineLimits, Vertices, farthest, fewest_lines, halfway, without_lag
 
 #: times the limits that chords may be off: moving their ends does not balance them perfectly
 _CHORD = 1.8
@@ -85,10 +85,9 @@ def _outside(rows: Vertices, near: _Near, limits: LineLimits, stays: Bools) -> t
         kept = without_lag(own, limits, kept)
         ends[again] = False
         ends[again[kept]] = True
-        line, share = _shares(own, kept)
-        place[again[kept]] = _moved(some, kept, stays[again[kept]], line, share)
-        off = _off(own, limits, _along(place[again[kept]], line, share))
-        far = (np.maximum.reduceat(off[:-1], kept[:-1]) > 1.0) & (np.diff(kept) > 1)  # else from one row to the next
+        moved = _moved(some, kept, stays[again[kept]], *_shares(own, kept, own.parameter))
+        place[again[kept]] = moved
+        far = (_off(own, limits, kept, moved) > 1.0) & (np.diff(kept) > 1)  # else from one row to the next
         if not far.any():
             break
         beside = np.convolve(far, np.ones(3))[1:-1] > 0.5
@@ -103,11 +102,12 @@ def _outside(rows: Vertices, near: _Near, limits: LineLimits, stays: Bools) -> t
     return replace(rows, tip=place[:, :3], words=place[:, 3:]), np.flatnonzero(ends)
 
 
-def _shares(rows: Vertices, kept: Ints) -> tuple[Ints, Floats]:
-    """(r,) the line between rows at which lines end that each row is on, and how far along it."""
-    line, s = np.append(np.repeat(np.arange(len(kept) - 1), np.diff(kept)), len(kept) - 2), rows.parameter[kept]
+def _shares(rows: Vertices, kept: Ints, parameter: Floats) -> tuple[Ints, Floats]:
+    """Line between rows at which lines end, and how far along it, at parameters of all rows, or between rows."""
+    line = np.append(np.repeat(np.arange(len(kept) - 1), np.diff(kept)), len(kept) - 2)[: len(parameter)]
+    s = rows.parameter[kept]
     length = np.diff(s)
-    return line, (rows.parameter - s[line]) / np.where(length > 0.0, length, 1.0)[line]
+    return line, (parameter - s[line]) / np.where(length > 0.0, length, 1.0)[line]
 
 
 def _along(ends: Floats, line: Ints, share: Floats) -> Floats:
@@ -181,12 +181,17 @@ def _moved(near: _Near, kept: Ints, stays: Bools, line: Ints, share: Floats) -> 
     return best
 
 
-def _off(rows: Vertices, limits: LineLimits, place: Floats) -> Floats:
-    """(r,) share of the limits in use at rows whose tips and words are others (r, 3 + d)."""
-    tip = place[:, :3]
-    axis_point = tip + limits.axis_length * limits.axis_of(place[:, 3:])
-    off_tip, off_axis_point = norm(tip - rows.original_tip), norm(axis_point - rows.original_axis_point)
-    return np.maximum(off_tip / limits.tip, off_axis_point / limits.axis_point)
+def _off(rows: Vertices, limits: LineLimits, kept: Ints, ends: Floats) -> Floats:
+    """(k − 1,) largest share of the limits in use on lines from row to row whose ends are others (k, 3 + d)."""
+    off = np.zeros(len(rows.parameter))
+    for seen in (rows, halfway(rows, limits)) if limits.rotary else (rows,):
+        place = _along(ends, *_shares(rows, kept, seen.parameter))
+        tip = place[:, :3]
+        axis_point = tip + limits.axis_length * limits.axis_of(place[:, 3:])
+        used = limits.used(tip, axis_point, seen.original_tip, seen.original_axis_point)
+        off[: len(used)] = np.maximum(off[: len(used)], used)
+    most: Floats = np.maximum.reduceat(off[:-1], kept[:-1])
+    return most
 
 
 def _fitted(data: Floats, kept: Ints, line: Ints, share: Floats, weight: Floats, pinned: Ints) -> Floats:
