@@ -69,7 +69,7 @@ def arcs(name: str) -> str:
 
 
 def seconds_of_cuts(text: str) -> float:
-    lines = program_lines(text)
+    lines = program_lines(text.encode())
     begin, end = line_times(lines, LIMITS)
     cuts = np.flatnonzero(np.isfinite(lines.feed))
     return float(end[cuts[-1]] - begin[cuts[0]])
@@ -155,7 +155,7 @@ def test_a_program_begins_in_g64() -> None:
     cuts = "G21 G90 G94\nG0 X0 Y0 Z0\nG1 F1500\n" + "".join(
         f"X{0.1 * k:.1f} Z{0.02 * (k % 2):.2f}\n" for k in range(1, 99)
     )
-    times = {word: line_times(program_lines(word + cuts), LIMITS)[1][-1] for word in ("", "G64\n", "G61\n")}
+    times = {word: line_times(program_lines((word + cuts).encode()), LIMITS)[1][-1] for word in ("", "G64\n", "G61\n")}
     assert times[""] == times["G64\n"]
     assert times["G61\n"] > 1.5 * times[""]
 
@@ -173,21 +173,42 @@ def test_a_program_begins_in_g64() -> None:
         "G90.1",
         "G3 X9",
         "G2 X9 I0",
+        "G8 X9",
+        "G0 X9 U1",
+        "G4 P1 X9",
+        "G95",
+        "/G0\nX9",
     ],
 )
 def test_what_the_text_does_not_say_has_no_time(line: str) -> None:
     with pytest.raises(InputError, match="CS264") as error:
-        program_lines(f"O0001\n(X#1 [a remark])\nG1 X5 F100\n{line}\n", "part.ngc")
-    assert error.value.line == 4
+        program_lines(f"O0001\n(X#1 [a remark])\nG1 X5 F100\n{line}\n".encode(), "part.ngc")
+    assert error.value.line == 4 + line.count("\n")
+
+
+@pytest.mark.parametrize("line", ["G10 L20 P1 X0 Y9", "G92 X0"])
+def test_axes_of_other_words_are_no_moves(line: str) -> None:
+    """They were lines to these places."""
+    assert program_lines(f"G0 X1 Y2\nG1 F100 X5\n{line}\nX6\n".encode()).end[:, 0].tolist() == [5.0, 6.0]
+
+
+def test_a_modal_arc_keeps_its_sense_behind_other_words() -> None:
+    head = "G17 G0 X0 Y0 Z0\nG3 F600 X10 Y0 I5\n"
+    modal, named = (program_lines(f"{head}M8\n{word} X20 Y0 I5\n".encode()) for word in ("", "G3"))
+    assert modal.arc.tolist() == named.arc.tolist()
+    assert modal.arc[0, 11] == 1.0
 
 
 def test_distances_take_the_time_of_positions() -> None:
     head, tail = "G0 X0 Y0 Z5\nG1 F900\n", "G0 Z5\n"
     there = "G90\nX10\nX12 Y3\nZ-1\n" + tail
     by = "G91\nX10\nX2 Y3\nZ-6\nG90\n" + tail
-    assert line_times(program_lines(head + by), LIMITS)[1][-1] == line_times(program_lines(head + there), LIMITS)[1][-1]
+    assert (
+        line_times(program_lines((head + by).encode()), LIMITS)[1][-1]
+        == line_times(program_lines((head + there).encode()), LIMITS)[1][-1]
+    )
     home = "G91 G28 Z0\nG90\n"  # a rapid of a length that is not known
-    assert len(program_lines(head + there + home)) == len(program_lines(head + there))
+    assert len(program_lines((head + there + home).encode())) == len(program_lines((head + there).encode()))
 
 
 if __name__ == "__main__":
@@ -196,5 +217,7 @@ if __name__ == "__main__":
 
 def test_straight_on_is_as_nearly_straight_on() -> None:
     """Tolerance over the smallest number was infinite, with a warning."""
-    straight, bent = (program_lines(f"G64 P20\nG0 X0 Y0\nG1 F9000 X100\nX200 Y{y}\nX300\n") for y in ("0", "0.000001"))
+    straight, bent = (
+        program_lines(f"G64 P20\nG0 X0 Y0\nG1 F9000 X100\nX200 Y{y}\nX300\n".encode()) for y in ("0", "0.000001")
+    )
     assert line_times(straight, LIMITS)[1] == pytest.approx(line_times(bent, LIMITS)[1], rel=1e-6)

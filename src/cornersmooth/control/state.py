@@ -283,6 +283,7 @@ class Rows:
     moves: Bools  #: (r,) whether an axis is named
     odd: Bools  #: (r,) whether it has other words than places, as arcs have
     lost: Bools  #: (r,) whether it leads to a place that is not known
+    columns: Mapping[str, Floats]  #: words as written, by letters; NaN where a block has none
 
     def __len__(self) -> int:
         return len(self.code)
@@ -325,7 +326,7 @@ def execute_rows(state: State, first: int, columns: Mapping[str, Floats], *, wea
         moves |= ~np.isnan(words)
         place[0, k] = state.place[letter]
         place[1:, k] = _places(words, state, letter, lost)
-    return Rows(first, state, code, place, feed, moves, odd, lost)
+    return Rows(first, state, code, place, feed, moves, odd, lost, columns)
 
 
 def _places(words: Floats, state: State, letter: str, lost: Bools) -> Floats:

@@ -18,18 +18,21 @@ The law is that of LinuxCNC 2.9 (``tp.c``, ``tc.c``, ``blendmath.c``, ``emccanon
 
 from __future__ import annotations
 
-import cmath
-import math
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from cornersmooth.arrays import dot, norm, unit
+from cornersmooth.arrays import dot, joined_rows, norm, unit
+from cornersmooth.control.program import Act, Stream, Text, line_of
+from cornersmooth.control.state import Rows, State
+from cornersmooth.control.table import table_of
+from cornersmooth.control.words import Lexer, Table, filled
 from cornersmooth.errors import InputError
 from cornersmooth.kinematics import Machine, check_dynamics
-from cornersmooth.model import MM_PER_UNIT, Bools, Floats, Ints
+from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.nc_reader.dialects import dialect_of
+from cornersmooth.nc_reader.tool import circles
 
 #: ``CARTFUZZ`` of posemath, mm or degrees: an axis that moves by less does not move
 FUZZ = 1e-8
@@ -42,15 +45,19 @@ _ARC_SHARE = np.sqrt(3.0) / 2.0
 #: ``TP_ANGLE_EPSILON``, rad: planes that lean by less are one
 _ONE_PLANE = 1e-6
 
-_COMMENT = re.compile(r"\([^)]*\)|;.*")
-_WORD = re.compile(r"([A-Z])\s*([-+]?\d*\.?\d+)")
 _AXES = "XYZABC"
 
-#: axes of G17, G18 and G19 in the order in which a right-handed turn about the third goes round, and letters of centres
-_PLANES = {17: ((0, 1, 2), "IJ"), 18: ((2, 0, 1), "KI"), 19: ((1, 2, 0), "JK")}
+#: at words of these letters, and at what is so called in `control.table.LOSES`, the motion stops
+_STOPS = frozenset(("M", "T", "dwell", "machine"))
 
-#: G codes of motion that the law does not hold for: splines, threads, cycles, absolute centres, and feed per revolution
-_UNKNOWN = frozenset((5, 5.1, 5.2, 33, 33.1, 38.2, 76, *range(81, 90), 90.1, 95, 96))
+#: centres of arcs that are places, and feeds that the spindle counts
+_STRANGE = frozenset(("G90.1", "G95"))
+
+#: G words of group 01
+_MOTIONS = (0.0, 1.0, 2.0, 3.0)
+
+#: groups that must be known where an axis moves
+_NEEDED = ("distance", "units", "feed", "path", "plane")
 
 #: loops, calls, and values that the control works out: what it runs is not in the text
 _WORKED_OUT = re.compile(r"[#\[]|^\s*/?\s*(N\s*\d+\s*)?O\s*(\d+|<[^>]*>)\s*[A-Z]|M\s*0*9[789](?![\d.])")
@@ -286,8 +293,10 @@ def axis_limits(machine: Machine, lines: Lines) -> AxisLimits:
     return AxisLimits(columns[:, 0], columns[:, 1])
 
 
-def program_lines(text: str, name: str | None = None) -> Lines:
+def program_lines(data: bytes, name: str | None = None) -> Lines:
     """Read the moves of a program; the motion stops at words M and T, at G4 and at moves of the machine.
+
+    What a block does, and what holds there, is that of `control.program.Stream`.
 
     Parameters
     ----------
@@ -297,91 +306,118 @@ def program_lines(text: str, name: str | None = None) -> Lines:
     Raises
     ------
     InputError
-        CS264: it has other motion than lines and arcs, or a line has no feed; loops, calls of subprograms, variables.
+        CS264: it has other motion than lines and arcs, or a line has no feed; what holds there is not known; loops,
+        calls of subprograms, variables.
     """
-    # it begins in G64 without P: on the whole controller a relief took 3.52 s with and without the word
-    place, feed, blend, timed, unit, code, plane = [np.nan] * 6, np.nan, 0.0, False, MM_PER_UNIT["mm"], 0.0, 17
-    relative = False
-    rows: list[tuple[list[float], list[float], float, float, list[float], int]] = []
-    for number, line in enumerate(text.upper().splitlines(), 1):
-        block = _COMMENT.sub("", line)
+    lexer, reader = dialect_of("linuxcnc", "ABC").lexer, _Reader()
+    try:
+        for item in Stream(Text.of(data), lexer, State(table_of("linuxcnc"), tuple(_AXES))):
+            if isinstance(item, Rows):
+                blocks = Table(item.first + 1 + np.arange(len(item)), dict(item.columns))
+                reader.move(blocks, item.before, item.feed)
+            else:
+                reader.act(item, lexer)
+    except InputError as error:
+        error.file = name
+        raise
+    return joined_rows(reader.moves) if reader.moves else Lines(*np.zeros((2, 0, 6)), *np.zeros((2, 0)))
+
+
+def _no_time(line: int, what: str, hint: str = "leave out the time") -> InputError:
+    return InputError("CS264", what, hint, line=line)
+
+
+class _Reader:
+    """Moves of a program, and what the machine of `control.state` does not tell of them."""
+
+    def __init__(self) -> None:
+        self.moves: list[Lines] = []
+        #: last words of the axes, mm and degrees, NaN for none; and last G word of group 01, for the sense of an arc
+        self._place, self._code = np.full(len(_AXES), np.nan), np.nan
+
+    def act(self, act: Act, lexer: Lexer) -> None:
+        """Take a line that is no plain motion block."""
+        number, block = act.line + 1, lexer.comment.sub("", act.text.decode("latin-1").upper()).strip()
         if _WORKED_OUT.search(block):
-            what = "a loop, a call or a variable: how long it takes is not in the program"
-            raise InputError("CS264", what, "leave out the time", file=name, line=number)
-        words = [(letter, float(value)) for letter, value in _WORD.findall(block)]
-        codes = {value for letter, value in words if letter == "G"}
-        if strange := codes & _UNKNOWN:
-            what = f"G{min(strange):g}: the law of LinuxCNC's planner is known for lines and arcs only"
-            raise InputError("CS264", what, "leave out the time, or write lines", file=name, line=number)
-        if rows and (codes & {4, 28, 30, 53} or any(letter in "MT" for letter, _ in words)):
-            rows[-1] = (*rows[-1][:3], np.nan, *rows[-1][4:])
-        unit = MM_PER_UNIT["inch" if 20 in codes else "mm"] if codes & {20, 21} else unit
-        timed = (93 in codes) if codes & {93, 94} else timed
-        relative = (91 in codes) if codes & {90, 91} else relative
-        code = next(iter(codes & {0.0, 1.0, 2.0, 3.0}), code)
-        plane = int(next(iter(codes & {17.0, 18.0, 19.0}), plane))
-        given = {letter: value * (unit if letter in "XYZIJKR" else 1.0) for letter, value in words}
-        feed = given.get("F", feed)
-        if codes & {61, 61.1}:
-            blend = np.nan
-        elif 64 in codes:
-            blend = given.get("P", 0.0) * unit
-        if codes & {28, 30, 53}:  # in coordinates of the machine: where that is in those of the part, nothing says
-            some = given if 53 in codes else _AXES
-            place = [np.nan if axis in some else old for axis, old in zip(_AXES, place, strict=True)]
-            continue
-        if relative:
-            target = [old + given.get(axis, 0.0) for axis, old in zip(_AXES, place, strict=True)]
-            begins = [0.0 if np.isnan(old) else old for old in place]
-            ends = [old + given.get(axis, 0.0) for axis, old in zip(_AXES, begins, strict=True)]
+            raise _no_time(number, "a loop, a call or a variable: how long it takes is not in the program")
+        line, after = line_of(act.text, lexer), act.after
+        words = () if line is None else line.words
+        codes = {word.value for word in words if word.name == "G"}
+        self._code = next((code for code in _MOTIONS if code in codes), self._code)
+        columns = {word.name: np.array([word.value]) for word in words if word.name != "G"}
+        found = act.before.rows(words)
+        beside = after.table.arguments.get(after.groups["motion"] or "", frozenset())
+        beside = beside.union(*(row.beside for *_, row in found))
+        rows = [(word, row) for word, name, row in found if name not in beside]
+        does = columns.keys() | frozenset[str]().union(*(row.does for _, row in rows))
+        if self.moves and does & _STOPS:
+            self.moves[-1].blend[-1] = np.nan
+        moving, own = columns.keys() & {*_AXES}, [word.name for word, row in rows if row.does & {"dwell", "place"}]
+        lost = after.groups["units"] is None and (moving or line is None)
+        odd = moving and ("dwell" in does or {*own} - {"G", "M"})
+        if "machine" in does:  # to where that is in places of the part nothing says
+            self._place[[53.0 not in codes or axis in columns for axis in _AXES]] = np.nan
+        elif strange := [one.spelling for one, row in rows if ("motion", None) in row.sets or one.spelling in _STRANGE]:
+            what = f"{strange[0]}: the law of LinuxCNC's planner is known for lines and arcs only"
+            raise _no_time(number, what, "leave out the time, or write lines")
+        elif lost or odd:
+            raise _no_time(number, f"{block}: what it does is not known")
+        elif not own:  # else X Y Z belong to these words
+            self.move(Table(np.array([number]), columns), after, np.array([after.feed]))
+
+    def move(self, blocks: Table, state: State, feed: Floats) -> None:
+        """Take blocks in one state, with their feeds as written."""
+        code = filled(blocks.column("G"), self._code if state.groups["motion"] else np.nan)[0]
+        words = np.stack([blocks.column(axis) for axis in _AXES], axis=1)
+        centres = {letter: state.unit * blocks.column(letter) for letter in "IJKR"}
+        unknown = [name for name in _NEEDED if state.groups[name] is None]
+        unknown += ["motion"] * bool(np.isnan(code[~np.isnan(words).all(axis=1)]).any())
+        if unknown and not np.isnan(words).all():
+            raise _no_time(int(blocks.line[0]), f"not known: {', '.join(unknown)}", "say it again, as in G21 G90 G94")
+        words[:, :3] *= state.unit
+        bent = (code > 1.0) & ~np.isnan([*words[:, :3].T, *centres.values()]).all(axis=0)
+        place, self._code = self._place, float(code[-1])
+        if state.groups["distance"] == "incremental":  # an axis of which nothing is known begins at 0
+            step = np.nan_to_num(words)
+            places = np.cumsum(np.vstack((place, step)), axis=0)
+            start = np.nan_to_num(places[:-1])
+            end = start + step
+        else:  # or where it is sent to
+            places = np.stack([filled(column, np.nan)[0] for column in np.vstack((place, words)).T], axis=1)
+            end = np.nan_to_num(places[1:])
+            start = np.where(np.isnan(places[:-1]), end, places[:-1])
+        self._place = places[-1]
+        rows = np.flatnonzero((start != end).any(axis=1) | bent)
+        if not len(rows):
+            return
+        start, end, code, feed = start[rows], end[rows], code[rows], feed[rows]
+        bent, number = bent[rows], blocks.line[rows]
+        arc = np.full((len(rows), 12), np.nan)
+        if bent.any():
+            of_arcs = Table(number[bent], {letter: column[rows][bent] for letter, column in centres.items()})
+            arc[bent] = _arcs(of_arcs, start[bent, :3], end[bent, :3], code[bent] == 3.0, state.plane)
+        linear, turned = norm((end - start)[:, :3]), norm(end - start)
+        if state.groups["feed"] == "inverse":
+            speed = np.where(bent, arc[:, 0], np.where(linear > 0.0, linear, turned)) * feed / 60.0
         else:
-            target = [given.get(axis, old) for axis, old in zip(_AXES, place, strict=True)]
-            ends = [0.0 if np.isnan(value) else value for value in target]
-            begins = [end if np.isnan(old) else old for old, end in zip(place, ends, strict=True)]
-        place = target
-        round_ = code > 1.0 and bool(given.keys() & set("XYZIJKR"))
-        if begins == ends and not round_:
-            continue
-        arc = _arc(begins, ends, given, plane, clockwise=code == 2.0) if round_ else [np.nan] * 12
-        if arc[1] == 0.0:
-            what = "an arc has neither a radius nor a centre away from where it begins"
-            raise InputError("CS264", what, "give it one", file=name, line=number)
-        if code == 0.0:
-            speed = np.inf
-        elif timed:
-            away = np.subtract(ends, begins)
-            length = arc[0] if round_ else float(np.linalg.norm(away[:3]) or np.linalg.norm(away))
-            speed = length * feed / 60.0
-        else:
-            speed = feed * (unit if begins[:3] != ends[:3] else 1.0) / 60.0
-        if not speed > 0.0:
-            raise InputError("CS264", "a line has no feed", "give it one", file=name, line=number)
-        rows.append((begins, ends, float(speed), blend, arc, number))
-    starts, targets, speeds, blends, arcs, numbers = zip(*rows, strict=True) if rows else ((), (), (), (), (), ())
-    start, end = (np.array(places, np.float64).reshape(-1, 6) for places in (starts, targets))
-    shapes = np.array(arcs, np.float64).reshape(-1, 12)
-    limits, rounding = np.array(speeds, np.float64), np.array(blends, np.float64)
-    return Lines(start, end, limits, rounding, shapes, np.array(numbers, np.int64))
+            speed = np.where(linear > 0.0, state.unit, 1.0) * feed / 60.0
+        speed[code == 0.0] = np.inf
+        for line in number[~(speed > 0.0)].tolist():
+            raise _no_time(line, "a line has no feed", "give it one")
+        path = state.groups["path"] or ""
+        within = re.search(r"P([\d.]+)", path)  # without P where the program begins, as the whole controller does
+        blend = np.nan if path.startswith("G61") else state.unit * float(within[1]) if within else 0.0
+        self.moves.append(Lines(start, end, speed, np.full(len(rows), blend), arc, number))
 
 
-def _arc(
-    start: list[float], end: list[float], given: Mapping[str, float], plane: int, *, clockwise: bool
-) -> list[float]:
-    """Row of an arc by radius or by centre, as in `Lines`."""
-    (u, v, w), letters = _PLANES[plane]
-    chord, rise = complex(end[u] - start[u], end[v] - start[v]), end[w] - start[w]
-    if "R" in given:
-        size = given["R"]
-        half = math.sqrt(max(size**2 - abs(chord) ** 2 / 4.0, 0.0)) * (1 if size > 0.0 else -1)
-        centre = chord / 2.0 + (-half if clockwise else half) * 1j * chord / (abs(chord) or 1.0)
-    else:
-        centre = complex(given.get(letters[0], 0.0), given.get(letters[1], 0.0))
-    sense, radius = -1.0 if clockwise else 1.0, abs(centre)
-    turn = (sense * (cmath.phase(chord - centre) - cmath.phase(-centre))) % math.tau or math.tau
-    length = math.hypot(radius * turn, rise)
-    found = [length, radius, turn]
-    for spoke in (-centre, chord - centre):
-        way, tangent = [0.0] * 3, sense * 1j * spoke / (abs(spoke) or 1.0) * radius * turn / (length or 1.0)
-        way[u], way[v], way[w] = tangent.real, tangent.imag, rise / (length or 1.0)
-        found += way
-    return [*found, *(sense * (axis == w) for axis in range(3))]
+def _arcs(centres: Table, start: Floats, end: Floats, counterclockwise: Bools, plane: int) -> Floats:
+    """(k, 12) arcs by radius or by centre, as in `Lines`."""
+    centre, normal, turn = circles(centres, start, end, counterclockwise, plane, [])
+    spokes, rise = np.stack((start, end)) - centre, dot(end - start, normal)[:, None] * normal
+    spokes[1] -= rise
+    radius = norm(spokes[0])
+    for line in centres.line[radius == 0.0].tolist():
+        raise _no_time(line, "an arc has neither a radius nor a centre away from where it begins", "give it one")
+    length = np.hypot(radius * turn, norm(rise))
+    ways = (np.cross(normal, unit(spokes)) * (radius * turn)[:, None] + rise) / length[:, None]
+    return np.column_stack((length, radius, turn, *ways, normal))

@@ -92,7 +92,7 @@ class Times:
     def _ends(self, reading: Reading) -> Floats:
         """(l,) when each line of a program ends on LinuxCNC, s."""
         if reading.data not in self.ends:
-            moves = program_lines(reading.data.decode("utf-8", "replace"))
+            moves = program_lines(reading.data)
             ends = np.zeros(max(len(reading), 1))
             ends[moves.number - 1] = line_times(moves, axis_limits(self.axes, moves))[1]
             self.ends[reading.data] = np.maximum.accumulate(ends)

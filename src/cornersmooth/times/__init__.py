@@ -128,7 +128,7 @@ class Timing:
 
     def _on_linuxcnc(self, text: bytes, program: Program) -> float:
         """Time by the law of LinuxCNC's planner, s."""
-        lines = program_lines(text.decode("utf-8", "replace"), program.source.name)
+        lines = program_lines(text, program.source.name)
         if not len(lines) or self.form.machine is None:
             return 0.0
         start, end = line_times(lines, axis_limits(self.machine, lines))
