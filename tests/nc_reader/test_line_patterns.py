@@ -12,7 +12,7 @@ import pytest
 
 from cornersmooth.control import line_patterns, source
 from cornersmooth.control.line_patterns import LinePatterns, Lines
-from cornersmooth.control.words import Table
+from cornersmooth.control.words import Table, numbers
 from cornersmooth.errors import InputError
 from cornersmooth.nc_reader.dialects import dialect_of
 from oracle.share import covering_share, how_many
@@ -65,9 +65,12 @@ def read(call):
     found = []
     try:
         found.extend(lines_apart(call))
+        wrong = ""
     except Exception as error:
-        return sorted(found, key=itemgetter(0)), str(error)
-    return sorted(found, key=itemgetter(0)), ""  # blank lines within a run come after it
+        wrong = str(error)
+    blocks = {number for number, said in found if isinstance(said, dict)}  # comments of these come before them
+    apart = [(number, said) for number, said in found if isinstance(said, dict) or number not in blocks]
+    return sorted(apart, key=itemgetter(0)), wrong  # blank lines within a run come after it
 
 
 def same_alone(data, dialect):
@@ -75,8 +78,8 @@ def same_alone(data, dialect):
     together, _ = read(source.read_lines(data, None, dialect.lexer))
     for (number, said), line in zip(together, data.split(b"\n")[:-1], strict=True):
         alone = dialect.lexer.line(line, number, None)
-        assert said == (alone if not isinstance(said, dict) else dialect.row(alone))
-    return sum(isinstance(said, dict) for _, said in together)
+        assert said == (alone if not isinstance(said, dict) else numbers(dialect.lexer.motion(alone)))
+    return int(Lines.of(data, LinePatterns(dialect.lexer)).bulk().sum())
 
 
 @pytest.mark.parametrize(
@@ -87,7 +90,7 @@ def test_lines_in_runs_say_what_each_says_alone(control, seed, odd):
     together, wrong = read(source.read_lines(data, None, dialect.lexer))
     for (number, said), line in zip(together, data.split(b"\n"), strict=False):
         alone = dialect.lexer.line(line, number, None)
-        assert said == (alone if not isinstance(said, dict) else dialect.row(alone))
+        assert said == (alone if not isinstance(said, dict) else numbers(dialect.lexer.motion(alone)))
     assert any(isinstance(said, dict) for _, said in together)
     if len(together) < len(data.split(b"\n")) - 1:
         assert odd is not None
@@ -110,6 +113,13 @@ def test_lines_that_each_have_a_shape_of_their_own_are_read_in_runs(control, mon
         words = [word if "." in word else word + "." for word in words]
         data.append(f"{number} L " + " ".join(words) if control == "heidenhain" else f"N{number} " + " ".join(words))
     assert same_alone("\n".join(data + ["G1 X1.5"]).encode() + b"\n", dialect_of(control)) >= 600
+
+
+def test_a_motion_block_with_a_comment_is_one_of_a_run():
+    one, two, table, three = source.read_lines(b"G1 X1.5 (A)\nX2.5(B)\n/X3.5 (C)\n", None, dialect_of("fanuc").lexer)
+    assert [(line.number, line.comments, line.words) for line in (one, two)] == [(1, ("A",), ()), (2, ("B",), ())]
+    assert (table.line.tolist(), table.columns["X"].tolist()) == ([1, 2], [1.5, 2.5])
+    assert (three.skipped, len(three.words)) == (True, 1)
 
 
 def test_lines_without_words_do_not_end_a_run():

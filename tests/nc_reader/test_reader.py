@@ -93,7 +93,6 @@ def test_curve():
         (b"R2.", b"R0.", ("CS518", 8)),
         (b"P4 K0. X0.0000", b"P4 K0. X0.0001", ("CS519", 6)),
         (b"V0.0000 W10.0000 R1.\nK0. X1.", b"V0.0001 W10.0000 R1.\nK0. X1.", ("CS519", 6)),
-        (b"R2.\n", b"R2.\n(COMMENT)\n", ("CS510", 10)),
         (b"R2.\n", b"R2. F50.\n", ("CS511", 8)),
     ],
 )
@@ -101,6 +100,13 @@ def test_rules_of_curves(old, new, expected):
     assert old in CURVE
     found = codes(HEAD + START + CURVE.replace(old, new))
     assert expected in found
+
+
+@pytest.mark.parametrize(
+    "more", [b"R2.\n(COMMENT)\n", b"R2.\n\n", b"R2. (COMMENT)\n", b"(COMMENT) R2.\n", b"R2.\nN5\n"]
+)
+def test_comments_inside_a_curve_do_not_break_it(more):
+    assert codes(HEAD + START + CURVE.replace(b"R2.\n", more)) == []
 
 
 def test_words_inside_a_curve_break_it():

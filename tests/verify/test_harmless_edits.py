@@ -148,10 +148,22 @@ def test_codes_may_have_zeros_before_them(control: str, tmp_path: Path) -> None:
 
 
 def test_a_block_with_a_vector_may_say_again_what_holds(tmp_path: Path) -> None:
-    """As posts of others write it, without digests in the head."""
+    """As posts of others write it, without digests in the head, and as a user does with ours."""
     others = (r"^; PARTS=.*\n", "")
     for word in ("G90", "G17"):
-        again = (r"^(G1 .*X20\..* Y20\..*)$", rf"{word} \1")
+        again = (r"^(G1 .*X20\..* Y20\..*)$", rf"{word} \1\n{word}")
         assert judged(tmp_path, "siemens", others, again).startswith("PASSED")
+        assert judged(tmp_path, "siemens", again).startswith("PASSED")
     turned = (r"^(G1 .*X20\..* Y20\..*C3=)1", r"G90 \1-1")
     assert judged(tmp_path, "siemens", others, turned).startswith("FAILED")
+
+
+def test_a_mark_of_the_coding_is_no_word(tmp_path: Path) -> None:
+    for control in ALL:
+        assert judged(tmp_path, control, (r"\A", "\N{ZERO WIDTH NO-BREAK SPACE}")).startswith("PASSED")
+
+
+@pytest.mark.parametrize("control", ISO)
+def test_numbers_of_retracts_may_be_spelt_otherwise(control: str, tmp_path: Path) -> None:
+    for zero in ("Z0.000", "Z-0.", "Z+00."):
+        assert judged(tmp_path, control, (r"\bZ0\.$", zero)).startswith("PASSED")

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 import re
+from codecs import BOM_UTF8
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -28,7 +29,6 @@ from cornersmooth.model import Ints
 #: lines before the first block: they name the program
 _TITLE: Final = re.compile(r"(?i)(%.*|[O:]\s*(\d+|<[^>]*>|[A-Z][^#\[(]*))")
 _WEAK_FEED: Final = re.compile(rb"(?i)F[ \t]*\d+(?![\d.])")
-_MARK: Final = b"\xef\xbb\xbf"
 
 #: what sends a control to other lines of the program; numbers of lines beside it, and a jump to a line that the
 #: program works out
@@ -111,7 +111,7 @@ class Stream:
     def __init__(self, text: Text, lexer: Lexer, state: State, *, weak_feed: bool = False) -> None:
         self.text, self._lexer, self._weak_feed = text, lexer, weak_feed
         self._first = first = _begin(text)
-        written = text.lines(first, len(text)).removeprefix(_MARK if first == 0 else b"")
+        written = text.lines(first, len(text)).removeprefix(BOM_UTF8 if first == 0 else b"")
         written += b"" if written.endswith(b"\n") else b"\n"
         #: lines from the first on, and which of them are plain motion blocks: these have no words of other kinds
         self._lines = lines = Lines.of(lexer.unfolded(written), LinePatterns(lexer))

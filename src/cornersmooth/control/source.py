@@ -8,14 +8,16 @@ import os
 import stat
 import time
 from bisect import bisect_left
-from collections.abc import Callable, Generator, Iterator
+from codecs import BOM_UTF8
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import BinaryIO, Final, Protocol
 
 import numpy as np
 
 from cornersmooth.control.line_patterns import LinePatterns, Lines
-from cornersmooth.control.words import Lexer, Line, Table
+from cornersmooth.control.words import Lexer, Line, Table, numbers, table_of
 from cornersmooth.errors import InputError
 
 #: bytes read at a time
@@ -171,10 +173,10 @@ def read_lines(
 def _chunks(data: bytes | Readable, lexer: Lexer) -> Iterator[bytes]:
     """Pieces of the text, cut where no curve is cut in two."""
     file = io.BytesIO(data) if isinstance(data, bytes) else data
-    rest = b""
+    rest, mark = b"", BOM_UTF8
     while True:
         more = file.read(CHUNK)
-        chunk = rest + more
+        chunk, mark = (rest + more).removeprefix(mark), b""
         if not chunk:
             return
         cut = lexer.cut(chunk) if more else len(chunk)
@@ -189,7 +191,7 @@ def _chunks(data: bytes | Readable, lexer: Lexer) -> Iterator[bytes]:
 def _in_order(lines: Lines, number: int, lexer: Lexer, name: str | None) -> Generator[Table | Line, None, int]:
     """Give out the lines of a chunk, runs as tables and the others one by one; return how many there are.
 
-    Asides within a run follow it.
+    Asides within a run follow it. Comments of motion blocks come before these.
     """
     bulk = lines.bulk()
     within = bulk.copy()
@@ -199,10 +201,28 @@ def _in_order(lines: Lines, number: int, lexer: Lexer, name: str | None) -> Gene
         rows = start + np.flatnonzero(bulk[start:stop])
         single = (start + np.flatnonzero(~bulk[start:stop])).tolist()
         before = bisect_left(single, rows[0]) if len(rows) else len(single)
-        for row in single[:before]:
-            yield lexer.line(lines.line(row), number + row, name)
+        yield from _one_by_one(lines, single[:before], number, lexer, name)
         if len(rows):
             yield Table(number + rows, lines.columns(rows))
-        for row in single[before:]:
-            yield lexer.line(lines.line(row), number + row, name)
+        yield from _one_by_one(lines, single[before:], number, lexer, name)
     return len(bulk)
+
+
+def _one_by_one(
+    lines: Lines, rows: Sequence[int], number: int, lexer: Lexer, name: str | None
+) -> Iterator[Table | Line]:
+    """Give out lines that are in no run: those that are motion blocks for all that, as with a comment, as tables."""
+    blocks: list[tuple[int, Mapping[str, float]]] = []
+    for row in rows:
+        line = lexer.line(lines.line(row), number + row, name)
+        columns = None if line.skipped else lexer.motion(line)
+        if columns is not None:
+            blocks.append((line.number, numbers(columns)))
+            line = replace(line, words=())
+        elif blocks and (line.words or line.tape):
+            yield table_of(blocks)
+            blocks = []
+        if columns is None or line.comments:
+            yield line
+    if blocks:
+        yield table_of(blocks)

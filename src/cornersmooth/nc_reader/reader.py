@@ -142,9 +142,6 @@ class Reader:
     def _line(self, line: Line) -> None:
         """Take a line that is not part of a run."""
         self.blocks += 1
-        if (row := self.dialect.row(line)) is not None:
-            self._single.append((line.number, row))
-            return
         self._flush()
         units, elements = self.units, self.elements
         self._take(line)

@@ -87,7 +87,6 @@ def _knot_curves(blocks: Blocks) -> Curves:
         """Blocks that begin no curve, and differ so from the one before."""
         return np.append(False, change) & later
 
-    complain("CS510", rows, beside(np.diff(table.line[rows]) != 1), "something else is between the blocks of a curve")
     complain("CS512", rows, np.isnan(table.column("K")[rows]), "a curve block without its knot K")
     fewer, more = single < order, single > order
     complain("CS513", head, fewer, "fewer blocks with only a knot than the order of the curve asks for")

@@ -75,7 +75,7 @@ class WordCheck:
         trusted = set(trusted)
         own = set(map(self._text, trusted))
         self._own = [re.compile(re.escape(text).replace(_ANY, r"[-+]?[\d.]+")) for text in own if text]
-        self._states = StateRules(State(table, ("X", "Y", "Z", *"ABC")), self._positions, trusted | own)
+        self._states = StateRules(State(table, (*"XYZABCIJK",)), self._positions, trusted | own)
         self._left, self._accepted = trusted, accepted
         self.problems, self._wrong = self._states.problems, self._states.wrong
         #: blocks taken on trust, line and text, and those of them that may bear on the motion
@@ -83,7 +83,7 @@ class WordCheck:
         kinds = KINDS & trusted
         self._moving = _own_table(kinds & _OF_MOTION)
         self.trusted += [(0, text) for text in _own_table(kinds - _OF_MOTION)]
-        self.parts = Parts(lexer)
+        self.parts = Parts()
         #: what stands before the program, what a comment begins with that is obeyed, and blocks of the end
         self._header, self._orders = re.compile(keys.get("header", "(?!)")), keys.get("orders", "(?!)")
         self._ends = tuple(map(re.compile, keys["end"]))

@@ -19,8 +19,7 @@ from typing import Final
 
 from cornersmooth.control.state import CUTS, State
 from cornersmooth.control.table import FRAME, Row
-from cornersmooth.control.words import Lexer, Line, Table, numbers
-from cornersmooth.control.words import table_of as table_of_rows
+from cornersmooth.control.words import Line, Table, Word
 from cornersmooth.frame import PARTS, PARTS_WORD
 
 #: hexadecimal digits of a part
@@ -33,6 +32,9 @@ _SWITCHED: Final = frozenset(("spindle", "coolant"))
 
 #: words that begin and end a program
 _FRAME: Final = re.compile("O$|(BEGIN|END) PGM")
+
+#: a word with a number; codes are in one spelling
+_NUMBER: Final = re.compile(r"([A-FH-LN-Z]+)([-+.\d]+)")
 
 #: letters of places, and of axes that turn
 _PLACES: Final = frozenset("XYZABCIJKUVW")
@@ -60,8 +62,7 @@ class _Part:
 class Parts:
     """Follows one program; lines are its blocks in order."""
 
-    def __init__(self, lexer: Lexer) -> None:
-        self._lexer = lexer
+    def __init__(self) -> None:
         self._parts: list[_Part] = []
         self._part = _Part()
         self._cuts = False  # whether the part is within cuts
@@ -88,10 +89,6 @@ class Parts:
 
     def line(self, line: Line, machine: State, after: State) -> None:
         """Take any other line; the machine is before it, and `after` it."""
-        columns = self._lexer.motion(line)
-        if columns is not None:  # a motion block with a comment
-            self.table(table_of_rows([(line.number, numbers(columns))]), machine)
-            return
         rows = machine.rows(line.words)
         does = {effect for _, _, row in rows for effect in row.does}
         beside = frozenset[str]().union(*(row.beside for _, _, row in rows))
@@ -109,15 +106,15 @@ class Parts:
             changed = any(
                 _value(before[group]) != _value(now[group]) or group.startswith(FRAME) for group, _ in row.sets
             )
-            own = [other.spelling for other in line.words if other.name in row.beside]
-            text = " ".join(("/" * line.skipped + word.spelling, *own))
+            own = [_spelt(other) for other in line.words if other.name in row.beside]
+            text = " ".join(("/" * line.skipped + _spelt(word), *own))
             if changed and not row.does and {group for group, _ in row.sets} <= _SWITCHED:
                 self._switched.append(text)
             elif changed or row.does:
                 self._take(line.number, text, stays="tool" not in row.does and "machine" not in does)
         moved = {word.name for word in line.words} & _PLACES
         if "machine" in does:
-            self._take(line.number, " ".join(sorted(word.spelling for word in line.words)))
+            self._take(line.number, " ".join(sorted(map(_spelt, line.words))))
             self._above = True
         elif moved:
             self._moves(line.number, moved)
@@ -195,6 +192,12 @@ class Parts:
         else:
             low, high = parts[first].first, parts[behind - 1].last
         return f"lines {low} to {high}, which were changed since the program was written"
+
+
+def _spelt(word: Word) -> str:
+    """A word, its number without a plus sign and zeros that say nothing."""
+    match = None if word.fixed else _NUMBER.fullmatch(word.spelling)
+    return f"{match[1]}{word.value + 0.0:.10g}{'.' * ('.' in match[2])}" if match else word.spelling
 
 
 def _alike(digests: Sequence[str], others: Sequence[str]) -> int:

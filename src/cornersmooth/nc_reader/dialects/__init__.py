@@ -10,7 +10,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Final
 
 from cornersmooth.control.table import CONTROLS, Table, table_of, word_table
-from cornersmooth.control.words import Lexer, Line, Word, numbers, refused, tools_first
+from cornersmooth.control.words import Lexer, Line, Word, refused, tools_first
 from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.nc_reader.acts import Acts, Beside, Move, Running
 from cornersmooth.nc_reader.rotary import Rotary
@@ -75,11 +75,6 @@ class Dialect:
         """Whether a word acts after the motion of its block: M words that stop, end or switch off."""
         kind, stated = self.means.get(f"M{value:g}", ("", "")) if letter == "M" else ("", "")
         return kind in ("stop", "end") or stated == "OFF"
-
-    def row(self, line: Line) -> dict[str, float] | None:
-        """Words of a motion block; None where the line is something else."""
-        columns = self.lexer.motion(line)
-        return None if columns is None else numbers(columns)
 
     def acts(self, line: Line, state: Running) -> Acts:
         """Give out what a line that is no motion block does; each act is carried out before the next is wanted.

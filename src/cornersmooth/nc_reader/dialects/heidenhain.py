@@ -51,8 +51,6 @@ _SILENT = (
     "CYCL DEF 32",
     "CYCL DEF 9.0",
     "CYCL DEF 247",
-    "* -",
-    "*-",
     "LBL",
 )
 #: hole cycles with their parameters, in the order of the control
@@ -183,7 +181,8 @@ class _KlartextLexer(Lexer):
         rf"(?P<factor>K[123][XYZABC])(?P<of>{NUMBER}(?:E[-+]?\d+)?)|(?P<vector>T[XYZ])(?P<part>{NUMBER})"
         rf"|(?P<rapid>F ?MAX\b)|(?P<turn>DR[-+])|(?P<side>R[0LR])(?!\w)|(?P<letter>[A-Z])(?P<value>{NUMBER})"
     )
-    comment = re.compile(r";(.*)$")
+    #: headings are no blocks either
+    comment = re.compile(r";(.*)$|(?<!\S)\* ?-(.*)$")
     block_number = re.compile(r"(\d+)(?:[ \t]+|$)")
 
     def __init__(self, rotary: str) -> None:
@@ -194,7 +193,7 @@ class _KlartextLexer(Lexer):
 
     def words(self, rest: str, place: int, number: int, name: str | None) -> list[Word]:
         """Words of a line from a place on, or the whole block as one; raises CS501."""
-        head = rest[place:].partition(" ")[0]
+        head = next(iter(rest[place:].split()), "")
         if not head:
             return []
         heads = {"C": "circle", "CR": "circle", "CC": "centre"} | dict(zip(_PATHS, _PATHS, strict=True))
