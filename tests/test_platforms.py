@@ -5,6 +5,8 @@ in .ci/windows.
 
 from __future__ import annotations
 
+import contextlib
+import hashlib
 import os
 import signal
 from collections.abc import Callable
@@ -177,3 +179,22 @@ def test_a_mark_that_is_lost_or_of_another_text_says_nothing(part: Path) -> None
     assert output.read_mark(str(out)) == {"made_of": "x"}
     out.write_bytes(b"G1\n")
     assert output.read_mark(str(out)) is None
+
+
+@pytest.mark.parametrize("rest", [b"G1\n", b"G1 X1\n" * 200_000])
+@pytest.mark.parametrize("place", [None, 0, 2, -1])
+def test_a_patched_text_has_its_own_hash_and_no_other_change(tmp_path: Path, rest: bytes, place: int | None) -> None:
+    out = tmp_path / "o.nc"
+    refused = contextlib.nullcontext() if place is None else pytest.raises(OutputError, match="CS407")
+    with refused, output.open_output(out) as made:
+        made.stream.write(b"(--)\n" + rest)
+        made.stream.patch(made.path, 1, b"ab")
+        if place is not None:
+            with open(made.path, "r+b") as file:
+                file.seek(place, os.SEEK_END if place < 0 else os.SEEK_SET)
+                file.write(b"#")
+    if place is None:
+        assert out.read_bytes() == b"(ab)\n" + rest
+        assert made.stream.digest == hashlib.sha256(b"(ab)\n" + rest).hexdigest()
+    else:
+        assert not out.exists()

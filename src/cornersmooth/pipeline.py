@@ -224,13 +224,11 @@ def postprocess(
     seconds: dict[str, float] = {}
     with timed(seconds, "read", progress):
         program = source if isinstance(source, Program) else read(source)
-    with timed(seconds, "smooth"):
-        step = stage_of(progress, "smoothing")
-        smoothed = smooth(program, settings, form=form, progress=step, processes=processes)
+    settings = nc.fit_settings(settings, form, program.units)
     return_free_memory()  # before processes share what there is
     frame = (frame or Frame()).with_offset_of(program, form)
     provenance = replace(
-        _provenance(program, smoothed.settings, form),
+        _provenance(program, settings, form),
         planned_feeds=plan_feeds is not None,
         work_offset=frame.named_offset(form.table),
         parts=not unverified,
@@ -243,7 +241,7 @@ def postprocess(
         verifier = None
         if not unverified:
             trust = Trust(
-                trusted=(*nc.own_words(form.table), *_users_blocks(frame, form, program, smoothed.settings)),
+                trusted=(*nc.own_words(form.table), *_users_blocks(frame, form, program, settings)),
                 accepted=form.table.trusted,
                 weights=provenance.weights,
                 slower=provenance.planned_feeds,
@@ -252,15 +250,18 @@ def postprocess(
             verifier = Verifier(
                 program,
                 output.path,
-                tolerance=smoothed.settings.tolerance,
-                axis_length=smoothed.settings.axis_length,
-                axis_tolerance=smoothed.settings.axis_tolerance,
+                tolerance=settings.tolerance,
+                axis_length=settings.axis_length,
+                axis_tolerance=settings.axis_tolerance,
                 trust=trust,
                 continuity=continuity,
                 processes=processes,
                 **back,
             )
-            stack.enter_context(verifier)
+            stack.enter_context(verifier)  # it lays out the CL path meanwhile
+        with timed(seconds, "smooth"):
+            step = stage_of(progress, "smoothing")
+            smoothed = smooth(program, settings, form=form, progress=step, processes=processes)
         with timed(seconds, "write"):
             step = stage_of(progress, "writing")
             if plan_feeds is None:
@@ -294,9 +295,9 @@ def postprocess(
             findings,
             seconds,
             path,
-            output.stream.digest,
         )
         output.failed = result.verdict is Verdict.FAILED or (strict and result.verdict is not Verdict.PASSED)
+    result = replace(result, sha256=output.stream.digest)
     if output.failed:
         where = "nothing was written" if path is None else f"the program is in {path}{FAILED}"
         failure = VerdictError("CS508", f"the verdict is {result.verdict}; {where}", file=program.source.name)

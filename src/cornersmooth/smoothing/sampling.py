@@ -144,18 +144,21 @@ class _Layout:
         return Rows(
             np.zeros((total, 3)),
             np.zeros((total, 3)),
-            np.repeat(np.arange(len(self.counts))[own], counts),
+            np.repeat(self._poses(own), counts),
             np.zeros(total, np.int8),
             np.zeros(total, np.bool_),
             spline=np.tile((0.0, 1.0, 0.0), (total, 1)) if self.curves else None,
         )
+
+    def _poses(self, own: slice) -> Ints:
+        return np.arange(*own.indices(len(self.counts)))
 
     def filled(self, own: slice, rows: Rows) -> Rows:
         """The rows of some poses, which are filled in place."""
         smoothed, segments, runs = self.smoothed, self.segments, self.runs
         program, counts = smoothed.program, self.counts[own].astype(np.int64)
         last = np.cumsum(counts)
-        batch = _Batch(np.arange(len(self.counts))[own], last - counts, last, rows)
+        batch = _Batch(self._poses(own), last - counts, last, rows)
         sharp = (segments.row[own] < 0) & (batch.last > batch.first)
         pose, at = batch.poses[sharp], batch.last[sharp] - 1
         rows.tip[at], rows.other[at] = program.tip[pose], program.axis[pose]

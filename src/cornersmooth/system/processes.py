@@ -130,35 +130,34 @@ def first_ready(helpers: Iterable[Helper]) -> list[Helper]:
     return [by_connection[one] for one in ready]  # type: ignore[index]
 
 
-def map_in_processes(
-    work: Callable[[Item], Result], items: Iterable[Item], processes: int, *, busy: bool = False
-) -> Iterator[Result]:
+def map_in_processes(work: Callable[[Item], Result], items: Iterable[Item], processes: int) -> Iterator[Result]:
     """Give out what `work` makes of each item, in order, as `processes` processes find it.
 
     Items are taken as they are needed, a fixed number ahead; none before the processes have been forked, which would
     keep copies of them. Nothing leaves this process where there is to be only one or the system cannot fork safely.
-    `busy`: to take an item is work, too, so there is one other process, and this one works on items while that does.
 
     Raises MemoryError where a process has been ended from outside, which is what a system short of memory does.
     """
     crew: list[Helper] = []
-    for _ in range(1 if busy else processes) if processes > 1 and can_fork() else ():
+    for _ in range(processes) if processes > 1 and can_fork() else ():
         crew.append(Helper(work, crew, daemon=True))
     waiting: deque[Callable[[], Result]] = deque()
 
-    def start(turn: int, item: Item) -> Callable[[], Result]:
-        member = crew[turn % len(crew)] if crew else None
-        if member is not None and not (busy and member.works):
-            member.start(item)
-            return member.result
-        found = work(item)
-        return lambda: found
+    def start(item: Item) -> Callable[[], Result]:
+        if not crew:
+            found = work(item)
+            return lambda: found
+        free = next((member for member in crew if not member.works), None) or first_ready(crew)[0]
+        crew.remove(free)
+        crew.append(free)  # all have their turn
+        free.start(item)
+        return free.result
 
     try:
-        for turn, item in enumerate(items):
+        for item in items:
             if len(waiting) == _AHEAD:
                 yield waiting.popleft()()
-            waiting.append(start(turn, item))
+            waiting.append(start(item))
             del item
         while waiting:
             yield waiting.popleft()()

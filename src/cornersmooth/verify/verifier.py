@@ -59,6 +59,9 @@ NO_FEED: Final = "no F before the first feed move, and most controls stop there 
 #: poses from which on it is worth while to let other processes work
 _LONG: Final = 30_000
 
+#: processes that who reads the text finds work for
+_READ_FOR: Final = 2
+
 #: how often parts of arcs may be halved, and one
 _HALVED: Final = 5
 
@@ -164,11 +167,9 @@ class Verifier:
             words = "the words of the text: they are looked at where it is read, not afterwards"
             return found.not_verified(words if self._trust.words else "")
         text.begin()
+        task = self._task(rotary=options.machine is not None, apart=apart)  # while the text begins
         steps = options.steps(text.head(DIGITS_SAMPLE))
         rotary = options.rotary(steps)
-        task = self._task(
-            rotary=rotary is not None, apart=apart
-        )  # takes memory, which who writes may need before there is text
         lever = None if rotary is None else float(rotary.levers(task.path.points[:, :3]).max(initial=0.0))
         reader = Reader(self._name, options, steps, lever)
         machine = self._machine if options.dialect.retracts else None
@@ -245,7 +246,7 @@ class Verifier:
                     check(match, found)
             return found
 
-        for number, found in enumerate(map_in_processes(work, items(), self._processes, busy=True)):
+        for number, found in enumerate(map_in_processes(work, items(), min(self._processes, _READ_FOR))):
             if len(findings.breaks) >= MOST_BREAKS:
                 continue
             for some in found.poses:
