@@ -22,7 +22,7 @@ from itertools import accumulate, chain, pairwise, repeat, takewhile
 import numpy as np
 
 from cornersmooth.arrays import dot, some_rows
-from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program, Statement
+from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Numbers, Program, Statement
 from cornersmooth.nc.blocks import feed_digits, feed_ticks
 from cornersmooth.nc.circles import FIRST_PLANE
 from cornersmooth.nc.control import Blocks
@@ -33,7 +33,7 @@ from cornersmooth.nc.motion import NOWHERE, Motion
 from cornersmooth.nc.planes import Planes
 from cornersmooth.nc.program_frame import Stream
 from cornersmooth.nc.rotary_words import machine_of
-from cornersmooth.nc.statement_args import tool_starts, with_starts
+from cornersmooth.nc.statement_args import tool_starts
 from cornersmooth.nc.statement_writer import StatementWriter
 from cornersmooth.smoothing.sampling import Rows
 from cornersmooth.text import format_number
@@ -59,9 +59,15 @@ class Script:
     _tilted: int = -1  #: tilted plane of the tool at hand
     _next: int = 0
     _in_order: tuple[Statement, ...] = field(init=False)
+    _part: Numbers = field(init=False)  #: (n,) poses with the same are holes or not, in one plane, without a FROM between
 
     def __post_init__(self) -> None:
-        self._in_order = with_starts(self.motion.program)
+        program, plane = self.motion.program, self.planes.of
+        # PAINT is for the screen of the CAM system alone
+        self._in_order = tuple(one for one in program.statements if one.word != "PAINT")
+        begins, hole = program.kind == Move.FROM, program.kind == Move.HOLE
+        begins[1:] |= (hole[1:] != hole[:-1]) | (plane[1:] != plane[:-1])
+        self._part = np.cumsum(begins, dtype=np.int32)
 
     def hand_on(self, stream: Stream) -> None:
         """Write to a stream what was written since it was handed on last."""
@@ -104,16 +110,14 @@ class Script:
         """Write rows between statements, holes apart from the others."""
         if start >= stop:
             return
-        poses = rows.move[start:stop]
-        hole, plane = self.motion.program.kind[poses] == Move.HOLE, self.planes.of[poses]
-        edges = np.flatnonzero((hole[1:] != hole[:-1]) | (plane[1:] != plane[:-1]))
-        for first, last in pairwise([0, *(1 + edges).tolist(), stop - start]):
-            part = slice(start + first, start + last)
-            self._take_coordinates(int(poses[first]))
-            if hole[first]:
-                self._drill(some_rows(rows, part))
+        edges = start + 1 + np.flatnonzero(np.diff(self._part[rows.move[start:stop]]))
+        for first, last in pairwise([start, *edges.tolist(), stop]):
+            pose, some = int(rows.move[first]), some_rows(rows, slice(first, last))
+            self._take_coordinates(pose)
+            if self.motion.program.kind[pose] == Move.HOLE:
+                self._drill(some)
             else:
-                self.motion.lines(some_rows(rows, part))
+                self.motion.lines(some)
 
     def _take_coordinates(self, pose: int) -> None:
         """Take the coordinates of a pose; between tilted planes, and beside them, the tool goes up."""

@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from cornersmooth.kinematics import Machine, check_travel
-from cornersmooth.model import Floats, Ints, Move, Program, Statement
+from cornersmooth.model import Floats, Ints, Program, Statement
 
 _LONGEST = 86_400_000  #: longest dwell that is written, ms: one day
 _MM_PER_MINUTE = {"SFM": 12.0 * 25.4, "SMM": 1000.0}  #: cutting speeds in mm per minute
@@ -51,21 +51,6 @@ def spoken_text(statement: Statement) -> str:
     text = statement.args[0] if statement.args and isinstance(statement.args[0], str) else statement.text
     text = text.strip()
     return text[1:-1] if len(text) > 1 and text[0] == text[-1] == "'" else text
-
-
-def with_starts(program: Program) -> tuple[Statement, ...]:
-    """Statements but PAINT, which only the CAM screen shows, and one for every FROM after what stands before it."""
-    starts = np.flatnonzero(program.kind == Move.FROM).tolist()
-    stated = [
-        Statement(pose, int(program.line[pose]), "FROM", tuple((program.tip[pose] / program.mm_per_unit).tolist()))
-        for pose in starts
-    ]
-    return tuple(
-        sorted(
-            (*(one for one in program.statements if one.word != "PAINT"), *stated),
-            key=lambda one: (one.pose, one.word == "FROM"),
-        )
-    )
 
 
 def milliseconds(amount: float, in_revolutions: bool, speed: float | None) -> int | None:

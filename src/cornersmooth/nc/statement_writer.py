@@ -272,13 +272,6 @@ class StatementWriter:
             return list(blocks)
         return self.modals.flow(blocks, off=blocks in off)
 
-    def start(self, statement: Statement) -> list[str]:
-        """FROM: a position that is stated; the tool is not sent there."""
-        decimals = self.form.tip_decimals(self.program.units)
-        numbers = (format_number(value, decimals, trim=True) for value in numbers_of(statement))
-        place = " ".join(letter + number for letter, number in zip("XYZ", numbers, strict=True))
-        return self.comment(f"FROM {place}")
-
 
 Handler = Callable[[StatementWriter, Statement], list[str] | None]
 _HANDLERS: dict[str, Handler] = {
@@ -298,5 +291,4 @@ _HANDLERS: dict[str, Handler] = {
     "END": StatementWriter.end,
     "INSERT": StatementWriter.insert,
     "AUXFUN": StatementWriter.auxiliary,
-    "FROM": StatementWriter.start,
 }
