@@ -12,18 +12,16 @@ from typing import Any, Final
 
 import numpy as np
 
-from cornersmooth.arrays import norm, starts
+from cornersmooth.arrays import norm
 from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.kinematics import Machine, solutions, tool_axis
 from cornersmooth.kinematics.poses import angle_between
-from cornersmooth.model import Bools, Floats, Ints, Move, Program, Runs, SmoothProgram, rapid_moves, still_poses
+from cornersmooth.model import Bools, Floats, Ints, Move, Program, SmoothProgram, rapid_moves, still_poses
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.messages import Findings
 from cornersmooth.nc.statement_args import tool_starts
 from cornersmooth.smoothing.sampling import Rows, all_dense_rows
 from cornersmooth.system.processes import return_free_memory
-
-_SWING = 2.0  #: what a curve may turn the axis, over ε at H: tip and axis point may be off to opposite sides
 
 
 @dataclass(frozen=True)
@@ -91,41 +89,20 @@ def machine_of(form: Form) -> Machine:
 
 
 def within_reach(smoothed: SmoothProgram, form: Form) -> SmoothProgram:
-    """Round runs at the limits of the rotary axes corner by corner, if the machine cannot follow their curves.
+    """Round runs corner by corner, if the machine of a form cannot follow their curves.
 
     Where poses are at the limit of a rotary axis, the curve of a run may go beyond it within the tolerance. That of a
     single corner does not: its axes are between those of the poses.
     """
-    runs, machine = smoothed.runs, form.machine
-    if runs is None or machine is None or not form.rotary or form.rewind:
-        return smoothed
-    near = _near_limits(runs, machine, smoothed)
-    if not near.any():
+    if smoothed.runs is None or not form.rotary or form.rewind:
         return smoothed
     try:
         rotary_way(all_dense_rows(smoothed), smoothed, form, Findings())
     except InputError:
         from cornersmooth.smoothing.global_runs import corner_by_corner  # which takes long to load
 
-        return corner_by_corner(smoothed, near)
+        return corner_by_corner(smoothed)
     return smoothed
-
-
-def _near_limits(runs: Runs, machine: Machine, smoothed: SmoothProgram) -> Bools:
-    """(r,) bool: runs with a pose so near to the limit of an axis that the curve may go beyond it."""
-    settings = smoothed.settings
-    if len(machine.names) < 2:  # whose limits are those of the directions, too
-        return np.ones(len(runs), np.bool_)
-    found = solutions(machine, smoothed.program.axis[runs.pose])
-    swing = np.degrees(_SWING * settings.tolerance / settings.axis_scale)
-    room = np.full(found.angles.shape, swing)
-    with np.errstate(divide="ignore"):  # at the pole the first axis turns as far as it likes
-        room[..., 0] /= np.abs(np.sin(np.radians(np.minimum(found.pole_distance, 90.0))))[:, None]
-    near = np.zeros(len(runs.pose), np.bool_)
-    for k, limit in zip(*np.nonzero(np.isfinite(machine.limits)), strict=True):
-        off = found.angles[..., k] - machine.limits[k, limit]
-        near |= (np.abs(off - 360.0 * np.round(off / 360.0)) <= room[..., k]).any(axis=1)
-    return np.maximum.reduceat(near, starts(runs.count)[:-1])
 
 
 LONGEST_DETOUR: Final = 30.0  #: degrees by which the way of the tool axis may be longer than the shortest one

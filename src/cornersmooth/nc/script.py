@@ -59,7 +59,9 @@ class Script:
     _tilted: int = -1  #: tilted plane of the tool at hand
     _next: int = 0
     _in_order: tuple[Statement, ...] = field(init=False)
-    _part: Numbers = field(init=False)  #: (n,) poses with the same are holes or not, in one plane, without a FROM between
+    _part: Numbers = field(
+        init=False
+    )  #: (n,) poses with the same are holes or not, in one plane, without a FROM between
 
     def __post_init__(self) -> None:
         program, plane = self.motion.program, self.planes.of

@@ -115,21 +115,20 @@ def _mark(corners: Corners, solved: _Solved) -> None:
         column[rows] = values
 
 
-def corner_by_corner(smoothed: SmoothProgram, runs: Bools) -> SmoothProgram:
-    """Take back the curves of some runs, which a machine cannot follow: (r,) of `SmoothProgram.runs`."""
+def corner_by_corner(smoothed: SmoothProgram) -> SmoothProgram:
+    """Take back the curves of runs, which a machine cannot follow."""
     program, whole, corners = smoothed.program, smoothed.runs, deepcopy(smoothed.corners)
     assert whole is not None
     alone = place_corners(program, smoothed.settings, CONSTRUCTION)
     run, place = spread(whole.count)
-    rows = np.searchsorted(corners.pose, whole.pose[runs[run] & (place > 0) & (place < whole.count[run] - 1)])
+    rows = np.searchsorted(corners.pose, whole.pose[(place > 0) & (place < whole.count[run] - 1)])
     for name in vars(corners).keys() - {"extra"}:
         getattr(corners, name)[rows] = getattr(alone, name)[rows]
     for column in corners.extra.values():
         column[rows] = np.nan
-    text = "corner rounded by itself: the curves of its run would leave the limits of a rotary axis"
+    text = "corner rounded by itself: curves of runs would leave the limits of a rotary axis"
     finding = Finding("CS239", "note", int(program.line[corners.pose[rows[0]]]), text, len(rows))
-    left = None if runs.all() else some_runs(whole, ~runs)
-    return replace(smoothed, corners=corners, findings=(*smoothed.findings, finding), runs=left)
+    return replace(smoothed, corners=corners, findings=(*smoothed.findings, finding), runs=None)
 
 
 def _backwards(point: Floats, count: Ints) -> Bools:
