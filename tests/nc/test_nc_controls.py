@@ -58,8 +58,7 @@ def test_a_statement_is_said_in_the_words_of_the_control(control: str) -> None:
             "g6.2",
             "table-ac",
             False,
-            "fanuc form g6.2 cannot run without tool tip control: its curves are refused at inverse time feed (G93); "
-            "use -f g1",
+            "fanuc form g6.2 cannot run without tool tip control; use -f g1",
         ),
         (
             "heidenhain",

@@ -6,7 +6,7 @@ Combinations that a control cannot run are refused with what works instead.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -221,32 +221,30 @@ def _instead(table: Control, fits: Callable[[FormTable], bool]) -> str:
 
 def _mode(table: Control, form: FormTable, machine: Machine | None, tcp: bool) -> tuple[Orientation, Mode]:
     """What says the orientation, and how; refuses what the form has not (CS215)."""
-    here = f"{table.name} form {form.name}"
-    if machine is not None and not machine.names:  # blocks without words of the tool axis, along Z
-        mode = form.modes.get("fixed", None if form.curve else form.upright)
-        if mode is None:
-            lines = _instead(table, lambda one: not one.curve and bool("fixed" in one.modes or one.upright))
-            what = f"{here} has no blocks without words of the tool axis"
-            raise SettingsError("CS215", what, lines or "leave out --machine")
-        return "fixed", mode
-    turning: tuple[Orientation, ...] = ("vector", "point", "fixed") if machine is None else ("angles",)
-    wanted = turning if tcp else ("machine",)
-    for orientation in wanted:
-        if orientation in form.modes:
-            return orientation, form.modes[orientation]
-    hint = _instead(table, lambda one: any(orientation in one.modes for orientation in wanted))
-    if machine is not None and tcp:
-        raise SettingsError("CS215", f"{here} has no rotary words", hint or "leave out --machine")
-    if tcp:
-        what = f"{here} has no tool vectors, only rotary words"
-        raise SettingsError("CS215", what, hint or "name your machine with --machine")
-    curves = ": its curves are refused at inverse time feed (G93)" if form.curve else ""
-    if hint and machine is None:
+    along_z = machine is not None and not machine.names
+
+    def modes(one: FormTable) -> Mapping[Orientation, Mode]:  # blocks without words of the tool axis are those of G1
+        return {"fixed": one.upright, **one.modes} if along_z and one.upright and not one.curve else one.modes
+
+    wanted: tuple[Orientation, ...]
+    if along_z:
+        wanted, lack, instead = ("fixed",), "has no blocks without words of the tool axis", "leave out --machine"
+    elif not tcp:
+        wanted, lack, instead = ("machine",), "cannot run without tool tip control", "leave out --no-tcp"
+    elif machine is not None:
+        wanted, lack, instead = ("angles",), "has no rotary words", "leave out --machine"
+    else:
+        wanted, lack = ("vector", "point", "fixed"), "has no tool vectors, only rotary words"
+        instead = "name your machine with --machine"
+    found = next((orientation for orientation in wanted if orientation in modes(form)), None)
+    if found is not None:
+        return found, modes(form)[found]
+    hint = _instead(table, lambda one: not modes(one).keys().isdisjoint(wanted))
+    if not tcp and hint and machine is None:
         hint += " and name your machine with --machine"
-    elif not hint:
-        lines = _instead(table, lambda one: not one.curve) if form.curve else ""
-        hint = f"{lines} and leave out --no-tcp" if lines else "leave out --no-tcp"
-    raise SettingsError("CS215", f"{here} cannot run without tool tip control{curves}", hint)
+    elif not tcp and form.curve and not hint:
+        hint = f"{_instead(table, lambda one: not one.curve)} and {instead}"
+    raise SettingsError("CS215", f"{table.name} form {form.name} {lack}", hint or instead)
 
 
 def _check_rewind(form: Form) -> None:
