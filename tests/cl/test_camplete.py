@@ -233,3 +233,22 @@ def test_an_origin_of_catia_without_a_shift_is_a_work_offset_that_is_not_compare
 def test_a_g_code_of_prefun_is_told_as_one() -> None:
     with pytest.raises(InputError, match=r"error\[CS115\]: PREFUN/54 is not understood\nhint: a G code may move"):
         read(b"UNITS/MM\nPREFUN/54\nGOTO/0,0,0\n")
+
+
+@pytest.mark.parametrize(
+    ("cycles", "args"),
+    [
+        ("DRILL,FEDTO,5,RAPTO,2,MMPM,90\nCYCLE/ON", "DRILL,FEDTO,5,RAPTO,2,MMPM,90"),
+        ("DRILL,FEDTO,5,DWELL,REV,4\nCYCLE/OFF\nCYCLE/ON,DEPTH,7", "DRILL,DWELL,REV,4,DEPTH,7"),
+        ("DEEP,FEDTO,9,STEP,4,3,RTRCTO,AUTO\nCYCLE/ON,INCR,2,RETURN,8", "DEEP,FEDTO,9,INCR,2,RETURN,8"),
+        ("DRILL,FEDTO,5\nCYCLE/INIT\nCYCLE/ON,IPM,3", "DRILL,FEDTO,5,IPM,3"),
+        ("ON,FEDTO,7", "ON,FEDTO,7"),
+        ("DRILL,ON,DEPTH,12,PERMIN,85", "DRILL,DEPTH,12,PERMIN,85"),
+        ("DEEP,12,INCR,8,MMPM,85,1,RAPTO,3", "DEEP,DEPTH,12,INCR,8,MMPM,85,CLEAR,1,RAPTO,3"),
+        ("DRILL,-12,MMPM,85,1", "DRILL,-12,MMPM,85,1"),
+    ],
+)
+def test_a_cycle_has_all_the_words_that_hold(cycles: str, args: str) -> None:
+    program = read(f"UNITS/MM\nGOTO/0,0,30\nCYCLE/{cycles}\nGOTO/5,6,0\nCYCLE/OFF\nFINI\n".encode())
+    found = [one for one in program.statements if one.word == "CYCLE"][-2].args
+    assert ",".join(f"{value:g}" if isinstance(value, float) else value for value in found) == args

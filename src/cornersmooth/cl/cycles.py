@@ -15,8 +15,13 @@ ORDER: Final = ("DEPTH", "FEED", "PITCH", "CLEAR", "RAPTO", "RETURN", "STEP", "D
 _INCH: Final = 25.4
 
 #: words of a cycle that have no number
-_KINDS: Final = frozenset("DRILL FACE SPOT CSINK REAM BORE DEEP BRKCHP TAP".split())
+_KINDS: Final = frozenset("DRILL FACE SPOT CSINK REAM BORE DEEP DEEP2 BRKCHP TAP".split())
 _UNITS: Final = frozenset("MMPM IPM PERMIN MMPR IPR PERREV".split())
+_STEPS: Final = frozenset("STEP INCR 1STPECK SUBPECK".split())
+#: words of which a later one takes the place of all the others
+_FAMILIES: Final = ({"FEDTO", "DEPTH"}, {"RTRCTO", "RETURN"}, _STEPS, {"RAPTO", "CLEAR"}, _UNITS, {"DWELL"})
+#: dialects in which numbers without words are those of `in_fixed_order`
+FIXED_ORDER: Final = ("plain", "hsm")
 
 
 def order_of(text: str | None) -> tuple[str, ...]:
@@ -34,9 +39,13 @@ def plain_cycle(args: Sequence[Argument], dialect: str, order: tuple[str, ...] =
     ``RIGID`` with ``PITCH`` is a tap (Autodesk's CAMplete post), ``TPI`` its pitch in threads per inch (PTC Creo);
     ``FLOAT`` says what holds the tap (NX). ``CSKDIA`` beside a depth is the diameter that comes of it (PTC Creo).
     ``ORIENT,0`` of the CAMplete post has no meaning: "unknown orientation". ``OPTION,CAM,n`` is a remark (NX).
+    ``CYCLE/DRILL,ON,...`` is how ISO 4343 (10.8.7) begins one.
     """
-    own = _named(args, order) if order else list(args)
+    own = [value for value in args if value != ""]
     kind = own[0] if own else ""
+    if own[1:2] == ["ON"] and kind in _KINDS:
+        del own[1]
+    own = _named(own, order) if order else own
     if kind == "RIGID" and _number_behind(own, "PITCH") is not None:
         own[0] = "TAP"
         own[own.index("PITCH")] = "PERREV"
@@ -53,6 +62,25 @@ def plain_cycle(args: Sequence[Argument], dialect: str, order: tuple[str, ...] =
     if "OPTION" in own and own[own.index("OPTION") + 1 :][:1] == ["CAM"] and _number_behind(own, "CAM") is not None:
         _drop(own, "OPTION", 3)
     return tuple(own)
+
+
+def in_fixed_order(args: Sequence[Argument]) -> tuple[Argument, ...] | None:
+    """Arguments of Autodesk's ISO 4343 post with words: kind, depth, pecks, unit, feed, clearance; None for others."""
+    unit = 4 if args[2:3] and args[2] in _STEPS else 2
+    numbers = [value for value in (*args[1:2], *args[unit + 1 : unit + 3]) if isinstance(value, float)]
+    if len(numbers) < 3 or args[0] not in _KINDS or args[unit] not in _UNITS or not numbers[0] > 0.0:
+        return None
+    return (args[0], "DEPTH", *args[1 : unit + 2], "CLEAR", *args[unit + 2 :])
+
+
+def going_on(before: Sequence[Argument], args: Sequence[Argument]) -> tuple[Argument, ...]:
+    """Arguments of a cycle that goes on with those before by ``CYCLE/ON``, but for what the words behind it replace."""
+    gone = set[Argument]().union(*(family for family in _FAMILIES if family & {*args}))
+    kept, word = list[Argument](), ""
+    for value in before:
+        word = value if isinstance(value, str) and value not in ("AUTO", "REV") else word
+        kept += [] if word in gone else [value]
+    return (*kept, *args[1:])
 
 
 def _named(args: Sequence[Argument], order: tuple[str, ...]) -> list[Argument]:

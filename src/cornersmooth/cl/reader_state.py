@@ -33,6 +33,7 @@ class ReaderState(Poses):
     rapid: bool = False  #: the next motion is rapid
     rapid_on: bool = False  #: all motions are
     hole: bool = False  #: every position is a hole
+    cycle: tuple[Argument, ...] = ()  #: arguments of the last CYCLE that says what to drill
     arc: Arc | None = None  #: waits for its end
     curve: Curve | None = None  #: waits for more control points
     spline: Spline | None = None  #: MOVNRB, until OFF

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.cl.bulk import FARTHEST
-from cornersmooth.cl.cycles import plain_cycle
+from cornersmooth.cl.cycles import FIXED_ORDER, going_on, in_fixed_order, plain_cycle
 from cornersmooth.cl.grammar import Argument, Record, joined, number
 from cornersmooth.cl.poses import IDENTITY, UNIT_TOLERANCE, UP, System, Vector, system_of
 from cornersmooth.cl.reader_state import ReaderState
@@ -288,7 +288,15 @@ def _cutcom(state: ReaderState, record: Record) -> None:
 def _cycle(state: ReaderState, record: Record) -> None:
     state.hole = record.option not in _ENDS
     state.set_kind(state.n)
-    state.keep(replace(record, args=plain_cycle(record.args, state.dialect.name, state.cycle_order)))
+    args = plain_cycle(record.args, state.dialect.name, state.cycle_order)
+    if state.dialect.name in FIXED_ORDER and (ordered := in_fixed_order(args)) is not None:
+        state.note("CS385", record.line)
+        args = ordered
+    if state.cycle and args[:1] == ("ON",):
+        args = going_on(state.cycle, args)
+    if state.hole and record.option != "INIT":  # by which SolidWorks announces one
+        state.cycle = args
+    state.keep(replace(record, args=args))
 
 
 def _frame(state: ReaderState, record: Record) -> None:

@@ -54,12 +54,6 @@ _FEEDS = {
     "IPR": (25.4, FeedMode.PER_REVOLUTION),
     "PERREV": (None, FeedMode.PER_REVOLUTION),
 }
-#: words of which a later one takes the place of all the others
-_FAMILIES = ({*_DEPTHS}, {*_RETURNS}, {*_STEPS}, {"RAPTO", "CLEAR"}, {*_FEEDS}, {"DWELL", "REV"})
-#: dialects in which the fixed order is that of ISO 4343; elsewhere a table of the post-processor says what numbers mean
-_FIXED_ORDER = ("plain", "hsm")
-
-
 #: kinds of a cycle, and its words with their numbers
 Given = tuple[set[str], dict[str, tuple[float, ...]]]
 
@@ -81,44 +75,8 @@ class Cycle:
     tap: bool = False  #: whether a thread is cut: the spindle turns with the feed
 
 
-def in_force(before: Given | None, stated: tuple[float | str, ...], program: Program) -> Given | None:
-    """Words that hold after a CYCLE statement with the arguments `stated`, every number by its word."""
-    own = _without_on(stated)
-    if own == ["INIT"]:  # SolidWorks announces a cycle by it
-        return before
-    if own[:1] != ["ON"]:
-        clearance = _unit_place(own) + 2
-        fixed = has_fixed_order(stated, program)
-        return _pairs([own[0], "DEPTH", *own[1:clearance], "CLEAR", *own[clearance:]] if fixed else own)
-    gone, more = set().union(*(family for family in _FAMILIES if family.intersection(own))), _pairs(own[1:])
-    if before is None or more is None:
-        return None
-    return before[0] | more[0], {word: value for word, value in before[1].items() if word not in gone} | more[1]
-
-
-def has_fixed_order(args: tuple[float | str, ...], program: Program) -> bool:
-    """Whether numbers have no words, but the order of Autodesk's ISO 4343 post: kind, depth, unit, feed, clearance."""
-    own = _without_on(args)
-    unit = _unit_place(own)
-    numbers = [value for value in (*own[1:2], *own[unit + 1 : unit + 3]) if isinstance(value, float)]
-    if program.source.dialect not in _FIXED_ORDER or len(numbers) < 3:
-        return False
-    return own[0] in _KINDS and own[unit] in _FEEDS and numbers[0] > 0.0
-
-
-def _without_on(args: tuple[float | str, ...]) -> list[float | str]:
-    """Arguments that say something, without the ON of ISO 4343 after the kind of cycle."""
-    own = [value for value in args if value != ""]
-    return own[:1] + own[2:] if own[1:2] == ["ON"] and own[0] in _KINDS else own
-
-
-def _unit_place(args: Sequence[float | str]) -> int:
-    """Where the unit is in the fixed order: pecks come before it."""
-    return 4 if args[2:3] and args[2] in _STEPS else 2
-
-
 def read_cycle(given: Given | None, program: Program, speed: float | None) -> Cycle | None:
-    """Read the words of a cycle, as `in_force` gives them; None where any of them is not understood.
+    """Read the words of a cycle, as `_pairs` gives them; None where any of them is not understood.
 
     A dwell may count in revolutions of the spindle at a speed, rev/min.
     """
@@ -213,7 +171,7 @@ class Drillings:
 
 def plan_drilling(program: Program, orders: Orders, findings: Findings) -> Drillings:
     """Go through the statements about cycles, and about the spindle, whose turns a dwell may count."""
-    given: Given | None = (set(), {})
+    given: Given | None = None
     drills, now, speed = False, Drilling(), None
     first, each = [0], [now]
     for statement in program.statements:
@@ -223,10 +181,9 @@ def plan_drilling(program: Program, orders: Orders, findings: Findings) -> Drill
         elif statement.word == "CYCLE" and ends(statement):
             drills = False
         elif statement.word == "CYCLE":
-            now, drills = replace(now, line=statement.line), drills or words_of(statement) != ["INIT"]
-            given = in_force(given, statement.args, program)
-            if has_fixed_order(statement.args, program):
-                findings.note("CS385", statement.line)
+            now = replace(now, line=statement.line)
+            if words_of(statement) != ["INIT"]:  # by which SolidWorks announces one
+                given, drills = _pairs(statement.args), True
         else:
             continue
         now = replace(now, cycle=read_cycle(given, program, speed) if drills else None)

@@ -75,7 +75,6 @@ WARNINGS: Final = {
     "CS348": "a tap is left to the control's cycle: see that it turns the spindle with the feed",
     "CS384": "the tool turns on its way to a hole to where feeding begins; see that it is free to, or give RTRCTO",
     "CS321": "CYCLE with pecks does not say how deep they are; see that the tool may drill in one feed",
-    "CS385": "CYCLE without words is read as depth, feed, clearance; see that the positions are tops of holes",
     # tilted planes and rotary axes
     "CS357": "no tilted plane: {why}: under tool tip control as other motion",
     "CS379": "a tilted plane stays within the travel with {angles} only; see that the control takes these angles",

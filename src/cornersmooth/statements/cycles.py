@@ -127,48 +127,6 @@ def _height(values: dict[str, float], words: tuple[str, ...], unit: float) -> fl
     return next((values[word] * unit for word in words if word in values), math.nan)
 
 
-def _goes_on(before: tuple[float | str, ...], args: tuple[float | str, ...], *, fixed: bool) -> tuple[float | str, ...]:
-    """Arguments of a cycle after a CYCLE statement, of which ON changes only what it names.
-
-    Where `fixed`, numbers without words are those of Autodesk's ISO 4343 post: depth first, clearance after the feed.
-    """
-    groups: list[list[float | str]] = []  # a word with what belongs to it
-    for value in args:
-        if isinstance(value, float) or value in ("AUTO", "REV"):
-            groups = groups or [[""]]
-            groups[-1].append(value)
-        elif value:
-            groups.append([value])
-    heads = [group[0] for group in groups]
-    if heads[:1] == ["ON"]:
-        changed = {_alike(head) for head in heads[1:]}
-        kept: list[float | str] = []
-        word = ""
-        for value in before:
-            word = value if isinstance(value, str) and value not in ("AUTO", "REV") else word
-            kept += [] if _alike(word) in changed else [value]
-        return (*kept, *args[args.index("ON") + 1 :])
-    if heads[1:2] == ["ON"] and heads[0] in _PLAIN:  # ISO 4343 10.8.7
-        groups[0] += groups.pop(1)[1:]
-    unit = next((group for group in groups if group[0] in _FEEDS), [])
-    if (
-        fixed
-        and groups
-        and groups[0][0] in _PLAIN
-        and [len(groups[0]), len(unit)] == [2, 3]
-        and float(groups[0][1]) > 0
-    ):
-        unit.insert(2, "CLEAR")
-        groups[0].insert(1, "DEPTH")
-    return tuple(value for group in groups for value in group)
-
-
-def _alike(word: float | str) -> str:
-    """One name for words that say the same of a cycle."""
-    families = (_DEPTH, _RETURNS, tuple(_FEEDS), ("RAPTO", "CLEAR"), _STEPS)
-    return next((family[0] for family in families if word in family), str(word))
-
-
 def drillings(program: Program, poses: list[int]) -> list[Drilling]:
     """Cycle in force at each of the hole poses, ascending."""
     found: list[Drilling] = []
@@ -176,7 +134,6 @@ def drillings(program: Program, poses: list[int]) -> list[Drilling]:
     args: tuple[float | str, ...] = ()
     last = Drilling()
     asking = Asking(program)
-    fixed = program.source.dialect in ("plain", "hsm")
     cycles = [statement for statement in program.statements if statement.word in ("CYCLE", *_TURNING)]
     k = 0
     for pose in poses:
@@ -186,7 +143,7 @@ def drillings(program: Program, poses: list[int]) -> list[Drilling]:
                 asking.take(cycles[k], 0)
             elif words != ["INIT"]:
                 on = words[:1] not in (["OFF"], ["NOMORE"])
-                args = _goes_on(args, cycles[k].args, fixed=fixed) if on else args
+                args = cycles[k].args if on else args
             # a pitch, and a dwell in revolutions, hang on the speed of now
             last = drilling(args, program, asking.speed) if args else Drilling()
             k += 1
