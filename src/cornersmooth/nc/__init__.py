@@ -31,7 +31,7 @@ from cornersmooth.nc.planes import Planes, check_travel_of_words, plan_planes
 from cornersmooth.nc.program_frame import BLEND_STEP, POINT_APPROACH, Frame, Stream
 from cornersmooth.nc.rotary_words import UPRIGHT, rotary_way, within_reach
 from cornersmooth.nc.script import Script
-from cornersmooth.nc.statement_args import Orders, tool_starts
+from cornersmooth.nc.statement_args import spindle_orders, tool_starts
 from cornersmooth.nc.statement_writer import StatementWriter
 from cornersmooth.settings import CURVES_METHOD, DEFAULT_METHOD, FLIP_ANGLE, Settings
 from cornersmooth.smoothing.sampling import Rows, all_dense_rows, curve_rows, dense_rows
@@ -173,7 +173,7 @@ def write(
     frame.refuse_tool(chosen, program)
     modals = Modals(chosen, values, frame.texts(chosen, values), findings, program.units)
     modals.now["blend"] = usual_blend = round(float(values["blend"]) / BLEND_STEP) if chosen.table.lines.rounding else 0
-    orders, native = Orders.of(program), frame.cycles == "native"
+    orders, native = spindle_orders(program), frame.cycles == "native"
     drillings = plan_drilling(program, orders, findings)
     statements = StatementWriter(chosen, program, findings, modals, orders, comments=frame.comments)
     planes = plan_planes(program, smoothed.settings, chosen, findings, drillings, drills=native)

@@ -105,7 +105,7 @@ class Words:
     compensation_left: Blocks = ()
     compensation_right: Blocks = ()
     compensation_off: Blocks = ()
-    #: whether the first move under it must go some way in the plane, more than what the register holds
+    #: whether the first move under it must go some way in the plane
     compensation_entry: bool = False
     #: block for the planes 17 (XY), 18 (ZX) and 19 (YZ)
     plane: Annotated[Mapping[int, str], {"xy": 17, "zx": 18, "yz": 19}] = field(default_factory=dict)

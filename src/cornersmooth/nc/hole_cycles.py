@@ -176,7 +176,7 @@ def plan_drilling(program: Program, orders: Orders, findings: Findings) -> Drill
     first, each = [0], [now]
     for statement in program.statements:
         if statement.word == "SPINDL":
-            order = orders.spindle[id(statement)] or ("", None)
+            order = orders[id(statement)] or ("", None)
             speed, now = order[1] or speed, replace(now, clockwise=order[0] in ("CLW", "ON"))
         elif statement.word == "CYCLE" and ends(statement):
             drills = False

@@ -180,7 +180,7 @@ class Script:
             cycle = None
         clearance = np.full(len(poses), cycle.clearance) if cycle and cycle.clearance is not None else travel
         if cycle is not None and kind:
-            self._cycles(cycle, kind, poses, (travel, clearance, leave))
+            self._cycles(cycle, kind, poses, (enter, travel, clearance, leave))
             return
         hole, tip, rapid, dwell = hole_moves(cycle, program, poses, (enter, clearance, leave))
         plain = BlockRows.straight(program, motion.ticks_at(rows, tip, hole), poses[hole])
@@ -221,13 +221,14 @@ class Script:
             return "", f"a tap, and {where}"
         return kind if self.native or cycle.tap else "", ""
 
-    def _cycles(self, cycle: Cycle, kind: str, poses: Ints, above: tuple[Floats, Floats, Floats]) -> None:
-        """Write holes as cycles of the control, each from its height of travel; the last is left as `crossings` plans.
+    def _cycles(self, cycle: Cycle, kind: str, poses: Ints, above: Sequence[Floats]) -> None:
+        """Write holes as cycles of the control, each from its height of travel.
 
-        Heights (h,) above the holes, mm: of travel, where feeding begins, and from which the tool goes.
+        Heights (h,) above the holes, mm: to which the tool comes, of travel, where feeding begins, and from which it
+        goes: the first and the last count where the height of travel is another one.
         """
         motion, program, at = self.motion, self.motion.program, self.motion.at
-        travel, clearance, leave = above
+        enter, travel, clearance, leave = above
         motion.findings.note_each("CS347", program.line[poses])
         if kind == "tap":
             motion.findings.note_each("CS348", program.line[poses])
@@ -237,21 +238,20 @@ class Script:
         (feeds, modes), frame = hole_feeds(cycle, program, poses), np.eye(3) if at.plane is None else at.plane.frame
         texts: Blocks = getattr(table, kind)
         once = next((k for k, block in enumerate(texts) if "{x}" in block), 0)  # so many are written where they change
-        over = at.ticks(program.tip[poses] + travel[:, None] * frame[:, 2], program.axis[poses])
+        come, over, go = (
+            at.ticks(program.tip[poses] + height[:, None] * frame[:, 2], program.axis[poses])
+            for height in (enter, travel, leave)
+        )
         words = [feed_digits(ticks, at) for ticks in feed_ticks(feeds, modes, program, at).tolist()]
         turns = np.where((modes == FeedMode.PER_REVOLUTION) | (speed == 0.0), 1.0, speed)
-        beside = poses[0] > 0 and program.kind[poses[0] - 1] == Move.HOLE and not motion.modals["high"]
+        begins = np.diff(over[:, 2], prepend=over[0, 2] - 1) != 0
+        ends = np.append(begins[1:], True)
         written: Blocks = ()
         for k, pose in enumerate(poses.tolist()):
-            if k == 0 or over[k, 2] != over[k - 1, 2]:
-                motion.say(table.off if written else ())
-                written, way = (), over[[k]]
-                if motion.position is not None and (k or beside):
-                    way = np.stack((motion.position, over[k], over[k]))
-                    way[:2, 2] = way[:2, 2].max()
-                motion.emit(motion.moving(BlockRows.straight(program, way, poses[[k] * len(way)], rapid=True)))
-                motion.say(motion.modals.go_on())
-                motion.say(motion.modals.set(feed_mode=int(modes[0])))
+            if begins[k]:
+                self._rapid(pose, come[k], over[k])
+                motion.say([*motion.modals.go_on(), *motion.modals.set(feed_mode=int(modes[0]))])
+                written = ()
             pitch = format_number(feeds[k] / program.mm_per_unit / turns[k], max(at.decimals[0], digits.most))
             values = {"feed": words[k], "pitch": pitch}
             values |= {"speed": format_number(speed, digits.speed, trim=True).rstrip(".")}
@@ -260,10 +260,14 @@ class Script:
             motion.say(blocks[once:] if written and written == blocks[:once] else blocks)
             written = blocks[:once] or blocks
             motion.stand(over[k])
-        motion.say(table.off)
+            if ends[k]:
+                motion.say(table.off)
+                self._rapid(pose, go[k])
         motion.modals.now["feed"] = -1
-        left = at.ticks(program.tip[poses[-1:]] + leave[-1] * frame[:, 2], program.axis[poses[-1:]])
-        motion.emit(motion.moving(BlockRows.straight(program, left, poses[-1:], rapid=True)))
+
+    def _rapid(self, pose: int, *ticks: Ints) -> None:
+        rows = BlockRows.straight(self.motion.program, np.stack(ticks), np.full(len(ticks), pose), rapid=True)
+        self.motion.emit(self.motion.moving(rows))
 
 
 def _numbers(

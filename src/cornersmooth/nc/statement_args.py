@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -65,28 +65,22 @@ def milliseconds(amount: float, in_revolutions: bool, speed: float | None) -> in
     return max(1, round(time)) if time > 0.0 else 0
 
 
-class Orders(NamedTuple):
-    """What statements ask for at the cutter before them, by their identity."""
+#: of SPINDL, by the identity of statements: ORIENT, OFF, CLW, CCLW or ON, and the speed, rev/min; None where it is not
+#: understood. A cutting speed counts at the cutter before; gears and limits of the speed are the control's own affair
+Orders = dict[int, tuple[str, float | None] | None]
 
-    #: of SPINDL: ORIENT, OFF, CLW, CCLW or ON, and the speed, rev/min; None where it is not understood. A cutting speed
-    #: counts at the cutter; gears and limits of the speed are the control's own affair
-    spindle: dict[int, tuple[str, float | None] | None]
-    diameters: dict[int, float]  #: of the cutter at each CUTCOM, mm
 
-    @classmethod
-    def of(cls, program: Program) -> Orders:
-        """Go through the statements of a program."""
-        found, diameter = cls({}, {}), 0.0
-        for statement in program.statements:
-            if statement.word in ("CUTTER", "TLDATA"):
-                numbers = numbers_of(statement)
-                mill = statement.word == "CUTTER" or {"MILL", "DRILL"} & set(words_of(statement))
-                diameter = numbers[0] * program.mm_per_unit if mill and numbers else 0.0
-            elif statement.word == "SPINDL":
-                found.spindle[id(statement)] = _spindle_order(statement, diameter)
-            elif statement.word == "CUTCOM":
-                found.diameters[id(statement)] = diameter
-        return found
+def spindle_orders(program: Program) -> Orders:
+    """What the statements of a program ask of the spindle."""
+    found, diameter = Orders(), 0.0
+    for statement in program.statements:
+        if statement.word in ("CUTTER", "TLDATA"):
+            numbers = numbers_of(statement)
+            mill = statement.word == "CUTTER" or {"MILL", "DRILL"} & set(words_of(statement))
+            diameter = numbers[0] * program.mm_per_unit if mill and numbers else 0.0
+        elif statement.word == "SPINDL":
+            found[id(statement)] = _spindle_order(statement, diameter)
+    return found
 
 
 def _spindle_order(statement: Statement, diameter: float) -> tuple[str, float | None] | None:

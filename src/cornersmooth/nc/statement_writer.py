@@ -7,7 +7,6 @@ is not understood becomes a comment and a counted warning, never an NC word by g
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -118,7 +117,7 @@ class StatementWriter:
         staged = self.words.tool_select if self.words.stage_tool and not selected else ()
         speed = None
         if any("{speed}" in block for block in self.words.tool_change):
-            orders = (self.orders.spindle.get(id(one)) or ("", None) for one in between)
+            orders = (self.orders.get(id(one)) or ("", None) for one in between)
             speed = next((speed for _, speed in orders if speed), self.modals.speed)
             if not speed:
                 raise refused("CS354", self.program, statement.line, tool=number)
@@ -147,7 +146,7 @@ class StatementWriter:
 
     def spindle(self, statement: Statement) -> list[str] | None:
         """SPINDL in every order of its words."""
-        order = self.orders.spindle[id(statement)]
+        order = self.orders[id(statement)]
         if order is None or (order[0] == "ORIENT" and not self.words.spindle_orient):
             return None
         turn, speed = order
@@ -228,13 +227,9 @@ class StatementWriter:
         register = whole_number(numbers or [float(self.modals.offset)])
         if not side or len(names) > 2 or not set(names[1:]) <= _PLANES.keys() or register is None:
             return None
-        if words.compensation_entry:  # the control refuses a first move that is too short
-            pose, tips = statement.pose, self.program.tip
-            length = math.hypot(*(tips[pose] - tips[pose - 1])[:2]) if 0 < pose < len(tips) else math.inf
-            if not length > 0.0:
-                raise refused("CS344", self.program, statement.line)
-            if length <= self.orders.diameters[id(statement)] / 2.0:
-                self.findings.note("CS345", statement.line, length=length)
+        entry = self.program.tip[max(statement.pose - 1, 0) : statement.pose + 1, :2]
+        if words.compensation_entry and len(entry) == 2 and (entry[0] == entry[1]).all():
+            raise refused("CS344", self.program, statement.line)
         tip = self.modals.mode is not self.form.upright and self.form.orientation not in ("fixed", "machine")
         also = "it may be used with tool tip control (--cycles native does without, along Z), and that " if tip else ""
         self.findings.note("CS319", statement.line, also=also)
