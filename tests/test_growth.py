@@ -30,7 +30,7 @@ def between(statement: str, count: int) -> str:
 
 
 INPUTS = {
-    "poses": (12000, lambda n: "\n".join(poses(n))),
+    "poses": (3000, lambda n: "\n".join(poses(n))),
     "unknown statements": (75, lambda n: between("ANYWORD/{}", n)),
     "coolant changes": (50, lambda n: between("COOLNT/{}", n)),
     "optional stops": (40, lambda n: between("OPSTOP", n)),

@@ -15,7 +15,9 @@ import pytest
 
 from careless import look_away
 from cornersmooth.cli import run
+from oracle.files import beginning
 from oracle.messages import one_line
+from oracle.share import THOROUGH
 
 SAMPLES = Path(__file__).resolve().parents[1] / "samples"
 
@@ -248,10 +250,10 @@ REAL = ["hust_5x_impeller_yelun.cls", "shenmuxin_5x_path.csv", "cnclite_iso_S_te
 def test_the_papers_method_has_no_tolerance_of_its_own(name, options, request, tmp_path, capsys):
     """Fast turns at a nearly straight tip are where its motion leaves ε; both commands agree, digits included."""
     folder = SAMPLES if name in OWN else request.getfixturevalue("corpus")
-    source = folder / name
-    out = tmp_path / "o.nc"
-    words = ("smooth", source, "-o", out, "--method", "zhang2016", "--feed", "900", "-H", "20", *options)
-    code, line = first_lines(capsys, *words)
-    assert (code, line.split(":")[0].split(",")[0]) == (0, "PASSED")
+    source, out = tmp_path / name, tmp_path / "o.nc"
+    whole = THOROUGH or not name.endswith(".cls")
+    source.write_bytes((folder / name).read_bytes() if whole else beginning(folder / name, 205))
+    words = ("smooth", source, "-q", "-o", out, "--method", "zhang2016", "--feed", "900", "-H", "20", *options)
+    assert first_lines(capsys, *words) == (0, "")  # it passes: anything else is said
     code, line = first_lines(capsys, "verify", source, out)
     assert (code, line.split(":")[0].split(",")[0]) == (0, "PASSED")

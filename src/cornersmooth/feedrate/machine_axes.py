@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cornersmooth.arrays import cross
 from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate import taylor
 from cornersmooth.feedrate.curves import WHOLE
@@ -92,8 +93,8 @@ class MachineAxes:
         gone = taylor.derivative(axis)
         b = np.zeros_like(axis)
         b[0] = _turned(first.unit, _waves(first.sign * value[None, :, 0]), second.unit[None, None])[0]
-        smallest = math.sin(math.radians(self.cone)) * float(np.linalg.norm(np.cross(about, second.unit)))
-        lever = np.cross(about, axis)
+        smallest = math.sin(math.radians(self.cone)) * float(np.linalg.norm(cross(about, second.unit)))
+        lever = cross(about, axis)
         rate = np.zeros((taylor.ORDERS - 1, len(value)))
         for k in range(taylor.ORDERS - 1):
             size = taylor.dot(lever[: k + 1], b[: k + 1])
@@ -101,7 +102,7 @@ class MachineAxes:
             size[0] = np.where(inside, np.where(size[0] < 0.0, -smallest, smallest), size[0])
             size[1:, inside] = 0.0
             rate[k] = taylor.divide(taylor.dot(gone[: k + 1], b[: k + 1]), size)[k]
-            b[k + 1] = taylor.multiply(rate[: k + 1, :, None], np.cross(about, b[: k + 1]))[k] / (k + 1)
+            b[k + 1] = taylor.multiply(rate[: k + 1, :, None], cross(about, b[: k + 1]))[k] / (k + 1)
         rest = gone - taylor.multiply(rate[..., None], lever[: len(rate)])
         across = taylor.cross(b, axis)[: len(rate)]
         other = taylor.divide(taylor.dot(rest, across), taylor.dot(across, across))
@@ -117,7 +118,7 @@ class MachineAxes:
         found = np.zeros((taylor.ORDERS, len(value), 2))
         found[0] = value
         first = self.machine.axes[0]
-        lever = np.cross(first.unit, axis)
+        lever = cross(first.unit, axis)
         size = taylor.dot(lever[:-1], lever[:-1])
         if not self.machine.names or (size[0] <= PARALLEL**2).any():
             return found
@@ -201,7 +202,7 @@ def _turned(direction: Floats, waves: tuple[Floats, Floats], vectors: Floats) ->
     along = (vectors @ direction)[..., None] * direction
     return along + (
         taylor.multiply(cosine[..., None], vectors - along)
-        + taylor.multiply(sine[..., None], np.cross(direction, vectors))
+        + taylor.multiply(sine[..., None], cross(direction, vectors))
     )
 
 

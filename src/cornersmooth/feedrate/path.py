@@ -14,7 +14,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.arrays import angle_between, dot, norm, unit
+from cornersmooth.arrays import angle_between, cross, dot, norm, unit
 from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate.curves import STANDSTILL, WHOLE, Curves, end_tangents
 from cornersmooth.model import Bools, Corners, FeedMode, Floats, Ints, Move, Program, Runs, Status
@@ -186,8 +186,8 @@ def arc_series(program: Program, moves: Ints, fraction: Floats | float) -> Float
     radius -= dot(radius, normal)[:, None] * normal
     rise = dot(program.tip[moves] - start, normal)[:, None] * normal
     angle = sweep * np.reshape(fraction, (-1, 1))
-    arm = np.cos(angle) * radius + np.sin(angle) * np.cross(normal, radius)  # Rodrigues
-    across = np.cross(normal, arm)
+    arm = np.cos(angle) * radius + np.sin(angle) * cross(normal, radius)  # Rodrigues
+    across = cross(normal, arm)
     tip = start - radius + arm + rise * np.reshape(fraction, (-1, 1))
     return np.stack((tip, sweep * across + rise, -(sweep**2) * arm / 2.0, -(sweep**3) * across / 6.0))
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from cornersmooth import arrays
 from cornersmooth.arrays import norm
 from cornersmooth.feedrate.curves import parameters_at, taylor_series
 from cornersmooth.feedrate.path import Kind, Path, arc_series
@@ -55,7 +56,7 @@ def dot(a: Floats, b: Floats) -> Floats:
 def cross(a: Floats, b: Floats) -> Floats:
     """Vector product of two Taylor series of vectors along the last axis."""
     orders = min(len(a), len(b))
-    return np.stack([sum(np.cross(a[i], b[k - i]) for i in range(k + 1)) for k in range(orders)])
+    return np.stack([sum(arrays.cross(a[i], b[k - i]) for i in range(k + 1)) for k in range(orders)])
 
 
 def normalised(a: Floats) -> Floats:
@@ -175,6 +176,6 @@ def poses(path: Path, element: Ints, local: Floats) -> tuple[Floats, Floats, Flo
 
 def curvature(tip: Floats) -> Floats:
     """Curvature (m,), 1/mm, from three Taylor coefficients of the tip; 0 where it is straight up to rounding."""
-    speed, bend, across = norm(tip[1]), 2.0 * norm(tip[2]), 2.0 * norm(np.cross(tip[1], tip[2]))
+    speed, bend, across = norm(tip[1]), 2.0 * norm(tip[2]), 2.0 * norm(arrays.cross(tip[1], tip[2]))
     straight = across <= _STRAIGHT * speed * bend
     return np.where(straight, 0.0, across / np.where(straight, 1.0, speed**3))

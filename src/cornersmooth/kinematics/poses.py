@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cornersmooth.arrays import dot, norm
+from cornersmooth.arrays import cross, dot, norm
 from cornersmooth.errors import InputError
 from cornersmooth.kinematics.machine import LINEAR, PARALLEL, Machine
 from cornersmooth.model import Bools, Floats, Ints
@@ -77,7 +77,7 @@ def _with_one_axis(machine: Machine, axis: Floats) -> Solutions:
     about, tool = machine.axes[0].unit, machine.tool
     across = tool - (tool @ about) * about
     if machine.names and np.linalg.norm(across) > PARALLEL:
-        other = np.cross(about, across)
+        other = cross(about, across)
         azimuth = np.arctan2(axis @ other, axis @ across)  # both are as long as each other
         angles[:, :, 0] = wrap(machine.axes[0].sign * np.degrees(azimuth))[:, None]
     beyond = angle_between(tool_axis(machine, angles[:, 0]), axis)
@@ -157,10 +157,10 @@ def passes_pole(machine: Machine, start: Floats, end: Floats, cone: float) -> Bo
         near = np.flatnonzero(2.0 - 2.0 * (start @ pole) <= step * step)
         if len(near):
             one, two = start[near], end[near]
-            normal = np.cross(one, two)
+            normal = cross(one, two)
             length = np.linalg.norm(normal, axis=1)
-            ahead = dot(np.cross(one, pole[None, :]), normal) > 0
-            behind = dot(np.cross(pole[None, :], two), normal) > 0
+            ahead = dot(cross(one, pole[None, :]), normal) > 0
+            behind = dot(cross(pole[None, :], two), normal) > 0
             close = np.abs(normal @ pole) <= np.sin(np.radians(cone)) * length
             passes[near] |= (length > 0) & ahead & behind & close
     return passes
@@ -240,13 +240,13 @@ class _Frame:
 
 def _columns(about: Floats, towards: Floats) -> Floats:
     """Right-handed frame as columns: the part of `towards` across `about`, the third direction, `about`."""
-    third = np.cross(about, towards)
+    third = cross(about, towards)
     third /= np.linalg.norm(third)
-    return np.stack((np.cross(third, about), third, about), axis=1)
+    return np.stack((cross(third, about), third, about), axis=1)
 
 
 def _angle(one: Floats, other: Floats) -> float:
-    return float(np.arctan2(np.linalg.norm(np.cross(one, other)), one @ other))
+    return float(np.arctan2(np.linalg.norm(cross(one, other)), one @ other))
 
 
 _ROUNDING = 1e-6  #: mm beyond the travel that are rounding

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from cornersmooth.arrays import cross
 from cornersmooth.model import Floats, Ints
 from cornersmooth.nc_reader.elements import Element, Elements
 from cornersmooth.nc_reader.execution import Modal
@@ -127,10 +128,10 @@ class Rotary:
         about, second, tool = self.machine.axes[0].unit, self.machine.axes[1].unit, self.machine.tool
         # the second axis turns the tool, so that the cosine of its angle to the first one swings about a middle
         middle = float(about @ second) * float(second @ tool)
-        swing = float(np.linalg.norm(np.cross(about, second)) * np.linalg.norm(np.cross(second, tool)))
+        swing = float(np.linalg.norm(cross(about, second)) * np.linalg.norm(cross(second, tool)))
         cosine, step = vector @ about, np.radians(self.angle_step)
         edge = (cosine <= middle - swing + step**2) | (cosine >= middle + swing - step**2)
-        sine = np.linalg.norm(np.cross(vector, about), axis=1)
+        sine = np.linalg.norm(cross(vector, about), axis=1)
         return np.where(sine <= _POLE * allowed, allowed, np.where(edge, _BEYOND * allowed, 0.0))
 
     def steps(self, lever: float) -> tuple[float, float]:
@@ -282,7 +283,7 @@ class _Moved:
         With a turn of a and an arm r, (R r)' = R (a x r + r') and (R r)" = R (a x (a x r) + 2 a x r' + r").
         """
         arm = self.point - centre
-        reach = np.linalg.norm(np.cross(axis.unit, arm), axis=1) + self.way
+        reach = np.linalg.norm(cross(axis.unit, arm), axis=1) + self.way
         return _Moved(
             centre + _turned(axis, degrees, arm),
             turn * reach + self.way,
@@ -302,4 +303,4 @@ def _turned(axis: RotaryAxis, degrees: Floats, vectors: Floats) -> Floats:
     angle = sense * np.radians(degrees)
     cosine, sine = np.cos(angle)[:, None], np.sin(angle)[:, None]
     along = (vectors @ direction)[:, None] * direction
-    return along + cosine * (vectors - along) + sine * np.cross(direction, vectors)
+    return along + cosine * (vectors - along) + sine * cross(direction, vectors)

@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from cornersmooth.arrays import cross
 from cornersmooth.control.words import Table
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.elements import Curves, Element, Elements, Problem
@@ -44,7 +45,7 @@ def circles(
     chord = end - before
     chord -= (chord @ upright)[:, None] * upright
     length = np.linalg.norm(chord, axis=1)
-    across = np.cross(upright, chord)
+    across = cross(upright, chord)
     radius = table.column("R")
     by_radius = ~np.isnan(radius)
     half = np.divide(length, 2 * np.abs(radius), out=np.ones_like(length), where=by_radius & (radius != 0))
@@ -70,7 +71,7 @@ def circles(
 
 def _sweep(start: Floats, end: Floats, normal: Floats, by_radius: Bools) -> Floats:
     """Angle from start to end, right-handed about the normals; a full turn for a centre form that comes back."""
-    sine = np.einsum("ij,ij->i", np.cross(start, end), normal)
+    sine = np.einsum("ij,ij->i", cross(start, end), normal)
     flat = start - np.einsum("ij,ij->i", start, normal)[:, None] * normal
     cosine = np.einsum("ij,ij->i", flat, end)
     angle = np.arctan2(sine, cosine) % _FULL_TURN
@@ -95,7 +96,7 @@ def arc_points(start: Floats, end: Floats, centre: Floats, normal: Floats, sweep
     """
     radius = start - centre
     radius = radius - np.einsum("ij,ij->i", radius, normal)[:, None] * normal
-    across = np.cross(normal, radius)
+    across = cross(normal, radius)
 
     def turned(angle: Floats) -> Floats:
         return start + (np.cos(angle) - 1)[:, None] * radius + np.sin(angle)[:, None] * across

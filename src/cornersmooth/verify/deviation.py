@@ -29,8 +29,14 @@ _HAIR: Final = 1e-9
 #: segments on either side of a place among which a nearer one is looked for
 _REACH: Final = 2
 
-#: places between two at which a distance is worked out, as often as so many rounds: to a billionth of the way
-_SHARES, _ROUNDS = np.linspace(0.0, 1.0, 17), 10
+#: places between two at which a distance is worked out, in so many rounds at most: to a billionth of the way
+_SHARES, _ROUNDS = np.linspace(0.0, 1.0, 33), 8
+
+#: the neighbours of a place
+_SIDES: Final = np.array([[-1], [1]])
+
+#: mm: rounds end where the next could not find less by more
+_NO_LESS: Final = 1e-9
 
 #: rows for which tip and axis point are looked at each on its own at a time: only the largest are wanted
 _SOME: Final = 16
@@ -155,15 +161,20 @@ def _least(
 ) -> tuple[Floats, Floats]:
     """(k,) places between two nearest to points (k, 6), and distances of the farther triple.
 
-    Exact where a motion is straight: there the distance falls and then rises.
+    Exact where a motion is straight: there the distance is convex, and falls below the least of three by no more than
+    the others are above it.
     """
+    each = np.arange(len(low))
     for _ in range(_ROUNDS):
         place = low + _SHARES[:, None] * (high - low)
         away = at(place.ravel()).reshape(*place.shape, -1) - points
         square = largest_square(np.moveaxis(away[..., columns], 2, 0))
-        best, each = square.argmin(axis=0), np.arange(len(low))
-        low, high = (place[np.clip(best + side, 0, len(_SHARES) - 1), each] for side in (-1, 1))
-    return place[best, each], np.sqrt(square[best, each])
+        best = square.argmin(axis=0)
+        sides = np.clip(best + _SIDES, 0, len(_SHARES) - 1)
+        (low, high), least = place[sides, each], np.sqrt(square[best, each])
+        if (np.sqrt(square[sides, each]) <= least + _NO_LESS).all():
+            break
+    return place[best, each], least
 
 
 def _written(match: Match, place: Floats) -> Floats:
