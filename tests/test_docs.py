@@ -20,7 +20,7 @@ import pytest
 
 import cornersmooth as cs
 from cornersmooth import read
-from cornersmooth.cli import compare
+from cornersmooth.cli import times
 from cornersmooth.cli.commands import COMMANDS
 from cornersmooth.cli.declared import GONE
 from cornersmooth.kinematics import parse_machine
@@ -139,8 +139,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def shop(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A copy of the folder; there a comparison tries a fifth of all ways."""
-    all_of = compare.candidates
-    monkeypatch.setattr(compare, "candidates", lambda *given: share(all_of(*given), 5))
+    all_of = times.candidates
+    monkeypatch.setattr(times, "candidates", lambda *given: share(all_of(*given), 5))
     return Path(shutil.copytree(made, tmp_path, dirs_exist_ok=True))
 
 

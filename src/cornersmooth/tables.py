@@ -14,7 +14,6 @@ from contextlib import contextmanager
 from copy import deepcopy
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from functools import lru_cache, partial
-from importlib import resources
 from itertools import accumulate
 from pathlib import Path
 from string import Formatter
@@ -52,9 +51,7 @@ class Shelf:
     """Where the tables of one kind lie."""
 
     kind: str  #: what they describe, for messages
-    #: where those lie that come with the program
-    package: str
-    folder: str
+    folder: Path  #: where those lie that come with the program
     keys: tuple[str, ...]  #: those that a table may have, ``like`` and ``aliases`` aside
     #: codes of the errors that say that a name is unknown, that a file or its text cannot be read, that a key is
     #: unknown, and that a value is of a wrong kind
@@ -65,15 +62,14 @@ class Shelf:
 
     def names(self) -> tuple[str, ...]:
         """Names of the tables that come with the program, sorted."""
-        files = (resources.files(self.package) / self.folder).iterdir()
-        return tuple(sorted(item.name.removesuffix(".toml") for item in files if item.name.endswith(".toml")))
+        return tuple(sorted(file.stem for file in self.folder.glob("*.toml")))
 
     def aliases(self) -> dict[str, str]:
         """Name of the table for each of its other names."""
         return {alias: name for name in self.names() for alias in _read(self._text(name)).get("aliases", ())}
 
     def _text(self, name: str) -> str:
-        return (resources.files(self.package) / self.folder / f"{name}.toml").read_text(encoding="utf-8")
+        return (self.folder / f"{name}.toml").read_text(encoding="utf-8")
 
     def find(self, name: str) -> str:
         """Return the name, as it is written, of the table that is called so; empty for none."""

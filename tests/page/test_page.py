@@ -13,12 +13,14 @@ from scipy.spatial import cKDTree
 
 import cornersmooth
 from cornersmooth.feedrate import Limits, direct
-from cornersmooth.page import read_written
-from cornersmooth.page.document import document
+from cornersmooth.page import document, read_written
 from cornersmooth.report.paths import original_path, thinned, written_path
 from oracle.command import run
 from oracle.share import share
 from page.making import HOSTILE, PATH, page_of, smoothed, values_of
+
+#: what a page says in words
+STORY = {"title": "part", "verdict": "", "badge": "PASSED", "notes": []}
 
 
 @pytest.fixture(scope="module")
@@ -133,7 +135,7 @@ def test_axes_of_a_machine_have_charts(result):
     from dataclasses import replace
 
     from cornersmooth.kinematics import load_machine
-    from cornersmooth.page.scene import Story, Subject, scene
+    from cornersmooth.page.scene import Subject, page_values
 
     subject = Subject(
         result.program,
@@ -143,12 +145,14 @@ def test_axes_of_a_machine_have_charts(result):
         result.smoothed,
         machine=load_machine("table-ac"),
     )
-    meta, pack = scene(subject, Story("part", "", True))
+    meta, pack = page_values(subject, STORY)
     assert set(meta["charts"]["axes"]) == set("XYZA")  # C turns by less than can be drawn
-    named = Story("part", "", True, limited_by=("the programmed feed", "jerk of A"))
-    assert scene(subject, named)[0]["charts"]["axes"][0] == "A"  # the axis of the verdict comes first
+    named = ("the programmed feed", "jerk of A")
+    assert (
+        page_values(subject, STORY, limited_by=named)[0]["charts"]["axes"][0] == "A"
+    )  # the axis of the verdict comes first
     bare = replace(subject, machine=None)
-    assert scene(bare, Story("part", "", True))[0]["charts"]["axes"] == []
+    assert page_values(bare, STORY)[0]["charts"]["axes"] == []
     meta, arrays = values_of(document(meta, pack))
     # what is saved so far ends with what is saved at all, and the axis that changes most comes first
     saved = meta["totals"]["direct"] - meta["totals"]["written"]
@@ -239,7 +243,7 @@ def test_thinning_of_a_long_path_hides_no_corner_out_of_tolerance(monkeypatch):
     nc = read_nc("\n".join([*lines, "M30", "%"]).encode())
     found = verify(program, nc, tolerance=0.02)
     subject = module.Subject(program, nc, cornersmooth.Settings(tolerance=0.02), found)
-    meta, pack = module.scene(subject, module.Story("long", "", False))
+    meta, pack = module.page_values(subject, STORY)
     meta, arrays = values_of(document(meta, pack))
     assert len(arrays["w_off"]) < 1600 < 2400
     assert meta["corners"]["counts"]["out of tolerance"] >= 23

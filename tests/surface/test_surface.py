@@ -13,8 +13,7 @@ from cornersmooth.errors import SettingsError
 from cornersmooth.geometry.tool import Tool, parse_tool, tools_of
 from cornersmooth.nc import choose_form, fit_settings
 from cornersmooth.surface import measure_surface, neighbouring_passes
-from cornersmooth.surface.distance import distance_to_motion
-from cornersmooth.surface.motion import envelope_points, original_cuts
+from cornersmooth.surface.motion import distance_to_motion, envelope_points, original_cuts
 from oracle.share import how_many, share
 
 UP = np.array([0.0, 0.0, 1.0])

@@ -149,6 +149,7 @@ COMPARE = new_command(
       cornersmooth compare part.cls --control linuxcnc --machine xyzac-trt -v
       cornersmooth compare part.ngc --control linuxcnc --machine xyzac-trt
     """,
+    module="times",
 )
 
 TIME = new_command(
@@ -174,6 +175,7 @@ TIME = new_command(
       cornersmooth time part.cls --text part.nc --block-time 1ms --look-ahead 200
       cornersmooth time part.ngc --control linuxcnc --machine xyzac-trt
     """,
+    module="times",
     feed=FEED_OF_ALL,
     block_time="Shortest time that the control takes for one block, of lines to write and in the plan. [default: that "
     "of the control's table for lines, none in the plan]",
@@ -198,7 +200,7 @@ SETUP = new_command(
       cornersmooth setup part.cls --limits mill.toml --control siemens
       cornersmooth setup part.cls --limits table-ac --tilt 20 --json
     """,
-    module="compare",
+    module="times",
     feed=FEED_OF_ALL,
     limits={
         "heading": "Everyday",

@@ -8,7 +8,7 @@ import textwrap
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
-from importlib.resources import files
+from pathlib import Path
 from typing import Any, Final
 
 import click
@@ -180,7 +180,8 @@ def run_explain(given: Options) -> int:
 def codes() -> dict[str, dict[str, Any]]:
     """Give messages, cause and remedy of every code; cause and remedy are empty where the message is all there is."""
     messages, causes = (
-        tomllib.loads((files(__package__) / f"{name}.toml").read_text(encoding="utf-8")) for name in ("codes", "causes")
+        tomllib.loads(Path(__file__).with_name(f"{name}.toml").read_text(encoding="utf-8"))
+        for name in ("codes", "causes")
     )
     keys = ("kind", "message", "hint")
     return {

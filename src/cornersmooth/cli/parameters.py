@@ -104,59 +104,38 @@ def _tool(text: str) -> Any:
 #: key of the shop settings in a context
 SHOP = "cornersmooth.shop"
 
-#: folders of the tables in the package
-_FOLDERS = {"controls": ("nc", "controls"), "machines": ("kinematics", "machines")}
-
 
 def _forms(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
     """Names of the forms of the control that is chosen, or of all of them."""
     from click.shell_completion import CompletionItem
 
-    tables = _tables("controls", ctx)
+    from cornersmooth.errors import SettingsError
+    from cornersmooth.nc import control_names, load_control
+
     chosen = ctx.params.get("control")
-    name = chosen if isinstance(chosen, str) else getattr(chosen, "name", "")
-    called = {alias: own for own, table in tables.items() for alias in table.get("aliases", ())}
-    one = called.get(name, name)
-    found = _forms_of(one, tables) if one in tables else {form for each in tables for form in _forms_of(each, tables)}
-    return [CompletionItem(form) for form in sorted(found) if form.startswith(incomplete)]
+    try:
+        controls = [load_control(chosen) if isinstance(chosen, str) else chosen]
+    except SettingsError:
+        controls = [load_control(name) for name in control_names()]
+    names = {form for control in controls for form in getattr(control, "forms", ())}
+    return [CompletionItem(name) for name in sorted(names) if name.startswith(incomplete)]
 
 
 def _offer(kind: str, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+    """Names of controls, and what else these are called, or of machines; else files."""
     from click.shell_completion import CompletionItem
 
-    tables = _tables(kind, ctx)
-    items = [
-        CompletionItem(name, help=str(table.get("description", "")) or None)
-        for name, table in sorted(tables.items())
-        if name.startswith(incomplete)
-    ]
-    aliases = sorted(alias for table in tables.values() for alias in table.get("aliases", ()))
-    items += [CompletionItem(alias) for alias in aliases if incomplete and alias.startswith(incomplete)]
-    return items or [CompletionItem(incomplete, type="file")]
+    from cornersmooth.kinematics import load_machine, machine_names
+    from cornersmooth.nc import control_aliases, control_names, load_control
 
-
-def _tables(kind: str, ctx: click.Context) -> dict[str, dict[str, Any]]:
-    """Tables of the package, read as text so that the shell need not wait for arrays, and of the shop settings here."""
-    import tomllib
-    from importlib import resources
-
-    found: dict[str, dict[str, Any]] = {
-        item.name.removesuffix(".toml"): tomllib.loads(item.read_text(encoding="utf-8"))
-        for item in resources.files("cornersmooth").joinpath(*_FOLDERS[kind]).iterdir()
-        if item.name.endswith(".toml")
-    }
+    names, aliases = (control_names(), control_aliases()) if kind == "controls" else (machine_names(), {})
+    load: Callable[[str], Any] = load_control if kind == "controls" else load_machine
+    found = {name: load(name).description or None for name in names if name.startswith(incomplete)}
     for file in getattr(ctx.meta.get(SHOP), "files", ()):
-        found |= {name: table for name, table in file.tables.get(kind, {}).items() if isinstance(table, dict)}
-    return found
-
-
-def _forms_of(name: str, tables: dict[str, dict[str, Any]]) -> set[str]:
-    """Forms of a control and of that which it is like."""
-    table = tables[name]
-    like = table.get("like", "")
-    inherited = _forms_of(like, tables) if like in tables and like != name else set()
-    own = table.get("forms", {})
-    return (inherited | set(own)) - {form for form, entry in own.items() if entry is False}
+        found |= {name: None for name in file.tables.get(kind, ()) if name.startswith(incomplete)}
+    items = [CompletionItem(name, help=text) for name, text in sorted(found.items())]
+    items += [CompletionItem(alias) for alias in sorted(aliases) if incomplete and alias.startswith(incomplete)]
+    return items or [CompletionItem(incomplete, type="file")]
 
 
 Length = Annotated[float, Value("mm", _length)]

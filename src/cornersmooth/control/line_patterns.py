@@ -19,6 +19,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from cornersmooth.arrays import distinct
 from cornersmooth.control.words import Lexer, Word
 from cornersmooth.errors import InputError
 from cornersmooth.model import Bools, Floats, Ints
@@ -326,7 +327,7 @@ class Lines:
         label, start, own = self.label[part], self.start[part], self.patterns
         used = np.flatnonzero(np.bincount(label, minlength=len(own.known)))
         kind, first = own.known[used].T
-        names = {k: own.kinds[k].names or () for k in np.unique(kind).tolist()}
+        names = {k: own.kinds[k].names or () for k in distinct(kind).tolist()}
         columns: dict[str, Floats] = {}
         lines: dict[bytes, tuple[Any, Ints, Ints]] = {}  # with any of some patterns, and which of these
         for name in dict.fromkeys(chain.from_iterable(names.values())):

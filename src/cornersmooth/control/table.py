@@ -59,17 +59,17 @@ import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cache, cached_property, lru_cache
-from importlib.resources import files
 from itertools import chain
+from pathlib import Path
 from typing import Any, Final, NamedTuple, Self
 
 #: words, and kind and value of what each says beside the motion
 Means = Mapping[str, tuple[str, str]]
 
-_LISTS: Final = files(__package__).joinpath("word_lists")
+_LISTS: Final = Path(__file__).with_name("word_lists")
 
 #: controls whose texts are read
-CONTROLS: Final = tuple(sorted(item.name.removesuffix(".toml") for item in _LISTS.iterdir()))
+CONTROLS: Final = tuple(sorted(file.stem for file in _LISTS.glob("*.toml")))
 
 
 @cache

@@ -30,10 +30,10 @@ products of changes would add. Linear limits in z: Verscheure et al. 2009; tange
 from __future__ import annotations
 
 import numpy as np
+from scipy.linalg.lapack import dpbtrf, dpbtrs
 
 from cornersmooth.feedrate.speed_problem import Batch, ahead, around, behind
 from cornersmooth.model import Floats
-from cornersmooth.system.lapack import dpbtrf, dpbtrs
 
 #: the remaining duality gap over the time, at which the profile is taken
 GAP = 2e-4

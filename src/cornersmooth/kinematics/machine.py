@@ -313,8 +313,7 @@ def _parallel(one: Floats, other: Floats) -> bool:
 Row = TypeVar("Row")
 _SHELF = Shelf(
     "machine",
-    __package__,
-    "machines",
+    Path(__file__).with_name("machines"),
     keys=(
         *("name", "description", "preferred", "tool_direction", "tool_length", "tool_lengths", "part_zero", "travel"),
         *("home", "tool_change", "tip_control", "axis", "dynamics"),

@@ -77,8 +77,7 @@ class _Controls(Shelf):
 
 _SHELF = _Controls(
     "control",
-    __package__,
-    "controls",
+    Path(__file__).with_name("controls"),
     keys=tuple("name description digits program layout words motion forms extras lines cycles trusted".split()),
     unknown="CS210",
     unreadable="CS212",

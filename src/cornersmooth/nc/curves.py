@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.arrays import ranges, some_rows
+from cornersmooth.arrays import distinct, ranges, some_rows
 from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc.circles import Circles
@@ -39,13 +40,13 @@ class Shape:
 
 def spelt(values: Floats | Ints, write: Callable[[float], str]) -> Part:
     """A text for each distinct value; mostly the first ones are all that there are."""
-    distinct = np.unique(values[:_FEW])
-    if len(distinct) == 1 and (values == distinct).all():
-        return [write(distinct[0].item()).encode()], np.zeros(len(values), np.int64)
-    which = np.searchsorted(distinct, values)
-    if len(values) > _FEW and (distinct.take(which, mode="clip") != values).any():
-        distinct, which = np.unique(values, return_inverse=True)
-    return [write(value).encode() for value in distinct.tolist()], which.reshape(-1)
+    numbers: NDArray[Any] = distinct(values[:_FEW])
+    if len(numbers) == 1 and (values == numbers).all():
+        return [write(numbers[0].item()).encode()], np.zeros(len(values), np.int64)
+    which = np.searchsorted(numbers, values)
+    if len(values) > _FEW and (numbers.take(which, mode="clip") != values).any():
+        numbers, which = np.unique(values, return_inverse=True)
+    return [write(value).encode() for value in numbers.tolist()], which.reshape(-1)
 
 
 def joined(*parts: Part) -> Part:

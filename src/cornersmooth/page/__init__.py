@@ -5,21 +5,24 @@ There are pages of a run of `postprocess`, and of a text that was verified, with
 
 from __future__ import annotations
 
+import base64
+import hashlib
+import html
 import io
 import json
 import os
+import re
 from collections.abc import Iterable, Mapping, Sequence
-from importlib.resources import files
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cornersmooth import __version__
-from cornersmooth.errors import Verdict
 from cornersmooth.geometry.tool import Tool
 from cornersmooth.kinematics import Machine, with_dynamics
 from cornersmooth.model import Program
 from cornersmooth.nc import write
 from cornersmooth.nc_reader import NcProgram
-from cornersmooth.page.scene import Story, Subject, page
+from cornersmooth.page.scene import Pack, Subject, page_values
 from cornersmooth.pipeline import Result, read_back
 from cornersmooth.report.tables import passes_text
 from cornersmooth.report.verdict import LIMITS_TOLD, Saving, sharp_line, time_text
@@ -157,23 +160,21 @@ def _page(
     inputs = [(origin, f"{source.name}: {source.dialect}, {len(program):,} poses, {program.units}")]
     inputs += [(f"SHA-256 of the {origin}", sha256)] if sha256 else []
     found, findings = subject.verification, contents["findings"]
-    story = Story(
-        title=os.path.basename(written.get("name") or "") or source.name,
-        verdict=text,
-        badge=Verdict(contents["verdict"]),
-        head=[(label, value) for label, value in head if value],
-        problems=_problems(found, [one for one in findings if one["severity"] != "note"]),
-        facts=[*inputs, *facts, *_limit_facts(subject.machine, subject.planner)],
-        notes=[
+    story = {
+        "title": os.path.basename(written.get("name") or "") or source.name,
+        "verdict": text,
+        "badge": contents["verdict"],
+        "origin": origin.split()[0],
+        "head": [(label, value) for label, value in head if value],
+        "problems": _problems(found, [one for one in findings if one["severity"] != "note"]),
+        "facts": [*inputs, *facts, *_limit_facts(subject.machine, subject.planner)],
+        "notes": [
             (f"CL line {one['line']}: " if one["line"] else "") + _text(one)
             for one in findings
             if one["severity"] == "note"
         ],
-        origin=origin.split()[0],
-        limited_by=limited_by,
-        left=left,
-    )
-    return page(subject, story)
+    }
+    return document(*page_values(subject, story, limited_by=limited_by, left=left))
 
 
 def _problems(found: Verification | None, warnings: list[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -205,7 +206,7 @@ def _measured_facts(found: Verification, whose: str) -> list[tuple[str, str]]:
 
 def _limit_facts(machine: Machine | None, planner: str) -> list[tuple[str, str]]:
     limits, machine = Limits(), with_dynamics(machine)
-    bundled = json.loads((files("cornersmooth.page") / "assets/vendor/versions.json").read_text(encoding="utf-8"))
+    bundled = json.loads(_asset("vendor/versions.json"))
     tip = f"{limits.accel:g} mm/s² and {limits.jerk:g} mm/s³ along the path, period {1000.0 * limits.period:g} ms"
     law = f"the law of {planner}" if planner else tip
     axes = () if machine is None else (f"axes of {machine.name}", *(item.describe() for item in machine.dynamics))
@@ -213,3 +214,82 @@ def _limit_facts(machine: Machine | None, planner: str) -> list[tuple[str, str]]
         *[("planned with", "; ".join(("feed as programmed", law, *axes)))] * (not planner or bool(axes)),
         ("made by", f"cornersmooth {__version__}, three.js {bundled['three']}, uPlot {bundled['uplot']}"),
     ]
+
+
+#: scripts in the order they are run
+_LIBRARIES = ("vendor/three.js", "vendor/uplot.js")
+_SCRIPTS = (
+    "data.js",
+    "colours.js",
+    "geometry.js",
+    "paths.js",
+    "camera.js",
+    "pace.js",
+    "tool.js",
+    "metal.js",
+    "view.js",
+    "charts.js",
+    "places.js",
+    "problems.js",
+    "list.js",
+    "corners.js",
+    "runs.js",
+    "drive.js",
+    "wiring.js",
+    "main.js",
+)
+_STYLES = ("vendor/uplot.css", "page.css")
+
+#: places of the template that are filled in
+_MARK = re.compile(r"\{\{(\w+)\}\}")
+
+#: longest text of the user's that is shown
+_LONGEST = 300
+
+
+def document(meta: dict[str, Any], pack: Pack) -> str:
+    """Put a page together; whatever stands in `meta` is shown as text and never as markup."""
+    styles = "\n".join(_asset(name) for name in _STYLES)
+    libraries = "\n".join(_asset(name) for name in _LIBRARIES)
+    script = '(() => {\n"use strict";\n' + "\n".join(_asset(name) for name in _SCRIPTS) + "\n})();\n"
+    policy = (
+        f"default-src 'none'; img-src data:; style-src {_hash(styles)}; script-src {_hash(libraries)} {_hash(script)}; "
+        "base-uri 'none'; form-action 'none'"
+    )
+    values = json.dumps({**_shortened(meta), "arrays": pack.table}, ensure_ascii=True, allow_nan=False)
+    # within a script element only these could end it or begin a comment
+    values = values.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+    parts = {
+        "policy": policy,
+        "title": html.escape(_shortened(meta["title"])),
+        "styles": styles,
+        "libraries": libraries,
+        "script": script,
+        "values": values,
+        "arrays": pack.text(),
+    }
+    # in one pass: what is put in is not looked at again
+    return _MARK.sub(lambda mark: parts[mark[1]], _asset("page.html"))
+
+
+def _asset(name: str) -> str:
+    return (Path(__file__).with_name("assets") / name).read_text(encoding="utf-8")
+
+
+def _hash(text: str) -> str:
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode('ascii')}'"
+
+
+def _shortened(value: Any) -> Any:
+    """The same values with long texts cut, and numbers that JSON has no word for as null."""
+    if isinstance(value, str):
+        # characters that are no text, such as halves of pairs out of names that are not UTF-8
+        value = value.encode("utf-8", "replace").decode("utf-8")
+        return value if len(value) <= _LONGEST else value[:_LONGEST] + " …"
+    if isinstance(value, dict):
+        return {str(key): _shortened(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_shortened(item) for item in value]
+    if isinstance(value, float) and value - value != 0.0:
+        return None
+    return value

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
+import base64
+import gzip
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cornersmooth.arrays import some_rows
-from cornersmooth.errors import Verdict
 from cornersmooth.feedrate import Limits
 from cornersmooth.geometry.tool import Tool, tools_of
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import Bools, Floats, Ints, Program, SmoothProgram
 from cornersmooth.nc_reader import NcProgram
 from cornersmooth.page.corners import KINDS, CornerList, measured_corners, smoothed_corners
-from cornersmooth.page.document import Pack, document
 from cornersmooth.page.planned_speeds import (
     NOT_PLANNED,
     Planned,
@@ -34,6 +35,37 @@ from cornersmooth.verify import Verification
 
 if TYPE_CHECKING:
     from cornersmooth.surface import SurfaceMap
+
+#: types that a browser has arrays of, by the name of the page
+_TYPES = {"f4": np.float32, "i4": np.int32, "u1": np.uint8}
+
+#: starts of arrays are multiples of this: typed arrays want to be aligned
+_ALIGNED = 4
+
+
+class Pack:
+    """Arrays by name, for `text` and `table`."""
+
+    def __init__(self) -> None:
+        self._parts: list[bytes] = []
+        self._length = 0
+        self.table: dict[str, dict[str, Any]] = {}
+
+    def add(self, name: str, values: NDArray[Any], kind: str, bits: int | None = None) -> None:
+        """Add an array (n,) or (n, w) as ``"f4"``, ``"i4"`` or ``"u1"``; to so many binary places it packs better."""
+        if bits is not None:
+            values = np.ldexp(np.round(np.ldexp(values, bits)), -bits)
+        data = np.ascontiguousarray(values, dtype=np.dtype(_TYPES[kind]).newbyteorder("<")).tobytes()
+        width = 1 if values.ndim == 1 else values.shape[1]
+        self.table[name] = {"type": kind, "at": self._length, "count": len(values), "width": width}
+        padding = -len(data) % _ALIGNED
+        self._parts.append(data + bytes(padding))
+        self._length += len(data) + padding
+
+    def text(self) -> str:
+        """Everything in base64 of gzip; the same arrays give the same text."""
+        return base64.b64encode(gzip.compress(b"".join(self._parts), 6, mtime=0)).decode("ascii")
+
 
 SCHEMA = "cornersmooth-page/1"
 
@@ -54,24 +86,6 @@ _NO_WAY = 1e-9
 
 
 @dataclass(frozen=True)
-class Story:
-    """What the page says in words."""
-
-    title: str  #: name of the program, else of the CL file
-    verdict: str  #: one sentence; the words of the terminal
-    badge: Verdict
-    head: Sequence[tuple[str, str]] = ()  #: labels and values that are always in sight
-    #: what is wrong or to check, in the order in which it is looked at: severity, lines, text, code
-    problems: Sequence[Mapping[str, Any]] = ()
-    facts: Sequence[tuple[str, str]] = ()  #: labels and values: settings, versions, hash
-    notes: Sequence[str] = ()  #: sentences of what was noticed that nobody has to check
-    origin: str = "CL"  #: whose lines the path is of: those of the CL file, or of the old program
-    limited_by: Sequence[str] = ()  #: limits that the verdict names, such as ``"jerk of C"``
-    #: of a filtered program: cuts that stay as they are: how many, first line, reason
-    left: Sequence[Mapping[str, Any]] = ()
-
-
-@dataclass(frozen=True)
 class Subject:
     """What a page is made of."""
 
@@ -87,11 +101,6 @@ class Subject:
     surface: SurfaceMap | None = None
     #: of a filtered program: first and last line of each run, in the old program and in the new one
     runs: Sequence[tuple[int, int, int, int]] | None = None
-
-
-def page(subject: Subject, story: Story) -> str:
-    """Page of a path, as text to be written in UTF-8; same input, same text: no dates, no paths."""
-    return document(*scene(subject, story))
 
 
 @dataclass(frozen=True)
@@ -136,24 +145,28 @@ class _View:
         return cls(subject, original, written, planned, corners, seconds, places, centre)
 
 
-def scene(subject: Subject, story: Story) -> tuple[dict[str, Any], Pack]:
-    """Plain values and arrays of a page."""
+def page_values(
+    subject: Subject,
+    story: Mapping[str, Any],
+    *,
+    limited_by: Sequence[str] = (),
+    left: Sequence[Mapping[str, Any]] = (),
+) -> tuple[dict[str, Any], Pack]:
+    """Plain values and arrays of a page; `story` is what it says in words, its notes last.
+
+    `limited_by` are limits that the verdict names, such as ``"jerk of C"``, `left` of a filtered program cuts that stay
+    as they are: how many, first line, reason.
+    """
     view, pack = _View.of(subject), Pack()
     original, planned, seconds, corners = view.original, view.planned, view.seconds, view.corners
     _add_original(pack, view)
     _add_written(pack, view)
-    charts = _add_charts(pack, view, story.limited_by)
+    charts = _add_charts(pack, view, limited_by)
     _add_corners(pack, view)
     meta: dict[str, Any] = {
         "schema": SCHEMA,
-        "title": story.title,
-        "verdict": story.verdict,
-        "badge": str(story.badge),
-        "origin": story.origin,
-        "head": [list(fact) for fact in story.head],
-        "problems": [dict(problem) for problem in story.problems],
-        "facts": [list(fact) for fact in story.facts],
-        "notes": [*story.notes, *planned.left_out, *_thinning_note(len(view.written), original)],
+        **story,
+        "notes": [*story["notes"], *planned.left_out, *_thinning_note(len(view.written), original)],
         "tolerance": subject.settings.tolerance,
         "axis_length": subject.settings.axis_length,
         "centre": view.centre.tolist(),
@@ -169,7 +182,7 @@ def scene(subject: Subject, story: Story) -> tuple[dict[str, Any], Pack]:
     }
     if subject.runs is not None:
         meta["runs"] = _runs(subject.runs, view.written, planned)
-        meta["left"] = [dict(one) for one in story.left]
+        meta["left"] = [dict(one) for one in left]
     if subject.surface is not None:
         meta["surface"] = _add_surface(pack, subject.surface, view.centre)
     return meta, pack

@@ -17,8 +17,14 @@ from cornersmooth.errors import SettingsError
 from cornersmooth.geometry.tool import Tool
 from cornersmooth.model import Bools, Floats, Ints, Program
 from cornersmooth.nc_reader import NcProgram
-from cornersmooth.surface.distance import distance_to_motion
-from cornersmooth.surface.motion import EnvelopePoints, RuledMotion, envelope_points, original_cuts, written_cuts
+from cornersmooth.surface.motion import (
+    EnvelopePoints,
+    RuledMotion,
+    distance_to_motion,
+    envelope_points,
+    original_cuts,
+    written_cuts,
+)
 
 __all__ = ["PassDifference", "SurfaceMap", "measure_surface"]
 

@@ -10,6 +10,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
+from cornersmooth.arrays import distinct
 from cornersmooth.model import Ints, Move
 from cornersmooth.nc_reader.elements import Event, Problem
 from cornersmooth.nc_reader.tool import beyond_digits
@@ -100,7 +101,7 @@ class Stops:
             np.flatnonzero(hole[moves]),
             np.logical_or.reduceat(fed, moves).tolist(),
             dict(zip(np.flatnonzero(hole).tolist(), cycles, strict=True)),
-            np.unique(stated).tolist(),
+            distinct(stated).tolist(),
             changes,
         )
 

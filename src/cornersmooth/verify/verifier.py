@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
+from cornersmooth.arrays import distinct
 from cornersmooth.control.source import Source, readable_twice
 from cornersmooth.errors import SettingsError
 from cornersmooth.model import Program
@@ -334,7 +335,7 @@ def _arc_weights(program: Program) -> list[float]:
     """
     sweep = program.arcs.sweep
     parts = np.outer(np.ceil(sweep / (2.0 * np.pi / 3.0) - 1e-9), 2.0 ** np.arange(_HALVED))
-    found: list[float] = np.unique((1.0 + 2.0 * np.cos(sweep[:, None] / parts / 2.0)) / 3.0).tolist()
+    found: list[float] = distinct((1.0 + 2.0 * np.cos(sweep[:, None] / parts / 2.0)) / 3.0).tolist()
     return found
 
 

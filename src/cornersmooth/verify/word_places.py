@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from cornersmooth.arrays import distinct
 from cornersmooth.control.table import Means
 from cornersmooth.model import Bools, Ints, Move
 from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem
@@ -41,7 +42,7 @@ class WordPlaces:
             ends = nc.tip, nc.second
             new = [event.element for event in self._events[self._looked :]]
             self._looked = len(self._events)
-            rows = np.unique(np.append(waiting, np.array(new, np.int64))) - offset
+            rows = distinct(np.append(waiting, np.array(new, np.int64))) - offset
             waiting = rows[rows >= len(nc)] + offset
             rows = rows[rows < len(nc)]
             while len(rows):
@@ -78,7 +79,7 @@ class WordPlaces:
         self._still |= batches.acts.still
         # statements by the first move behind them that leads anywhere, words and retracts by the first such element
         places = np.searchsorted(original.pose, [one.pose for one in program.statements]).tolist()
-        unique = np.unique(np.array(places, np.int64))
+        unique = distinct(np.array(places, np.int64))
         leading, beyond = self._leading(unique, set()), self._leading(unique, batches.acts.moves_left_out)
         requested = [
             one

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg.lapack import dpbsv
 from scipy.sparse import csc_array, csr_array
 
 from cornersmooth.arrays import ranges, spread, starts
 from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.system.lapack import dpbsv
 
 #: control points that stay at each end: with them position, first and second derivative
 HELD = 3
