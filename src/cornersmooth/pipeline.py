@@ -223,7 +223,7 @@ def postprocess(
         unverified = "nothing was measured: the control is like none whose programs can be read"
     seconds: dict[str, float] = {}
     with timed(seconds, "read", progress):
-        program = source if isinstance(source, Program) else read(source)
+        program = source if isinstance(source, Program) else read(source, processes=processes)
     settings = nc.fit_settings(settings, form, program.units)
     return_free_memory()  # before processes share what there is
     frame = (frame or Frame()).with_offset_of(program, form)

@@ -36,7 +36,7 @@ def test_message(path: Path) -> None:
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_careful_reader_says_the_same(path: Path) -> None:
     said = []
-    for find_plain in (bulk.find_plain, lambda text, first: None):
+    for find_plain in (bulk.find_plain, lambda text: None):
         with pytest.raises(InputError) as caught, patch.object(bulk, "find_plain", find_plain):
             read_apt(clean(path.read_bytes(), "x"), name="x")
         said.append(str(caught.value))

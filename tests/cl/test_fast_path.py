@@ -20,11 +20,11 @@ from oracle.share import how_many
 ARRAYS = ("tip", "axis", "kind", "feed", "line", "feed_mode", "keep")
 
 
-def outcome(data: bytes, *, fast: bool) -> Program | str:
-    finds = bulk.find_plain if fast else lambda text, first: None
+def outcome(data: bytes, *, fast: bool, processes: int = 1) -> Program | str:
+    finds = bulk.find_plain if fast else lambda text: None
     try:
         with patch.object(bulk, "find_plain", finds):
-            return read_apt(clean(data, "x.cls"), name="x.cls")
+            return read_apt(clean(data, "x.cls"), name="x.cls", processes=processes)
     except InputError as error:
         return str(error)
 
@@ -56,6 +56,7 @@ def test_files(own: bool, least: int) -> None:
         assert_same(outcome(data, fast=True), careful)
         with patch.object(bulk, "CHUNK", 300):
             assert_same(outcome(data, fast=True), careful)
+            assert_same(outcome(data, fast=True, processes=2), careful)
         seen += 1
     assert seen >= least
 
@@ -120,6 +121,18 @@ def test_random_programs(lines: list[str], head: str, small: bool) -> None:
     if small:
         with patch.object(bulk, "CHUNK", 40):
             assert_same(outcome(data, fast=True), careful)
+
+
+@pytest.mark.parametrize("harm", ["", "SPINDL/RPM,$", "FINI", "GOTO/1,2,3,0,0,2"])
+def test_processes_read_the_same(harm: str) -> None:
+    lines = [f"GOTO/{k}.5,{-k}.25,1.,0,0,1" if k % 7 else f"FEDRAT/MMPM,{k}." for k in range(1, 700)]
+    lines.insert(500, harm)
+    data = "\n".join(lines).encode()
+    with patch.object(bulk, "CHUNK", 300):
+        assert len([*bulk._chunks(data)]) > bulk._FEW
+        alone = outcome(data, fast=True)
+        assert isinstance(alone, str) == bool(harm)
+        assert_same(outcome(data, fast=True, processes=3), alone)
 
 
 def test_plain_lines_take_the_fast_path() -> None:

@@ -52,6 +52,7 @@ def read(
     between_passes: float | None = None,
     cycle_order: str | None = None,
     machine: Machine | None = None,
+    processes: int = 1,
 ) -> Program:
     """Read a tool path.
 
@@ -89,6 +90,8 @@ def read(
         Whose rotary angles a table has in place of tool axes; the positions are those of the tip on the part.
     size_limit : bool
         Refuse inputs of more than 2 GB, and gzip files that grow 200-fold.
+    processes : int
+        Processes to read a long CL file with, where the system can fork; the result does not depend on it.
 
     Returns
     -------
@@ -134,9 +137,15 @@ def read(
         text = clean(data, name)
         if dialect is None and is_simulation_cld(text):
             text, dialect = apt_of_simulation_cld(text, name), "plain"
-        order = order_of(cycle_order)
         program = read_apt(
-            text, name=name, dialect=dialect, units=units, arc_rule=arc_rule, lenient=lenient, cycle_order=order
+            text,
+            name=name,
+            dialect=dialect,
+            units=units,
+            arc_rule=arc_rule,
+            lenient=lenient,
+            cycle_order=order_of(cycle_order),
+            processes=processes,
         )
     program = replace(program, source=replace(program.source, name=os.path.basename(name), sha256=digest))
     if operation is not None or tool_number is not None or spindle is not None:

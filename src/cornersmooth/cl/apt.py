@@ -70,6 +70,7 @@ def read_apt(
     arc_rule: ArcRule | None = None,
     lenient: bool = False,
     cycle_order: tuple[str, ...] = (),
+    processes: int = 1,
 ) -> Program:
     """Read an APT / CL text; parameters are those of `cornersmooth.cl.read`.
 
@@ -83,7 +84,7 @@ def read_apt(
         file=name, dialect=known, wanted_units=units, arc_rule=arc_rule, lenient=lenient, cycle_order=cycle_order
     )
     decode = _decoder(data)
-    for part in parts(data):
+    for part in parts(data, processes):
         if state.finished and lenient:
             break
         if part.poses is not None:

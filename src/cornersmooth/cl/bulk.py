@@ -12,10 +12,14 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from cornersmooth.model import Floats, Ints
+from cornersmooth.system.processes import map_in_processes
 from cornersmooth.text import parse_numbers
 
 #: bytes of a chunk: enough to make the fixed cost of a chunk small, little enough to stay in cache
 CHUNK: Final = 1 << 20
+
+#: chunks for which no other process is begun
+_FEW: Final = 16
 
 #: no machine reaches farther, in units of the file
 FARTHEST: Final = 1e7
@@ -37,38 +41,39 @@ class Part(NamedTuple):
     follows: str = "GOTO"  #: what comes after the text
 
 
-def parts(data: bytes) -> Iterator[Part]:
-    """Cut a text, whose last line has an end, too."""
-    begin, line = 0, 1
-    while begin < len(data):
-        end = _chunk_end(data, begin)
-        text = data[begin:end]
-        at = 0
-        for start, stop, after, poses in find_plain(text, line) or ():
+def parts(data: bytes, processes: int = 1) -> Iterator[Part]:
+    """Cut a text, whose last line has an end, too; `processes` look for what is plain in a long one."""
+    chunks, line = [*_chunks(data)], 1
+    plain = map_in_processes(lambda chunk: find_plain(data[chunk]), chunks, processes if len(chunks) > _FEW else 1)
+    for chunk, runs in zip(chunks, plain, strict=True):
+        text, first, at = data[chunk], line, 0
+        for start, stop, after, poses in runs or ():
             if at < start:
                 yield Part(line, text[at:start])
-            yield Part(line, poses=poses)
-            at, line = stop, after
+            poses[:, 6] += first
+            yield Part(int(poses[0, 6]), poses=poses)
+            at, line = stop, first + after
         if at < len(text):
-            yield Part(line, text[at:], follows="GOTO" if end < len(data) else "the end of the file")
-        begin, line = end, line + text.count(b"\n", at)
+            yield Part(line, text[at:], follows="GOTO" if chunk.stop < len(data) else "the end of the file")
+        line += text.count(b"\n", at)
 
 
-def _chunk_end(data: bytes, start: int) -> int:
+def _chunks(data: bytes) -> Iterator[slice]:
     """A chunk ends before a GOTO line."""
-    if len(data) - start <= CHUNK:
-        return len(data)
-    stop = data.rfind(b"\nGOTO", start + CHUNK // 2, start + CHUNK)
-    if stop < 0:
-        stop = data.find(b"\nGOTO", start + CHUNK)
-    return len(data) if stop < 0 else stop + 1
+    begin = 0
+    while begin < len(data):
+        stop = -1 if len(data) - begin <= CHUNK else data.rfind(b"\nGOTO", begin + CHUNK // 2, begin + CHUNK)
+        if stop < 0:
+            stop = data.find(b"\nGOTO", begin + CHUNK)
+        end = len(data) if stop < 0 else stop + 1
+        yield slice(begin, end)
+        begin = end
 
 
-def find_plain(text: bytes, first: int) -> list[tuple[int, int, int, Floats]] | None:
+def find_plain(text: bytes) -> list[tuple[int, int, int, Floats]] | None:
     """Find and convert the runs of plain GOTO statements; None if any of them needs care.
 
-    Of each run: its first byte, and byte and line after it, and its poses, (m, 7) as in `Part`. The text begins with
-    line `first`.
+    Of each run: its first byte, and byte and line after it, and its poses, (m, 7) as in `Part`. Lines count from 0.
     """
     spans = [found.span() for found in _PLAIN.finditer(text)]
     if not spans:
@@ -95,7 +100,7 @@ def find_plain(text: bytes, first: int) -> list[tuple[int, int, int, Floats]] | 
     if not (np.abs(poses[:, :3]) <= FARTHEST).all():
         return None
     counts = [text.count(b"GOTO", start, stop) for start, stop in spans]
-    lines = first + np.searchsorted(np.flatnonzero(np.frombuffer(text, np.uint8) == ord("\n")), spans)
+    lines = np.searchsorted(np.flatnonzero(np.frombuffer(text, np.uint8) == ord("\n")), spans)
     size = lines[:, 1] - lines[:, 0]
     poses[:, 6] = line + np.repeat(lines[:, 0] - np.cumsum(size) + size, counts)
     runs = zip(spans, lines[:, 1].tolist(), np.cumsum(counts).tolist(), counts, strict=True)

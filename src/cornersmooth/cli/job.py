@@ -36,7 +36,7 @@ from cornersmooth.report import corners_csv
 from cornersmooth.report.verdict import Saving
 from cornersmooth.settings import AUTO, TIMED_POSES, Settings
 from cornersmooth.system.output import ClosedPipe, make_folder, read_mark, write_mark
-from cornersmooth.system.processes import return_large_arrays
+from cornersmooth.system.processes import return_large_arrays, useful_processes
 
 if TYPE_CHECKING:
     from cornersmooth.feedrate import Limits
@@ -183,7 +183,9 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> None:
     }
     reading: dict[str, float] = {}
     with timed(reading, "read", progress):
-        program = read(source, name=name, **given.reading()).with_feed(given.feed)
+        processes = useful_processes() if job.alone else 1
+        program = read(source, name=name, processes=processes, **given.reading()).with_feed(given.feed)
+    del source  # as large as all that is made of it
     text = io.BytesIO()
     try:
         result = postprocess(
@@ -197,7 +199,7 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> None:
             strict=given.strict,
             force=force,
             continuity=bool(job.reports) or given.as_json,
-            processes=None if job.alone else 1,
+            processes=processes,
             progress=progress,
         )
     except VerdictError as failure:
