@@ -242,7 +242,6 @@ def test_finer_digits_of_a_later_chunk_leave_the_tool_in_the_spindle(monkeypatch
     text += b"".join(b"X%d. A10.\n" % k for k in range(2, 60)) + b"X60.0001 A20.0001\n"
     whole = read_nc(text, machine=machine, tcp=False)
     monkeypatch.setattr(source, "CHUNK", 500)
-    monkeypatch.setattr("cornersmooth.nc_reader.DIGITS_SAMPLE", 100)
     cut = read_nc(text, machine=machine, tcp=False)
     assert cut.tip[-1].tolist() == whole.tip[-1].tolist()
 
@@ -326,3 +325,11 @@ def test_another_transformation_is_no_tip_control():
     first, second = (read_nc(text.format(word).encode(), control="siemens") for word in ("TRAORI", "TRAORI(2)"))
     assert first.problems == ()
     assert [problem.code for problem in second.problems] == ["CS506"]
+
+
+def test_words_of_vectors_say_what_the_tool_axis_is(tmp_path):
+    """Those of Siemens were overlooked: the axis had room as if no word said anything of it."""
+    text = b"G90 G94 G17 G40 G710\nTRAORI\nORIWKS ORIVECT\nG0 X1.000 Y2.000 Z3.000 A3=0.0000000 B3=0.1 C3=1.\n"
+    nc = read_nc(text + b"G1 X2.000 F100.\nM30\n", control="siemens")
+    assert (nc.tip_step, nc.second_step) == pytest.approx((1e-3, 1e-7), rel=0.01)
+    assert not nc.second_room.any()

@@ -29,18 +29,15 @@ def test_text_is_read_by_one_thread_while_another_writes(tmp_path):
 
     writer = threading.Thread(target=fill)
     writer.start()
-    assert source.head(2000) == WHOLE[:2000]
     read = list(iter(lambda: source.read(700), b""))
     writer.join()
     assert b"".join(read) == WHOLE
     assert {len(part) for part in read[:-1]} == {700}
-    assert source.head(100) == WHOLE[:100]
     source.close()
 
 
 def test_bytes_are_read_from_their_beginning_on():
     source = Source(WHOLE)
-    assert source.head(10) == WHOLE[:10]
     assert source.read(100) + source.read(10**6) == WHOLE
     assert source.read(5) == b""
 

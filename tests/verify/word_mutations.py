@@ -16,7 +16,6 @@ from typing import TypeVar
 
 import numpy as np
 
-from cornersmooth.control.source import read_lines
 from cornersmooth.errors import InputError
 from cornersmooth.nc import fit_settings, write
 from cornersmooth.nc_reader.dialects import ReadingOptions
@@ -177,10 +176,10 @@ def named_by_words(case: Case, lines: list[str], end: str = "\n") -> list[tuple[
     """What is wrong, as far as it is seen while the text is read; `verify` names that and what it measures."""
     data = (end.join(lines) + end).encode("latin-1")
     options = options_of(case)
-    reader = Reader(None, options, options.steps(data))
+    reader = Reader(None, options)
     check = WordCheck(options.control, options.dialect.lexer, EPS, weights=(1.0,))
     try:
-        for _ in reader.chunks(check.watch(read_lines(data, None, options.dialect.lexer))):
+        for _ in reader.chunks(check.watch(reader.lines(io.BytesIO(data)))):
             pass
     except InputError as error:
         return [(error.line, error.what)]

@@ -97,27 +97,18 @@ class Source:
         """Read from the beginning, again if need be."""
         self._place = 0
 
-    def head(self, size: int) -> bytes:
-        """First bytes, so many unless the text is shorter; `read` begins with them, too."""
-        return self._part(0, size)
-
     def read(self, size: int) -> bytes:
         """Next bytes, so many unless the text ends."""
-        data = self._part(self._place, size)
-        self._place += len(data)
-        return data
-
-    def _part(self, start: int, size: int) -> bytes:
+        start, parts = self._place, list[bytes]()
         if isinstance(self._text, bytes):
-            return self._text[start : start + size]
-        size = max(min(start + size, self._size(start + size)) - start, 0)
-        self._text.seek(start)
-        parts: list[bytes] = []
-        while size > 0:
-            parts.append(self._text.read(size))
-            if not parts[-1]:
-                break
-            size -= len(parts[-1])
+            parts.append(self._text[start : start + size])
+        else:
+            size = min(size, self._size(start + size) - start)
+            self._text.seek(start)
+            while size > 0 and (part := self._text.read(size)):
+                parts.append(part)
+                size -= len(part)
+        self._place += sum(map(len, parts))
         return parts[0] if len(parts) == 1 else b"".join(parts)
 
     def _size(self, wanted: int) -> int:
@@ -138,14 +129,14 @@ class Readable(Protocol):
     """What text is read from."""
 
     def read(self, size: int, /) -> bytes:
-        """Next bytes, at most so many; none at the end."""
+        """Next bytes, so many unless the text ends."""
 
 
 def read_lines(
     data: bytes | Readable,
     name: str | None,
     lexer: Lexer,
-    show: Callable[[bytes], None] = lambda lines: None,
+    show: Callable[[list[bytes]], None] = lambda lines: None,
 ) -> Iterator[Table | Line]:
     """Give out the text in order, as runs of motion blocks and as other lines.
 
@@ -165,7 +156,7 @@ def read_lines(
         chunk = lexer.unfolded(chunk)
         lines = Lines.of(chunk, patterns)
         if patterns.fresh:
-            show(b"\n".join(patterns.fresh))
+            show(patterns.fresh)
             patterns.fresh.clear()
         number += yield from _in_order(lines, number, lexer, name)
 
@@ -177,15 +168,12 @@ def _chunks(data: bytes | Readable, lexer: Lexer) -> Iterator[bytes]:
     while True:
         more = file.read(CHUNK)
         chunk, mark = (rest + more).removeprefix(mark), b""
-        if not chunk:
-            return
-        cut = lexer.cut(chunk) if more else len(chunk)
+        cut = lexer.cut(chunk) if len(more) == CHUNK else len(chunk)
         chunk, rest = chunk[:cut], chunk[cut:]
-        if not cut:
-            continue
-        if not chunk.endswith(b"\n"):
-            chunk += b"\n"
-        yield chunk
+        if cut:
+            yield chunk if chunk.endswith(b"\n") else chunk + b"\n"
+        if len(more) < CHUNK:
+            return
 
 
 def _in_order(lines: Lines, number: int, lexer: Lexer, name: str | None) -> Generator[Table | Line, None, int]:

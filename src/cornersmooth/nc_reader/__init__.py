@@ -29,7 +29,7 @@ from typing import TYPE_CHECKING
 
 from cornersmooth.control.source import Source, readable_twice
 from cornersmooth.control.table import CONTROLS, word_table
-from cornersmooth.nc_reader.dialects import DIGITS_SAMPLE, ReadingOptions
+from cornersmooth.nc_reader.dialects import ReadingOptions
 from cornersmooth.nc_reader.elements import Elements, Event, NcProgram, Problem
 from cornersmooth.nc_reader.reader import Reader
 
@@ -83,7 +83,7 @@ def read_nc(
     source = Source(readable_twice(data))
     try:
         source.finish()
-        reader = Reader(label, options, options.steps(source.head(DIGITS_SAMPLE)))
+        reader = Reader(label, options)
         return program_of(reader, list(reader.chunks(reader.lines(source))))
     finally:
         source.close()

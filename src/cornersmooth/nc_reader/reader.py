@@ -54,9 +54,9 @@ class Reader:
         Longest distance, mm, at which rotary axes move the tip; as far as the text goes by default.
     """
 
-    def __init__(self, name: str | None, options: ReadingOptions, steps: Steps, lever: float | None = None) -> None:
-        self.name, self.options, self.dialect, self.steps = name, options, options.dialect, steps
-        rotary = options.rotary(steps)
+    def __init__(self, name: str | None, options: ReadingOptions, lever: float | None = None) -> None:
+        self.name, self.options, self.dialect, self.steps = name, options, options.dialect, Steps()
+        rotary = options.rotary(self.steps)
         clamped = {} if rotary is None else {axis.name: True for axis in rotary.machine.axes if axis.clamp is not None}
         modal = Modal(rotary="" if rotary is None else rotary.names)
         self.state = Running(State(options.table, (*"XYZABCIJK",)), modal, rotary, clamped=clamped)
@@ -86,9 +86,9 @@ class Reader:
         """Read lines, and take note of the digits of all of them."""
         return read_lines(source, self.name, self.dialect.lexer, show=self.note_digits)
 
-    def note_digits(self, lines: bytes) -> None:
+    def note_digits(self, lines: Iterable[bytes]) -> None:
         """Take the digits of some lines where they are finer than those before."""
-        finer, before = self.steps.finer(self.options.steps(lines)), self.state.rotary
+        finer, before = self.steps.finer(self.dialect.steps(lines)), self.state.rotary
         rotary = self.options.rotary(finer) if finer != self.steps else None
         if before is not None and rotary is not None:  # the tool stays
             self.state.rotary = replace(rotary, machine=before.machine)

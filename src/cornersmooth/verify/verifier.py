@@ -17,7 +17,7 @@ from cornersmooth.control.source import Source, readable_twice
 from cornersmooth.errors import SettingsError
 from cornersmooth.model import Program
 from cornersmooth.nc_reader import program_of
-from cornersmooth.nc_reader.dialects import DIGITS_SAMPLE, ReadingOptions
+from cornersmooth.nc_reader.dialects import ReadingOptions, Steps
 from cornersmooth.nc_reader.elements import Element, Elements, Event, NcProgram, Problem
 from cornersmooth.nc_reader.needed_states import CONTROL_WORDS
 from cornersmooth.nc_reader.reader import Reader
@@ -171,8 +171,14 @@ class Verifier:
         task = self._task(rotary=options.machine is not None, apart=apart)  # while the text begins
         steps = options.steps(text.head(DIGITS_SAMPLE))
         rotary = options.rotary(steps)
+=======
+        rotary = options.rotary(Steps())
+        task = self._task(
+            rotary=rotary is not None, apart=apart
+        )  # takes memory, which who writes may need before there is text
+        rotary = options.rotary(Steps())
         lever = None if rotary is None else float(rotary.levers(task.path.points[:, :3]).max(initial=0.0))
-        reader = Reader(self._name, options, steps, lever)
+        reader = Reader(self._name, options, lever)
         machine = self._machine if options.dialect.retracts else None
         scale, trust = self._program.mm_per_unit, self._trust
         positions = MachinePositions(machine, scale, switches=options.dialect.switches, tcp=options.tcp)

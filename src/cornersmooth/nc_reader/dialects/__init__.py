@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Container, Set
+from collections.abc import Container, Iterable, Set
 from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Final
@@ -51,8 +50,6 @@ class Dialect:
     beside: Set[str] = frozenset("MTS")
     others: Container[str] = "DN%"
     quiet: Set[str] = frozenset()  #: words that are no events
-    #: the first letter, or letters, of tip and second triple in the lexer, with their decimals
-    digits: re.Pattern[bytes] = re.compile(rb"(?:([XYZ])|([IJUVW]))[-+]?\d*\.(\d*)")
 
     def __init__(self, control: str, rotary: str = "") -> None:
         table = word_table(control)
@@ -61,10 +58,6 @@ class Dialect:
         self.switches, self.rotary, self.control = table.get("switches", False), rotary, control
         self.table = table_of(control)
         self.means = self.table.means
-        if rotary:
-            self.digits = re.compile(
-                rb"(?<!K\d)(?:([XYZ])|(?<![A-Z0-9])([%b])(?:=DC\()?)[-+]?\d*\.(\d*)" % rotary.encode()
-            )
 
     @property
     def asks_tip(self) -> bool:
@@ -156,24 +149,25 @@ class Dialect:
             return refused(line, f"{text}: rotary words", "name the machine they are for, with --machine")
         return refused(line, f"{text} is not understood here", "see that the control is the one the text is for")
 
-    def decimals(self, text: bytes) -> tuple[int, int | None]:
-        """Decimals of the tip and of the second triple, from a sample of the text; None without any."""
-        tip, second = 0, None
-        shapes = set(text.upper().translate(_ONE_DIGIT).split(b"\n"))  # many lines differ in nothing but their digits
-        for _, other, fraction in self.digits.findall(_COMMENT.sub(b"", b"\n".join(shapes))):
-            if other:
-                second = max(second or 0, len(fraction))
-            else:
-                tip = max(tip, len(fraction))
-        for fraction in _VECTOR_K.findall(b"\n".join(shapes)) if b"IJ" in self.digits.pattern else ():
-            second = max(second or 0, len(fraction))
-        return tip, second
+    def steps(self, lines: Iterable[bytes]) -> Steps:
+        """What the last printed digit of tip and second triple is worth in some lines."""
+        tip, second = [0], list[int]()
+        for line in lines:
+            try:
+                words = self.lexer.line(line, 0, None).words
+            except InputError:  # who reads it complains
+                continue
+            names = {word.name for word in words}
+            # K alone is a knot; centres of arcs and angles of planes are no vectors
+            vector = {word.value for word in words if word.name == "G"}.isdisjoint(_NO_VECTOR)
+            others = self.rotary or ("UVW" + "IJ" * vector + "K" * (vector and "J" in names))
+            for word in words:
+                if len(parts := line[word.start : word.stop].split(b".")) > 1 and word.name in {*"XYZ", *others}:
+                    (second if word.name in others else tip).append(len(parts[1]))
+        return Steps(10.0 ** -max(tip), 10.0 ** -max(second) if second else 0.0)
 
 
-_COMMENT = re.compile(rb"\([^)\n]*\)|;[^\n]*")
-#: K of a vector; alone it is a knot
-_VECTOR_K = re.compile(rb"J[-+]?\d*\.?\d*[ ]*K[-+]?\d*\.(\d*)")
-_ONE_DIGIT = bytes.maketrans(b"0123456789", b"0" * 10)
+_NO_VECTOR: Final = (2.0, 3.0, 68.2)
 
 
 #: classes of the modules of these names, each of which is loaded when a program in its words is read
@@ -201,9 +195,6 @@ def dialect_of(control: str, rotary: str = "") -> Dialect:
     return found
 
 
-#: decimals are looked for in so many bytes before the first block is read, and then in all that is read
-DIGITS_SAMPLE: Final = 1 << 16
-
 #: share of the tolerance that the rounding of one number, half a step of its last digit, accounts for at most: a
 #: control reads ``I0.`` as 0 exactly, however few digits a program shows
 DIGITS_SHARE: Final = 0.5
@@ -213,8 +204,8 @@ DIGITS_SHARE: Final = 0.5
 class Steps:
     """What the last printed digit is worth."""
 
-    tip: float  #: in units of the text
-    second: float  #: of the second triple; 0 without any
+    tip: float = 1.0  #: in units of the text
+    second: float = 0.0  #: of the second triple; 0 without any
 
     def finer(self, other: Steps) -> Steps:
         """Give the finer of two of the same text."""
@@ -247,11 +238,6 @@ class ReadingOptions:
         switch = machine.tip_control if machine is not None and turns and dialect.switches else None
         table = dialect.table.switched(switch or ())
         return cls(control, dialect, table, machine if turns else None, tcp, tolerance, axis_length)
-
-    def steps(self, sample: bytes) -> Steps:
-        """Printed digits of a piece of a text, as its control's format shows them."""
-        tip, second = self.dialect.decimals(sample)
-        return Steps(10.0**-tip, 0.0 if second is None else 10.0**-second)
 
     @property
     def widest(self) -> tuple[float, float]:

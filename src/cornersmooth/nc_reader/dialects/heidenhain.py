@@ -73,7 +73,6 @@ class Heidenhain(Dialect):
     beside = frozenset(("M", "S", "side"))
     others = ()
     quiet = frozenset(("M99",))
-    digits = re.compile(rb"(?<!K\d)(?:(?<!T)([XYZ])|(T[XYZ]))[-+]?\d*\.(\d*)")
 
     def __init__(self, control: str, rotary: str = "") -> None:
         super().__init__(control, rotary)

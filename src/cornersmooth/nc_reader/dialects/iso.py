@@ -42,9 +42,7 @@ _IN_MACHINE = 53.0
 _CYCLES = {73.0: "Q", 81.0: "", 82.0: "P", 83.0: "Q", 84.0: "P", 85.0: "", 89.0: "P"}
 _BACK_TO_START = 98.0
 #: G words of tilted planes, by what switches them on
-_TILTED, _PLANE_LINE = 68.2, re.compile(rb"G68\.2[^\n]*", re.IGNORECASE)
-#: an arc, and what may be the words of its centre
-_ARC_LINE, _CENTRE = re.compile(rb"[Gg]0?[23](?![\d.])[^\n]*"), re.compile(rb"[IJKijk][^A-Za-z\n]*")
+_TILTED = 68.2
 _PLANE_WORDS: Mapping[str, frozenset[float]] = {
     "G68.2": frozenset((_TILTED, 53.1, 69.0)),
     "G254": frozenset((254.0, 255.0)),
@@ -71,12 +69,6 @@ class Iso(Dialect):
         self._planes = frozenset[float]().union(*known)
         #: whether ``M29 S`` asks for taps that turn the spindle with the feed
         self._rigid = "M29" in self.table.named
-
-    def decimals(self, text: bytes) -> tuple[int, int | None]:
-        """As `Dialect.decimals`: the angles of a tilted plane are no vectors, nor are the centres of arcs."""
-        planes = b"G68.2" in text or b"g68.2" in text  # the pattern takes long where there are none
-        text = _PLANE_LINE.sub(b"", text) if planes else text
-        return super().decimals(_ARC_LINE.sub(lambda line: _CENTRE.sub(b"", line[0]), text))
 
     def alone(self, line: Line, state: Running) -> Acts | None:
         """As `Dialect.alone`: switched kinematics, positions of the machine, hole cycles, planes and dwells."""

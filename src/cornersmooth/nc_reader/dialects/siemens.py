@@ -98,7 +98,6 @@ class Siemens(Dialect):
 
     beside = frozenset(("M", "T", "S", "SPOS"))
     others = ("D", "N", "%")
-    digits = re.compile(rb"(?:([XYZ])|([ABC]3=|[XYZ]H=))[-+]?\d*\.(\d*)")
 
     def __init__(self, control: str, rotary: str = "") -> None:
         super().__init__(control, rotary)
