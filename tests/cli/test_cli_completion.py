@@ -49,7 +49,6 @@ def test_bash_completes(tmp_path: Path) -> None:
         ("smooth", "--work"): ["--work-offset"],
         ("smooth", "part.cls", "--control", "s"): ["shop", "siemens", "sinumerik", "sinumerik-one"],
         ("smooth", "part.cls", "--machine", "m"): ["mill"],
-        ("smooth", "part.cls", "--control", "siemens", "-f", ""): ["bspline", "g1", "poly"],
         ("smooth", "part.cls", "--control", "shop", "-f", "s"): ["spl"],
     }
     assert {words: complete(*words, folder=tmp_path) for words in answers} == answers

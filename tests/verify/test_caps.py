@@ -109,8 +109,8 @@ def test_motion_after_long_standing_still_is_compared(behind: list[str], verdict
 
 
 def test_after_many_places_nothing_more_is_looked_at() -> None:
-    source = cl("RAPID", "GOTO/0,0,50,0,0,1", "FEDRAT/1000,MMPM", *(f"GOTO/{x},0,50,0,0,1" for x in range(1, 300)))
-    cut = [f"G1 X{x}. Y{0.1 * (x % 2):.1f}" + " F1000." * (x == 1) for x in range(1, 300)]
+    source = cl("RAPID", "GOTO/0,0,50,0,0,1", "FEDRAT/1000,MMPM", *(f"GOTO/{x},0,50,0,0,1" for x in range(1, 211)))
+    cut = [f"G1 X{x}. Y{0.1 * (x % 2):.1f}" + " F1000." * (x == 1) for x in range(1, 211)]
     found = verify(read(source), program(START, *cut), tolerance=0.02)
     assert found.verdict == Verdict.FAILED
     assert "after 100 places where the motions part" in found.unverified

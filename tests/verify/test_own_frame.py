@@ -89,7 +89,7 @@ def _program():
 
 @cache
 def _text(control: str, offset: str | None = None) -> str:
-    settings = Settings(tolerance=0.01, axis_length=10.0)
+    settings = Settings(tolerance=0.01, axis_length=10.0, lines="long")
     form = choose_form(load_control(control), None, machine=load_machine(MACHINES[control]))
     stream = io.BytesIO()
     postprocess(_program(), stream, settings, form=form, frame=Frame(work_offset=offset))

@@ -221,10 +221,12 @@ def test_holes_are_the_same_however_the_text_is_read(changes, monkeypatch):
 
 def test_path_before_holes_is_measured_as_it_is_read(monkeypatch):
     """What cannot belong to the holes any more is not held, though the pose before them is met early, too."""
-    path = [[0.0, 0, 20], *([float(x), 3, 5] for x in range(400)), *HOLES]
-    kinds = [Move.RAPID, *[Move.LINEAR] * 400, *KINDS]
-    program = said(Statement(402, 3, "CYCLE", CYCLE.args), Statement(404, 9, "CYCLE", ("OFF",)), kind=kinds, tip=path)
-    lines = [("G0", 0, 0, 20), *(("G1", x, 3, 5) for x in range(400)), *DRILLED]
+    count = 240
+    path = [[0.0, 0, 20], *([float(x), 3, 5] for x in range(count)), *HOLES]
+    kinds = [Move.RAPID, *[Move.LINEAR] * count, *KINDS]
+    cycle = Statement(count + 2, 3, "CYCLE", CYCLE.args), Statement(count + 4, 9, "CYCLE", ("OFF",))
+    program = said(*cycle, kind=kinds, tip=path)
+    lines = [("G0", 0, 0, 20), *(("G1", x, 3, 5) for x in range(count)), *DRILLED]
     monkeypatch.setattr(reader, "GIVEN_OUT", 4)
     monkeypatch.setattr(source, "CHUNK", 60)
     monkeypatch.setattr(parse, "TOGETHER", 4)
@@ -233,8 +235,8 @@ def test_path_before_holes_is_measured_as_it_is_read(monkeypatch):
     part = Ahead.part
     monkeypatch.setattr(Ahead, "part", lambda ahead, *rows: (held.append(len(ahead.nc)), part(ahead, *rows))[1])
     assert codes(program, text("G43.5 H1", *lines)) == []
-    assert max(held) < 150  # of 400 lines: two chunks and what a batch holds
-    assert "CS562" in codes(program, text("G43.5 H1", *lines[:403], ("G1", 0, 0, -7), *lines[404:]))
+    assert max(held) < 150  # of 240 lines: two chunks and what a batch holds
+    assert "CS562" in codes(program, text("G43.5 H1", *lines[: count + 3], ("G1", 0, 0, -7), *lines[count + 4 :]))
 
 
 def many_holes(count, dwell=()):
@@ -250,7 +252,7 @@ def many_holes(count, dwell=()):
 
 
 def test_a_long_run_of_holes_is_measured_as_it_is_read(monkeypatch):
-    program, lines = many_holes(200)
+    program, lines = many_holes(90)
     monkeypatch.setattr(reader, "GIVEN_OUT", 4)
     monkeypatch.setattr(source, "CHUNK", 60)
     monkeypatch.setattr(parse, "TOGETHER", 8)
@@ -258,9 +260,9 @@ def test_a_long_run_of_holes_is_measured_as_it_is_read(monkeypatch):
     part = Ahead.part
     monkeypatch.setattr(Ahead, "part", lambda ahead, *rows: (held.append(len(ahead.nc)), part(ahead, *rows))[1])
     assert codes(program, text(*lines)) == []
-    assert max(held) < 150  # of 400 lines: two chunks and what a batch holds
-    assert codes(program, text(*lines[:300], ("G1", lines[300][1], 0, -8.5), *lines[301:])) == ["CS562"]
-    assert codes(program, text(*lines[:302], *lines[305:])) == ["CS561"]
+    assert max(held) < 150  # of 270 lines: two chunks and what a batch holds
+    assert codes(program, text(*lines[:120], ("G1", lines[120][1], 0, -8.5), *lines[121:])) == ["CS562"]
+    assert codes(program, text(*lines[:122], *lines[125:])) == ["CS561"]
 
 
 def test_one_dwell_of_many_that_is_missing_is_one_finding():

@@ -347,6 +347,11 @@ class Table:
 
         return lru_cache(_REMEMBERED)(row)
 
+    @cached_property
+    def accepting(self) -> Callable[[str], list[Row]]:
+        """Rows of those that verification accepts which a word fits."""
+        return lru_cache(_REMEMBERED)(lambda word: [row for row in self.listed if row.pattern.fullmatch(word)])
+
     def switched(self, blocks: Sequence[str]) -> Table:
         """Table of a machine where such blocks, if any, switch tip control of the kinematics on and off."""
         table = self

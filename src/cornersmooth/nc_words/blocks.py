@@ -63,7 +63,6 @@ class WordRules:
         self._rooms = {"length": tolerance, "angle": axis_tolerance}
         # most blocks beside the motion are alike; those of cycles are not, but most of their words are
         self.of = lru_cache(_REMEMBERED)(self._of)
-        self._fitting = lru_cache(_REMEMBERED)(self._rows_for)
 
     def _of(self, words: tuple[str, ...]) -> Ruled:
         """Rows of the words of a block, or of the whole block where that is on the list."""
@@ -74,13 +73,10 @@ class WordRules:
         ruled: Ruled = []
         for k, word in enumerate(words):
             others = words[:k] + words[k + 1 :]
-            fitting = [row for row in self._fitting(word) if row.needs is None or any_of(row.needs, others)]
+            fitting = [row for row in self._table.accepting(word) if row.needs is None or any_of(row.needs, others)]
             # what belongs beside another word comes first
             ruled.append((word, min(fitting, key=lambda row: row.needs is None, default=UNLISTED)))
         return ruled
-
-    def _rows_for(self, word: str) -> list[Row]:
-        return [row for row in self._table.listed if row.pattern.fullmatch(word)]
 
     def problems(self, line: Line, block: Block, *, metric: bool) -> Iterator[Problem]:
         """What is wrong with a block by itself: words off the list, twice, without others or beside others."""
@@ -90,7 +86,7 @@ class WordRules:
             return Problem(NOT_LISTED, 0, block.line, text)
 
         for word, row in ruled:
-            if row is UNLISTED and self._fitting(word):
+            if row is UNLISTED and self._table.accepting(word):
                 yield wrong(f"{word} is beside nothing that it belongs to")
             elif row is UNLISTED:
                 yield wrong(f"{word} is not on the list of words for this control")

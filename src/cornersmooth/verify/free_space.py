@@ -22,8 +22,9 @@ from cornersmooth.verify.cl_motion import parts_of
 #: what is reached of a row: by segment of the path the lowest and the highest fraction
 Reached: TypeAlias = dict[int, tuple[float, float]]
 
-#: rows whose edges are worked out together (speed only), and segments of them up to which that is worth while
-_ROWS, _NARROW = 8, 64
+#: speed only: rows whose edges are worked out together, segments of them up to which that is worth while, and segments
+#: that are worked out beyond those reached
+_ROWS, _NARROW, _AHEAD = 32, 128, 32
 
 #: fraction of a segment by which two ways of working out the same place may differ
 _HAIR = 1e-9
@@ -104,7 +105,7 @@ class FreeSpace:
         while row < last and reached:
             low, top = min(reached), max(reached)
             if row - begin >= len(edges) or low < first or (top + 1 >= stop and stop < count):
-                begin, first, stop = row, low, min(max(2 * top - low, top) + 4, count)
+                begin, first, stop = row, low, min(max(2 * top - low, top) + _AHEAD, count)
                 edges = self._edges(row, first, stop)
             new: Reached = {}
             below: float | None = None
