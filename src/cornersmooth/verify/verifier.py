@@ -169,13 +169,6 @@ class Verifier:
             return found.not_verified(words if self._trust.words else "")
         text.begin()
         task = self._task(rotary=options.machine is not None, apart=apart)  # while the text begins
-        steps = options.steps(text.head(DIGITS_SAMPLE))
-        rotary = options.rotary(steps)
-=======
-        rotary = options.rotary(Steps())
-        task = self._task(
-            rotary=rotary is not None, apart=apart
-        )  # takes memory, which who writes may need before there is text
         rotary = options.rotary(Steps())
         lever = None if rotary is None else float(rotary.levers(task.path.points[:, :3]).max(initial=0.0))
         reader = Reader(self._name, options, lever)
