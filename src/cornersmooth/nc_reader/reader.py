@@ -13,7 +13,7 @@ import numpy as np
 
 from cornersmooth.control.source import Readable, read_lines
 from cornersmooth.control.state import State
-from cornersmooth.control.words import MOTION_CODES, Line, Table, joined_tables, table_of
+from cornersmooth.control.words import Line, Table, joined_tables, table_of
 from cornersmooth.errors import InputError
 from cornersmooth.model import MM_PER_UNIT, Floats, Units
 from cornersmooth.nc_reader.acts import ASIDE, NOT_ABOVE, Act, Beside, Move, Running, Tilt, TiltedPlane, ToMachine
@@ -64,7 +64,6 @@ class Reader:
         self._tool = -1.0  # that has been chosen
         self._left_at: Floats | None = None  # where a tool of another length has left
         self._waiting: list[Table] = []
-        self._single: list[tuple[int, Mapping[str, float]]] = []  # single blocks that wait behind these
         self.ready: list[Elements] = []
         self.events: list[Event] = []
         self.late: list[Event] = []
@@ -116,28 +115,10 @@ class Reader:
     def _rows(self, table: Table) -> None:
         """Take a run of motion blocks."""
         # the first block that moves Z behind a retract is looked at with what it leads to
-        leads, count = self.retracts.open and len(self._single) > 0, len(self._waiting) + len(self._single)
-        if not leads and len(table) + count > FEW_ROWS and (table.closed or self._code in MOTION_CODES[:4]):
+        if table.closed and len(table) + len(self._waiting) > FEW_ROWS and not self.retracts.open:
             self._flush()
-        self._gather()
         self._waiting.append(table)
         self.blocks += len(table)
-
-    def _gather(self) -> None:
-        """Put single blocks that wait into a table."""
-        if self._single:
-            self._waiting.append(table_of(self._single))
-            self._single = []
-
-    @property
-    def _code(self) -> float:
-        """G word of group 01 behind what waits."""
-        self._gather()
-        for table in reversed(self._waiting):
-            codes = table.column("G")
-            if len(known := codes[~np.isnan(codes)]):
-                return float(known[-1])
-        return self.state.modal.code
 
     def _line(self, line: Line) -> None:
         """Take a line that is not part of a run."""
@@ -183,7 +164,7 @@ class Reader:
     def _move(self, line: Line, row: Mapping[str, float], *, later: bool) -> None:
         """Execute a single motion block, `later` with those behind it; one without position only changes what holds."""
         if row.keys() & self.dialect.lexer.places or row.keys() & set("XYZIJKUVW"):
-            self._single.append((line.number, row))
+            self._waiting.append(table_of([(line.number, row)]))
             if not later:
                 self._flush()
         else:
@@ -284,7 +265,6 @@ class Reader:
 
     def _flush(self) -> None:
         """Execute the motion blocks that wait."""
-        self._gather()
         if self._waiting:
             for table in joined_tables(self._waiting, sys.maxsize if self.retracts.open else FEW_ROWS):
                 self._execute(table)

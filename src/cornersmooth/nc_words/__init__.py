@@ -2,5 +2,5 @@
 
 Nothing in it measures motion, and nothing in it knows the CL file: what that wants, `statements` compares. `check`
 walks through all blocks in order. `blocks` has the rules of one block, `states` those of groups where the tool moves or
-is changed, `parts` the digests of what is not of the motion, `machine_positions` those of the machine's file.
+is changed, `parts` the digests of what is not of the motion.
 """

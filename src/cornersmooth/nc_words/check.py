@@ -14,9 +14,8 @@ from cornersmooth.control.table import UNLISTED, Row, any_of, shown, table_of, w
 from cornersmooth.control.words import Lexer, Line, Table
 from cornersmooth.errors import InputError
 from cornersmooth.nc_words.blocks import NOT_LISTED, Block, WordRules
-from cornersmooth.nc_words.machine_positions import MachinePositions
 from cornersmooth.nc_words.parts import Parts
-from cornersmooth.nc_words.states import LINEAR, ROTARY, StateRules
+from cornersmooth.nc_words.states import LINEAR, ROTARY, MachinePositions, StateRules
 from cornersmooth.statements.comparison import KINDS
 
 #: code of positions of the machine that its file does not have, or that are missing

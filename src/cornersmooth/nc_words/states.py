@@ -6,25 +6,29 @@ the way down, under tool tip control.
 
 Posts have many ways to begin, to change tools and to end, and most of them are right. What has changed in a program
 whose head has how it was made, `parts` finds; around its retracts it must be right also without digests
-(`StateRules._around_retracts`).
+(`StateRules._around_retracts`). Where tools are changed and the program ends, the machine's file may have positions.
 """
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Mapping, Set
-from typing import Final
+from dataclasses import replace
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from cornersmooth.control.state import LastWord, State
-from cornersmooth.control.table import Row, any_of, shown, title_of
+from cornersmooth.control.table import Row, Table, any_of, shown, title_of
 from cornersmooth.errors import command_text
 from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.nc_reader.rotary import tool_vectors
 from cornersmooth.nc_words.blocks import NOT_LISTED, Block
-from cornersmooth.nc_words.machine_positions import MachinePositions
 from cornersmooth.statements.tokens import ENDINGS
+
+if TYPE_CHECKING:
+    from cornersmooth.kinematics.machine import Machine
 
 #: a retract with the same tool, which only GOHOME of the CL file wants
 GONE_ON: Final = "a retract that another motion of the same tool follows"
@@ -34,6 +38,10 @@ NOT_ESTABLISHED: Final = "CS572"
 
 #: name of the blocks around the motion, among what is left to the user
 FRAME: Final = "program frame"
+
+#: printed digits by which angles may differ, degrees, and by which a position may be off
+_SAME: Final = 1e-5
+_ROOM: Final = 5e-4
 
 #: groups of planes to which the control turns the rotary axes
 _PLANES: Final = ("frame.rotation", "frame.plane", "frame.swivel")
@@ -51,6 +59,77 @@ _POINT: Final = frozenset(("U", "V", "W", "XH", "YH", "ZH"))
 #: angles of a plane, and the cosine of the angle from Z beyond which a tool is tilted
 _DECIMAL: Final = re.compile(r"(?<![G\d])\d+\.\d*")
 _UPRIGHT: Final = 1.0 - 1e-6
+
+
+class MachinePositions:
+    """Follows the machine's axes through blocks that name positions of the machine.
+
+    Parameters
+    ----------
+    machine : Machine or None
+        Without positions, or without a machine, none are required.
+    mm_per_unit : float
+        Of the text.
+    switches : bool
+        `Dialect.switches`.
+    tcp : bool
+        Whether words are those of the tip.
+    """
+
+    def __init__(
+        self, machine: Machine | None, mm_per_unit: float, *, switches: bool = False, tcp: bool = True
+    ) -> None:
+        positions = {} if machine is None else {"home": machine.home, "change": machine.tool_change}
+        units = dict.fromkeys("XYZ", mm_per_unit)
+        self._known = {
+            name: {axis: value / units.get(axis, 1.0) for axis, value in known} for name, known in positions.items()
+        }
+        self._at: dict[str, float] = {}
+        self._axes = () if machine is None else machine.axes
+        #: with its rotary axes
+        self.machine = machine if self._axes else None
+        self._switch = (machine.tip_control or ()) if machine is not None and self._axes and switches else ()
+        #: whether words are those of the tip without any that switches that on
+        self.keeps_tip = bool(switches and tcp and not self._switch)
+
+    def __bool__(self) -> bool:
+        return any(self._known.values())
+
+    def table(self, table: Table) -> Table:
+        """Table of the control with the words that switch tip control of these kinematics, and with positions."""
+        table = table.switched(self._switch)
+        return replace(table, blocks=(*table.blocks, *table.positions)) if self else table
+
+    def away(self, angles: Mapping[str, float]) -> list[str]:
+        """Names of axes that are not at zero, or at a full turn of an axis that turns without end."""
+        endless = {axis.name for axis in self._axes if axis.limits is None}
+        turns = {name: math.remainder(angle, 360.0) if name in endless else angle for name, angle in angles.items()}
+        return sorted(name for name, angle in turns.items() if abs(angle) > _SAME)
+
+    def leave(self, names: Set[str]) -> None:
+        """Take note of axes that move otherwise: words of the tip may move all of them."""
+        gone = names & set("ABC") | (set(self._at) if names & set("XYZ") else set())
+        self._at = {axis: value for axis, value in self._at.items() if axis not in gone}
+
+    def missed(self, name: str) -> str:
+        """Axes with the values of a position, "home" or "change", at which they are not."""
+        wanted = self._known.get(name, {}).items()
+        return " ".join(f"{axis}{value:g}" for axis, value in wanted if not self._is_at(axis, value))
+
+    def _is_at(self, axis: str, value: float) -> bool:
+        return abs(self._at.get(axis, math.nan) - value) <= _ROOM
+
+    def go(self, given: Mapping[str, float], *, free_z: bool) -> Iterator[tuple[str, str]]:
+        """Take note of a block of positions; yield those that the file does not have, and those that it has.
+
+        `free_z`: the control's own table has the block as a retract, which holds where the file has no Z of home.
+        """
+        for axis in given.keys() & set("XYZABC"):
+            self._at[axis] = given[axis]
+            known = [position[axis] for position in self._known.values() if axis in position]
+            free = free_z and axis == "Z" and "Z" not in self._known["home"]
+            if known and not free and not any(self._is_at(axis, value) for value in known):
+                yield f"{axis} goes to {given[axis]:g}", " or ".join(f"{axis}{value:g}" for value in known)
 
 
 class StateRules:

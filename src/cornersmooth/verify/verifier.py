@@ -23,8 +23,7 @@ from cornersmooth.nc_reader.needed_states import CONTROL_WORDS
 from cornersmooth.nc_reader.reader import Reader
 from cornersmooth.nc_reader.rotary import sagitta
 from cornersmooth.nc_words.check import WordCheck
-from cornersmooth.nc_words.machine_positions import MachinePositions
-from cornersmooth.nc_words.states import FRAME, GONE_ON
+from cornersmooth.nc_words.states import FRAME, GONE_ON, MachinePositions
 from cornersmooth.settings import BOUNDS
 from cornersmooth.statements.asked import not_understood_text
 from cornersmooth.statements.comparison import KINDS
