@@ -178,8 +178,7 @@ def write(
     statements = StatementWriter(chosen, program, findings, modals, orders, comments=frame.comments)
     planes = plan_planes(program, smoothed.settings, chosen, findings, drillings, drills=native)
     check_travel_of_words(planes, program, chosen, findings)
-    of_rows = Findings()  # rows are made as they are written: their findings come last
-    rows, circles = _rows(smoothed, chosen, planes, of_rows)
+    rows, circles = _rows(smoothed, chosen, planes, findings)
     _add_warnings(chosen, smoothed, circles, planes, findings)
     stretch = chosen.stretch(smoothed.settings.axis_length)
     tilting = Coordinates(chosen, program.units, stretch, modal=frame.modal)
@@ -196,7 +195,6 @@ def write(
             progress(int(some.move[-1]) + 1, len(program))
     script.finish()
     script.hand_on(text)
-    findings.add_all(of_rows.all())
     return Written(blocks.written, findings.all())
 
 
@@ -245,7 +243,7 @@ def _add_warnings(form: Form, smoothed: SmoothProgram, circles: Circles, planes:
 
 
 def _rows(smoothed: SmoothProgram, form: Form, planes: Planes, findings: Findings) -> tuple[Iterator[Rows], Circles]:
-    """Rows as they come, and how their arcs are written; findings of rows come later."""
+    """Rows as they come, and how their arcs are written."""
     program, settings = smoothed.program, smoothed.settings
     circles, long = plan_circles(program, settings, form, planes), settings.lines == "long"
     if form.curves:

@@ -48,11 +48,9 @@ _CYCLE_BRACES: Table = dict.fromkeys(
     "",
 ) | {"milliseconds": 1, "speed": ""}
 _EXTRA_BRACES: Table = {"blend": "0.001", "turn": "0.01"}  #: the same in blocks of extras
-#: functions that mean the same on every machine (ISO 6983-1; M17 ends a subprogram)
-_FIXED = re.compile(r"M(\d|17|19|30)")
-#: functions that move the tool, change what coordinates mean, or jump to other blocks
-_MOVING = re.compile(r"M(9[6-9]|198|428|429|430)")
-_PATH_FUNCTIONS = re.compile(r"M(89|9\d|1[0-4]\d)")  #: path functions of Klartext
+#: functions that mean the same on every machine (ISO 6983-1; M17 ends a subprogram), that move the tool, change what
+#: coordinates mean, or jump to other blocks; and path functions of Klartext
+_FIXED, _PATH_FUNCTIONS = r"M(\d|17|19|30|9[6-9]|198|428|429|430)", r"M(89|9\d|1[0-4]\d)"
 
 
 class _Controls(Shelf):
@@ -178,20 +176,16 @@ def _forms(forms: Any, where: str, motion: Table) -> dict[str, FormTable]:
 def _trusted(given: Any, where: str, dialect: str) -> frozenset[str]:
     """Machine functions that a shop's own table declares not to move the tool."""
     rows = table_of(dialect).listed if dialect in CONTROLS else ()
+    known = f"{_FIXED}|{_PATH_FUNCTIONS}" if dialect == "heidenhain" else _FIXED
 
     def row_of(word: str) -> Row | None:
         return next((row for row in rows if row.pattern.fullmatch(word)), None)
 
     found = _SHELF.texts(given, where)
     for word in found:
-        why = ""
-        if not re.fullmatch(r"M[1-9]\d{0,3}", word):
-            why = "is no machine function: other words may move the tool"
-        elif _MOVING.fullmatch(word) or (dialect == "heidenhain" and _PATH_FUNCTIONS.fullmatch(word)):
-            why = "may move the tool"
-        elif _FIXED.fullmatch(word) or row_of(word) is not row_of("M9999"):
-            why = "is a function that verification compares with the CL file"
-        if why:
+        other = row_of(word) is row_of("M9999")
+        if not other or re.fullmatch(known, word) or not re.fullmatch(r"M[1-9]\d{0,3}", word):
+            why = "is no function of the shop alone: it may move the tool, or verification compares it"
             raise _SHELF.wrong(f"{where}: {word!r} {why}", 'give machine functions, as in ["M208"]')
     return frozenset(found)
 
