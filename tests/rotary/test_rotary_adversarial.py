@@ -18,7 +18,7 @@ from cornersmooth.kinematics import (
     tool_axis,
 )
 from cornersmooth.kinematics.poses import angle_between
-from cornersmooth.rotary import FilledPath, fill, insertions, rotary_angles
+from cornersmooth.rotary import FilledPath, filled_path, rotary_angles
 from oracle.share import how_many, share
 
 TOLERANCE = 0.02  # degrees
@@ -112,7 +112,7 @@ def test_words_are_right_or_refused(part: int):
         line = np.arange(len(axis)) + 1
         try:
             path = rotary_angles(machine, tip, axis, tolerance=TOLERANCE, rapid=rapid, line=line)
-            more = insertions(machine, tip, axis, path.angles, tolerance=TOLERANCE, rapid=rapid, line=line)
+            filled, jumps = filled_path(machine, tip, axis, path.angles, tolerance=TOLERANCE, rapid=rapid, line=line)
         except InputError as error:
             outcome = error.code if error.line is not None else "no line"
             outcomes[outcome] = outcomes.get(outcome, 0) + 1
@@ -122,11 +122,10 @@ def test_words_are_right_or_refused(part: int):
         assert (path.angles <= limits[:, 1] + 1e-8).all(), seed
         assert angle_between(tool_axis(machine, path.angles), axis).max() <= TOLERANCE * (1 + 1e-9), seed
         turned = np.degrees(np.arccos(np.clip(np.einsum("ij,ij->i", axis[1:], axis[:-1]), -1, 1)))
-        assert (turned[more.unsolved] > 179.99).all(), seed
-        filled = fill(tip, axis, path.angles, more)
+        assert (turned[jumps] > 179.99).all(), seed
         assert (filled.angles >= limits[:, 0] - 1e-8).all(), seed
         assert (filled.angles <= limits[:, 1] + 1e-8).all(), seed
-        cut = ~(rapid[filled.pose[1:]] | np.isin(filled.pose[1:] - 1, more.unsolved))
+        cut = ~(rapid[filled.pose[1:]] | np.isin(filled.pose[1:] - 1, jumps))
         assert walk_error(machine, filled, cut) <= TOLERANCE * (1 + 1e-6), seed
         joints = machine_position(machine, filled.tip, filled.angles)
         np.testing.assert_allclose(tip_position(machine, joints, filled.angles), filled.tip, atol=1e-9)
@@ -146,12 +145,9 @@ def test_second_axis_goes_on_through_the_pole(name: str):
             axis = tilted(np.array(tilt), azimuth)
             tip = np.arange(3.0 * len(tilt)).reshape(-1, 3)
             angles = rotary_angles(machine, tip, axis, tolerance=TOLERANCE).angles
-            more = insertions(machine, tip, axis, angles, tolerance=TOLERANCE)
-            assert len(more.unsolved) == 0
-            assert (
-                walk_error(machine, fill(tip, axis, angles, more), np.ones(len(tilt) - 1 + len(more), bool))
-                <= TOLERANCE
-            )
+            filled, jumps = filled_path(machine, tip, axis, angles, tolerance=TOLERANCE)
+            assert len(jumps) == 0
+            assert walk_error(machine, filled, np.ones(len(filled.pose) - 1, bool)) <= TOLERANCE
 
 
 def fewest_rewinds(machine: Machine, axis: np.ndarray, rapid: np.ndarray) -> float:

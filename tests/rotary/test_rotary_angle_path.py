@@ -14,7 +14,7 @@ from cornersmooth.errors import InputError
 from cornersmooth.kinematics import Machine, load_machine, machine_names, poses, tool_axis
 from cornersmooth.kinematics.poses import angle_between
 from cornersmooth.model import Move, rapid_moves, still_poses
-from cornersmooth.rotary import angle_path, fill, insertions, rotary_angles
+from cornersmooth.rotary import angle_path, filled_path, rotary_angles
 from cornersmooth.rotary.angle_path import RotaryPath
 from oracle.messages import one_line
 from oracle.share import covering_share
@@ -79,9 +79,8 @@ def test_impeller_blade(corpus: Path, name: str):
     path = rotary_angles(machine, tip, axis, tolerance=TOLERANCE)
     assert len(path.angles) > 40
     np.testing.assert_allclose(tool_axis(machine, path.angles), axis, atol=1e-12)
-    more = insertions(machine, tip, axis, path.angles, tolerance=TOLERANCE)
-    assert len(more.unsolved) == 0
-    filled = fill(tip, axis, path.angles, more)
+    filled, jumps = filled_path(machine, tip, axis, path.angles, tolerance=TOLERANCE)
+    assert len(jumps) == 0
     assert np.abs(np.diff(filled.angles, axis=0)).max() < 5
 
 
@@ -123,9 +122,8 @@ def test_through_the_pole_within_tolerance(name: str, aside: float):
     tip = line_of(9)
     path = rotary_angles(machine, tip, axis, tolerance=TOLERANCE)
     assert deviation(machine, path, axis).max() <= TOLERANCE
-    more = insertions(machine, tip, axis, path.angles, tolerance=TOLERANCE, max_step=5.0)
-    assert len(more.unsolved) == 0
-    filled = fill(tip, axis, path.angles, more)
+    filled, jumps = filled_path(machine, tip, axis, path.angles, tolerance=TOLERANCE, max_step=5.0)
+    assert len(jumps) == 0
     assert np.abs(np.diff(filled.angles, axis=0)).max() <= 5.0 + 1e-9
     # Our own walk along every block, against the ruled motion between the original poses.
     share = np.linspace(0, 1, 33)[:, None, None]
@@ -135,7 +133,7 @@ def test_through_the_pole_within_tolerance(name: str, aside: float):
     part = ((along - tip[segment, 0]) / (tip[segment + 1, 0] - tip[segment, 0]))[:, None]
     wanted = unit(axis[segment] * (1 - part) + axis[segment + 1] * part)
     assert angle_between(tool_axis(machine, words), wanted).max() <= TOLERANCE * 1.02
-    assert len(more) < 150
+    assert filled.inserted.sum() < 150
 
 
 def test_bend_at_the_pole_turns_inside_the_cone():
@@ -350,8 +348,7 @@ def test_random_walks(seed: int):
         machine = load_machine(name)
         path = rotary_angles(machine, tip, axis, tolerance=TOLERANCE)
         assert angle_between(tool_axis(machine, path.angles), axis).max() <= TOLERANCE
-        more = insertions(machine, tip, axis, path.angles, tolerance=TOLERANCE)
-        assert len(more.unsolved) == 0
+        assert len(filled_path(machine, tip, axis, path.angles, tolerance=TOLERANCE)[1]) == 0
 
 
 @pytest.mark.parametrize(("size", "seed"), covering_share(product([1, 2, 7, 64], range(4)), 7))

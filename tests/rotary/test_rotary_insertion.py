@@ -20,7 +20,7 @@ from cornersmooth.kinematics import (
 )
 from cornersmooth.kinematics.poses import angle_between
 from cornersmooth.model import Move, rapid_moves
-from cornersmooth.rotary import FilledPath, Insertions, fill, insertions, rotary_angles
+from cornersmooth.rotary import FilledPath, filled_path, rotary_angles
 from oracle.share import covering_share, how_many
 
 STEPS = 24
@@ -78,16 +78,14 @@ def test_axis_stays_on_the_ruled_motion(name: str, seed: int):
     tip, axis = random_path(seed)
     tolerance = 0.05
     angles = rotary_angles(machine, tip, axis, tolerance=tolerance).angles
-    more = insertions(machine, tip, axis, angles, tolerance=tolerance, max_step=10.0)
-    assert len(more.unsolved) == 0
-    path = fill(tip, axis, angles, more)
+    path, jumps = filled_path(machine, tip, axis, angles, tolerance=tolerance, max_step=10.0)
+    assert len(jumps) == 0
     assert axis_error(machine, path, walked(path)).max() <= tolerance * 1.001
     assert np.abs(np.diff(path.angles, axis=0)).max() <= 10.0 + 1e-9
     np.testing.assert_array_equal(path.angles[~path.inserted], angles)
     np.testing.assert_array_equal(path.tip[~path.inserted], tip)
-    np.testing.assert_array_equal(
-        np.bincount(path.pose[1:], minlength=60)[1:] - 1, np.bincount(more.segment, minlength=59)
-    )
+    assert path.pose[~path.inserted].tolist() == list(range(60))
+    assert (np.diff(path.pose)[path.inserted[:-1]] == 0).all()
 
 
 @pytest.mark.parametrize("name", machine_names())
@@ -96,16 +94,15 @@ def test_tip_stays_on_its_line_without_control_of_it(name: str, seed: int):
     machine = load_machine(name)
     tip, axis = random_path(seed)
     angles = rotary_angles(machine, tip, axis, tolerance=0.05).angles
-    more = insertions(machine, tip, axis, angles, tolerance=0.05, tip_tolerance=0.01)
-    assert len(more.unsolved) == 0
-    path = fill(tip, axis, angles, more)
+    path, jumps = filled_path(machine, tip, axis, angles, tolerance=0.05, tip_tolerance=0.01)
+    assert len(jumps) == 0
     words = walked(path)
     assert tip_error(machine, path, words).max() <= 0.01 * 1.001
     assert axis_error(machine, path, words).max() <= 0.05 * 1.001
     # The points are needed: without them the tip leaves its line.
-    bare = fill(tip, axis, angles, insertions(machine, tip, axis, angles, tolerance=180.0))
+    bare, _ = filled_path(machine, tip, axis, angles, tolerance=180.0)
     assert not bare.inserted.any()
-    assert len(more) == 0 or tip_error(machine, bare, walked(bare)).max() > 0.009
+    assert not path.inserted.any() or tip_error(machine, bare, walked(bare)).max() > 0.009
 
 
 def large_turns(seed: int, count: int = 40) -> tuple[np.ndarray, np.ndarray]:
@@ -125,11 +122,12 @@ def large_turns(seed: int, count: int = 40) -> tuple[np.ndarray, np.ndarray]:
     return np.cumsum(rng.uniform(0, 1, (count + 1, 3)) * size, axis=0), np.array(axis)
 
 
-def walk(tip: np.ndarray, axis: np.ndarray, angles: np.ndarray, more: Insertions, segment: int, steps: int):
+def walk(path: FilledPath, segment: int, steps: int):
     """Words, tips at their ends and fractions of the blocks of one segment, densely: (blocks, steps + 1, ...)."""
-    own = more.segment == segment
-    fraction = np.concatenate(([0.0], more.fraction[own], [1.0]))
-    words = np.concatenate((angles[segment][None], more.angles[own], angles[segment + 1][None]))
+    end = int(np.flatnonzero(~path.inserted)[segment + 1])
+    own = slice(int(np.flatnonzero(~path.inserted)[segment]), end + 1)
+    words, gone = path.angles[own], np.linalg.norm(path.tip[own] - path.tip[own][0], axis=1)
+    fraction = gone / gone[-1]
     share = np.linspace(0, 1, steps + 1)[:, None]
     dense = words[:-1, None] * (1 - share) + words[1:, None] * share
     place = fraction[:-1, None] * (1 - share[:, 0]) + fraction[1:, None] * share[:, 0]
@@ -145,11 +143,11 @@ def test_large_turns_keep_the_tolerance_everywhere(name: str, seed: int, toleran
     machine = replace(plain, axes=tuple(replace(item, limits=None) for item in plain.axes))
     tip, axis = large_turns(seed)
     angles = rotary_angles(machine, tip, axis, tolerance=tolerance).angles
-    more = insertions(machine, tip, axis, angles, tolerance=tolerance)
-    assert len(more.unsolved) == 0
+    path, jumps = filled_path(machine, tip, axis, angles, tolerance=tolerance)
+    assert len(jumps) == 0
     worst = 0.0
     for segment in range(len(tip) - 1):
-        _, _, words, place = walk(tip, axis, angles, more, segment, 40)
+        _, _, words, place = walk(path, segment, 40)
         wanted = unit(axis[segment] * (1 - place[:, :, None]) + axis[segment + 1] * place[:, :, None])
         got = tool_axis(machine, words.reshape(-1, 2)).reshape(wanted.shape)
         worst = max(worst, angle_between(got, wanted).max())
@@ -166,11 +164,11 @@ def test_large_turns_keep_the_tip_too(name: str, seed: int):
     machine = replace(plain, axes=axes, tool_length=90.0, part_zero=(40.0, 25.0, 10.0))
     tip, axis = large_turns(seed, 12)
     angles = rotary_angles(machine, tip, axis, tolerance=0.05).angles
-    more = insertions(machine, tip, axis, angles, tolerance=0.05, tip_tolerance=0.01)
-    assert len(more.unsolved) == 0
+    path, jumps = filled_path(machine, tip, axis, angles, tolerance=0.05, tip_tolerance=0.01)
+    assert len(jumps) == 0
     share = np.linspace(0, 1, 41)[:, None]
     for segment in range(len(tip) - 1):
-        fraction, ends, words, place = walk(tip, axis, angles, more, segment, 40)
+        fraction, ends, words, place = walk(path, segment, 40)
         stops = tip[segment] + fraction[:, None] * (tip[segment + 1] - tip[segment])
         joints = machine_position(machine, stops, ends)
         joints = joints[:-1, None] * (1 - share) + joints[1:, None] * share
@@ -196,8 +194,7 @@ def test_an_exact_reversal_of_the_axis_is_told():
     tip = np.array([[0.0, 0, 0], [10, 0, 0]])
     machine = replace(machine, axes=tuple(replace(item, limits=None) for item in machine.axes))
     angles = rotary_angles(machine, tip, axis, tolerance=0.05).angles
-    more = insertions(machine, tip, axis, angles, tolerance=0.05)
-    assert more.unsolved.tolist() == [0]
+    assert filled_path(machine, tip, axis, angles, tolerance=0.05)[1].tolist() == [0]
 
 
 def test_few_points_where_the_motion_is_smooth():
@@ -207,10 +204,10 @@ def test_few_points_where_the_motion_is_smooth():
     axis = np.stack((np.sin(angle), np.zeros(2), np.cos(angle)), axis=1)
     tip = np.array([[0.0, 0, 100], [0.001, 0, 100]])
     angles = rotary_angles(machine, tip, axis, tolerance=5.0).angles
-    more = insertions(machine, tip, axis, angles, tolerance=5.0, tip_tolerance=0.01)
+    path, _ = filled_path(machine, tip, axis, angles, tolerance=5.0, tip_tolerance=0.01)
     needed = np.sqrt(100 * np.radians(10) ** 2 / 8 / 0.01)
-    assert needed <= len(more) + 1 <= np.ceil(needed * 1.1)
-    np.testing.assert_allclose(np.diff(more.fraction), 1 / (len(more) + 1))
+    assert needed <= len(path.pose) - 1 <= np.ceil(needed * 1.1)
+    np.testing.assert_allclose(np.diff(path.tip[:, 0]), 0.001 / (len(path.pose) - 1))
 
 
 def test_rapids_need_no_points():
@@ -218,9 +215,10 @@ def test_rapids_need_no_points():
     tip, axis = random_path(4)
     rapid = np.arange(60) % 2 == 0
     angles = rotary_angles(machine, tip, axis, tolerance=0.01, rapid=rapid).angles
-    more = insertions(machine, tip, axis, angles, tolerance=0.01, rapid=rapid)
-    assert not rapid[more.segment + 1].any()
-    assert len(insertions(machine, tip, axis, angles, tolerance=0.01)) > len(more) > 0
+    path, _ = filled_path(machine, tip, axis, angles, tolerance=0.01, rapid=rapid)
+    assert not rapid[path.pose[path.inserted]].any()
+    whole, _ = filled_path(machine, tip, axis, angles, tolerance=0.01)
+    assert whole.inserted.sum() > path.inserted.sum() > 0
 
 
 def test_jump_is_not_hidden():
@@ -230,8 +228,7 @@ def test_jump_is_not_hidden():
     angles = rotary_angles(machine, np.zeros((2, 3)), axis, tolerance=0.01).angles
     angles[1] = angles[1] * [1, -1] + [180, 0]
     np.testing.assert_allclose(tool_axis(machine, angles), axis, atol=1e-12)
-    more = insertions(machine, np.zeros((2, 3)), axis, angles, tolerance=0.01)
-    assert more.unsolved.tolist() == [0]
+    assert filled_path(machine, np.zeros((2, 3)), axis, angles, tolerance=0.01)[1].tolist() == [0]
 
 
 def test_limit_on_the_way_between_two_poses():
@@ -250,15 +247,15 @@ def test_limit_on_the_way_between_two_poses():
     angles = rotary_angles(plain, tip, axis, tolerance=0.01).angles
     assert np.abs(angles[:, 1]).max() < 101
     with pytest.raises(InputError, match=said):
-        insertions(machine, tip, axis, angles, tolerance=0.01, **where)
+        filled_path(machine, tip, axis, angles, tolerance=0.01, **where)
 
 
 def test_nothing_to_do():
     machine = load_machine("table-ac")
     for n in (0, 1):
-        more = insertions(machine, np.zeros((n, 3)), np.tile([[0, 0, 1.0]], (n, 1)), np.zeros((n, 2)), tolerance=0.01)
-        assert len(more) == 0
-        assert len(fill(np.zeros((n, 3)), np.tile([[0, 0, 1.0]], (n, 1)), np.zeros((n, 2)), more).pose) == n
+        axis = np.tile([[0, 0, 1.0]], (n, 1))
+        path, jumps = filled_path(machine, np.zeros((n, 3)), axis, np.zeros((n, 2)), tolerance=0.01)
+        assert [len(path.pose), int(path.inserted.sum()), len(jumps)] == [n, 0, 0]
 
 
 def test_moves_that_do_not_cut():

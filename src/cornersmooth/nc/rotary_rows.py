@@ -18,7 +18,7 @@ from cornersmooth.nc.form import TIP_SHARE, Form
 from cornersmooth.nc.messages import Findings
 from cornersmooth.nc.rotary_words import RotaryWay, machine_of
 from cornersmooth.nc.statement_args import check_tool_travel
-from cornersmooth.rotary import FilledPath, fill, insertions
+from cornersmooth.rotary import FilledPath, filled_path
 from cornersmooth.settings import METHODS, TIMED_POSES, Settings
 from cornersmooth.smoothing.blending import largest_blends
 from cornersmooth.smoothing.long_lines import LineLimits, Vertices, fewest_lines, segments_of_rows, vertices
@@ -72,7 +72,7 @@ def rotary_rows(
         part = some_rows(way, here)
         move, path = part.move, (part.tip, part.axis, part.angles)
         line = program.line[move]
-        more = insertions(
+        filled, jumps = filled_path(
             machine,
             *path,
             tolerance=way.tolerance,
@@ -82,9 +82,8 @@ def rotary_rows(
             line=line,
             file=program.source.name,
         )
-        findings.note_each("CS369", line[more.unsolved + 1])
-        findings.note_each("CS367", line[more.segment + 1], names=" and ".join(machine.names))
-        filled = fill(*path, more)
+        findings.note_each("CS369", line[jumps + 1])
+        findings.note_each("CS367", line[filled.pose[filled.inserted]], names=" and ".join(machine.names))
         segments = segments_of_rows(way.move, here.start, here.stop)
         chunk = _Chunk(part, smoothed, form, limits, *segments, None if timed is None else timed[here])
         blend = None

@@ -1,14 +1,12 @@
 """Rotary angles along a path: one solution for every pose, points where angles need them."""
 
 from cornersmooth.rotary.angle_path import RotaryPath, reach_error, rewound_angles, rotary_angles
-from cornersmooth.rotary.subdivision import FilledPath, Insertions, fill, insertions
+from cornersmooth.rotary.subdivision import FilledPath, filled_path
 
 __all__ = [
     "FilledPath",
-    "Insertions",
     "RotaryPath",
-    "fill",
-    "insertions",
+    "filled_path",
     "reach_error",
     "rewound_angles",
     "rotary_angles",

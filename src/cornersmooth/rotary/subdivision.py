@@ -45,19 +45,6 @@ CHUNK = 1 << 15  #: Samples that are worked on at a time.
 
 
 @dataclass(frozen=True)
-class Insertions:
-    """Points to insert into a path of n poses; m rows in path order."""
-
-    segment: Ints  #: (m,) the segment from pose ``segment`` to pose ``segment + 1``
-    fraction: Floats  #: (m,) share of the segment before the point, in (0, 1)
-    angles: Floats  #: (m, 2), degrees
-    unsolved: Ints  #: (u,) segments that no division brought within the tolerances: the axis jumps there
-
-    def __len__(self) -> int:
-        return len(self.segment)
-
-
-@dataclass(frozen=True)
 class FilledPath:
     """A path with its inserted points: m rows, exact points of the ruled motion."""
 
@@ -68,7 +55,7 @@ class FilledPath:
     angles: Floats  # degrees
 
 
-def insertions(
+def filled_path(
     machine: Machine,
     tip: Floats,
     axis: Floats,
@@ -80,13 +67,14 @@ def insertions(
     max_step: float | None = None,
     line: Ints | None = None,
     file: str | None = None,
-) -> Insertions:
-    """Points that a path needs so that straight blocks between its rotary words stay on the ruled motion.
+) -> tuple[FilledPath, Ints]:
+    """Path with the points that straight blocks between its rotary words need to stay on the ruled motion.
 
     Tips (n, 3) are in mm, axes unit vectors, angles (n, 2) degrees from `rotary_angles`. The tool axis may be off that
     of the ruled motion by the tolerance, degrees, on the way to each point (n,), and the tip off its line by
     `tip_tolerance`, mm, None where the control keeps it there. A rotary axis may turn by `max_step` degrees in one
     block. `rapid` moves (n,) need no points. CS362: a rotary axis would leave its limits between two poses within them.
+    Besides come the segments (u,), by the pose before each, that no division brought within the tolerances.
     """
     rapid = np.zeros(len(axis), np.bool_) if rapid is None else rapid
     motion = RuledMotion(machine, tip, axis, np.broadcast_to(tolerance, len(axis)), tip_tolerance, max_step)
@@ -99,8 +87,8 @@ def insertions(
             break
         if not number:
             open_ = motion.segments(angles, open_.segment, branches=True)
-        open_, inserted = motion.divide(open_, parts)
-        found.append(inserted)
+        open_, divided = motion.divide(open_, parts)
+        found.append(divided)
     new = joined_rows((some_rows(open_, slice(0)), *found))
     new = some_rows(new, np.lexsort((new.share[:, 0], new.segment)))
     segment, fraction, inner = new.segment, new.share[:, 0], new.angles[:, 0]
@@ -114,16 +102,11 @@ def insertions(
         both = solutions(machine, ruled(tip, axis, segment[here], fraction[here])[1]).angles[0]
         number = 0 if line is None else int(line[segment[first] + 1])
         raise limit_error(machine, both, inner[first], number, file)
-    return Insertions(segment, fraction, inside, np.unique(open_.segment))
-
-
-def fill(tip: Floats, axis: Floats, angles: Floats, more: Insertions) -> FilledPath:
-    """Path with the points of `more` put in: n + m rows."""
-    at = more.segment + 1
+    at = segment + 1
     pose, inserted = np.insert(np.arange(len(tip)), at, at), np.insert(np.zeros(len(tip), np.bool_), at, True)
-    new_tip, new_axis = ruled(tip, axis, more.segment, more.fraction)
-    pairs = (tip, new_tip), (axis, new_axis), (angles, more.angles)
-    return FilledPath(pose, inserted, *(np.insert(old, at, new, axis=0) for old, new in pairs))
+    pairs = zip((tip, axis, angles), (*ruled(tip, axis, segment, fraction), inside), strict=True)
+    whole = (np.insert(old, at, new, axis=0) for old, new in pairs)
+    return FilledPath(pose, inserted, *whole), np.unique(open_.segment)
 
 
 def ruled(tip: Floats, axis: Floats, segment: Ints, fraction: Floats) -> tuple[Floats, Floats]:
