@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from cornersmooth.cl import read
+from cornersmooth.report.verdict import other_corners
 from cornersmooth.smoothing import smooth
-from cornersmooth.smoothing.sharp import other_corners
 from oracle.command import DONE, run
 
 HEAD = "UNITS/MM\nLOADTL/1\nSPINDL/RPM,1000,CLW\nFEDRAT/500,MMPM\nRAPID\nGOTO/0,0,0,0,0,1\nMULTAX/ON\n"

@@ -14,8 +14,8 @@ from cornersmooth.cl.nurbs import cubic
 from cornersmooth.errors import InputError, Verdict
 from cornersmooth.model import Floats, Program
 from cornersmooth.nc import choose_form
+from cornersmooth.report.verdict import sharp_rows
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing.sharp import sharp_rows
 
 LOW = np.array([[0, 0, 0], [10, 0, 0], [20, 5, 0], [30, 5, 1], [38, 0, 2], [45, -3, 2.0]])
 HIGH = np.array([[0, 0, 10], [10, 1, 10], [22, 5, 10], [33, 5, 10], [42, 0, 11], [50, -3, 11.0]])

@@ -16,7 +16,7 @@ from cornersmooth.cl.poses import IDENTITY, UNIT_TOLERANCE, UP, System, Vector, 
 from cornersmooth.cl.reader_state import ReaderState
 from cornersmooth.cl.words import MOTION_WORDS, REFUSED_WORDS, TURNS
 from cornersmooth.model import FeedMode, Keep, Statement, Units
-from cornersmooth.statements.work_offsets import number_of
+from cornersmooth.statements import number_of
 
 #: unit words of FEDRAT: millimetres per unit of the value (None: the unit of the file) and what it is per
 FEED_UNITS: Final[dict[str, tuple[float | None, FeedMode]]] = {

@@ -30,7 +30,7 @@ from cornersmooth.nc.control_tables import control_names, load_control
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.statement_args import tool_loads
 from cornersmooth.settings import Settings
-from cornersmooth.statements.work_offsets import spellings, work_offset_of
+from cornersmooth.statements import spellings, work_offset_of
 from cornersmooth.tables import filled as filled_in
 from cornersmooth.text import format_number
 

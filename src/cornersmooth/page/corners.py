@@ -10,7 +10,7 @@ import numpy as np
 from cornersmooth.arrays import angle_between, some_rows
 from cornersmooth.model import Bools, Floats, Ints, LimitedBy, Program, SmoothProgram, Status
 from cornersmooth.report.tables import corner_table
-from cornersmooth.smoothing.sharp import other_corners, sharp_rows
+from cornersmooth.report.verdict import other_corners, sharp_rows
 from cornersmooth.verify import Verification
 
 #: rounded corners that are listed, beside all sharp ones and all out of tolerance

@@ -12,8 +12,8 @@ import numpy as np
 
 from cornersmooth.control.table import Means
 from cornersmooth.model import Ints, Move, Program, Statement
+from cornersmooth.statements import work_offset_of
 from cornersmooth.statements.tokens import SPEED_DECIMALS, Token, of_m
-from cornersmooth.statements.work_offsets import work_offset_of
 
 #: cutting speeds in mm per minute
 _MM_PER_MINUTE = {"SMM": 1000.0, "SFM": 304.8}

@@ -25,9 +25,9 @@ from cornersmooth.nc_reader.rotary import sagitta
 from cornersmooth.nc_words.check import WordCheck
 from cornersmooth.nc_words.states import FRAME, GONE_ON, MachinePositions
 from cornersmooth.settings import BOUNDS
+from cornersmooth.statements import spellings, work_offset_of
 from cornersmooth.statements.asked import not_understood_text
 from cornersmooth.statements.comparison import KINDS
-from cornersmooth.statements.work_offsets import spellings, work_offset_of
 from cornersmooth.system.processes import Helper, can_fork, map_in_processes
 from cornersmooth.verify.batches import Batches
 from cornersmooth.verify.cl_motion import half_turns
