@@ -30,11 +30,11 @@ def between(statement: str, count: int) -> str:
 
 
 INPUTS = {
-    "poses": (3000, lambda n: "\n".join(poses(n))),
-    "unknown statements": (75, lambda n: between("ANYWORD/{}", n)),
-    "coolant changes": (50, lambda n: between("COOLNT/{}", n)),
+    "poses": (12000, lambda n: "\n".join(poses(n))),
+    "unknown statements": (50, lambda n: between("ANYWORD/{}", n)),
+    "coolant changes": (40, lambda n: between("COOLNT/{}", n)),
     "optional stops": (40, lambda n: between("OPSTOP", n)),
-    "comments": (75, lambda n: between("PPRINT of pose {}", n)),
+    "comments": (50, lambda n: between("PPRINT of pose {}", n)),
     "length of a line": (1500, lambda n: "GOTO/1,1,1\nPPRINT " + "word " * n + "\nGOTO/2,2,2"),
     "tools": (
         20,

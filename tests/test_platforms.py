@@ -68,10 +68,10 @@ def files(folder: Path) -> set[str]:
     return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
 
 
-@pytest.fixture
-def expected(part: Path) -> bytes:
+@pytest.fixture(scope="module")
+def expected() -> bytes:
     """Program of the part, made before anything is missing."""
-    return run("smooth", part, "-o", "-").stdout
+    return run("smooth", "-", "-o", "-", "-q", data=SMALL).stdout.replace(b"CL=<stdin>", b"CL=part.cls")
 
 
 @pytest.mark.usefixtures("expected", "elsewhere")

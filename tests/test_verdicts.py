@@ -15,11 +15,8 @@ import pytest
 
 from careless import look_away
 from cornersmooth.cli import run
-from oracle.files import beginning
+from oracle.files import sample
 from oracle.messages import one_line
-from oracle.share import THOROUGH
-
-SAMPLES = Path(__file__).resolve().parents[1] / "samples"
 
 CL = """\
 TOOL PATH/A,TOOL,B
@@ -249,10 +246,8 @@ REAL = ["hust_5x_impeller_yelun.cls", "shenmuxin_5x_path.csv", "cnclite_iso_S_te
 @pytest.mark.parametrize(("name", "options"), [(name, WAYS[k % 3]) for k, name in enumerate(OWN + REAL)], ids=str)
 def test_the_papers_method_has_no_tolerance_of_its_own(name, options, request, tmp_path, capsys):
     """Fast turns at a nearly straight tip are where its motion leaves ε; both commands agree, digits included."""
-    folder = SAMPLES if name in OWN else request.getfixturevalue("corpus")
     source, out = tmp_path / name, tmp_path / "o.nc"
-    whole = THOROUGH or not name.endswith(".cls")
-    source.write_bytes((folder / name).read_bytes() if whole else beginning(folder / name, 205))
+    source.write_bytes(sample(name) if name in OWN else (request.getfixturevalue("corpus") / name).read_bytes())
     words = ("smooth", source, "-q", "-o", out, "--method", "zhang2016", "--feed", "900", "-H", "20", *options)
     assert first_lines(capsys, *words) == (0, "")  # it passes: anything else is said
     code, line = first_lines(capsys, "verify", source, out)

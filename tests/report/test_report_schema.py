@@ -44,11 +44,19 @@ REPORTS = {
 }
 
 
+@pytest.fixture(scope="module")
+def program(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    folder = tmp_path_factory.mktemp("program")
+    (folder / "part.cls").write_text(CL)
+    assert run("smooth", "part.cls", "-o", "a.nc", "-e", "0.02", "-q", cwd=folder).returncode == 0
+    return (folder / "a.nc").read_bytes()
+
+
 @pytest.fixture
-def part(tmp_path: Path) -> Path:
+def part(tmp_path: Path, program: bytes) -> Path:
     source = tmp_path / "part.cls"
     source.write_text(CL)
-    assert run("smooth", "part.cls", "-o", "a.nc", "-e", "0.02", cwd=tmp_path).returncode == 0
+    (tmp_path / "a.nc").write_bytes(program)
     return source
 
 

@@ -10,9 +10,10 @@ it says where in such a line the numbers stand and what their columns are called
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from functools import cached_property, lru_cache
+from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -125,6 +126,10 @@ class Line:
     tape: bool = False  #: whether it is a bare ``%``
 
 
+#: fields of a line but its number
+_Parts: TypeAlias = tuple[tuple[Word, ...], tuple[str, ...], Word | None, bool, bool]
+
+
 def refused(line: Line, what: str, hint: str) -> InputError:
     """Error for words that make it impossible to tell where the tool is."""
     return InputError("CS503", what, hint, line=line.number)
@@ -165,6 +170,9 @@ _LARGEST: Final = 1e12
 #: bytes at the end of a chunk in which the begin of a block is looked for first, and next
 _TAILS: Final = 1 << 11, 1 << 16
 
+#: lines that a grammar remembers
+_REMEMBERED: Final = 4096
+
 _HEAD: Final = re.compile(r"[ \t]*(/\d?)?[ \t]*")
 
 
@@ -194,6 +202,17 @@ class Lexer:
         InputError
             CS501 where it is not made of words.
         """
+        try:
+            return Line(number, *self._parts(text))
+        except InputError as error:
+            raise InputError(error.code, error.what, error.hint, file=name, line=number) from None
+
+    @cached_property
+    def _parts(self) -> Callable[[bytes], _Parts]:
+        """Fields of a line but its number: a line beside the motion is met three times, and in most programs again."""
+        return lru_cache(_REMEMBERED)(self._taken_apart)
+
+    def _taken_apart(self, text: bytes) -> _Parts:
         text = text.removesuffix(b"\n").removesuffix(b"\r")
         line = text.decode("latin-1")
         comments = tuple(next(filter(None, match.groups()), "").strip(" \t") for match in self.comment.finditer(line))
@@ -205,23 +224,18 @@ class Lexer:
             block_number = Word("N", float(found[1]), found[0].strip(), *found.span(1))
             place = found.end()
         tape = rest[place:] == "%"
-        words = [] if tape else self.words(rest, place, number, name)
-        return Line(number, tuple(words), comments, block_number, bool(head and head[1]), tape)
+        words = [] if tape else self.words(rest, place)
+        return tuple(words), comments, block_number, bool(head and head[1]), tape
 
-    def words(self, rest: str, place: int, number: int, name: str | None) -> list[Word]:
-        """Words of a line from a place on; raises CS501."""
+    def words(self, rest: str, place: int) -> list[Word]:
+        """Words of a line from a place on; raises CS501, without the line."""
         words: list[Word] = []
         while place < len(rest):
             match = self.word.match(rest, place)
             found = self.named(match) if match else None
             if match is None or found is None or any(abs(word.value) > _LARGEST for word in found):
-                raise InputError(
-                    "CS501",
-                    f"{rest[place : place + 20]!r} is no NC word",
-                    "give a file written for this control",
-                    file=name,
-                    line=number,
-                )
+                what = f"{rest[place : place + 20]!r} is no NC word"
+                raise InputError("CS501", what, "give a file written for this control")
             words += found
             place = match.end()
             while place < len(rest) and rest[place] in " \t":

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 from typing import Final
 
@@ -167,7 +168,7 @@ class ProgramReader:
         self.axes = ("X", "Y", "Z", *names)
         self.wanted = NONE if not tcp else VECTOR if machine is None else ANGLES if names else ANY
         turning = ("A", "B", "C") if self.wanted == ANY else names
-        self.lexer = dialect_of(control, "" if machine is None else "".join(turning)).lexer
+        self.lexer = copy(dialect_of(control, "" if machine is None else "".join(turning)).lexer)
         self._weak_feed = "F" in self.lexer.points  # in inches a feed without a point may count otherwise
         self.lexer.points = self.lexer.points - {"F"}
         self.lexer.places = self.lexer.places | {"F"}  # a feed in a line of its own ends no run

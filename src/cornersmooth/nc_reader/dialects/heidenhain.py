@@ -190,7 +190,7 @@ class _KlartextLexer(Lexer):
         self.names = frozenset((*axes, "F", "RAPID", *_PATHS, *self.factors, *(() if rotary else "IJK")))
         self.places = frozenset("XYZ" + (rotary or "IJK"))
 
-    def words(self, rest: str, place: int, number: int, name: str | None) -> list[Word]:
+    def words(self, rest: str, place: int) -> list[Word]:
         """Words of a line from a place on, or the whole block as one; raises CS501."""
         head = next(iter(rest[place:].split()), "")
         if not head:
@@ -199,10 +199,10 @@ class _KlartextLexer(Lexer):
         if head in heads:
             tail = place + len(head)
             tail += len(rest[tail:]) - len(rest[tail:].lstrip())
-            return [Word(heads[head], 0.0, head), *super().words(rest, tail, number, name)]
+            return [Word(heads[head], 0.0, head), *super().words(rest, tail)]
         if not re.match(rf"[A-Z]{NUMBER}(?:[ \t]|$)", rest[place:]):
             return [Word("block", 0.0, " ".join(rest[place:].split()))]
-        return super().words(rest, place, number, name)
+        return super().words(rest, place)
 
     def named(self, match: re.Match[str]) -> list[Word]:
         """Word of one match."""

@@ -209,11 +209,11 @@ class _SiemensLexer(Lexer):
         self._second = frozenset() if rotary else frozenset("IJKUVW")
         self.places = frozenset("XYZ" + (rotary or "IJKUVW"))
 
-    def words(self, rest: str, place: int, number: int, name: str | None) -> list[Word]:
+    def words(self, rest: str, place: int) -> list[Word]:
         """Words of a line from a place on; raises CS501."""
         if rest.startswith("%", place):  # a mark of the transfer
             return [Word("%", 0.0, rest[place:])]
-        return super().words(rest, place, number, name)
+        return super().words(rest, place)
 
     def named(self, match: re.Match[str]) -> Iterable[Word] | None:
         """Words of one match: an axis of a polynomial has several; a letter without a number is none."""
