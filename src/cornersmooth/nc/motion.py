@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cornersmooth.arrays import some_rows
+from cornersmooth.arrays import any_of, some_rows
 from cornersmooth.kinematics import solutions
 from cornersmooth.kinematics.poses import continued
 from cornersmooth.model import Floats, Ints, Move, Program
@@ -139,7 +139,7 @@ class Motion:
         """Leave out the rows that do not move the tool in the written digits."""
         ticks = rows.ticks
         new = np.ones(len(ticks), np.bool_)
-        new[1:] = (ticks[1:] != ticks[:-1]).any(axis=1)
+        new[1:] = any_of(ticks[1:] != ticks[:-1])
         if self.position is not None:
             new[0] = bool((ticks[0] != self.position).any())
         kept = new | (rows.curve > 0)

@@ -249,8 +249,11 @@ def groups(curves: Curves, index: Ints) -> Iterator[CurveGroup]:
 
 def unit(vectors: Floats) -> Floats:
     """Vectors (k, 3) at length one; zero stays zero."""
-    length = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))[:, None]
-    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
+    length = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
+    some = length > 0
+    found = vectors / np.where(some, length, 1.0)[:, None]
+    found[~some] = 0.0
+    return found
 
 
 def cross(one: Floats, other: Floats) -> Floats:

@@ -62,13 +62,14 @@ class Legs(NamedTuple):
 
 def legs_at(program: Program, axis_length: float, pose: Ints, before: Ints, after: Ints) -> Legs:
     """Segments at the corners `pose` with their neighbours `before` and `after`, (g,) each: equations (1) and (2)."""
-    tip, axis, moved = program.tip, program.axis, program.moved
-    corner, direction = tip[pose], axis[pose]
+    moved = program.moved
+    corner, tip_before, tip_after = (program.tip.take(at, axis=0) for at in (pose, before, after))
+    direction, axis_before, axis_after = (program.axis.take(at, axis=0) for at in (pose, before, after))
     return Legs(
-        corner - tip[before],
-        tip[after] - corner,
-        axis_length * (direction - axis[before]),
-        axis_length * (axis[after] - direction),
+        corner - tip_before,
+        tip_after - corner,
+        axis_length * (direction - axis_before),
+        axis_length * (axis_after - direction),
         direction,
         np.zeros(len(pose)) if moved is None else np.maximum(moved[pose], np.maximum(moved[before], moved[after])),
     )
@@ -263,7 +264,7 @@ def find_neighbours(program: Program, axis_length: float, near: float) -> Neighb
     inner = (first >= 0) & (own != last)
 
     duplicate = first >= 0
-    duplicate[1:] &= distance(program, own[1:], own[:-1], axis_length) <= near
+    duplicate[1:] &= distance(program, slice(1, None), slice(None, -1), axis_length) <= near
     duplicate[1:] &= program.kind[:-1] != Move.HOLE  # the tool has left the hole, and comes back to its pose
     representative = np.maximum.accumulate(np.where(duplicate, 0, own))
     repeats = np.flatnonzero(duplicate)
@@ -279,7 +280,7 @@ def find_neighbours(program: Program, axis_length: float, near: float) -> Neighb
     return Neighbours(previous, following, inner, duplicate)
 
 
-def distance(program: Program, one: Ints, other: Ints, axis_length: float) -> Floats:
+def distance(program: Program, one: Ints | slice, other: Ints | slice, axis_length: float) -> Floats:
     """(k,) mm between some poses and others: the larger of tip and axis point."""
     step = program.tip[one] - program.tip[other]
     return np.maximum(norm(step), norm(step + axis_length * (program.axis[one] - program.axis[other])))
@@ -339,7 +340,7 @@ def _steps(program: Program, axis_length: float) -> Floats:
     chains = program.chains
     pose = ranges(chains[:, 0] + 1, chains[:, 1] - chains[:, 0])
     size = np.full(len(program), np.inf)
-    size[pose] = distance(program, pose, pose - 1, axis_length)
+    size[pose] = distance(program, slice(1, None), slice(None, -1), axis_length)[pose - 1]
     return size
 
 

@@ -182,9 +182,9 @@ class Proportional(Construction):
         trim_in, trim_out = corners.trim_in[rows, None], corners.trim_out[rows, None]
         legs = np.empty((2, len(rows), 3, 3))
         for own, values in zip(legs, (smoothed.program.tip, smoothed.program.axis), strict=True):
-            own[:, 0] = here = values[pose]
-            np.multiply(here - values[before], trim_in, out=own[:, 1])
-            np.multiply(values[after] - here, trim_out, out=own[:, 2])
+            own[:, 0] = here = values.take(pose, axis=0)
+            np.multiply(here - values.take(before, axis=0), trim_in, out=own[:, 1])
+            np.multiply(values.take(after, axis=0) - here, trim_out, out=own[:, 2])
         return shares @ legs[0], shares @ legs[1]
 
     def divide(self, smoothed: SmoothProgram, segments: Segments, pose: Ints, number: int) -> tuple[Floats, Floats]:

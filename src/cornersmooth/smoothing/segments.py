@@ -141,8 +141,7 @@ def _measure_remainders(smoothed: SmoothProgram, segments: Segments, poses: Ints
     """
     program, settings = smoothed.program, smoothed.settings
     start = segments.start[poses]
-    step = program.tip[poses] - program.tip[start]
-    turn = program.axis[poses] - program.axis[start]
+    step, turn = (rows.take(poses, axis=0) - rows.take(start, axis=0) for rows in (program.tip, program.axis))
     # a remainder below the shortest line, and short beside the transition it leads to, is no line of its own
     joins = (segments.row[poses] >= 0) & (segments.row[start] >= 0)
     for length, entry, leave in (

@@ -78,7 +78,7 @@ class Reached:
 def of_written(match: Match) -> Reached:
     """Every written vertex that has a place, against the polyline of the original there."""
     vertex = np.flatnonzero(match.on)
-    six = match.six[vertex]
+    six = match.six.take(vertex, axis=0)
     place, away = together(match, six, match.place[vertex], vertex)
     return Reached(vertex, six, Gap.of(match.task, away), place, True)
 
@@ -120,7 +120,7 @@ def together(match: Match, six: Floats, place: Floats, vertex: Ints) -> tuple[Fl
 def of_original(match: Match) -> Reached:
     """Every vertex of the original that is passed, against the step of the written motion on which it is."""
     vertex, row, share = match.passing
-    place, point = row + share, match.path.points[vertex]
+    place, point = row + share, match.path.points.take(vertex, axis=0)
     away = _written(match, place) - point
     # the sum of both squares is least there, and where that is not enough the larger of both has to be
     if len(far := np.flatnonzero(largest_square(away.T) > match.task.radius**2)):

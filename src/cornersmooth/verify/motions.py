@@ -115,7 +115,7 @@ def digit_errors(nc: Elements, element: Ints, tip: Floats, axis: Floats, axis_le
     off = nc.tip[element] - tip
     second = nc.second[element]
     near = np.abs(off) <= (nc.tip_step / 2 + nc.tip_room[element] + ARITHMETIC)[:, None]
-    exact: Bools = np.logical_and.reduce(near, axis=1)
+    exact: Bools = np.logical_and.reduce([*near.T])
     if nc.second_is == "vector":
         side = second - axis
         room = (nc.second_step / 2 + nc.second_room[element] + ARITHMETIC)[:, None]
@@ -123,6 +123,6 @@ def digit_errors(nc: Elements, element: Ints, tip: Floats, axis: Floats, axis_le
         side = second - nc.tip[element]
         side -= np.linalg.norm(side, axis=1)[:, None] * axis
         room = np.sqrt(3) * (nc.second_step + nc.tip_step) / 2 + ARITHMETIC
-    exact &= (np.abs(side) <= room).all(axis=1)
+    exact &= np.logical_and.reduce([*(np.abs(side) <= room).T])
     turned = off + axis_length * (directions(nc, nc.tip[element], second) - axis)
     return exact, np.maximum(np.linalg.norm(off, axis=1), np.linalg.norm(turned, axis=1))

@@ -142,9 +142,10 @@ def length_of(tolerance: float, axis_tolerance: float) -> float:
 
 def side_by_side(tip: Floats, axis: Floats, axis_length: float, own_axis: bool) -> Floats:
     """(..., 6) tips and axis points, mm."""
-    six = np.concatenate((tip, axis_length * axis), axis=-1)
-    if not own_axis:
-        six[..., 3:] += tip
+    six = np.empty((*tip.shape[:-1], 6))
+    for k in range(3):  # by columns: rows are too short to go along
+        six[..., k], other = tip[..., k], axis_length * axis[..., k]
+        six[..., 3 + k] = other if own_axis else other + tip[..., k]
     return six
 
 
