@@ -12,11 +12,7 @@ from cornersmooth.cli import run
 from cornersmooth.nc_reader import read_nc
 from cornersmooth.nc_reader.tool import written_at
 from cornersmooth.report.paths import deviation_along
-from cornersmooth.report.tables import (
-    along_lines,
-    histogram_lines,
-    verification_csv,
-)
+from cornersmooth.report.tables import verification_csv
 from cornersmooth.verify import verify
 from cornersmooth.verify.cl_motion import original_motion
 from oracle.messages import one_line
@@ -99,15 +95,6 @@ def test_reports_and_refusals(files, tmp_path, capsys):
     assert "bad.nc:1: error" in capsys.readouterr().err
 
 
-def test_tables_on_the_terminal(files, capsys):
-    assert run(["verify", *files, "-e", "0.04", "-v"]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    histogram = [line for line in lines if " - " in line]
-    assert len(histogram) == 10
-    assert sum(int(line.split()[4]) for line in histogram) == 3
-    assert any("CL line" in line and "path mm" in line for line in lines)
-
-
 def test_distribution_along_the_path():
     program, lines = job("g6.2")
     found = verify(program, encode(lines), tolerance=0.02)
@@ -128,9 +115,5 @@ def test_distribution_along_the_path():
     owner = np.searchsorted(motion.pose, along.pose[sampled])
     reached, _ = motion.at(owner, along.share[sampled])
     np.testing.assert_allclose(np.linalg.norm(written - reached, axis=1), along.tip[sampled], atol=1e-9)
-    table = along_lines(along, 0.02)
-    assert f"{along.tip.max():.6f}" in "\n".join(table)
     assert "".join(verification_csv(program, found)).count("\n") == 1 + np.isfinite(found.pose_tip).sum()
     assert found.to_dict()["poses"] == len(program)
-    over = verify(program, encode(lines), tolerance=0.01)
-    assert histogram_lines(over)[-1].lstrip().startswith("over 0.01 mm")

@@ -102,7 +102,7 @@ VERIFY = new_command(
     },
     reports="Write what was found: .json for the results, .csv for a row per pose, .html for a page to look at. May be "
     "repeated.",
-    verbose="More: every problem, and how large deviations are and where along the path.",
+    verbose="More: every problem.",
 )
 
 SURFACE = new_command(

@@ -20,9 +20,9 @@ from cornersmooth.errors import SettingsError, Verdict
 from cornersmooth.geometry.tool import Tool, tools_of
 from cornersmooth.model import Program
 from cornersmooth.nc import own_words
-from cornersmooth.nc_reader import NcProgram, read_nc
+from cornersmooth.nc_reader import read_nc
 from cornersmooth.report import NcFile, cl_file, findings_table, record, sha256_of
-from cornersmooth.report.tables import along_lines, histogram_lines, verification_csv
+from cornersmooth.report.tables import verification_csv
 from cornersmooth.report.verdict import judge, trusted_blocks
 from cornersmooth.settings import UNITS
 from cornersmooth.system.processes import return_large_arrays
@@ -59,7 +59,7 @@ def run_verify(given: Options) -> int:
     machine = reader["machine"]
     measures = {name: getattr(given, name) for name in ("tolerance", "axis_length", "axis_tolerance")}
     program = read(data, name=name, **given.reading())
-    if given.verbose or given.reports or given.as_json:  # it is looked at more than once
+    if given.reports or given.as_json:  # it is looked at more than once
         nc = readable_twice(nc)
     trusted = [line for path in given.trusted for line in files.read_lines(path)]
     if given.work_offset:
@@ -102,17 +102,14 @@ def run_verify(given: Options) -> int:
     )
     contents["verification"] = found.to_dict()
 
-    def read_again() -> NcProgram:
-        own = given.axis_tolerance
-        length = given.axis_length if own is None else length_of(given.tolerance, own)
-        return read_nc(nc, **reader, tolerance=given.tolerance, axis_length=length)
-
     def page() -> str:
         from cornersmooth.page import verified_page
 
+        own = given.axis_tolerance
+        length = given.axis_length if own is None else length_of(given.tolerance, own)
         return verified_page(
             program,
-            read_again(),
+            read_nc(nc, **reader, tolerance=given.tolerance, axis_length=length),
             found,
             contents,
             machine=machine,
@@ -136,12 +133,6 @@ def run_verify(given: Options) -> int:
         say_line(verdict)
         for line in _summary(found):
             say_line(line, indent=18)
-        if given.verbose:
-            from cornersmooth.report.paths import deviation_along
-
-            along = deviation_along(program, read_again(), **measures)
-            for line in ("", *histogram_lines(found), "", *along_lines(along, found.tolerance)):
-                say_line(line)
     taken = (Verdict.PASSED,) if given.strict else (Verdict.PASSED, Verdict.INCOMPLETE)
     return 0 if found.verdict in taken else 1
 

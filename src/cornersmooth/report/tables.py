@@ -24,7 +24,6 @@ from cornersmooth.smoothing.segments import lines_of
 if TYPE_CHECKING:
     from cornersmooth.feedrate.timelaw import TimeLaw
     from cornersmooth.model import Program
-    from cornersmooth.report.paths import Distribution
     from cornersmooth.surface import PassDifference, SurfaceMap
     from cornersmooth.verify import Verification
 
@@ -81,11 +80,8 @@ def timelaw_csv(law: TimeLaw) -> Iterator[str]:
     return csv_text(len(times), columns)
 
 
-#: width of the longest bar of a histogram, and classes: parts of the tolerance, and of the span of the surface
-_BAR, _PARTS, _CLASSES = 40, 10, 20
-
-#: rows of the table along the path
-_ROWS = 20
+#: width of the longest bar of a histogram, and classes of the span of the surface
+_BAR, _CLASSES = 40, 20
 
 
 def verification_csv(program: Program, found: Verification) -> Iterator[str]:
@@ -102,47 +98,6 @@ def verification_csv(program: Program, found: Verification) -> Iterator[str]:
         )
 
     return csv_text(len(poses), columns)
-
-
-def histogram_lines(found: Verification) -> list[str]:
-    """How many poses are how far off: the larger deviation of tip and axis point, in tenths of the tolerance."""
-    larger = np.fmax(found.pose_tip, found.pose_axis_point)
-    larger = larger[np.isfinite(larger)]
-    if not len(larger):
-        return []
-    step = found.tolerance / _PARTS
-    counts = np.bincount(np.minimum((larger / step).astype(np.int64), _PARTS), minlength=_PARTS + 1)
-    most = int(counts.max())
-    lines = []
-    for k, count in enumerate(counts.tolist()):
-        if k == _PARTS and not count:
-            continue
-        label = f"over {found.tolerance:.5g}" if k == _PARTS else f"{k * step:.5f} - {(k + 1) * step:.5f}"
-        bar = "#" * max(round(_BAR * count / most), int(count > 0))
-        lines.append(f"{label:>19} mm {count:>9} {bar}".rstrip())
-    return lines
-
-
-def along_lines(found: Distribution, tolerance: float) -> list[str]:
-    """Table along the path: the largest deviations in each of a number of equal parts of it."""
-    if not len(found):
-        return []
-    edges = np.linspace(found.way[0], found.way[-1], _ROWS + 1)
-    part = np.clip(np.searchsorted(edges, found.way, side="right") - 1, 0, _ROWS - 1)
-    lines = [f"{'path mm':>21} {'tip mm':>10} {'axis pt mm':>10} {'axis deg':>9} {'CL line':>8} {'NC line':>8}"]
-    for k in range(_ROWS):
-        rows = np.flatnonzero(part == k)
-        if not len(rows):
-            continue
-        worst = rows[int(np.argmax(np.maximum(found.tip[rows], found.axis_point[rows])))]
-        larger = max(float(found.tip[worst]), float(found.axis_point[worst]))
-        bar = "#" * round(_BAR / 2 * min(larger / tolerance, 1.0))
-        lines.append(
-            f"{edges[k]:>10.3f}-{edges[k + 1]:>10.3f} {found.tip[rows].max():>10.6f} "
-            f"{found.axis_point[rows].max():>10.6f} {found.angle[rows].max():>9.5f} "
-            f"{found.cl_line[worst]:>8} {found.nc_line[worst]:>8} {bar}".rstrip()
-        )
-    return lines
 
 
 def surface_csv(surface: SurfaceMap) -> Iterator[str]:
