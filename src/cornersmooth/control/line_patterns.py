@@ -19,8 +19,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.arrays import distinct
-from cornersmooth.control.words import Lexer, Word
+from cornersmooth.control.words import Lexer, Word, distinct
 from cornersmooth.errors import InputError
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.text.parse import DIGITS, LAST_DIGITS, Bytes, Words, join_digits, words_of

@@ -78,9 +78,7 @@ def control_points(
     poses = [column[rows] for column in (corners.pose, corners.before, corners.after)]
     curves, trims = [], (corners.trim_in, corners.trim_out, corners.axis_trim_in, corners.axis_trim_out)
     for height, (trim_in, trim_out) in ((0.0, trims[:2]), (axis_length, trims[2:])):
-        corner, before, after = (
-            program.tip.take(at, axis=0) + height * program.axis.take(at, axis=0) for at in poses
-        )
+        corner, before, after = (program.tip.take(at, axis=0) + height * program.axis.take(at, axis=0) for at in poses)
         legs = (corner - before) * trim_in[rows][:, None], (after - corner) * trim_out[rows][:, None]
         curves.append(five_points(corner, *legs))
     return curves[0], curves[1]
