@@ -21,6 +21,8 @@ ALLOWED = (
     "cornersmooth.nc_reader",
     "cornersmooth.control",
     "cornersmooth.model",
+    # rows of tables, not vectors
+    *(f"cornersmooth.arrays.{name}" for name in ("distinct", "ranges", "some_rows", "spread", "starts")),
     "cornersmooth.errors",
     "cornersmooth.system.processes",  # who does the work, not how
     "cornersmooth.settings",

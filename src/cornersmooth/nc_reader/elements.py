@@ -12,6 +12,7 @@ from typing import Any, Final, Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from cornersmooth.arrays import ranges, some_rows
 from cornersmooth.control.table import Means
 from cornersmooth.errors import message
 from cornersmooth.model import MM_PER_UNIT, Bools, Floats, Ints, Units
@@ -48,7 +49,7 @@ class _Shapes:
 
     def only(self, chosen: Ints) -> Self:
         """Some of them."""
-        return replace(self, **{name: values[chosen] for name, values in _stored(self).items()})
+        return some_rows(self, chosen)
 
     def part(self, first: int, stop: int) -> Self:
         """Those that are elements from `first` to `stop`, the latter excluded."""
@@ -70,8 +71,10 @@ class _Shapes:
         return whole if rises else whole.only(np.argsort(whole.element, kind="stable"))
 
 
-def _stored(shapes: _Shapes) -> dict[str, NDArray[Any]]:
-    return {one.name: getattr(shapes, one.name) for one in fields(shapes)}
+def _stored(rows: _Shapes | Elements) -> dict[str, NDArray[Any]]:
+    """What has a row for each."""
+    stored = {one.name: getattr(rows, one.name) for one in fields(rows)}
+    return {name: values for name, values in stored.items() if isinstance(values, np.ndarray)}
 
 
 @dataclass(frozen=True)
@@ -101,17 +104,10 @@ class Curves(_Shapes):
 
     def only(self, chosen: Ints) -> Self:
         """Some of them."""
-        place, at = _slices(self.points, chosen), _slices(self.points + self.order, chosen)
+        place = ranges(self.first_point[chosen], self.points[chosen])
+        at = ranges(self.first_knot[chosen], (self.points + self.order)[chosen])
         rows = {"point": place, "weight": place, "knot": at}
         return replace(self, **{name: values[rows.get(name, chosen)] for name, values in _stored(self).items()})
-
-
-def _slices(size: Ints, chosen: Ints) -> Ints:
-    """Indices of the parts `chosen` of a table that consists of parts of given sizes."""
-    first = np.cumsum(size) - size
-    count = size[chosen]
-    start = np.cumsum(count) - count
-    return np.arange(int(count.sum())) + np.repeat(first[chosen] - start, count)
 
 
 @dataclass(frozen=True)
@@ -189,9 +185,8 @@ class Elements:
 
     def part(self, first: int, stop: int) -> Elements:
         """Elements from `first` to `stop`, the latter excluded, counted anew."""
-        rows = slice(first, stop)
-        own: dict[str, Any] = {name: getattr(self, name)[rows] for name in _COLUMNS}
-        return replace(self, **own, curves=self.curves.part(first, stop), arcs=self.arcs.part(first, stop))
+        own = some_rows(self, slice(first, stop))
+        return replace(own, curves=self.curves.part(first, stop), arcs=self.arcs.part(first, stop))
 
     def only(self, kept: Bools) -> Elements:
         """Those of the elements, among them all curves and arcs."""
@@ -199,9 +194,9 @@ class Elements:
 
     def divided(self, owner: Ints, last: Ints) -> Elements:
         """Every element as often as it is in `owner`, ascending; curves and arcs are the `last` of the others."""
-        own: dict[str, Any] = {name: getattr(self, name)[owner] for name in _COLUMNS}
         curves = replace(self.curves, element=last[self.curves.element])
-        return replace(self, **own, curves=curves, arcs=replace(self.arcs, element=last[self.arcs.element]))
+        arcs = replace(self.arcs, element=last[self.arcs.element])
+        return replace(some_rows(self, owner), curves=curves, arcs=arcs)
 
     def at_most(self) -> Self:
         """Return the same elements with feeds that a plan may have lowered: none per revolution, which cuts threads."""
@@ -223,16 +218,11 @@ class Elements:
         if len(parts) == 1:
             return parts[0]
         start = np.cumsum([0, *map(len, parts)]).tolist()
-        own: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in _COLUMNS}
-        curves = Curves.joined([part.curves for part in parts], start)
-        return replace(parts[-1], **own, curves=curves, arcs=NcArcs.joined([part.arcs for part in parts], start))
-
-
-#: fields of `Elements` with a row for each
-_COLUMNS: Final = (
-    *("kind", "tip", "second", "line", "feed", "per_revolution"),
-    *("other_feed", "least_feed", "feed_room", "second_room", "tip_room"),
-)
+        own: dict[str, Any] = {
+            name: np.concatenate([getattr(part, name) for part in parts]) for name in _stored(parts[0])
+        }
+        own["curves"] = Curves.joined([part.curves for part in parts], start)
+        return replace(parts[-1], **own, arcs=NcArcs.joined([part.arcs for part in parts], start))
 
 
 @dataclass(frozen=True, kw_only=True)

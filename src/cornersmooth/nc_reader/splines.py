@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cornersmooth.arrays import ranges, spread, starts
 from cornersmooth.control.words import BSPLINE, NURBS, POLY, SPL, Table
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.elements import Curves, Problem
@@ -169,16 +170,14 @@ def _interval_curves(blocks: Blocks, rows: Ints) -> Curves:
     points, order = count + 1, np.full(len(first), SPLINE_ORDER, np.int64)
     few = points < SPLINE_ORDER
     complain("CS514", rows[first], few, "fewer control points than the order of the curve")
-    begin = np.cumsum(points) - points  # of each curve among the control points
-    step = np.arange(int(points.sum())) - np.repeat(begin, points)
-    control = blocks.starts(np.repeat(rows[first], points) + step)
-    weights = np.append(1.0, weight)[np.repeat(first, points) + step]
-    weights[begin[opens[first]]] = 1.0  # the first control point of a spline is no block's own
+    control = blocks.starts(ranges(rows[first], points))
+    weights = np.append(1.0, weight)[ranges(first, points)]
+    weights[starts(points)[:-1][opens[first]]] = 1.0  # the first control point of a spline is no block's own
     # four equal knots at each end; between them knots 3 to `count` + 1 follow from the intervals of the blocks
     size = points + SPLINE_ORDER
-    start = np.cumsum(size) - size
-    within, used = np.arange(int(size.sum())) - np.repeat(start, size) - 3, np.repeat(count - 1, size)
-    block = np.repeat(first, size) + within
+    start, used = starts(size)[:-1], np.repeat(count - 1, size)
+    block = ranges(first - 3, size)
+    within = block - np.repeat(first, size)
     risen = np.cumsum(np.where((within >= 0) & (within < used), interval.take(block, mode="clip"), 0.0))
     knot = risen - np.repeat(risen[start], size)
     bad = few | (interval[first] != 0) | (interval[first + count - 1] != 0)
@@ -238,15 +237,14 @@ def cut_long(curves: Curves) -> tuple[Curves, Bools]:
     long = (curves.order == 4) & (curves.points > 4) & (curves.knot[first_knot + size - 1] != 1.0)
     if long.any():
         rises = np.append(np.diff(curves.knot) > 0, False)
-        within = np.arange(len(curves.knot)) - np.repeat(first_knot, size)
+        _, within = spread(size)
         wanted = (within >= 3) & (within < np.repeat(curves.points, size))
         long &= np.logical_and.reduceat(curves.weight == 1.0, first_point)
         long &= np.logical_and.reduceat(rises | ~wanted, first_knot)
     if not long.any():
         return curves, long
     number = np.where(long, curves.points - 3, 1)
-    owner = np.repeat(np.arange(len(curves)), number)
-    k = np.arange(len(owner)) - np.repeat(np.cumsum(number) - number, number)
+    owner, k = spread(number)
     mine = long[owner]
     own, place = owner[mine], k[mine]
     bezier = _intervals_alone(curves, first_knot[own] + place, first_point[own] + place)
