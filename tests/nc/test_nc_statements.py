@@ -550,6 +550,16 @@ def test_what_the_interpreter_refuses_is_refused_with_its_line_in_the_cl_file(cl
     write(smooth(program, fit_settings(Settings(), fanuc, "mm")), io.BytesIO(), form=fanuc)
 
 
+@pytest.mark.parametrize(("control", "machine"), [("linuxcnc", "xyzac-trt"), ("fanuc", ""), ("siemens", "table-ac")])
+def test_a_short_lead_in_under_cutter_compensation_is_said(control: str, machine: str) -> None:
+    cl = "UNITS/MM\nCUTTER/8,0,4\nRAPID\nGOTO/0,0,5\nFEDRAT/9,MMPM\nCUTCOM/LEFT\nGOTO/0,{},5\nGOTO/9,3,5\nFINI\n"
+    form = choose_form(control, machine=load_machine(machine) if machine else None)
+    for length, said_so in ((3, True), (5, False)):
+        program = read(cl.format(length).encode(), name="part.cls")
+        written = write(smooth(program, fit_settings(Settings(), form, "mm")), io.BytesIO(), form=form)
+        assert ("CS345" in {finding.code for finding in written.findings}) == said_so
+
+
 @pytest.mark.parametrize(
     ("control", "form"), [("fanuc", "g1"), ("fanuc", "g6.2"), ("siemens", "bspline"), ("heidenhain", "g1")]
 )

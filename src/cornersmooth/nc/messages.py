@@ -51,6 +51,10 @@ WARNINGS: Final = {
     "CS332b": "GOHOME without coordinates is written as the retract of the control's table",
     "CS335": "the spindle is started without a speed: a control takes the one that holds from before",
     "CS335b": "the spindle is not started before the first cut of a tool; put SPINDL before it",
+    "CS345": (
+        "cutter compensation begins on a move of {length:g} mm in the plane: where the register holds the whole radius "
+        "of the tool, the control refuses it, or cuts into the part"
+    ),
     "CS359": "AUXFUN/{number} clamps a rotary axis or lets it turn: left out, the machine's file says where",
     "CS383": "a dwell under feed per revolution: it counts turns of the spindle {where}",
     # tools

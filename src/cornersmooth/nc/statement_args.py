@@ -66,12 +66,13 @@ def milliseconds(amount: float, in_revolutions: bool, speed: float | None) -> in
 
 
 #: of SPINDL, by the identity of statements: ORIENT, OFF, CLW, CCLW or ON, and the speed, rev/min; None where it is not
-#: understood. A cutting speed counts at the cutter before; gears and limits of the speed are the control's own affair
+#: understood. A cutting speed counts at the cutter before; gears and limits of the speed are the control's own affair.
+#: Of CUTCOM: the word, and the diameter of the cutter before, mm
 Orders = dict[int, tuple[str, float | None] | None]
 
 
 def spindle_orders(program: Program) -> Orders:
-    """What the statements of a program ask of the spindle."""
+    """What the statements of a program ask of the spindle, and the cutter."""
     found, diameter = Orders(), 0.0
     for statement in program.statements:
         if statement.word in ("CUTTER", "TLDATA"):
@@ -80,6 +81,8 @@ def spindle_orders(program: Program) -> Orders:
             diameter = numbers[0] * program.mm_per_unit if mill and numbers else 0.0
         elif statement.word == "SPINDL":
             found[id(statement)] = _spindle_order(statement, diameter)
+        elif statement.word == "CUTCOM":
+            found[id(statement)] = statement.word, diameter
     return found
 
 

@@ -7,6 +7,7 @@ is not understood becomes a comment and a counted warning, never an NC word by g
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -228,8 +229,12 @@ class StatementWriter:
         if not side or len(names) > 2 or not set(names[1:]) <= _PLANES.keys() or register is None:
             return None
         entry = self.program.tip[max(statement.pose - 1, 0) : statement.pose + 1, :2]
-        if words.compensation_entry and len(entry) == 2 and (entry[0] == entry[1]).all():
+        length = math.dist(*entry) if len(entry) == 2 else math.inf
+        if words.compensation_entry and not length:
             raise refused("CS344", self.program, statement.line)
+        _, diameter = self.orders[id(statement)] or ("", None)
+        if length <= (diameter or 0.0) / 2.0:
+            self.findings.note("CS345", statement.line, length=length)
         tip = self.modals.mode is not self.form.upright and self.form.orientation not in ("fixed", "machine")
         also = "it may be used with tool tip control (--cycles native does without, along Z), and that " if tip else ""
         self.findings.note("CS319", statement.line, also=also)
