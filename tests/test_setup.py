@@ -117,3 +117,16 @@ def test_command_saves_a_tenth_and_says_what_is_the_users(tmp_path: Path) -> Non
     lost = run("setup", part, "--limits", "four.toml", "--feed", "1000", cwd=tmp_path)
     assert lost.returncode == BAD_INPUT
     assert b"part.csv:" in lost.stderr
+
+
+def test_feed_is_that_of_moves_without_one(tmp_path: Path) -> None:
+    """--feed and FEDRAT of the same number are the same program, as for smooth and time."""
+    program = cone(20.0, 20)
+    numbers = np.hstack((program.tip * [1.0, 10.0, 1.0], program.axis))
+    lines = "".join(f"GOTO/{','.join(f'{value:.9f}' for value in row)}\n" for row in numbers.tolist())
+    (tmp_path / "bare.cls").write_text(lines)
+    (tmp_path / "fed.cls").write_text(f"FEDRAT/MMPM,3000\n{lines}")
+    how = ("--limits", "table-ac", "--tilt", "0", "--json")
+    one = json.loads(run("setup", "bare.cls", "--feed", "3000", *how, cwd=tmp_path).stdout)
+    other = json.loads(run("setup", "fed.cls", *how, cwd=tmp_path).stdout)
+    assert one["today"]["seconds"] == pytest.approx(other["today"]["seconds"], rel=1e-9)

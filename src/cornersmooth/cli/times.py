@@ -333,7 +333,7 @@ def run_setup(given: Options) -> int:
     data, name = read_input(given.source, size_limit=not given.no_size_limit)
     with progress_bar(given.quiet) as progress:
         found = find_setups(
-            read(data, name=name, **given.reading()),
+            read(data, name=name, **given.reading()).with_feed(given.feed),
             form,
             given.settings(),
             given.path_limits(),
