@@ -79,8 +79,7 @@ def test_the_documented_examples_keep_the_tolerance_on_a_real_file(tmp_path, mon
 
 
 def test_every_public_name_is_there_and_help_lists_the_functions():
-    import cornersmooth.report  # the packages of the same name do not hide the functions
-    import cornersmooth.verify
+    import cornersmooth.verify  # the package of the same name does not hide the function
 
     for name in cornersmooth.__all__:
         assert callable(getattr(cornersmooth, name))

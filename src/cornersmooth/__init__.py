@@ -14,7 +14,7 @@ Step by step, with the numbers in between; the form says which digits the contro
         cornersmooth.write(smoothed, stream, form=form)
     found = cornersmooth.verify(program, "part.nc", tolerance=0.04)
 
-- `sample` gives points on the smoothed path, `corner_table` its corners, `report` the whole story as a dictionary
+- `sample` gives points on the smoothed path, `corner_table` its corners
 - `filter_program` smooths the runs of a finished NC program
 - `plan` and `direct` say how long a machine takes for the smoothed and the original path, `compare` both
 - `choose_form`, `load_control` and `load_machine` take names or TOML files; `Frame` holds what stands around the motion
@@ -54,7 +54,6 @@ if TYPE_CHECKING:
     from cornersmooth.pipeline import Result as Result
     from cornersmooth.pipeline import postprocess as postprocess
     from cornersmooth.pipeline import smooth as smooth
-    from cornersmooth.report import report as report
     from cornersmooth.report.tables import corner_table as corner_table
     from cornersmooth.settings import Settings as Settings
     from cornersmooth.smoothing.sampling import PathPoints as PathPoints
@@ -80,7 +79,6 @@ _HOME = {
         "nc": "Frame choose_form fit_settings load_control write",
         "smoothing.sampling": "PathPoints sample",
         "pipeline": "Result postprocess smooth",
-        "report": "report",
         "report.tables": "corner_table",
         "settings": "Settings",
         "times": "compare",

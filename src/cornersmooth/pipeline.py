@@ -25,7 +25,7 @@ from cornersmooth.nc import Form, Frame, Written
 from cornersmooth.nc.program_frame import blend_word
 from cornersmooth.nc_reader import CONTROLS, NcProgram, read_nc
 from cornersmooth.nc_reader.elements import Element
-from cornersmooth.report import NcFile, planned_times, report
+from cornersmooth.report import report
 from cornersmooth.report.verdict import Judgement, Saving, judge, trusted_blocks
 from cornersmooth.settings import AUTO, CURVES_METHOD, DEFAULT_METHOD, Settings
 from cornersmooth.system.output import FAILED, Output, Target, check_output, open_output, path_of
@@ -80,20 +80,7 @@ class Result:
         dict
             Plain values; keys carry their unit (`report/report.schema.json`).
         """
-        form, own = self.form, len(self.smoothed.findings)
-        return report(
-            self.smoothed,
-            dense=not form.curve,
-            blocks_out=self.written.blocks,
-            findings=self.findings[own:],
-            verification=self.verification,
-            unverified=self.unverified,
-            nc_file=NcFile.of(self.path, self.sha256, form),
-            command=command,
-            loosened=loosened,
-            times=planned_times(saving, limits or form.machine),
-            machine=form.machine if form.rotary else None,
-        )
+        return report(self, command=command, loosened=loosened, saving=saving, limits=limits)
 
 
 def smooth(

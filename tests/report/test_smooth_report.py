@@ -5,13 +5,14 @@ from __future__ import annotations
 import csv
 import io
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from cornersmooth import Program, Settings, smooth
+from cornersmooth import Program, Result, Settings, postprocess, smooth
 from cornersmooth.errors import Finding
-from cornersmooth.report import corners_csv, report, report_json
+from cornersmooth.report import corners_csv, report_json
 
 COLUMNS = (
     "corner,line,x,y,z,tip_angle_deg,axis_angle_deg,tip_length_in_mm,tip_length_out_mm,axis_length_in_mm,"
@@ -31,10 +32,14 @@ def table(text: str) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO(text)))
 
 
+def written(program: Program, settings: Settings) -> Result:
+    return postprocess(program, io.BytesIO(), settings, verify=False)
+
+
 def test_json_has_the_agreed_keys_and_counts(program):
-    smoothed = smooth(program, Settings(tolerance=0.02))
+    made = written(program, Settings(tolerance=0.02))
     finding = Finding("CS310", "warning", 7, "X is not translated", 3)
-    contents = json.loads(report_json(report(smoothed, blocks_out=40, findings=(finding,))))
+    contents = json.loads(report_json(replace(made, findings=(finding,)).report()))
     assert contents["schema"] == "cornersmooth-report/2"
     judged = {"verdict", "verdict_text", "to_check", "left_out", "not_verified"}
     assert (
@@ -50,7 +55,7 @@ def test_json_has_the_agreed_keys_and_counts(program):
     assert summary["not_smoothed"] == {"reversal": 1, "duplicate": 1}
     assert summary["limited_by_tolerance"] + summary["limited_by_segment"] == 2
     assert summary["blocks_in"] == 6
-    assert summary["blocks_out"] == 40
+    assert summary["blocks_out"] == made.written.blocks > 6
     assert summary["length_mm"] == pytest.approx(40.0)
     assert contents["findings"] == [
         {"code": "CS310", "severity": "warning", "line": 7, "text": "X is not translated", "count": 3, "to_check": True}
@@ -93,15 +98,15 @@ def test_the_papers_method_adds_what_its_synchronisation_leaves(program):
     smoothed_row = next(row for row in rows if row["status"] == "smoothed")
     assert float(smoothed_row["sync_residual_mm"]) >= 0.0
     assert {"joint_jump_in_deg", "joint_jump_out_deg"} <= set(rows[0])
-    summary = json.loads(report_json(report(smoothed)))["summary"]
+    summary = json.loads(report_json(written(program, smoothed.settings).report()))["summary"]
     assert summary["max_sync_residual_mm"] >= 0.0
     assert summary["max_joint_jump_deg"] >= 0.0
 
 
 def test_a_program_without_corners_has_an_empty_report():
-    smoothed = smooth(Program.from_poses(np.zeros((1, 3)), np.array([[0.0, 0, 1]])))
-    assert "".join(corners_csv(smoothed)) == COLUMNS + "\n"
-    contents = json.loads(report_json(report(smoothed)))
+    made = written(Program.from_poses(np.zeros((1, 3)), np.array([[0.0, 0, 1]])), Settings())
+    assert "".join(corners_csv(made.smoothed)) == COLUMNS + "\n"
+    contents = json.loads(report_json(made.report()))
     assert contents["summary"]["max_tip_error_mm"] == 0.0
     assert contents["worst"] == []
 

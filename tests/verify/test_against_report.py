@@ -18,9 +18,8 @@ from cornersmooth.nc import choose_form, fit_settings, write
 from cornersmooth.nc_reader import read_nc
 from cornersmooth.nc_reader.elements import Element
 from cornersmooth.nc_reader.tool import written_at
-from cornersmooth.report import report
 from cornersmooth.report.paths import deviation_along
-from cornersmooth.report.tables import path_distances
+from cornersmooth.report.tables import path_distances, worst_corners
 from cornersmooth.settings import LARGEST_CHORD, Settings
 from cornersmooth.smoothing import smooth
 from cornersmooth.verify import verify
@@ -47,10 +46,10 @@ def differences(program: Program, form: str, tolerance: float, axis_length: floa
     write(smoothed, stream, form=chosen)
     text = read_nc(stream.getvalue())
     measured = verify(program, stream.getvalue(), tolerance=tolerance, axis_length=axis_length)
-    said = report(smoothed, dense=not chosen.curve)["summary"]
+    worst = worst_corners(smoothed, dense=not chosen.curve)
     return (
-        measured.max_tip_deviation_mm - said["max_tip_error_mm"],
-        measured.max_axis_point_deviation_mm - said["max_axis_error_mm"],
+        measured.max_tip_deviation_mm - worst.tip_error,
+        measured.max_axis_point_deviation_mm - worst.axis_error,
         text.tip_step,
     )
 

@@ -17,58 +17,32 @@ from cornersmooth.geometry.arcs import arc_radii
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import Floats, Ints, Move, Program, SmoothProgram, Status, rapid_moves
 from cornersmooth.report.tables import Columns, corner_table, counts_of, csv_text, worst_corners
-from cornersmooth.report.verdict import Judgement, Saving, judge, sharp_corners
+from cornersmooth.report.verdict import Judgement, Saving, sharp_corners
 from cornersmooth.smoothing.construction import construction_of
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics import Machine
     from cornersmooth.nc import Form
-    from cornersmooth.verify import Verification
+    from cornersmooth.pipeline import Result
 
 
 __all__ = ["SCHEMA", "NcFile", "corners_csv", "findings_table", "report", "report_json"]
 
 
 def report(
-    smoothed: SmoothProgram,
+    result: Result,
     *,
-    dense: bool = True,
-    blocks_out: int | None = None,
-    findings: tuple[Finding, ...] = (),
-    verification: Verification | None = None,
-    unverified: str = "",
-    nc_file: NcFile | None = None,
     command: str = "",
     loosened: str = "",
-    times: Mapping[str, Any] | None = None,
-    machine: Machine | None = None,
+    saving: Saving | None = None,
+    limits: Machine | None = None,
 ) -> dict[str, Any]:
-    """Everything that the JSON report of ``smooth`` says; ``report.schema.json`` describes it.
+    """Everything that the JSON report of ``smooth`` says, as `cornersmooth.pipeline.Result.report` gives it.
 
-    Parameters
-    ----------
-    dense : bool
-        Whether transitions are written as lines, not as curves: where their legs are unequal, errors differ.
-    blocks_out : int, optional
-        NC blocks written.
-    findings : tuple of Finding
-        Those of the writer, besides those of the program.
-    verification : Verification, optional
-        What `cornersmooth.verify` measured in the written program.
-    unverified : str
-        What was not verified, and why; empty for nothing.
-    command, loosened, times
-        As `record` has them.
-    machine : Machine, optional
-        Whose rotary axes accelerate at places that are listed.
-
-    Returns
-    -------
-    dict
-        Plain values; numbers in mm, degrees and s as their keys name them.
+    Numbers are in mm, degrees and s as their keys name them; ``report.schema.json`` describes it.
     """
-    all_findings = (*smoothed.findings, *findings)
-    program, corners = smoothed.program, smoothed.corners
+    smoothed, form, found, findings = result.smoothed, result.form, result.verification, result.findings
+    program, corners, dense = smoothed.program, smoothed.corners, not form.curve
     done, runs = corners.rounded, smoothed.runs
     worst = worst_corners(smoothed, dense=dense)
     sharp, listed = sharp_corners(smoothed)
@@ -77,7 +51,7 @@ def report(
         "method": smoothed.settings.method,
         "corners": len(corners),
         "corners_in_runs": int((corners.status == Status.IN_RUN).sum()),
-        "instead": [{"count": one.count, "text": one.text} for one in all_findings if one.instead],
+        "instead": [{"count": one.count, "text": one.text} for one in findings if one.instead],
         "smoothed": int(done.sum()),
         **counts_of(corners),
         "sharp": sharp,
@@ -86,7 +60,7 @@ def report(
         "max_orientation_error_deg": float(np.degrees(_largest(corners.orientation_error))),
         "length_mm": _feed_length(smoothed),
         "blocks_in": int(np.count_nonzero(program.kind != Move.FROM)),
-        "blocks_out": blocks_out,
+        "blocks_out": result.written.blocks,
     }
     if runs is not None:
         summary["runs"] = len(runs)
@@ -96,20 +70,20 @@ def report(
     summary |= construction_of(smoothed.settings.method).report_summary(corners)
     contents = record(
         "smooth",
-        judge(verification, all_findings, unverified),
+        result.judgement,
         source=cl_file(program),
-        program=nc_file,
+        program=NcFile.of(result.path, result.sha256, form),
         settings=smoothed.settings.as_dict(),
-        findings=all_findings,
+        findings=findings,
         command=command,
         loosened=loosened,
-        times=times,
+        times=planned_times(saving, limits or form.machine),
     )
     contents |= {"summary": summary, "worst": _records(smoothed, worst.rows, dense=dense), "sharp": listed}
-    if marks := rotary_marks(program, machine):
+    if marks := rotary_marks(program, form.machine if form.rotary else None):
         contents["rotary_marks"] = marks
-    if verification is not None:
-        contents["verification"] = verification.to_dict()
+    if found is not None:
+        contents["verification"] = found.to_dict()
     return contents
 
 
