@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
@@ -167,3 +168,54 @@ def test_a_mark_of_the_coding_is_no_word(tmp_path: Path) -> None:
 def test_numbers_of_retracts_may_be_spelt_otherwise(control: str, tmp_path: Path) -> None:
     for zero in ("Z0.000", "Z-0.", "Z+00."):
         assert judged(tmp_path, control, (r"\bZ0\.$", zero)).startswith("PASSED")
+
+
+CURVES = {"fanuc": "g6.2", "mitsubishi": "g6.2", "siemens": "bspline", "heidenhain": "spl", "generic": "g6.2"}
+CURVES_ALSO = {"siemens": "poly"}
+
+
+def _each(pattern: str, new: str) -> Callable[[str], str]:
+    return lambda text: re.sub(pattern, new, text, flags=re.MULTILINE)
+
+
+@cache
+def _curves(control: str, form: str) -> str:
+    made = run("smooth", "-", "-e", "0.02", "--control", control, "--form", form, data=CL.encode())
+    assert made.returncode == DONE, made.stderr
+    return made.stdout.decode()
+
+
+@pytest.mark.parametrize(("control", "form"), [*CURVES.items(), *CURVES_ALSO.items()])
+@pytest.mark.parametrize(
+    "rewrite",
+    [
+        "comments between",
+        "comments behind",
+        "empty lines",
+        "blanks at the end",
+        "CR LF",
+        "coding",
+        "lower case",
+        "numbers",
+    ],
+)
+def test_curves_in_another_spelling_pass(control: str, form: str, rewrite: str, tmp_path: Path) -> None:
+    """With the digests of the head."""
+    comment = {"siemens": "; CUT", "heidenhain": "; CUT"}.get(control, "(CUT)")
+    block = r"^((?:\d+ )?[GXKLSMB](?!EGIN).*[\d)X])$"
+    changes: dict[str, Callable[[str], str]] = {
+        "comments between": _each(block, rf"\1\n{'9 ' if control == 'heidenhain' else ''}{comment}"),
+        "comments behind": _each(block, rf"\1 {comment}"),
+        "empty lines": _each(block, r"\1\n\n"),
+        "blanks at the end": _each(block, r"\1  "),
+        "CR LF": _each("$", "\r"),
+        "coding": _each(r"\A", "\N{ZERO WIDTH NO-BREAK SPACE}"),
+        "lower case": lambda text: re.sub(block, lambda match: match[1].lower(), text, flags=re.MULTILINE),
+        "numbers": _each(r"^\d+", "7") if control == "heidenhain" else _each(block, r"N7 \1"),
+    }
+    text = changes[rewrite](_curves(control, form))
+    assert text != _curves(control, form)
+    (tmp_path / "part.cls").write_text(CL)
+    (tmp_path / "part.nc").write_bytes(text.encode())
+    found = run("verify", "part.cls", "part.nc", "-e", "0.02", "--control", control, cwd=tmp_path)
+    assert found.stdout.startswith(b"PASSED"), found.stdout + found.stderr
