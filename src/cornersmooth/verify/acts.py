@@ -17,7 +17,7 @@ from cornersmooth.nc_reader.tool import beyond_digits
 from cornersmooth.statements.asked import NOTHING, Asking
 from cornersmooth.statements.cycles import Drilling, drillings
 from cornersmooth.verify.cl_motion import Original
-from cornersmooth.verify.holes import HoleLines
+from cornersmooth.verify.holes import Hole, HoleLines
 
 
 class Step(NamedTuple):
@@ -28,16 +28,6 @@ class Step(NamedTuple):
     opens: bool  #: whether feed moves may follow, rather than a hole
     last: int  #: last move before the next stop
     within: bool = False  #: whether both motions pass a pose of a run there, where both files have words
-
-
-class Hole(NamedTuple):
-    """A hole that is drilled."""
-
-    move: int
-    first: int  #: the first element that belongs to it
-    bottom: int  #: the element behind its deepest feed move: it may wait before that
-    leaves: int  #: the element with which the tool leaves it
-    cycle: Drilling
 
 
 @dataclass

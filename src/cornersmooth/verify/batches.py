@@ -194,7 +194,8 @@ class Batches:
     def _stands(self, move_last: int, element_last: int, *, cl_moves: bool) -> None:
         """Say if between two stops one motion leaves the place where the other stands: CS535, CS536."""
         task, path, original = self.task, self.task.path, self.task.original
-        motion = written_motion(self._ahead.part(self._element, element_last + 1), task)
+        part = self._ahead.part(self._element, element_last + 1)
+        motion = written_motion(part, task)
         place = path.at(self._place[:1])
         if cl_moves:
             start, stop = int(self._place[0]), int(original.trail.last[move_last])
@@ -204,7 +205,10 @@ class Batches:
             own, bend = motion.six, motion.bend
             text, code, other = "feed moves that the CL file does not have", "CS536", place[0]
         off = np.sqrt(largest_square((own - other).T))
-        amount = float((np.maximum(off[1:], off[:-1]) + bend).max(initial=0.0))
+        if not cl_moves:  # rapids that lead nowhere were passed, though digits of a fine ε show them
+            off[part.kind[motion.owner] == Element.RAPID] = 0.0
+        # out of a hole it may begin beside the path
+        amount = float((np.maximum(off[1:], off[:-1]) + bend).max(initial=float(off[0])))
         if amount > task.tolerance + ARITHMETIC:
             self._told = True
             nc, base = self._ahead.nc, self._ahead.base

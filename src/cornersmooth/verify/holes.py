@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Final
+from dataclasses import dataclass
+from itertools import chain
+from typing import Final, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +29,9 @@ _WINDOW = 16
 
 #: a direction along which no two poses of a usual part are at the same place
 _ASLANT: Final = np.array([0.48, 0.6, 0.64])
+
+#: code of a fault, its element, a text, and how much, mm
+_Fault: TypeAlias = tuple[str, int, str, float]
 
 
 class HoleLines:
@@ -194,128 +199,168 @@ class HoleLines:
         """Whether an element has a feed."""
         return bool(self.ahead.nc.carry(element - self.ahead.base, feed, per_revolution))
 
-    def fed_above(self, move: int, element: int, cycle: Drilling) -> bool:
-        """Whether a feed move ends above a hole, where no cycle feeds."""
-        highest = max(cycle.clearance, cycle.level) + self.room
-        return self.feeds(element) and self.height(move, element) > highest
 
-    def check(self, move: int, elements: range, cycle: Drilling) -> tuple[list[Problem], bool]:
-        """What is wrong with a hole that has some elements, and whether it is left out as it may be.
+@dataclass(frozen=True)
+class Hole:
+    """A hole of the CL file, and what a program does in it: by moves, or by a cycle of the control."""
 
-        CS541 a wrong feed, CS561 a hole is missing, CS562 a wrong depth, CS563 a rapid inside or beside a hole, CS564 a
-        feed that is not a hole's.
+    lines: HoleLines
+    move: int
+    cycle: Drilling
+    first: int  #: the first element in its line; -1 where there is none
+    bottom: int  #: the element behind its deepest feed move: it may wait before that
+    leaves: int  #: the element with which the tool leaves it
+    before: float  #: mm above its pose, where the tool comes from; NaN beside its line
+    height: dict[int, float]  #: the same of the ends of its elements that lead anywhere, in their order
+    feeds: list[int]  #: those of them that are no rapids
+
+    @classmethod
+    def of(cls, lines: HoleLines, move: int, elements: range, cycle: Drilling) -> Self:
+        """Make it of elements, of which those count that end in its line."""
+        over = {k: height for k in elements if not math.isnan(height := lines.height(move, k))}
+        fed = [k for k in over if lines.feeds(k)]
+        bottom = 1 + min(fed, default=elements.stop, key=lambda k: over[k])
+        while bottom < elements.stop and lines.stands(bottom):  # a block may be there twice
+            bottom += 1
+        inside = [k + 1 for k, height in over.items() if height < -lines.room] or fed[-1:] or [*over][:1] or [-1]
+        moved = {k: height for k, height in over.items() if not lines.stands(k)}
+        before = lines.height(move, max(next(iter(moved), 0) - 1, 0))
+        feeds = [k for k in fed if k in moved]
+        first = next(iter(over), -1)
+        return cls(lines, move, cycle, first, bottom, min(inside[-1], elements.stop), before, moved, feeds)
+
+    @property
+    def left_out(self) -> bool:
+        """Whether it is left out, as it may be."""
+        tapped = bool(self.feeds) and self.lines.carries(self.feeds[0], self.cycle.feed, per_revolution=True)
+        open_ = math.isnan(self.cycle.depth) or (self.cycle.tap and not tapped)
+        return open_ and (self.cycle.tap or not self.feeds)
+
+    def problems(self) -> list[Problem]:
+        """What is wrong with it.
+
+        CS541 a wrong feed, CS561 it is missing, CS562 a wrong depth, CS563 a rapid inside or beside it, CS564 a feed
+        that is not a hole's.
         """
-        height = {k: h for k in elements if not (math.isnan(h := self.height(move, k)) or self.stands(k))}
-        feeds = [k for k in height if self.feeds(k)]
-        found: list[Problem] = []
+        cycle, room = self.cycle, self.lines.room
+        found: Iterator[_Fault]
+        if math.isnan(cycle.depth) or self.left_out:
+            found = self._in_left_out()
+        elif not self.feeds:
+            missing = "CS561", next(iter(self.height), -1), "a hole of the CL file is not drilled", math.nan
+            found = iter([missing] if cycle.depth > room else [])
+        else:
+            pecks = self._in_pecks() if cycle.steps or not cycle.pecking else iter(())
+            found = chain(self._around(), self._step_by_step(), pecks)
+        return [self.lines.problem(code, self.move, k, text, amount) for code, k, text, amount in found]
 
-        def say(code: str, element: int, text: str, amount: float = math.nan) -> None:
-            found.append(self.problem(code, move, element, text, amount))
+    def _in_left_out(self) -> Iterator[_Fault]:
+        """What is wrong where it is left out: a feed move, or a rapid into it."""
+        if self.feeds:
+            yield "CS564", self.feeds[0], "the cycle does not say what is fed here", math.nan
+        elif self.height and (depth := -min(self.height.values())) > self.lines.room:
+            lowest = min(self.height, key=lambda k: self.height[k])
+            yield "CS563", lowest, f"a rapid goes {depth:.4f} mm into the uncut hole", depth
 
-        tapped = bool(feeds) and self.carries(feeds[0], cycle.feed, per_revolution=True)
-        if math.isnan(cycle.depth) or (cycle.tap and not tapped):
-            if feeds:
-                say("CS564", feeds[0], "the cycle does not say what is fed here")
-            elif height and height[lowest := min(height, key=lambda k: height[k])] < -self.room:
-                depth = -height[lowest]
-                say("CS563", lowest, f"a rapid goes {depth:.4f} mm into the uncut hole", depth)
-            return found, cycle.tap or not feeds
-        if not feeds:
-            if cycle.depth > self.room:
-                say("CS561", next(iter(height), -1), "a hole of the CL file is not drilled")
-            return found, False
+    def _around(self) -> Iterator[_Fault]:
+        """What is wrong with its depth, with where the tool comes from, and with where it goes."""
+        lines, move, cycle, height, feeds = self.lines, self.move, self.cycle, self.height, self.feeds
+        room = lines.room
         first, last = next(iter(height)), next(reversed(height))
         deepest = min(feeds, key=lambda k: height[k])
-        if abs(off := height[deepest] + cycle.depth) > self.room:
-            text = f"a hole is {abs(off):.4f} mm too {'shallow' if off > 0 else 'deep'}"
-            say("CS562", deepest, text, abs(off))
+        if abs(off := height[deepest] + cycle.depth) > room:
+            yield "CS562", deepest, f"a hole is {abs(off):.4f} mm too {'shallow' if off > 0 else 'deep'}", abs(off)
         after = next((k for k in height if k > deepest), deepest)
-        if cycle.feed_out and not self.feeds(after):
-            say("CS563", after, "a rapid leaves a hole that the tool is to leave at feed")
-        fed_out = next((k for k in feeds if height[k] > height.get(k - 1, math.inf) + self.room), 0)
+        if cycle.feed_out and not lines.feeds(after):
+            yield "CS563", after, "a rapid leaves a hole that the tool is to leave at feed", math.nan
+        fed_out = next((k for k in feeds if height[k] > height.get(k - 1, math.inf) + room), 0)
         if fed_out and not cycle.feed_out:
-            say("CS564", fed_out, "the tool goes up at feed in a hole that it is to leave in rapid")
-        before = self.height(move, max(first - 1, 0))
-        beside = math.isnan(before)
-        low = [(last, cycle.level)] if move + 1 < len(self.tip) and not self.in_line(move, move + 1) else []
-        if beside and not self.feeds(first) and move and self.kind[move - 1] == Move.HOLE:
-            way, turn = (values[move - 1] - values[move] for values in (self.tip, self.axis))
-            if np.linalg.norm(turn) * self.axis_length <= 2 * self.room:
-                low.append((first, cycle.level + min(float(way @ self.axis[move]), 0.0)))
+            yield "CS564", fed_out, "the tool goes up at feed in a hole that it is to leave in rapid", math.nan
+        beside, behind_hole = math.isnan(self.before), lines.kind[move - 1] == Move.HOLE
+        low = [(last, cycle.level)] if move + 1 < len(lines.tip) and not lines.in_line(move, move + 1) else []
+        if beside and not lines.feeds(first) and move and behind_hole:
+            way, turn = (values[move - 1] - values[move] for values in (lines.tip, lines.axis))
+            if np.linalg.norm(turn) * lines.axis_length <= 2 * room:
+                low.append((first, cycle.level + min(float(way @ lines.axis[move]), 0.0)))
         for k, level in low:
-            if self.room < (amount := level - height[k]) < cycle.level + self.room:  # within it, another fault
+            if room < (amount := level - height[k]) < cycle.level + room:  # within it, another fault
                 text = f"a rapid beside a hole runs {amount:.4f} mm below the height of its cycle (RTRCTO, RAPTO)"
-                say("CS563", k, text, amount)
-        if self.feeds(first) and beside:
-            say("CS563", first, "a feed move enters a hole from the side")
-        if self.feeds(first) and before < -self.room and self.kind[move - 1] == Move.HOLE:
-            say("CS563", first, f"a rapid goes {-before:.4f} mm into the uncut hole", -before)
-        free = 0.0 if math.isnan(cycle.clearance) else cycle.clearance  # height down to which rapids may go
-        drilled, deep, above = 0.0, False, math.inf
-        gap = _gap(cycle) + self.room
-        begins = height.get(feeds[0] - 1, self.height(move, max(feeds[0] - 1, 0)))
-        if begins > max(cycle.clearance, 0.0) + self.room:
-            say(
-                "CS564",
-                feeds[0],
-                f"feeding begins {begins:.4f} mm above the hole, the cycle says {cycle.clearance:g} (RAPTO)",
-            )
-        for k, here in height.items():
-            if self.feeds(k):
-                if not (math.isnan(cycle.feed) or self.carries(k, cycle.feed, per_revolution=cycle.per_revolution)):
-                    feed = self.ahead.nc.feed[k - self.ahead.base]
-                    say("CS541", k, f"the feed is {feed:g}, the cycle says {cycle.feed:g}")
-                down = above > here
-                if down and self.fed_above(move, k, cycle):
-                    say("CS564", k, "a feed move ends above the heights of the cycle")
-                cut = deep or (drilled > self.room and self.room < -here)
-                if down and cut and -here <= drilled + ARITHMETIC:
-                    say("CS562", k, "a hole is drilled again")
-                deep = deep or here <= self.room - cycle.depth
-                drilled, free = max(drilled, -here), min(free, here)
-            elif here < above and drilled > self.room and here + drilled < gap:
-                say("CS563", k, "a rapid goes down onto the bottom of a hole, or short of it")
-            elif deep and here < above and here < -self.room:
-                say("CS563", k, "a rapid goes down into a hole that is drilled")
-            elif here < free - self.room:
-                where = "into the uncut hole" if free <= 0.0 else "below the height where the feed begins (RAPTO)"
-                say("CS563", k, f"a rapid goes {free - here:.4f} mm {where}", free - here)
-            above = here
-        if above < -self.room:
-            say("CS563", last, "the tool leaves a hole sideways", -above)
-        if cycle.steps or not cycle.pecking:
-            for k, text in self._wrong_pecks(height, cycle):
-                say("CS562", k, text)
-        return found, False
+                yield "CS563", k, text, amount
+        if lines.feeds(first) and beside:
+            yield "CS563", first, "a feed move enters a hole from the side", math.nan
+        if lines.feeds(first) and self.before < -room and behind_hole:
+            yield "CS563", first, f"a rapid goes {-self.before:.4f} mm into the uncut hole", -self.before
+        if (begins := lines.height(move, max(feeds[0] - 1, 0))) > max(cycle.clearance, 0.0) + room:
+            text = f"feeding begins {begins:.4f} mm above the hole, the cycle says {cycle.clearance:g} (RAPTO)"
+            yield "CS564", feeds[0], text, math.nan
+        if height[last] < -room:
+            yield "CS563", last, "the tool leaves a hole sideways", -height[last]
 
-    def _wrong_pecks(self, height: dict[int, float], cycle: Drilling) -> Iterator[tuple[int, str]]:
-        """Elements that end pecks which are not those of the cycle, and what is wrong; heights in order.
+    def _step_by_step(self) -> Iterator[_Fault]:
+        """What is wrong with each move in it: its feed, and how deep it goes."""
+        lines, cycle, room = self.lines, self.cycle, self.lines.room
+        free = 0.0 if math.isnan(cycle.clearance) else cycle.clearance  # height down to which rapids may go
+        drilled, above = -math.inf, math.inf
+        for k, here in self.height.items():
+            deep = drilled >= cycle.depth - room
+            if lines.feeds(k):
+                if not (math.isnan(cycle.feed) or lines.carries(k, cycle.feed, per_revolution=cycle.per_revolution)):
+                    feed = lines.ahead.nc.feed[k - lines.ahead.base]
+                    yield "CS541", k, f"the feed is {feed:g}, the cycle says {cycle.feed:g}", math.nan
+                if here < above and self.fed_above(here):
+                    yield "CS564", k, "a feed move ends above the heights of the cycle", math.nan
+                cut = deep or (drilled > room and room < -here)
+                if here < above and cut and -here <= drilled + ARITHMETIC:
+                    yield "CS562", k, "a hole is drilled again", math.nan
+                drilled, free = max(drilled, -here), min(free, here)
+            elif here < above and drilled > room and here + drilled < _gap(cycle) + room:
+                yield "CS563", k, "a rapid goes down onto the bottom of a hole, or short of it", math.nan
+            elif deep and here < above and here < -room:
+                yield "CS563", k, "a rapid goes down into a hole that is drilled", math.nan
+            elif here < free - room:
+                where = "into the uncut hole" if free <= 0.0 else "below the height where the feed begins (RAPTO)"
+                yield "CS563", k, f"a rapid goes {free - here:.4f} mm {where}", free - here
+            above = here
+
+    def fed_above(self, height: float) -> bool:
+        """Whether a feed move at a height is above those at which a cycle feeds."""
+        return height > max(self.cycle.clearance, self.cycle.level) + self.lines.room
+
+    def _in_pecks(self) -> Iterator[_Fault]:
+        """Elements that end pecks which are not those of the cycle, and what is wrong.
 
         A control may count the first from where feeding begins, and the last one takes what is left.
         """
+        cycle, room = self.cycle, self.lines.room
         pecks: list[tuple[int, float, float]] = []  # the last element of each, its depth, how high the tool was before
         above = top = math.inf
         fed = False
-        for k, here in height.items():
-            feeds = self.feeds(k) and here < above
+        for k, here in self.height.items():
+            feeds = self.lines.feeds(k) and here < above
             if feeds:
                 pecks[len(pecks) - fed :] = [(k, -here, pecks[-1][2] if fed else top if pecks else above)]
             top = here if feeds or top == math.inf else max(top, here)
             fed, above = feeds, here
         if not cycle.steps:
-            yield from ((k, "a hole is drilled in pecks that the cycle does not have") for k, _, _ in pecks[1:2])
+            yield from (
+                ("CS562", k, "a hole is drilled in pecks that the cycle does not have", math.nan)
+                for k, _, _ in pecks[1:2]
+            )
         done, steps = 0.0, [*cycle.steps, *cycle.steps[-1:] * len(pecks)]
         for number, ((k, depth, before), step) in enumerate(zip(pecks, steps, strict=False)):
             last, peck = number == len(pecks) - 1, depth - done
             least = -math.inf if last else step - max(before, 0.0) if not number else step
-            out, clear = before > self.room, before >= -self.room or done <= self.room
-            stays = number and before + done < _gap(cycle) - self.room
-            if not least - self.room <= peck <= step + (_REST if last else 0.0) + self.room:
-                yield k, f"a peck is {peck:.4f} mm deep, the cycle says {step:g}"
+            out, clear = before > room, before >= -room or done <= room
+            stays = number and before + done < _gap(cycle) - room
+            text = ""
+            if not least - room <= peck <= step + (_REST if last else 0.0) + room:
+                text = f"a peck is {peck:.4f} mm deep, the cycle says {step:g}"
             elif stays or (number and not (clear or cycle.breaks_chips)):
-                yield k, "the tool does not come up between pecks as the cycle says"
-            elif number and cycle.breaks_chips and out and before + done > 2.0 * step + self.room:
-                yield k, "the tool leaves the hole between pecks that break chips in it"
+                text = "the tool does not come up between pecks as the cycle says"
+            elif number and cycle.breaks_chips and out and before + done > 2.0 * step + room:
+                text = "the tool leaves the hole between pecks that break chips in it"
+            if text:
+                yield "CS562", k, text, math.nan
             done = depth
 
 

@@ -21,10 +21,10 @@ import numpy as np
 from cornersmooth.model import Move
 from cornersmooth.nc_reader.elements import Ahead, Element, Event, Problem
 from cornersmooth.nc_reader.tool import directions, moving_rapids
-from cornersmooth.verify.acts import Acts, Hole, Step, Stops, Words
+from cornersmooth.verify.acts import Acts, Step, Stops, Words
 from cornersmooth.verify.along_tool import AlongTool
 from cornersmooth.verify.feeds import feed_at, out_of_hole
-from cornersmooth.verify.holes import HoleLines
+from cornersmooth.verify.holes import Hole, HoleLines
 from cornersmooth.verify.task import Task
 
 #: elements that are given out together
@@ -176,10 +176,7 @@ class Parse:
             idle = lines.stands(element) or (rapid and stop >= 0 and lines.negligible(element))
             if idle and not (rapid and stop >= 0 and self._comes_down_first(stop, element)):
                 element += 1
-            elif self._hole[following] and (
-                self._over(following, element)
-                or (self._may_be_left_out(following) and self._begins(following, element))
-            ):
+            elif self._begins(following, element):
                 break
             elif along.stays(element):
                 lines.forget()
@@ -198,99 +195,88 @@ class Parse:
         changed = stop > 0 and self._hole[stop - 1] and not self._has_tool(self._move[stop], element - 1)
         return changed or not lines.stands(element)
 
-    def _drill(self, stop: int, element: int) -> tuple[int, int]:
-        """Take a hole: up to the end of a cycle of the control, or until it is done and what follows begins."""
-        lines, move, end, done, other_tool = self.lines, self._move[stop], element, False, 0
-        cycle, lowest = self._cycles[move], math.inf  # of the feed moves
-        left = self._may_be_left_out(stop) and not self._is_tapped(stop, element)
-        while self._over(stop, end) or (end > element and self._ahead.has(end) and lines.stands(end)):
-            feeds, height = lines.feeds(end), lines.height(move, end)
-            if left:
-                done = feeds or self._reaches(stop + 1, end)
-                if self._hole[stop + 1]:
-                    highest = max(cycle.level, cycle.clearance) + lines.room
-                    away = height < -lines.room or (self._rises(stop, end) and height > highest)
-                    done |= away and self._over(stop + 1, end)
-                elif not done:
-                    behind = takewhile(lambda one: self._ahead.has(one) and not lines.feeds(one), count(end + 1))
-                    done = not any(self._reaches(stop + 1, one) for one in behind)
-            done |= lowest <= lines.room - cycle.depth and lines.height(move, end - 1) >= -lines.room
-            if done and (self._begins(stop, end) or (not left and self._hole[stop + 1] and self._has_words(end))):
-                if not self._reaches(stop + 1, end) or self._has_tool(self._move[stop + 1], end):
-                    break
-                other_tool = other_tool or end
+    def _drill(self, stop: int, begin: int) -> tuple[int, int]:
+        """Take a hole: a cycle of the control, or what leads to its depth and out again, and the rapids behind that."""
+        lines, move, end, lowest = self.lines, self._move[stop], begin, math.inf  # of the feed moves
+        left = self._is_left_out(stop, begin)
+        while not left and (self._over(stop, end) or (end > begin and self._ahead.has(end) and lines.stands(end))):
             block = lines.block(end)
-            native = not left and lines.is_cycle(block)
-            done |= native
-            lowest = min(lowest, height) if feeds else lowest
-            end = max(end + 1, native * block.stop)
-        else:
-            if other_tool and not self._begins(stop, end):
-                end = other_tool
-        while not left and self._hole[stop + 1] and self._rises(stop, end):
+            if lines.is_cycle(block):
+                end = block.stop
+                break
+            lowest = min(lowest, lines.height(move, end)) if lines.feeds(end) else lowest
             end += 1
-        return self._leave(stop, element, end)
+            if lowest <= lines.room - self._cycles[move].depth and lines.height(move, end - 1) >= -lines.room:
+                break
+        if not self._hole[stop + 1]:
+            end = self._up_to_rapid(stop, end, left=left)
+        else:
+            end = self._passed_over(stop, begin) if left else self._up_to_hole(stop, end)
+        return self._leave(stop, begin, end)
 
-    def _rises(self, stop: int, element: int) -> bool:
-        """Whether a rapid goes up along the tool, and belongs to a hole rather than to the next."""
-        if not self._ahead.has(element) or self.lines.feeds(element) or not self._along.height(element, element - 1):
-            return False
-        return not (self._has_words(element) and self._over(stop + 1, element))
+    def _up_to_rapid(self, stop: int, end: int, *, left: bool) -> int:
+        """First element from one on that is no rapid in the line of a hole, or belongs to the act behind it."""
+        following = stop + 1
+        while self._over(stop, end) and not self.lines.feeds(end):
+            if self._is_there(following, end) and self._reaches(following, end):
+                break
+            if self._is_there(following, end - 1) and self._begins(following + 1, end):
+                rapids = takewhile(lambda one: self._ahead.has(one) and not self.lines.feeds(one), count(end + 1))
+                if not (left and any(self._reaches(following, one) for one in rapids)):
+                    break
+            end += 1
+        return end
 
-    def _is_tapped(self, stop: int, element: int) -> bool:
-        """Whether the first feed move in the line of a hole is that of its tap."""
+    def _up_to_hole(self, stop: int, end: int) -> int:
+        """First element from one on that does not go up along a hole, or belongs to the next one."""
+        lines, move = self.lines, self._move[stop]
+        while self._over(stop, end) and not lines.feeds(end):
+            rises = lines.height(move, end) > lines.height(move, end - 1)
+            if not (rises or lines.stands(end)) or (self._has_words(end) and self._over(stop + 1, end)):
+                break
+            end += 1
+        return end
+
+    def _passed_over(self, stop: int, begin: int) -> int:
+        """First element behind the rapids over a hole that is left out, where another one follows, perhaps in its line.
+
+        That one begins with its words where it is drilled, else where the tool is lower or higher than this one has it.
+        """
+        lines, move = self.lines, self._move[stop]
+        rapids = list(takewhile(lambda one: self._over(stop, one) and not lines.feeds(one), count(begin)))
+        others = [one for one in rapids if self._over(stop + 1, one)]
+        said = next((one for one in others if one > begin and self._has_words(one)), -1)
+        highest = max(self._cycles[move].level, self._cycles[move].clearance) + lines.room
+        away = (one for one in others if not -lines.room <= lines.height(move, one) <= highest)
+        drilled = said >= 0 and not self._is_left_out(stop + 1, said)
+        return said if drilled else next(away, begin + len(rapids))
+
+    def _is_left_out(self, stop: int, element: int) -> bool:
+        """Whether a hole may be left out, and the first feed move in its line is not that of its cycle."""
         lines, cycle = self.lines, self._cycles[self._move[stop]]
         while self._over(stop, element) and not lines.feeds(element):
             element += 1
-        return cycle.tap and self._over(stop, element) and lines.carries(element, cycle.feed, per_revolution=True)
-
-    def _end_of(self, stop: int, element: int, end: int) -> int:
-        """First element that does not belong to a hole: the way up is the hole's, wherever else it leads."""
-        lines, move = self.lines, self._move[stop]
-        before = lines.height(move, end - 1) if end > element else math.inf
-        if (before < -lines.room or not self._hole[stop + 1]) and self._ahead.has(end) and not lines.feeds(end):
-            return end + int(lines.height(move, end) > before)
-        return end
+        if not self._may_be_left_out(stop) or math.isnan(cycle.depth) or not self._over(stop, element):
+            return self._may_be_left_out(stop)
+        return not (math.isnan(cycle.feed) or lines.carries(element, cycle.feed, per_revolution=cycle.per_revolution))
 
     def _begins(self, stop: int, element: int) -> bool:
-        """Whether what follows a stop begins with an element; holes may be left out, and what leads nowhere."""
-        lines, following, has = self.lines, stop + 1, self._ahead.has(element)
-        if self._fed[stop]:
-            if self._feeds_on(stop, element):
-                return True
-            if not self._done(stop, element):
-                return False
-        if following == len(self.moves):
-            return not has
-        if self._hole[following]:
-            below = lines.height(self._move[following], element - 1) < -lines.room  # from there no hole is fed
-            if self._over(following, element) and not (below and lines.feeds(element)):
-                return True
-            return self._may_be_left_out(following) and self._begins(following, element)
-        there = element > 0 and lines.at(self._move[following], element - 1)
-        return self._reaches(following, element) or (there and self._begins(following, element))
-
-    def _feeds_on(self, stop: int, element: int) -> bool:
-        """Whether feed moves from an element on may lead to the last pose before the next stop."""
-        move = self._move[stop + 1] - 1
-        for one in range(element, element + _AFTER_FAULT):
-            feeds = self._ahead.has(one) and self.lines.feeds(one)
-            if not feeds or self.lines.at(move, one):
-                return feeds
-        return True
+        """Whether an element begins a hole, or what follows holes that may be left out."""
+        while self._hole[stop] and self._may_be_left_out(stop) and not self._over(stop, element):
+            stop += 1
+        return self._over(stop, element) if self._hole[stop] else self._reaches(stop, element)
 
     def _is_in_doubt(self, stop: int, element: int) -> bool:
         """Whether nobody can tell which of holes in one line an element belongs to: a cycle of the control tells."""
-        lines, others = self.lines, (one for one in (stop - 1, stop + 1) if one >= 0 and self._hole[one])
+        lines, moves = self.lines, [self._move[one] for one in (stop - 1, stop + 1) if one >= 0 and self._hole[one]]
         fed = next((one for one in range(element, self._ahead.count) if lines.feeds(one)), element)
-        alike = any(self._are_alike(stop, one) for one in others)
+        move = self._move[stop]
+        alike = any(self._load(move) == self._load(one) and lines.in_line(move, one) for one in moves)
         return alike and self._over(stop, element) and not lines.is_cycle(lines.block(fed))
 
-    def _are_alike(self, one: int, other: int) -> bool:
-        """Whether two holes are in one line, for the same tool."""
-        moves = self._move[one], self._move[other]
-        loads = {bisect_right(self._loads, self._task.original.pose[move]) for move in moves}
-        return len(loads) == 1 and self.lines.in_line(*moves)
+    def _load(self, move: int) -> int:
+        """How many tool changes are in front of a move."""
+        return bisect_right(self._loads, self._task.original.pose[move])
 
     def _leave(self, stop: int, begin: int, end: int) -> tuple[int, int]:
         """Take down a hole that some elements belong to."""
@@ -298,8 +284,11 @@ class Parse:
         if self._begun >= 0:
             self._steps.append(Step(move, begin, False, -1))
         self._end_run(move, begin)
-        behind = self._end_of(stop, begin, end)
-        found, left = lines.check(move, range(begin, behind), self._cycles[move])
+        behind = end  # the way up is the hole's, wherever else it leads
+        if self._over(stop, end) and not lines.feeds(end) and not self._hole[stop + 1]:
+            behind += int(end == begin or lines.height(move, end) > lines.height(move, end - 1))
+        hole = Hole.of(lines, move, range(begin, behind), self._cycles[move])
+        found = hole.problems()
         if any(one.code != "CS541" for one in found) and self._is_in_doubt(stop, begin):
             self.acts.unlooked.append((lines.nc_line(begin), "holes above one another in one line"))
             found = []
@@ -307,10 +296,18 @@ class Parse:
             text = f"a rapid goes aslant to a hole, {slant:.4f} mm: across at the higher level, then down"
             found.append(lines.problem("CS563", move, begin, text, slant))
         self.acts.problems += found
-        self._drilled(stop, begin, behind, left=left)
-        return self._go_out(stop, begin, end)
+        begins = hole.first >= 0
+        if hole.left_out:
+            text = f"a hole of the CL file is not {'tapped' if hole.cycle.tap else 'drilled'}"
+            self.acts.left_out.append(lines.problem("CS561", move, hole.first, text))
+            self.acts.moves_left_out.add(move)
+            begins = begins and self._words.tool_changes(hole.first) > self._words.tool_changes(hole.first - 1)
+        elif begins:
+            self.acts.holes.append(hole)
+        self.acts.begins.extend((move, hole.first) if begins else ())
+        return self._go_out(hole, stop, begin, end)
 
-    def _go_out(self, stop: int, begin: int, end: int) -> tuple[int, int]:
+    def _go_out(self, hole: Hole, stop: int, begin: int, end: int) -> tuple[int, int]:
         """Begin the run of feed moves that leads out of a hole, or take the rapid that its way up is."""
         ahead, lines, move, following = self._ahead, self.lines, self._move[stop], stop + 1
         while self._fed[stop] and ahead.has(end) and lines.feeds(end) and lines.stands(end):
@@ -333,8 +330,8 @@ class Parse:
             if self._reaches(following, end):
                 self._open(following, end, up=self._is_way_up(following, begin, end))
                 return following, end + 1
-            there = lines.at(self._move[following], end - 1) and self._has_tool(self._move[following], end - 1)
-            if there and not lines.fed_above(move, end - 1, self._cycles[move]):
+            there = self._is_there(following, end - 1)
+            if there and not (lines.feeds(end - 1) and hole.fed_above(lines.height(move, end - 1))):
                 reached = next(one for one in range(end - 1, -1, -1) if not lines.stands(one))
                 self._open(following, reached, up=self._is_way_up(following, begin, reached))
                 return following, end
@@ -357,14 +354,11 @@ class Parse:
             self.acts.problems.append(lines.problem("CS531", self._move[first], element, text, amount))
             self._open(first, element)
             return first, element + 1
-        self._surplus(first, element)
+        code, text = "CS536", "feed moves that the CL file does not have"
+        if not feeds:
+            code, text = "CS533", "a rapid that the CL file does not have, or a feed move written as one"
+        self.acts.problems.append(lines.problem(code, self._move[first], element, text))
         return stop, element + 1
-
-    def _surplus(self, stop: int, element: int) -> None:
-        """An element before a stop is one too many."""
-        surplus = ("CS533", "a rapid that the CL file does not have, or a feed move written as one")
-        code, text = ("CS536", "feed moves that the CL file does not have") if self.lines.feeds(element) else surplus
-        self.acts.problems.append(self.lines.problem(code, self._move[stop], element, text))
 
     def _lack(self, stop: int, element: int) -> int:
         """A stop is missing before an element."""
@@ -405,7 +399,12 @@ class Parse:
 
     def _has_tool(self, move: int, element: int) -> bool:
         """Whether as many tool changes are in front of an element as in front of a move."""
-        return bisect_right(self._loads, self._task.original.pose[move]) == self._words.tool_changes(element)
+        return self._load(move) == self._words.tool_changes(element)
+
+    def _is_there(self, stop: int, element: int) -> bool:
+        """Whether an element ends at the pose of a rapid of the CL file, and no tool change parts it from that."""
+        known = stop < len(self.moves) and not self._hole[stop] and element >= 0
+        return known and self.lines.at(self._move[stop], element) and self._has_tool(self._move[stop], element)
 
     def _has_words(self, element: int) -> bool:
         """Whether words are in front of an element that do not belong into a hole."""
@@ -455,22 +454,3 @@ class Parse:
         move, came_from = self._move[first], nc.tip[max(begin - 1 - self._ahead.base, 0)]
         highest = max(self._cycles[move].level, float((came_from - lines.tip[move]) @ lines.axis[move]))
         return self._over(first, element) and lines.height(move, element) <= highest + lines.tolerance
-
-    def _drilled(self, stop: int, begin: int, end: int, *, left: bool) -> None:
-        """Take down a hole."""
-        lines, move = self.lines, self._move[stop]
-        cycle, group = self._cycles[move], [one for one in range(begin, end) if lines.over(move, one)]
-        if left:
-            text = f"a hole of the CL file is not {'tapped' if cycle.tap else 'drilled'}"
-            self.acts.left_out.append(lines.problem("CS561", move, group[0] if group else -1, text))
-            self.acts.moves_left_out.add(move)
-            if group and self._words.tool_changes(group[0]) > self._words.tool_changes(group[0] - 1):
-                self.acts.begins.extend((move, group[0]))
-        elif group:
-            fed = [one for one in group if lines.feeds(one)]
-            bottom = 1 + min(fed, default=end, key=lambda one: lines.height(move, one))
-            while bottom < end and lines.stands(bottom):  # a block may be there twice
-                bottom += 1
-            inside = [one + 1 for one in group if lines.height(move, one) < -lines.room] or fed[-1:] or group[:1]
-            self.acts.holes.append(Hole(move, group[0], bottom, min(inside[-1], end), cycle))
-            self.acts.begins.extend((move, group[0]))
