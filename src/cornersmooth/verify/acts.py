@@ -6,7 +6,7 @@ from array import array
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple, Self
+from typing import Final, NamedTuple, Self
 
 import numpy as np
 
@@ -18,6 +18,9 @@ from cornersmooth.statements.asked import NOTHING, Asking
 from cornersmooth.statements.cycles import Drilling, drillings
 from cornersmooth.verify.cl_motion import Original
 from cornersmooth.verify.holes import Hole, HoleLines
+
+#: words that a hole may have: its dwell and its tap
+_IN_HOLES: Final = (("G", 4.0), ("G", 84.0))
 
 
 class Step(NamedTuple):
@@ -110,6 +113,10 @@ class Words:
         """Words in front of elements, from the first to `stop`, that excluded."""
         places = (bisect_left(self.events, one, key=lambda event: event.element) for one in (first, stop))
         return self.events[slice(*places)]
+
+    def acting(self, element: int) -> bool:
+        """Whether words are in front of an element that are neither the dwell nor the tap of a hole."""
+        return any((one.letter, one.value) not in _IN_HOLES for one in self.between(element, element + 1))
 
     def tool_changes(self, element: int) -> int:
         """How many tool changes are in front of an element."""

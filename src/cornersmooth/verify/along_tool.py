@@ -16,9 +16,10 @@ from typing import Final
 
 import numpy as np
 
-from cornersmooth.nc_reader.elements import Ahead, Element, Event
+from cornersmooth.nc_reader.elements import Ahead, Element, Event, Problem
 from cornersmooth.nc_reader.tool import directions
 from cornersmooth.verify.acts import Acts
+from cornersmooth.verify.holes import HoleLines
 
 #: how far, mm and rad, a way along the tool may be off it: printed digits
 _ASIDE, _TURN = 1e-3, 1e-3
@@ -95,10 +96,17 @@ class AlongTool:
         self._left = -1
         return element - 1
 
-    def comes_back(self, element: int) -> bool:
-        """Whether an element goes on at feed with a cut that its tool has left, or it or the next one in rapid."""
-        if element != self._left:
-            return False
+    def check_return(self, element: int, lines: HoleLines) -> None:
+        """Complain of an element that goes on with a cut, but if the CL file has a pose where that was left: CS582."""
+        rapid = self._is(Element.RAPID, element)
+        if element != self._left or not self._comes_back(element) or lines.goes_to(element - 1, rapid=rapid):
+            return
+        at_feed = "the tool goes on at feed with a cut that it has left, and does not come from above"
+        text = "the tool comes back in rapid to where it has left a cut" if rapid else at_feed
+        self._acts.problems.append(Problem("CS582", 0, lines.nc_line(element), text))
+
+    def _comes_back(self, element: int) -> bool:
+        """Whether the first element behind a retract goes on at feed with a cut, or it or the next one in rapid."""
         first, last = (
             side(self._events, element, key=lambda event: event.element) for side in (bisect_left, bisect_right)
         )

@@ -26,7 +26,7 @@ from cornersmooth.verify.task import ARITHMETIC, Task
 #: places nearer to a vertex of the CL path are at it, in segments
 _HAIR: Final = 1e-9
 
-#: segments on either side of a place among which a nearer one is looked for
+#: segments on either side of a place among which a nearer one is looked for at first
 _REACH: Final = 2
 
 #: places between two at which a distance is worked out, in so many rounds at most: to a billionth of the way
@@ -140,17 +140,13 @@ def nearest(match: Match, reached: Reached, rows: Ints, metric: Metric) -> Float
         other, middle = match.six, np.minimum(middle, len(match.six) - 2)
         first, last = match.runs
         low, high = first[middle], last[middle] - 1
-    best = nearest_places(six, other, middle, _REACH, low, high, metric)
-    while len(far := np.flatnonzero(np.abs(best.astype(np.int64) - middle) >= _REACH)):  # lines much shorter than ε
-        middle[far] = np.clip(best[far].astype(np.int64), low[far], high[far])
-        best[far] = nearest_places(six[far], other, middle[far], _REACH, low[far], high[far], metric)
-    reach = _REACH
-    while match.task.apart and reach < _MOST_SEGMENTS:  # where each is run on its own, a tip that stands is passed
-        off = largest_square((six.T - points_at(other, best))[COLUMNS[metric]])
-        if not len(far := np.flatnonzero(off > match.tolerance**2)):
-            break
-        reach *= 4
+    best, far, reach = np.empty(len(rows)), np.arange(len(rows)), _REACH
+    while len(far) and reach <= _MOST_SEGMENTS:  # where lines are much shorter than ε, many are near
         best[far] = nearest_places(six[far], other, middle[far], reach, low[far], high[far], metric)
+        more = np.abs(best[far].astype(np.int64) - middle[far]) >= reach
+        if match.task.apart:  # where each is run on its own, a tip that stands is passed
+            more |= largest_square((six[far].T - points_at(other, best[far]))[COLUMNS[metric]]) > match.tolerance**2
+        far, reach = far[more], 4 * reach
     ends = np.maximum(best - 0.5, low), np.minimum(best + 0.5, high + 1.0)
     at = match.path.at if reached.mine else lambda where: _written(match, where)
     return _least(at, six, COLUMNS[metric], *ends)[1]

@@ -19,7 +19,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from cornersmooth.model import Move
-from cornersmooth.nc_reader.elements import Ahead, Element, Event, Problem
+from cornersmooth.nc_reader.elements import Ahead, Element, Event
 from cornersmooth.nc_reader.tool import directions, moving_rapids
 from cornersmooth.verify.acts import Acts, Step, Stops, Words
 from cornersmooth.verify.along_tool import AlongTool
@@ -32,9 +32,6 @@ TOGETHER: Final = 1 << 14
 
 #: stops and elements behind a fault among which the next that fits is looked for
 _AFTER_FAULT: Final = 64
-
-#: words that a hole may have: its dwell and its tap
-_IN_HOLES: Final = (("G", 4.0), ("G", 84.0))
 
 #: elements before those that are certain that are still looked at
 BEFORE: Final = 16
@@ -169,8 +166,7 @@ class Parse:
         lines, along, following = self.lines, self._along, stop + 1
         while self._ahead.has(element):
             rapid = not lines.feeds(element)
-            if along.comes_back(element):
-                self._check_return(element)
+            along.check_return(element, lines)
             if self._reaches(following, element):
                 break
             idle = lines.stands(element) or (rapid and stop >= 0 and lines.negligible(element))
@@ -232,7 +228,7 @@ class Parse:
         lines, move = self.lines, self._move[stop]
         while self._over(stop, end) and not lines.feeds(end):
             rises = lines.height(move, end) > lines.height(move, end - 1)
-            if not (rises or lines.stands(end)) or (self._has_words(end) and self._over(stop + 1, end)):
+            if not (rises or lines.stands(end)) or (self._words.acting(end) and self._over(stop + 1, end)):
                 break
             end += 1
         return end
@@ -245,7 +241,7 @@ class Parse:
         lines, move = self.lines, self._move[stop]
         rapids = list(takewhile(lambda one: self._over(stop, one) and not lines.feeds(one), count(begin)))
         others = [one for one in rapids if self._over(stop + 1, one)]
-        said = next((one for one in others if one > begin and self._has_words(one)), -1)
+        said = next((one for one in others if one > begin and self._words.acting(one)), -1)
         highest = max(self._cycles[move].level, self._cycles[move].clearance) + lines.room
         away = (one for one in others if not -lines.room <= lines.height(move, one) <= highest)
         drilled = said >= 0 and not self._is_left_out(stop + 1, said)
@@ -384,14 +380,6 @@ class Parse:
         there = move > self._move[stop] and self.lines.kind[move] == Move.RAPID
         return not (there and self._has_tool(move, element))
 
-    def _check_return(self, element: int) -> None:
-        """Complain of an element that goes on with a cut, but if the CL file has a pose where that was left."""
-        lines, rapid = self.lines, not self.lines.feeds(element)
-        if not lines.goes_to(element - 1, rapid=rapid):
-            at_feed = "the tool goes on at feed with a cut that it has left, and does not come from above"
-            text = "the tool comes back in rapid to where it has left a cut" if rapid else at_feed
-            self.acts.problems.append(Problem("CS582", 0, lines.nc_line(element), text))
-
     def _over(self, stop: int, element: int) -> bool:
         """Whether an element ends in the line of a hole, and no tool change parts it from that."""
         has = self._ahead.has(element) and self._has_tool(self._move[stop], element)
@@ -405,11 +393,6 @@ class Parse:
         """Whether an element ends at the pose of a rapid of the CL file, and no tool change parts it from that."""
         known = stop < len(self.moves) and not self._hole[stop] and element >= 0
         return known and self.lines.at(self._move[stop], element) and self._has_tool(self._move[stop], element)
-
-    def _has_words(self, element: int) -> bool:
-        """Whether words are in front of an element that do not belong into a hole."""
-        words = self._words.between(element, element + 1)
-        return any((one.letter, one.value) not in _IN_HOLES for one in words)
 
     def _may_be_left_out(self, stop: int) -> bool:
         cycle = self._cycles[self._move[stop]]
@@ -449,7 +432,7 @@ class Parse:
         if holes and (element <= holes[-1].leaves or lines.block(element).start <= holes[-1].leaves):
             return True
         left_out = self._move[first] in self.acts.moves_left_out
-        if self._has_words(element) or not (left_out or element == begin or lines.feeds(element - 1)):
+        if self._words.acting(element) or not (left_out or element == begin or lines.feeds(element - 1)):
             return False
         move, came_from = self._move[first], nc.tip[max(begin - 1 - self._ahead.base, 0)]
         highest = max(self._cycles[move].level, float((came_from - lines.tip[move]) @ lines.axis[move]))
