@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from .small import codes, right
+from .small import codes, passes, right
 
 CL = """LOADTL/3
 SPINDL/RPM,3000,CLW
@@ -84,3 +84,52 @@ def test_a_rapid_goes_across_at_the_higher_level_behind_a_tool_change_without_wa
     change = next(k for k, line in enumerate(lines) if line.startswith("T4"))
     across = next(k for k in range(change, len(lines)) if lines[k].startswith("G0 "))
     assert codes(AFTER_A_TOOL, [*lines[:across], *lines[across + 1 :]], "generic") == {"CS563"}
+
+
+#: three holes in one line, one of which may be left out, with another state for each
+IN_ONE_LINE = """LOADTL/3
+SPINDL/RPM,3000,CLW
+RAPID
+GOTO/10,0,60,0,0,1
+CYCLE/DRILL,FEDTO,4,MMPM,100,RAPTO,3,RTRCTO,10
+GOTO/10,0,20,0,0,1
+SPINDL/RPM,2000,CLW
+CYCLE/{kind},FEDTO,4,MMPM,150,RAPTO,3,RTRCTO,10
+GOTO/10,0,10,0,0,1
+SPINDL/RPM,1000,CLW
+CYCLE/DRILL,FEDTO,4,MMPM,200,RAPTO,3,RTRCTO,10
+GOTO/10,0,0,0,0,1
+CYCLE/OFF
+RAPID
+GOTO/10,0,80,0,0,1
+SPINDL/OFF
+FINI
+"""
+
+
+@pytest.mark.parametrize("kind", ["FACE", "BORE", "TAP"])
+@pytest.mark.parametrize("cycles", ["moves", "native"])
+def test_words_between_holes_in_one_line_stay_between_them(kind: str, cycles: str) -> None:
+    text = IN_ONE_LINE.format(kind=kind)
+    lines = right(text, "fanuc", cycles, skip=True)
+    speeds = [k for k, line in enumerate(lines) if re.match(r"S[12]000 ", line)]
+    assert len(speeds) == 2
+    for k in speeds[kind == "TAP" :]:  # a speed at a tap that is left out no motion meets
+        others = [*lines[:k], *lines[k + 1 :]]
+        assert not passes(text, others, skip=True)
+        fed = [j for j, line in enumerate(others) if re.match(r"G1 |G98|G81|G8[2459]", line)]
+        behind = next(j for j in fed if j >= k)
+        before = [j for j in fed if j < k]
+        # in front of a feed move before it, or behind one that it has to be in front of
+        for place in (*before, behind + 1):
+            assert not passes(text, [*others[:place], lines[k], *others[place:]], skip=True), (lines[k], place)
+
+
+@pytest.mark.parametrize("cycles", ["moves", "native"])
+def test_of_holes_in_one_line_none_is_lost_and_none_is_drilled_twice(cycles: str) -> None:
+    text = IN_ONE_LINE.format(kind="DRILL")
+    lines = right(text, "fanuc", cycles)
+    for k in [k for k, line in enumerate(lines) if re.match(r"G1 .*Z|G98|G81|.*F[12][05]0", line)]:
+        assert not passes(text, [*lines[:k], *lines[k + 1 :]]), lines[k]
+        deeper = re.sub(r"Z(-?\d+)", lambda found: f"Z{int(found[1]) - 1}", lines[k])
+        assert not passes(text, [*lines[:k], deeper, *lines[k + 1 :]]), deeper

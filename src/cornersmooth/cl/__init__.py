@@ -17,7 +17,7 @@ from cornersmooth.cl.source import clean, load
 from cornersmooth.errors import SettingsError
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import MM_PER_UNIT, Program, Statement, Units
-from cornersmooth.statements.asked import statements_not_understood, turns
+from cornersmooth.statements.asked import Asking, turns
 
 __all__ = ["DIALECTS", "FORMATS", "read"]
 
@@ -159,7 +159,7 @@ def read(
 
 def _refuse(program: Program, name: str, lenient: bool) -> None:
     """Refuse what must not be missing from a program in silence: a spindle that is not understood, and turning."""
-    unknown = statements_not_understood(program, at_all=True)
+    unknown = Asking.of(program).not_understood
     turning = next((statement for statement in unknown if turns(statement)), None)
     if turning is not None and not lenient:
         raise error("CS179", name, turning.line, text=turning.text)

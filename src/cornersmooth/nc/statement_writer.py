@@ -32,7 +32,7 @@ from cornersmooth.nc.statement_args import (
     whole_number,
     words_of,
 )
-from cornersmooth.statements.asked import statements_not_understood
+from cornersmooth.statements.asked import Asking
 from cornersmooth.text import format_number
 
 #: words whose text is for the machinist: comments without the word
@@ -62,7 +62,7 @@ class StatementWriter:
         self.words = self.form.table.words
         self._loads = {id(statement): tool for statement, tool in tool_loads(self.program)}
         self._ahead_of_tools = ahead_of_tools(self.program)
-        self._unknown = frozenset(map(id, statements_not_understood(self.program)))
+        self._unknown = frozenset(map(id, Asking.of(self.program).in_doubt))
 
     def blocks(self, statement: Statement) -> list[str]:
         """NC blocks of one statement, without line ends."""

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise
+from typing import Self
 
 import numpy as np
 
@@ -57,13 +59,10 @@ Handler = Callable[[list[str], list[float], Statement], bool]
 
 
 class Asking:
-    """Goes through the CL statements and notes what they ask for, and those that are not understood.
+    """Goes through the CL statements and notes what they ask for, and those that are not understood."""
 
-    What words of the control say (`Table.means`) is for AUXFUN.
-    """
-
-    def __init__(self, program: Program, means: Means | None = None) -> None:
-        self.program, self.means = program, means or {}
+    def __init__(self, program: Program) -> None:
+        self.program = program
         self.tokens: list[Token] = []
         self.not_understood: list[Statement] = []  #: nothing is compared with them
         self.in_part: list[Statement] = []  #: what is understood of them is compared
@@ -103,6 +102,20 @@ class Asking:
             "STOP": self.halt,
             "OPSTOP": self.halt,
         }
+
+    @classmethod
+    def of(cls, program: Program) -> Self:
+        """Go through all of them; tokens are placed by the poses that they are in front of."""
+        asking = cls(program)
+        for statement in program.statements:
+            asking.take(statement, statement.pose)
+        return asking
+
+    @property
+    def in_doubt(self) -> list[Statement]:
+        """Statements that are not understood, or only in part, in their order."""
+        both = {id(statement): statement for statement in (*self.not_understood, *self.in_part)}
+        return sorted(both.values(), key=lambda statement: statement.line)
 
     @cached_property
     def moving(self) -> Ints:
@@ -255,7 +268,7 @@ class Asking:
         """An M word by its number, unless it would end or change more than a word may."""
         if len(numbers) != 1 or words or not _whole(numbers[0]) or numbers[0] in (2, 6, 30, 98, 99):
             return False
-        self.say(*of_m(numbers[0], self.means))
+        self.say("auxiliary", numbers[0])
         return True
 
     def halt(self, words: list[str], numbers: list[float], statement: Statement) -> bool:
@@ -281,41 +294,36 @@ def turns(statement: Statement) -> bool:
     )
 
 
-def statements_not_understood(program: Program, *, at_all: bool = False) -> list[Statement]:
-    """CL statements that are not understood: neither compared, nor words that ask for nothing; or only in part."""
-    asking = Asking(program)
-    for statement in program.statements:
-        asking.take(statement, statement.pose)
-    wholly = asking.not_understood
-    both = {id(statement): statement for statement in (*wholly, *asking.in_part)}
-    return wholly if at_all else sorted(both.values(), key=lambda statement: statement.line)
-
-
-def not_understood_text(program: Program) -> str:
+def not_understood_text(asking: Asking) -> str:
     """Say which CL statements are not understood, and their lines; empty for none."""
-    found = statements_not_understood(program)
+    found = asking.in_doubt
     named = [f"{' '.join((one.text or one.word).split())[:_LONGEST]} in CL line {one.line}" for one in found[:_NAMED]]
     more = f" and {len(found) - _NAMED:,} more" if len(found) > _NAMED else ""
     return f"not understood: {', '.join(named)}{more}" if found else ""
 
 
-def asked(program: Program, places: Sequence[int], end: int, means: Means) -> list[Token]:
-    """What the CL statements ask for.
+def asked(asking: Asking, poses: Ints, means: Means) -> list[Token]:
+    """What the CL statements ask for, and the end; each is placed by the move that it is in front of.
 
     Parameters
     ----------
-    places : sequence of int
-        The moves that the statements stand before, of which there are `end`.
+    poses : array
+        (m,) where the moves end.
     means : mapping
-        What words of the control say, as of `Table.means`.
+        What words of the control say, as of `Table.means`: it is for AUXFUN.
     """
-    asking, homes = Asking(program, means), list[Token]()
-    for statement, place in zip(program.statements, places, strict=True):
-        asking.take(statement, place)
-        if statement.word == "GOHOME" and not statement.args and place not in [one.place for one in homes[-1:]]:
-            homes.append(Token("home", "", place, statement.line))
-    line = max((item.line for item in program.statements if item.word in ("FINI", "END")), default=0)
-    return [*sorted([*asking.tokens, *homes], key=lambda token: (token.place, token.line)), Token("end", "", end, line)]
+    statements = asking.program.statements
+    stated = [one.pose for one in statements]
+    move = dict(zip(stated, np.searchsorted(poses, stated).tolist(), strict=True))
+    tokens = [replace(one, place=move[one.place]) for one in asking.tokens]
+    for k, one in enumerate(tokens):
+        if one.kind == "auxiliary":
+            kind, value = of_m(float(one.value), means)
+            tokens[k] = replace(one, kind=kind, value=value)
+    homes = {move[one.pose]: one.line for one in reversed(statements) if one.word == "GOHOME" and not one.args}
+    tokens += [Token("home", "", place, line) for place, line in homes.items()]
+    line = max((item.line for item in statements if item.word in ("FINI", "END")), default=0)
+    return [*sorted(tokens, key=lambda token: (token.place, token.line)), Token("end", "", len(poses), line)]
 
 
 def _behind(statement: Statement, word: str) -> float | None:

@@ -14,10 +14,10 @@ from cornersmooth.control.words import distinct
 from cornersmooth.model import Ints, Move
 from cornersmooth.nc_reader.elements import Event, Problem
 from cornersmooth.nc_reader.tool import beyond_digits
-from cornersmooth.statements.asked import NOTHING, Asking
+from cornersmooth.statements.asked import NOTHING
 from cornersmooth.statements.cycles import Drilling, drillings
-from cornersmooth.verify.cl_motion import Original
 from cornersmooth.verify.holes import Hole, HoleLines
+from cornersmooth.verify.task import Task
 
 #: words that a hole may have: its dwell and its tap
 _IN_HOLES: Final = (("G", 4.0), ("G", 84.0))
@@ -68,8 +68,9 @@ class Stops:
     loads: list[int]  #: poses that tool changes are in front of, ascending
 
     @classmethod
-    def of(cls, original: Original, lines: HoleLines) -> Self:
+    def of(cls, task: Task, lines: HoleLines) -> Self:
         """Find them: rapids that move the tool by more than digits show or come out of a hole, from anywhere."""
+        original = task.original
         hole, rapid = lines.kind == Move.HOLE, np.flatnonzero(lines.kind == Move.RAPID)
         before = np.maximum(rapid - 1, 0)
         turned = np.linalg.norm(lines.axis[rapid] - lines.axis[before], axis=1) * lines.axis_length > lines.room
@@ -82,10 +83,7 @@ class Stops:
         cycles = drillings(original.program, original.pose[hole].tolist())
         asks = [one.pose for one in original.program.statements if one.word == "GOHOME" or one.word not in NOTHING]
         stated = np.searchsorted(original.pose, asks)
-        asking = Asking(original.program)
-        for statement in original.program.statements:
-            asking.take(statement, statement.pose)
-        tools = [token for token in asking.tokens if token.kind == "tool"]
+        tools = [token for token in task.asking.tokens if token.kind == "tool"]
         changes = [one.place for k, one in enumerate(tools) if not k or one.value != tools[k - 1].value]
         return cls(
             moves,

@@ -41,7 +41,7 @@ def check_feeds(match: Match, found: Findings) -> None:
     good = still | (nc.kind[element] == Element.RAPID)
     wrong = np.full(len(element), -1)
     first, last = _runs_between(task, *place)
-    good |= (first == last) & (_misfit(task, nc, element, first, first) < 0)
+    good |= (first == last) & _fits(task.original, nc, element, task.feed_runs[1][first])
     until = wrong.copy()  # the last run whose feed would do, from `wrong` on
     if len(rows := np.flatnonzero(~good)):
         own = start[rows]
@@ -51,12 +51,13 @@ def check_feeds(match: Match, found: Findings) -> None:
         latest, earliest = reach(task, six[0], from_, limits, 1), reach(task, six[1], to, limits, -1)
         between = latest + _HAIR < earliest - _HAIR
         runs = _runs_between(task, latest, earliest)
-        wrong[rows] = until[rows] = np.where(between, _misfit(task, nc, element[rows], *runs), -1)
+        wrong[rows] = until[rows] = np.where(between, _first_run(task, nc, element[rows], *runs, fits=False), -1)
         if len(some := np.flatnonzero(~between)):
             limits, rows = (limits[0][some], limits[1][some]), rows[some]
             around = (reach(task, six[k][some], (from_, to)[k][some], limits, 2 * k - 1) for k in (0, 1))
             runs = _runs_between(task, *around)
-            wrong[rows], until[rows] = np.where(_fits_any(task, nc, element[rows], *runs), -1, runs)
+            fitting = _first_run(task, nc, element[rows], *runs, fits=True) >= 0
+            wrong[rows], until[rows] = np.where(fitting, -1, runs)
         good = wrong < 0
     wrongs = np.flatnonzero(~good)
     if len(wrongs):
@@ -75,24 +76,13 @@ def _runs_between(task: Task, low: Floats, high: Floats) -> tuple[Ints, Ints]:
     return run[owner[first + 1]], run[owner[last + 1]]
 
 
-def _misfit(task: Task, nc: Elements, element: Ints, first: Ints, last: Ints) -> Ints:
-    """(k,) first of some runs whose feed elements do not carry, from `first` to `last`; -1 for none."""
-    wrong, run, rows = np.full(len(element), -1), first.copy(), np.arange(len(element))
+def _first_run(task: Task, nc: Elements, element: Ints, first: Ints, last: Ints, *, fits: bool) -> Ints:
+    """(k,) first of some runs, from `first` to `last`, whose feed elements carry, or do not; -1 for none."""
+    found, run, rows = np.full(len(element), -1), first.copy(), np.arange(len(element))
     while len(rows):
-        fit = _fits(task.original, nc, element[rows], task.feed_runs[1][run[rows]])
-        wrong[rows[~fit]] = run[rows[~fit]]
-        rows = rows[fit & (run[rows] < last[rows])]
-        run[rows] += 1
-    return wrong
-
-
-def _fits_any(task: Task, nc: Elements, element: Ints, first: Ints, last: Ints) -> Bools:
-    """(k,) whether elements carry the feed of any of some runs, from `first` to `last`."""
-    found, run, rows = np.zeros(len(element), np.bool_), first.copy(), np.arange(len(element))
-    while len(rows):
-        fit = _fits(task.original, nc, element[rows], task.feed_runs[1][run[rows]])
-        found[rows[fit]] = True
-        rows = rows[~fit & (run[rows] < last[rows])]
+        here = _fits(task.original, nc, element[rows], task.feed_runs[1][run[rows]]) == fits
+        found[rows[here]] = run[rows[here]]
+        rows = rows[~here & (run[rows] < last[rows])]
         run[rows] += 1
     return found
 
@@ -150,7 +140,7 @@ def feed_at(task: Task, nc: Elements, element: int, move: int, place: float) -> 
         first, last = _runs_between(task, *(reach(task, six, at, limits, way) for way in (-1, 1)))
     if (
         _fits(task.original, nc, element, np.array([move])).any()
-        or _fits_any(task, nc, np.array([element]), first, last)[0]
+        or _first_run(task, nc, np.array([element]), first, last, fits=True)[0] >= 0
     ):
         return []
     return [_problem(task.original, nc, element, np.array([move]))]

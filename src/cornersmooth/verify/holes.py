@@ -224,7 +224,7 @@ class Hole:
             bottom += 1
         inside = [k + 1 for k, height in over.items() if height < -lines.room] or fed[-1:] or [*over][:1] or [-1]
         moved = {k: height for k, height in over.items() if not lines.stands(k)}
-        before = lines.height(move, max(next(iter(moved), 0) - 1, 0))
+        before = lines.height(move, max(next(iter(moved)) - 1, 0)) if moved else math.nan
         feeds = [k for k in fed if k in moved]
         first = next(iter(over), -1)
         return cls(lines, move, cycle, first, bottom, min(inside[-1], elements.stop), before, moved, feeds)

@@ -50,7 +50,7 @@ class Parse:
     def __init__(self, task: Task, ahead: Ahead, events: Sequence[Event], along: AlongTool, acts: Acts) -> None:
         self._task, self._ahead, self._words, self._along, self.acts = task, ahead, Words(events), along, acts
         self.lines = HoleLines(task.original, ahead, task.axis_length, task.tolerance)
-        stops = Stops.of(task.original, self.lines)
+        stops = Stops.of(task, self.lines)
         self.moves, self._move, self._hole, self._holes = stops.moves, stops.move, stops.hole, stops.holes
         self._fed, self._cycles, self._stated, self._loads = stops.fed, stops.cycles, stops.stated, stops.loads
         self._steps: list[Step] = []
@@ -248,13 +248,15 @@ class Parse:
         return said if drilled else next(away, begin + len(rapids))
 
     def _is_left_out(self, stop: int, element: int) -> bool:
-        """Whether a hole may be left out, and the first feed move in its line is not that of its cycle."""
+        """Whether a hole may be left out, and the first feed move in its line belongs to what is behind it."""
         lines, cycle = self.lines, self._cycles[self._move[stop]]
         while self._over(stop, element) and not lines.feeds(element):
             element += 1
-        if not self._may_be_left_out(stop) or math.isnan(cycle.depth) or not self._over(stop, element):
+        if not self._may_be_left_out(stop) or not self._over(stop, element):
             return self._may_be_left_out(stop)
-        return not (math.isnan(cycle.feed) or lines.carries(element, cycle.feed, per_revolution=cycle.per_revolution))
+        carries = math.isnan(cycle.feed) or lines.carries(element, cycle.feed, per_revolution=cycle.per_revolution)
+        others = self._fed[stop] or (self._hole[stop + 1] and self._over(stop + 1, element))
+        return others and (math.isnan(cycle.depth) or not carries)
 
     def _begins(self, stop: int, element: int) -> bool:
         """Whether an element begins a hole, or what follows holes that may be left out."""

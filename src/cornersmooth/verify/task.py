@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints, Keep, Program
+from cornersmooth.statements.asked import Asking
 from cornersmooth.verify.chain import Path
 from cornersmooth.verify.cl_motion import Original, original_motion
 from cornersmooth.verify.nearest import COLUMNS, Metric
@@ -118,6 +119,11 @@ class Task:
         for name in ("tip", "axis_point") if self.apart else ():
             found[name] = self.path.only(COLUMNS[name]), self.tolerance + ARITHMETIC
         return found
+
+    @cached_property
+    def asking(self) -> Asking:
+        """What the statements of the CL file ask for."""
+        return Asking.of(self.original.program)
 
     @cached_property
     def feed_runs(self) -> tuple[Ints, Ints]:

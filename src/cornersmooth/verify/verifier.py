@@ -293,7 +293,7 @@ class Verifier:
             curves=curves,
             left_out=len(batches.acts.left_out) if self._trust.skip_cycles else 0,
             rewinds=tuple(batches.acts.rewinds),
-        ).not_verified(not_understood_text(program), unsaid)
+        ).not_verified(not_understood_text(task.asking), unsaid)
 
 
 def verify(program: Program, nc: NcProgram | bytes | str | os.PathLike[str], **how: Any) -> Verification:

@@ -75,7 +75,7 @@ class WordPlaces:
         machine wants them, not where AUXFUN has them. GOHOME asks for a retract, where the program can have `retracts`.
         """
         batches, original = self._batches, self._task.original
-        program, moves = original.program, len(original.pose)
+        program = original.program
         self._still |= batches.acts.still
         # statements by the first move behind them that leads anywhere, words and retracts by the first such element
         places = np.searchsorted(original.pose, [one.pose for one in program.statements]).tolist()
@@ -83,7 +83,7 @@ class WordPlaces:
         leading, beyond = self._leading(unique, set()), self._leading(unique, batches.acts.moves_left_out)
         requested = [
             one
-            for one in asked(program, places, moves, means)
+            for one in asked(self._task.asking, original.pose, means)
             if (one.kind != "auxiliary" or one.value not in clamps) and (one.kind != "home" or retracts)
         ]
         cl_tokens = [replace(one, place=leading.get(one.place, one.place)) for one in requested]
