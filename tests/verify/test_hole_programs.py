@@ -96,6 +96,7 @@ RANDOM_REFUSED_ONCE = {
     8700253: "taps that are left out, and the same holes drilled behind another speed",
     8601301: "words behind a tap that is left out, where the next rapid leads",
     8800022: "a bore whose way up ends where the next tool begins",
+    8910507: "a tap left out, and a rapid to the same pose with the next tool, twice",
     8910811: "a tap left out, and a rapid over it by digits that an ε of a thousandth shows",
     8800032: "taps left out, and the same holes drilled from where the tool was before them",
 }
@@ -107,6 +108,7 @@ KNOWN = {
     1710186: "two optional stops around a tool that does nothing",
     1730122: "coolant ends between holes in one line, cycles of the control",
     1003544: "a dwell behind a tap that is left out, and GOHOME twice around two that are, in its line",
+    8910896: "an optional stop and a pose a digit away, and a tool with which nothing moves",
     8600559: "a dwell between poses that are a digit apart: the text passes them in one",
     8800136: "a dwell between poses that are a digit apart, the same",
     8601699: "coolant at the end of a run between poses that are a digit apart: the text passes them in one",

@@ -167,12 +167,13 @@ class Parse:
         while self._ahead.has(element):
             rapid = not lines.feeds(element)
             along.check_return(element, lines)
-            if self._reaches(following, element):
+            due = self._due(following, element)
+            if self._reaches(due, element):
                 break
             idle = lines.stands(element) or (rapid and stop >= 0 and lines.negligible(element))
             if idle and not (rapid and stop >= 0 and self._comes_down_first(stop, element)):
                 element += 1
-            elif self._begins(following, element):
+            elif self._hole[due] and self._over(due, element):
                 break
             elif along.stays(element):
                 lines.forget()
@@ -260,9 +261,14 @@ class Parse:
 
     def _begins(self, stop: int, element: int) -> bool:
         """Whether an element begins a hole, or what follows holes that may be left out."""
+        due = self._due(stop, element)
+        return self._over(due, element) if self._hole[due] else self._reaches(due, element)
+
+    def _due(self, stop: int, element: int) -> int:
+        """The first stop from one on that is no hole left out without any element in its line."""
         while self._hole[stop] and self._may_be_left_out(stop) and not self._over(stop, element):
             stop += 1
-        return self._over(stop, element) if self._hole[stop] else self._reaches(stop, element)
+        return stop
 
     def _is_in_doubt(self, stop: int, element: int) -> bool:
         """Whether nobody can tell which of holes in one line an element belongs to: a cycle of the control tells."""
