@@ -242,21 +242,23 @@ class Parse:
         lines, move = self.lines, self._move[stop]
         rapids = list(takewhile(lambda one: self._over(stop, one) and not lines.feeds(one), count(begin)))
         others = [one for one in rapids if self._over(stop + 1, one)]
-        said = next((one for one in others if one > begin and self._words.acting(one)), -1)
+        first = next((one for one in others if one > begin and self._words.acting(one)), -1)
         highest = max(self._cycles[move].level, self._cycles[move].clearance) + lines.room
         away = (one for one in others if not -lines.room <= lines.height(move, one) <= highest)
-        drilled = said >= 0 and not self._is_left_out(stop + 1, said)
-        return said if drilled else next(away, begin + len(rapids))
+        drilled = first >= 0 and not self._is_left_out(stop + 1, first)
+        return first if drilled else next(away, begin + len(rapids))
 
-    def _is_left_out(self, stop: int, element: int) -> bool:
+    def _is_left_out(self, stop: int, begin: int) -> bool:
         """Whether a hole may be left out, and the first feed move in its line belongs to what is behind it."""
+        if not self._may_be_left_out(stop):
+            return False
         lines, cycle = self.lines, self._cycles[self._move[stop]]
-        while self._over(stop, element) and not lines.feeds(element):
-            element += 1
-        if not self._may_be_left_out(stop) or not self._over(stop, element):
-            return self._may_be_left_out(stop)
-        carries = math.isnan(cycle.feed) or lines.carries(element, cycle.feed, per_revolution=cycle.per_revolution)
-        others = self._fed[stop] or (self._hole[stop + 1] and self._over(stop + 1, element))
+        fed = next(one for one in count(begin) if not self._over(stop, one) or lines.feeds(one))
+        if not self._over(stop, fed):
+            return True
+        others = self._fed[stop] or (self._hole[stop + 1] and self._over(stop + 1, fed))
+        others |= any(self._is_there(stop + 1, one) for one in range(begin - 1, fed))
+        carries = math.isnan(cycle.feed) or lines.carries(fed, cycle.feed, per_revolution=cycle.per_revolution)
         return others and (math.isnan(cycle.depth) or not carries)
 
     def _begins(self, stop: int, element: int) -> bool:
