@@ -106,3 +106,9 @@ def test_no_file_imports_itself_in_a_circle() -> None:
 
 def test_the_root_has_ten_modules() -> None:
     assert len(list(SOURCE.glob("*.py"))) <= 10
+
+
+@pytest.mark.parametrize("package", ["nc", "rotary"])
+def test_modules_of_the_writer_are_a_few_screens(package: str) -> None:
+    sizes = {path.name: path.read_text(encoding="utf-8").count("\n") for path in (SOURCE / package).glob("*.py")}
+    assert {name for name, size in sizes.items() if size > 400} == set()
