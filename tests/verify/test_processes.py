@@ -44,6 +44,26 @@ def test_large_items_and_results_do_not_stand_still():
     assert [len(item) for item in found] == [6_000_000] * 12
 
 
+@pytest.mark.parametrize("room", [1 << 12, 1 << 20])
+def test_arrays_of_items_come_whole_whether_they_have_room_or_not(monkeypatch, room):
+    monkeypatch.setattr(crews, "_ROOM", room)
+
+    def work(item):
+        number, arrays = item
+        arrays[0][:1] += 1.0  # as in the process that made them
+        return number, arrays[::-1]
+
+    def item(k):
+        return [np.full(5 + k, k / 3.0), np.zeros(0), np.arange(100.0 * k), np.full((300, 3), k)[:, ::2], np.True_]
+
+    found = list(crews.map_in_processes(work, ((k, item(k)) for k in range(20)), 2))
+    for k, (number, arrays) in enumerate(found):
+        wanted = item(k)
+        wanted[0][:1] += 1.0
+        assert number == k
+        assert all(np.array_equal(one, other) for one, other in zip(arrays[::-1], wanted, strict=True))
+
+
 def test_an_item_goes_to_a_process_that_is_free(tmp_path):
     def work(item):
         if item == 3:

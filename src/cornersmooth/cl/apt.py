@@ -83,6 +83,7 @@ def read_apt(
     state = ReaderState(
         file=name, dialect=known, wanted_units=units, arc_rule=arc_rule, lenient=lenient, cycle_order=cycle_order
     )
+    state.expect(data.count(b"GOTO"))
     decode = _decoder(data)
     for part in parts(data, processes):
         if state.finished and lenient:

@@ -143,6 +143,10 @@ class Poses:
         """(n, 7) float64: tip, axis and line of every pose, as in `Part`."""
         return self._rows[: self.n]
 
+    def expect(self, poses: int) -> None:
+        """Have room for so many poses; room that is not used takes no memory."""
+        self._rows = np.empty((max(poses, _ROOM), 7))
+
     def take(self, rows: Floats) -> None:
         """Append poses (m, 7)."""
         begin, self.n = self.n, self.n + len(rows)

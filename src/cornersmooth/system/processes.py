@@ -7,7 +7,9 @@ data of its parent without copying it.
 from __future__ import annotations
 
 import ctypes
+import mmap
 import os
+import pickle
 import signal
 import sys
 import warnings
@@ -26,6 +28,10 @@ MOST_PROCESSES: Final = 4
 
 #: items taken ahead of what has been given out, whatever the number of processes: what comes out never depends on it
 _AHEAD: Final = 5
+
+#: bytes that a process shares with another for the arrays of an item, which take memory only as they are used
+_ROOM: Final = 32 << 20
+_ALIGNED: Final = 64
 
 #: how processes begin; elsewhere as the system has it: a process of a batch begins anew there
 _START: Final = "fork" if sys.platform == "linux" else None
@@ -60,10 +66,11 @@ class Helper:
 
         context = get_context(_START)
         self.connection, other_end = context.Pipe()
+        self._room = mmap.mmap(-1, _ROOM) if can_fork() else None  # which both have
         ends = [*(other.connection for other in others), self.connection]
         with warnings.catch_warnings():  # newer Pythons warn of threads, of which only numpy's idle ones are left
             warnings.simplefilter("ignore", DeprecationWarning)
-            self._process = context.Process(target=_serve, args=(work, other_end, ends), daemon=daemon)
+            self._process = context.Process(target=_serve, args=(work, other_end, ends, self._room), daemon=daemon)
             self._process.start()
         self.pid = self._process.pid
         other_end.close()
@@ -79,7 +86,7 @@ class Helper:
         """Send an item, after what was found for the one before has been taken in."""
         self._take()
         try:
-            self.connection.send(item)
+            self.connection.send(_packed(item, self._room))
         except BrokenPipeError:
             raise MemoryError(_ENDED) from None
         self._working = True
@@ -166,7 +173,24 @@ def map_in_processes(work: Callable[[Item], Result], items: Iterable[Item], proc
             member.end()
 
 
-def _serve(work: Callable[[Any], Any], connection: Connection, parents: list[Connection]) -> None:
+def _packed(item: Any, room: mmap.mmap | None) -> tuple[bytes, list[slice]]:
+    """Pickle an item, its arrays put into a room as far as they fit: in a pipe they would be copied seven times."""
+    parts: list[slice] = []
+
+    def put(buffer: pickle.PickleBuffer) -> bool:
+        data, start = buffer.raw(), -(-parts[-1].stop // _ALIGNED) * _ALIGNED if parts else 0
+        if room is None or start + len(data) > len(room):
+            return True  # it stays with the rest
+        parts.append(slice(start, start + len(data)))
+        room[parts[-1]] = data
+        return False
+
+    return pickle.dumps(item, protocol=5, buffer_callback=put), parts
+
+
+def _serve(
+    work: Callable[[Any], Any], connection: Connection, parents: list[Connection], room: mmap.mmap | None
+) -> None:
     """Work on what comes until nothing more can come.
 
     The parent can end this process; an interruption ends the parent only, which does so.
@@ -177,7 +201,8 @@ def _serve(work: Callable[[Any], Any], connection: Connection, parents: list[Con
         other.close()
     while True:
         try:
-            item = connection.recv()
+            text, parts = connection.recv()
+            item = pickle.loads(text, buffers=[memoryview(room)[part] for part in parts])  # type: ignore[arg-type]
         except (EOFError, OSError):
             return
         try:
