@@ -10,7 +10,6 @@ import time
 from bisect import bisect_left
 from codecs import BOM_UTF8
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import BinaryIO, Final, Protocol
 
@@ -206,7 +205,7 @@ def _one_by_one(
         columns = None if line.skipped else lexer.motion(line)
         if columns is not None:
             blocks.append((line.number, numbers(columns)))
-            line = replace(line, words=())
+            line = Line(line.number, (), line.comments)
         elif blocks and (line.words or line.tape):
             yield table_of(blocks)
             blocks = []
