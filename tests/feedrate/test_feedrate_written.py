@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from cornersmooth.kinematics import load_machine
 from cornersmooth.model import Program, SmoothProgram
 from cornersmooth.nc import choose_form, fit_settings, load_control, write
 from cornersmooth.nc_reader import NcProgram, read_nc
+from cornersmooth.pipeline import read_back
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from oracle.command import run
@@ -252,3 +254,60 @@ def test_an_arc_that_rises_is_as_fast_as_its_control_counts(control: str, share:
     law = plan_text(read_nc(text.encode(), control=control), Limits(accel=1e5, jerk=1e8))
     seconds = np.diff(law.times_at(law.edge))[law.path.kind == Kind.ARC].sum()
     assert seconds == pytest.approx(share * 60.0 * rise / 100.0, rel=2e-3)
+
+
+def in_rotary_words(program: Program, machine: str, *, tcp: bool, tolerance: float) -> tuple[list[str], TimeLaw]:
+    """Lines of a Siemens program in words of a machine, and its plan under the limits of that machine."""
+    form = choose_form("siemens", "g1", machine=load_machine(machine), tcp=tcp)
+    settings = fit_settings(Settings(tolerance=tolerance), form, program.units)
+    stream = io.BytesIO()
+    write(smooth(program, settings), stream, form=form)
+    nc = read_back(stream.getvalue(), form, settings)
+    law = plan_text(nc, LIMITS, settings=settings, machine=load_machine(machine))
+    return stream.getvalue().decode().splitlines(), law
+
+
+def test_no_rotary_axis_jumps_from_block_to_block_by_the_written_digits() -> None:
+    """Words run evenly in each block: planned by tool vectors between its ends, jumps were 1.4 times too large."""
+    lines, law = in_rotary_words(read(beginning(SAMPLE, 60), name="impeller.cls"), "table-ac", tcp=True, tolerance=0.01)
+    speed = dict(
+        zip(law.path.program.line[law.path.move].tolist(), law.kinematics(law.times_at(law.edge[1:]))[1], strict=True)
+    )
+    now, blocks = dict.fromkeys("XYZAC", np.nan), []
+    for number, line in enumerate(lines, 1):
+        words = {name: float(value) for name, value in re.findall(r"\b([XYZAC])=?(-?[\d.]+)", line)}
+        if (words and line[:2] in ("G0", "G1")) or line[:1] in now:
+            now |= words
+            blocks.append((number, line.startswith("G0"), *now.values()))
+    step = np.diff(np.array([block[2:] for block in blocks]), axis=0)
+    way = np.linalg.norm(step[:, :3], axis=1)
+    accel = {item.name: item.per_second[1] for item in load_machine("table-ac").dynamics}
+    worst = []
+    for k in range(1, len(step)):
+        if not (blocks[k][1] or blocks[k + 1][1]) and min(way[k - 1], way[k]) > 1e-3 and blocks[k][0] in speed:
+            jump = np.abs(step[k, 3:] / way[k] - step[k - 1, 3:] / way[k - 1]) * speed[blocks[k][0]]
+            worst.append(max(jump / (LIMITS.period * np.array([accel["A"], accel["C"]]))))
+    assert len(worst) > 200
+    assert 0.9 < max(worst) < 1.01
+
+
+def test_a_tip_that_stands_but_for_its_digits_is_a_turn_on_the_spot() -> None:
+    """Without tip control the linear axes carry the tip round, and their digits were a way of the tip."""
+    angle = np.radians([0.0, 0.0, 12.0, 24.0, 36.0, 36.0])
+    tip = np.array([[0.0, 0, 0], [30, 0, 0], [30, 0, 0], [30, 0, 0], [30, 0, 0], [60, 0, 0]])
+    axis = np.stack((np.sin(angle) * 0.6, np.sin(angle) * 0.8, np.cos(angle)), axis=1)
+    _, law = in_rotary_words(Program.from_poses(tip, axis, feed=2000.0), "head-table-bc", tcp=False, tolerance=0.01)
+    turning = law.path.turning
+    assert turning.sum() > 100
+    assert np.diff(turning.astype(int)).clip(0).sum() == 1, "in one go"
+    assert law.length == pytest.approx(60.0, abs=0.05)
+    assert len(law.time) < 4 * len(law.path)
+
+
+def test_cells_are_as_many_as_blocks_at_the_pole() -> None:
+    """The first axis turns fast there: at the feed its rate would vary much, at the speed that it allows not."""
+    way = np.linspace(-1.0, 1.0, 41)
+    axis = np.stack((0.2 * way, np.full(41, 0.004), np.ones(41)), axis=1)
+    tip = np.stack((20.0 * way, 0.0 * way, 0.0 * way), axis=1)
+    lines, law = in_rotary_words(Program.from_poses(tip, axis, feed=3000.0), "table-ac", tcp=True, tolerance=0.02)
+    assert len(law.time) < 8 * len(lines)

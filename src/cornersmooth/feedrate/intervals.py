@@ -97,10 +97,10 @@ class Quantities:
             Places, as in `taylor_along`. Where the tip comes to a stand there are no derivatives: they are zero.
         """
         which, where = element.ravel(), share.ravel()
-        tip, axis, speed = taylor_along(self.path, which, where)
-        found = np.zeros((3, 0, len(which)))
-        if self.machine_axes is not None:
-            positions = self.machine_axes.positions(which, where, tip, axis)
+        if self.machine_axes is None:
+            tip, found = taylor_along(self.path, which, where)[0], np.zeros((3, 0, len(which)))
+        else:
+            positions, speed, tip = self.machine_axes.series(which, where)
             found = np.stack(taylor.by_way(positions, speed)).transpose(0, 2, 1)
         found = np.where(self.counts[:, which] & np.isfinite(found), found, 0.0)
         return found.reshape(3, len(self), *element.shape), tip.reshape(4, *element.shape, 3)
@@ -247,12 +247,13 @@ def _look(
     with np.errstate(divide="ignore"):
         steady = ((bounds / amounts) ** power).min(axis=1)  # of v², by each order alone
         agile = (bounds[2] / amounts[0]).min(axis=0)
-    uneven = (np.ptp(np.abs(derivatives[0]), axis=-1) * np.sqrt(cap) > resolution.varied * bounds[0]).any(axis=0)
-    uneven |= bends & (cap < steady.min(axis=0))
-    cap = np.minimum(cap, steady[0])
+    kept = steady.min(axis=0)
+    uneven = bends & (cap < kept)
+    kept = np.minimum(cap, kept)  # no profile is faster than that for long
+    uneven |= (np.ptp(np.abs(derivatives[0]), axis=-1) * np.sqrt(kept) > resolution.varied * bounds[0]).any(axis=0)
     off = np.abs(derivatives[..., 1] - derivatives[..., 0] * (1.0 - middle) - derivatives[..., 2] * middle)
-    used = off * np.minimum(cap, steady.min(axis=0)) ** (1.0 / power) / bounds
-    return width, middle, cap, agile, uneven | (used > resolution.even).any(axis=(0, 1))
+    uneven |= (off * kept ** (1.0 / power) > resolution.even * bounds).any(axis=(0, 1))
+    return width, middle, np.minimum(cap, steady[0]), agile, uneven
 
 
 def _curved(path: Path, most: float) -> Bools:

@@ -12,7 +12,7 @@ At the pole (a₁×k)·b vanishes. Within the cone in which a control may turn t
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,11 +20,11 @@ from cornersmooth.arrays import cross
 from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate import taylor
 from cornersmooth.feedrate.curves import WHOLE
-from cornersmooth.feedrate.path import Path
+from cornersmooth.feedrate.path import Kind, Path
 from cornersmooth.feedrate.taylor import taylor_along
 from cornersmooth.kinematics import Machine
 from cornersmooth.kinematics.machine import PARALLEL
-from cornersmooth.kinematics.poses import continued
+from cornersmooth.kinematics.poses import continued, machine_position
 from cornersmooth.model import Floats, Ints, rapid_moves
 from cornersmooth.rotary import rotary_angles
 
@@ -41,6 +41,8 @@ class MachineAxes:
     angles: Floats  #: (n, 2) degrees: rotary angles at the poses of the program
     branch: Ints  #: (n,): solution that a move into a pose is on; -1 where it passes from one to the other
     cone: float  #: degrees
+    even: bool = False  #: whether lines are blocks of words of this machine, in which these run evenly
+    places: Floats | None = None  #: (n, 3) mm: words of the linear axes at the poses, where these run evenly, too
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -62,27 +64,31 @@ class MachineAxes:
         share : (m,) float64
             Where on each element, as in `taylor_along`; infinite derivatives where the tip comes to a stand.
         """
-        tip, axis, speed = taylor_along(self.path, element, share)
-        position = self.positions(element, share, tip, axis)
+        position, speed, _ = self.series(element, share)
         return position[0], *taylor.by_way(position, speed)
 
-    def positions(self, element: Ints, share: Floats, tip: Floats, axis: Floats) -> Floats:
-        """Taylor series (4, m, 5) of the axes from those of tip and tool axis, (4, m, 3) each."""
+    def series(self, element: Ints, share: Floats) -> tuple[Floats, Floats, Floats]:
+        """Taylor series of the axes (4, m, 5), of the speed of the coordinate (3, m), and of the tip (4, m, 3)."""
         path = self.path
+        tip, axis, speed = taylor_along(path, element, share)
         start, end = path.start[element], path.move[element]
         span = path.span[element]
         part = span[:, :1] + share[:, None] * (span[:, 1:] - span[:, :1])  # as good as a guess of angles needs it
-        whole = self.angles[end] - self.angles[start]
-        guess = self.angles[start] + part * whole
-        value, _ = continued(self.machine, axis[0], guess, self.branch[end], self.cone)
-        rapid = path.rapid[element]
-        value[rapid] = guess[rapid]
-        turning = self._angle_series(axis, np.radians(value))
-        # in a rapid all axes run evenly, back by whole turns too
-        turning[1:, rapid] = 0.0
-        turning[1, rapid] = np.radians(whole[rapid])
+        # in a rapid rotary axes run evenly, back by whole turns too
+        even = path.rapid[element] | (self.even & (path.kind[element] == Kind.LINE))
+        turning = _evenly(np.radians(self.angles), start, end, part)
+        led = np.flatnonzero(~even)
+        guess = np.degrees(turning[0, led])
+        value, _ = continued(self.machine, axis[0, led], guess, self.branch[end[led]], self.cone)
+        turning[:, led] = self._angle_series(axis[:, led], np.radians(value))
+        linear = _linear_series(self.machine, tip, turning)
+        if self.places is not None:
+            own = np.flatnonzero(even)
+            linear[:, own] = _evenly(self.places, start[own], end[own], part[own])
+            own = own[~(path.rapid | path.turning)[element[own]]]  # the tip runs unevenly on these
+            speed[:, own] = taylor.speed_of(_tip_series(self.machine, linear[:, own], turning[:, own]))
         rotary = np.degrees(turning[..., : len(self.machine.names)])
-        return np.concatenate((_linear_series(self.machine, tip, turning), rotary), axis=-1)
+        return np.concatenate((linear, rotary), axis=-1), speed, tip
 
     def _angle_series(self, axis: Floats, value: Floats) -> Floats:
         """Taylor series (4, m, 2) of the rotary angles, rad."""
@@ -165,6 +171,9 @@ def follow(machine: Machine, path: Path) -> MachineAxes:
             "add [dynamics.X] with velocity, acceleration and jerk to its file, and the same for the other axes",
         )
     program, settings = path.program, path.settings
+    words = path.words if path.words is not None and path.words.machine.turns_like(machine) else None
+    if words is not None:
+        machine = replace(machine, tool_length=words.machine.tool_length)
     tolerance = math.degrees(settings.tolerance / settings.axis_scale)
     cone = tolerance / _CONES
     rapid = rapid_moves(program.kind)
@@ -178,11 +187,14 @@ def follow(machine: Machine, path: Path) -> MachineAxes:
         file=program.source.name,
     )
     _, own = continued(machine, program.axis, found.angles, np.full(len(program), -1), cone)
+    places = None
+    if words is not None and not words.tip_control:
+        places = machine_position(machine, program.tip, found.angles)
     branch = np.full(len(program), -1, np.int64)
     start, end = path.start, path.move
     one, other = own[start], own[end]
     branch[end] = np.where(one == other, one, np.where(one < 0, other, np.where(other < 0, one, -1)))
-    return MachineAxes(machine, path, found.angles, branch, cone)
+    return MachineAxes(machine, path, found.angles, branch, cone, words is not None, places)
 
 
 def _waves(angle: Floats) -> tuple[Floats, Floats]:
@@ -206,24 +218,47 @@ def _turned(direction: Floats, waves: tuple[Floats, Floats], vectors: Floats) ->
     )
 
 
+def _evenly(values: Floats, start: Ints, end: Ints, part: Floats) -> Floats:
+    """Taylor series (4, m, d) of what runs evenly from rows to rows of values (n, d), at parts (m, 1) of the way."""
+    found = np.zeros((taylor.ORDERS, len(start), values.shape[1]))
+    found[1] = values[end] - values[start]
+    found[0] = values[start] + part * found[1]
+    return found
+
+
 def _linear_series(machine: Machine, tip: Floats, angles: Floats) -> Floats:
     """Taylor series (4, m, 3) of `cornersmooth.kinematics.machine_position`."""
     waves = [_waves(axis.sign * angles[..., index]) for index, axis in enumerate(machine.axes)]
-    zero = np.array(machine.part_zero)
-    position = tip.copy()
-    position[0] += zero
-    swing = np.zeros_like(tip)
-    for index, axis in enumerate(machine.axes):
+    return _on_tables(machine, waves, tip, -1.0) - _swing(machine, waves, tip.shape)
+
+
+def _tip_series(machine: Machine, position: Floats, angles: Floats) -> Floats:
+    """Taylor series (4, m, 3) of `cornersmooth.kinematics.poses.tip_position`."""
+    waves = [_waves(axis.sign * angles[..., index]) for index, axis in enumerate(machine.axes)]
+    return _on_tables(machine, waves, position + _swing(machine, waves, position.shape), 1.0)
+
+
+def _on_tables(machine: Machine, waves: list[tuple[Floats, Floats]], points: Floats, sense: float) -> Floats:
+    """Points that the tables carry along, from the zero of the part, or back where `sense` is -1."""
+    points, zero = points.copy(), np.array(machine.part_zero)
+    points[0] += zero
+    for index in (1, 0) if sense > 0.0 else (0, 1):
+        axis, (cosine, sine) = machine.axes[index], waves[index]
         if axis.carrier == "table":
-            cosine, sine = waves[index]
-            position = _about(axis.unit, np.array(axis.point), (cosine, -sine), position)
+            points = _about(axis.unit, np.array(axis.point), (cosine, sense * sine), points)
+    points[0] -= zero
+    return points
+
+
+def _swing(machine: Machine, waves: list[tuple[Floats, Floats]], shape: tuple[int, ...]) -> Floats:
+    """Way of the tip when the heads turn and the linear axes stand."""
+    swing = np.zeros(shape)
     for index in (1, 0):
         axis = machine.axes[index]
         if axis.carrier == "head":
             point = machine.tool_length * machine.tool + np.array(axis.point)
             swing = _about(axis.unit, point, waves[index], swing)
-    position[0] -= zero
-    return position - swing
+    return swing
 
 
 def _about(direction: Floats, point: Floats, waves: tuple[Floats, Floats], points: Floats) -> Floats:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from cornersmooth.arrays import angle_between, cross, dot, norm, unit
 from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate.curves import STANDSTILL, WHOLE, Curves, end_tangents
+from cornersmooth.kinematics import Machine
 from cornersmooth.model import Bools, Corners, FeedMode, Floats, Ints, Move, Program, Runs, Status
 from cornersmooth.settings import Limits, Settings
 from cornersmooth.smoothing.construction import find_neighbours
@@ -31,6 +33,13 @@ class Kind(IntEnum):
     LINE = 0
     CURVE = 1
     ARC = 2
+
+
+class Words(NamedTuple):
+    """How rotary words move the tool: they run evenly in each block."""
+
+    machine: Machine
+    tip_control: bool  #: whether the tip runs evenly beside them, or the linear axes do
 
 
 @dataclass(frozen=True)
@@ -53,6 +62,7 @@ class Path:
     rapid: Bools  #: (m,)
     #: (m + 1,): largest speed at the start of element i, and at the end of the last: 0 for a stop, inf for none
     junction_speed: Floats
+    words: Words | None = None  #: of the rotary words that lines are blocks of, or parts of blocks
 
     def __len__(self) -> int:
         return len(self.length)

@@ -112,13 +112,13 @@ def taylor_along(path: Path, element: Ints, share: Floats, orders: int = ORDERS)
         around[0] += path.curves.origin[own]
         tip[:, curve] = around
         moving = np.flatnonzero(~path.turning[element[curve]])
-        speed[:, curve[moving]] = _speed(around[:, moving])
+        speed[:, curve[moving]] = speed_of(around[:, moving])
     if len(line):
         tip[:, line], lever[:, line] = _lines(path, element[line], share[line], orders)
     return tip, normalised(lever), speed
 
 
-def _speed(tip: Floats) -> Floats:
+def speed_of(tip: Floats) -> Floats:
     """Taylor series of the speed of a tip by its parameter; next to nothing where it stands."""
     gone = derivative(tip)
     squared = dot(gone, gone)

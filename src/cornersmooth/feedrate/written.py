@@ -12,7 +12,7 @@ from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate.curves import Curves, polynomial
 from cornersmooth.feedrate.intervals import Resolution
 from cornersmooth.feedrate.machine_axes import follow
-from cornersmooth.feedrate.path import Path, build_path
+from cornersmooth.feedrate.path import Path, Words, build_path
 from cornersmooth.feedrate.planner import Progress, plan_along
 from cornersmooth.feedrate.timelaw import TimeLaw, peak_speed
 from cornersmooth.kinematics import Machine, endless
@@ -26,6 +26,9 @@ _MOVES = {Element.RAPID: Move.RAPID, Element.LINE: Move.LINEAR, Element.ARC: Mov
 
 #: parts of blocks add up to whole ones but for this
 _PART_OF_A_BLOCK = 1e-6
+
+#: steps of the digits by which a tip that stands may be off, and the part of the way of the axis point that this is
+_DIGITS, _STANDING = 2.0, 0.02
 
 #: minutes: no block takes less
 _SHORTEST = 1e-9
@@ -94,6 +97,10 @@ def written_motion(nc: NcProgram, name: str, axis_length: float = 10.0) -> Writt
         known = turning & (speed > 0.0)
         feed, turning = np.where(known, feed * speed, feed), turning & ~known
     first = np.append(last - count + 1, len(owner))
+    same = np.concatenate(([False], (nc.line[owner[1:]] == nc.line[owner[:-1]]) & (nc.rotary is not None)))
+    within = same & (nc.kind[owner] != Element.RAPID)
+    if nc.rotary is not None:
+        tip = _with_turns(tip, axis_length * unit(lever), within, nc.kind[owner] == Element.LINE, nc.tip_step)
     program = Program(
         tip=tip,
         axis=unit(lever),
@@ -111,8 +118,26 @@ def written_motion(nc: NcProgram, name: str, axis_length: float = 10.0) -> Writt
         units=nc.units,
         source=Source(name, "nc"),
     )
-    same = np.concatenate(([False], (nc.line[owner[1:]] == nc.line[owner[:-1]]) & nc.rotary))
-    return WrittenMotion(program, curves, (_blocks(nc) / count)[owner], owner, same & (nc.kind[owner] != Element.RAPID))
+    return WrittenMotion(program, curves, (_blocks(nc) / count)[owner], owner, within)
+
+
+def _with_turns(tip: Floats, lever: Floats, within: Bools, lines: Bools, step: float) -> Floats:
+    """Tips (n, 3), mm, that stand in blocks of rotary words which leave them where they are but for the digits.
+
+    Those would be a way of the tip, at the feed. `within`: rows (n,) that go on with the block of the row before;
+    `lever`: axis points from the tips; `step`: what printed digits stand for.
+    """
+    first = np.flatnonzero(~within)
+    last, before = np.append(first[1:], len(tip)) - 1, np.maximum(first - 1, 0)
+    way, swing = (norm(ends[last] - ends[before]) for ends in (tip, lever))
+    surely = way <= np.minimum(_DIGITS * step, _STANDING * swing)
+    # the tip stands on in blocks that follow, up to twice as much: else its digits would let it stop and go
+    may = lines[first] & (way <= 2.0 * np.minimum(_DIGITS * step, _STANDING * swing))
+    may[:1] = False
+    run = np.cumsum(~may)
+    stands = may & np.isin(run, run[surely & may])
+    moves = ~np.repeat(stands, last - first + 1)
+    return tip[np.maximum.accumulate(np.where(moves, np.arange(len(tip)), 0))]
 
 
 def _curve_pieces(nc: NcProgram, axis_length: float) -> tuple[Any, ...]:
@@ -290,5 +315,7 @@ def text_path(
     motion = written_motion(nc, name, settings.axis_length)
     path = build_path(motion.program, None, settings, limits, curves=motion.curves)
     inside = motion.within[path.move] & ~path.turning & ~np.concatenate(([True], path.turning[:-1]))
-    path = replace(path, junction_speed=np.where(np.append(inside, False), np.inf, path.junction_speed))
+    words = None if nc.rotary is None else Words(nc.rotary, nc.tip_control)
+    junction_speed = np.where(np.append(inside, False), np.inf, path.junction_speed)
+    path = replace(path, junction_speed=junction_speed, words=words)
     return within_blocks(path, limits, BlockLimits() if blocks is None else blocks, motion.blocks)

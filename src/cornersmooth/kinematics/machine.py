@@ -249,6 +249,15 @@ class Machine:
         """Whether a rotary axis in the head moves the tip by the length of the tool."""
         return any(axis.carrier == "head" for axis in self.axes)
 
+    def turns_like(self, other: Machine) -> bool:
+        """Whether the same words bring tools of the same length to the same place."""
+        shapes = (
+            [(axis.name, axis.carrier, axis.direction, axis.point, axis.positive) for axis in machine.axes]
+            for machine in (self, other)
+        )
+        alike = self.tool_direction == other.tool_direction and self.part_zero == other.part_zero
+        return alike and next(shapes) == next(shapes)
+
     def describe(self) -> str:
         """Text of a few lines for people."""
         lines = [f"{self.name}: {self.description}" if self.description else self.name]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, fields, replace
 from enum import IntEnum
 from functools import cached_property
 from itertools import repeat
-from typing import Any, Final, Literal, Self
+from typing import TYPE_CHECKING, Any, Final, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,9 @@ from cornersmooth.arrays import ranges, some_rows
 from cornersmooth.control.table import Means
 from cornersmooth.errors import message
 from cornersmooth.model import MM_PER_UNIT, Bools, Floats, Ints, Units
+
+if TYPE_CHECKING:
+    from cornersmooth.kinematics.machine import Machine
 
 #: relative slack of arithmetic on feeds
 _ARITHMETIC: Final = 1e-9
@@ -178,7 +181,8 @@ class Elements:
     #: value of the last printed digit of tip (mm) and of vector (1) or axis point (mm)
     tip_step: float = 0.0
     second_step: float = 0.0
-    rotary: bool = False  #: whether the text has rotary words
+    rotary: Machine | None = None  #: that rotary words are for; None for a text without any
+    tip_control: bool = True  #: whether X Y Z beside rotary words are the tip, or the linear axes
 
     def __len__(self) -> int:
         return len(self.kind)

@@ -368,7 +368,8 @@ class Reader:
             left_at, self._left_at = self._left_at, None
             if left_at is not None and np.linalg.norm(run.tip[0] - left_at) <= steps[0]:
                 run.tip[0] = left_at  # another tool is put to where the one before has left
-        run = replace(run, second_is=second_is, tip_step=steps[0], second_step=steps[1], rotary=rotary is not None)
+            run = replace(run, rotary=rotary.machine, tip_control=rotary.tip_control)
+        run = replace(run, second_is=second_is, tip_step=steps[0], second_step=steps[1])
         if plane is not None:
             run.second_room[:], run.tip_room[:] = min(plane.room, turn / 2.0), ASIDE * run.tip_step
         self.ready.append(run)

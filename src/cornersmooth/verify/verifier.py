@@ -162,7 +162,7 @@ class Verifier:
         options, text = self._options, self._text
         if isinstance(text, NcProgram):
             elements = Elements(**{column.name: getattr(text, column.name) for column in fields(Elements)})
-            task, read = self._task(rotary=text.rotary, apart=apart), (text, len(text.curves))
+            task, read = self._task(rotary=text.rotary is not None, apart=apart), (text, len(text.curves))
             found = self._found(task, iter([elements]), list(text.events), text.retracts, lambda: read)
             words = "the words of the text: they are looked at where it is read, not afterwards"
             return found.not_verified(words if self._trust.words else "")
