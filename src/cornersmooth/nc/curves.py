@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.arrays import distinct, ranges, some_rows
+from cornersmooth.arrays import ranges, some_rows
 from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc.circles import Circles
@@ -40,7 +40,7 @@ class Shape:
 
 def spelt(values: Floats | Ints, write: Callable[[float], str]) -> Part:
     """A text for each distinct value; mostly the first ones are all that there are."""
-    numbers: NDArray[Any] = distinct(values[:_FEW])
+    numbers: NDArray[Any] = np.array(sorted({*values[:_FEW].tolist()}), values.dtype)
     if len(numbers) == 1 and (values == numbers).all():
         return [write(numbers[0].item()).encode()], np.zeros(len(values), np.int64)
     which = np.searchsorted(numbers, values)

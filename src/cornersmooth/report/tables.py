@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.arrays import angle_between, distinct, dot, norm, square, unit
+from cornersmooth.arrays import angle_between, dot, norm, square, unit
 from cornersmooth.errors import InputError
 from cornersmooth.geometry import nurbs
 from cornersmooth.kinematics.machine import LINEAR
@@ -321,7 +321,7 @@ def path_distances(smoothed: SmoothProgram, rows: Ints, *, dense: bool) -> tuple
             aslant |= np.abs(dot(along, off)) > _SQUARE * norm(along) * norm(off)
         chosen = chosen[aslant]
         number = lines_of(smoothed, rows[chosen]) if dense else np.full(len(chosen), _FINE)
-        for lines in distinct(number):
+        for lines in np.flatnonzero(np.bincount(number)):
             some = chosen[number == lines]
             seen = _seen_from_corners(smoothed, rows[some], nodes(int(lines)))
             for error, (point, tip, lever) in zip(found, seen, strict=False):

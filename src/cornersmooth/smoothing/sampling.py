@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.arrays import distinct, joined_rows, ranges, some_rows, starts, unit
+from cornersmooth.arrays import joined_rows, ranges, some_rows, starts, unit
 from cornersmooth.geometry import nurbs
 from cornersmooth.geometry.arcs import arc_curves, arc_lines, arc_points, arc_weights, divided
 from cornersmooth.model import Bools, Floats, Ints, Numbers, SmoothProgram
@@ -259,7 +259,7 @@ def _fill_transitions(smoothed: SmoothProgram, segments: Segments, batch: _Batch
     poses, last = batch.poses[here], batch.last[here]
     rows = segments.row[poses].astype(np.int64)
     number = halves[rows]
-    for lines in distinct(number):
+    for lines in np.flatnonzero(np.bincount(number)):
         chosen = np.flatnonzero(number == lines)
         u = nodes(int(lines))
         points, levers = construction.points(smoothed, rows[chosen], u)
@@ -275,7 +275,7 @@ def _fill_divided(smoothed: SmoothProgram, segments: Segments, batch: _Batch) ->
     """Inner points of the straight remainders that are written as several lines."""
     construction, tip = construction_of(smoothed.settings.method), smoothed.program.tip
     lines = np.where(segments.has_line[batch.poses] & (batch.last > batch.first), segments.lines[batch.poses], 1)
-    for number in distinct(lines):
+    for number in np.flatnonzero(np.bincount(lines)):
         if number < 2:
             continue
         pose, first = batch.poses[lines == number], batch.first[lines == number]
