@@ -142,6 +142,14 @@ def test_the_spindle_may_be_turned_for_another_tool(control: str, tmp_path: Path
     assert judged(tmp_path, control, (r"^(G1 .*X20\..* Y0\..*)$", rf"{orient}\n\1")).startswith("FAILED")
 
 
+@pytest.mark.parametrize(
+    ("control", "zeros"),
+    [("siemens", ("^(SUPA G0 Z0 D)0$", r"\g<1>00")), ("siemens", ("^D1$", "D01")), ("mitsubishi", ("H4$", "H004"))],
+)
+def test_whole_numbers_may_have_zeros_before_them(control: str, zeros: tuple[str, str], tmp_path: Path) -> None:
+    assert judged(tmp_path, control, zeros).startswith("PASSED")
+
+
 @pytest.mark.parametrize("control", ["fanuc", "siemens", "linuxcnc"])
 def test_codes_may_have_zeros_before_them(control: str, tmp_path: Path) -> None:
     edits = [("^M8$", "M08"), (r" M3$", " M03"), ("^M5$", "M05")]

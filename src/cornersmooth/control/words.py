@@ -33,6 +33,10 @@ MOTION_CODES = (0.0, 1.0, 2.0, 3.0, NURBS)
 BY_WORD: Final = "DC"
 
 
+#: zeros that say nothing in a whole number; that of a program, which is its name, has them
+_ZEROS: Final = re.compile(r"(?<=^[A-NP-Z])0+(?=\d+$)")
+
+
 class Word(NamedTuple):
     """A word of a line."""
 
@@ -51,10 +55,10 @@ class Word(NamedTuple):
 
     @property
     def spelling(self) -> str:
-        """Its text as tables have it: blanks left out, codes without leading zeros."""
+        """Its text as tables have it: blanks left out, codes and whole numbers without leading zeros."""
         if self.name in ("G", "M") and self.text[:1] == self.name and not {*"+-"} & {*self.text}:  # no code has a sign
             return f"{self.name}{self.value:g}"
-        return self.text if self.name == "block" else self.text.replace(" ", "").replace("\t", "")
+        return self.text if self.name == "block" else _ZEROS.sub("", self.text.replace(" ", "").replace("\t", ""))
 
 
 def tools_first(words: Iterable[Word]) -> list[Word]:
