@@ -174,7 +174,8 @@ def new_command(
 
     def called(**given: Any) -> int:
         run = getattr(import_module(f"cornersmooth.cli.{module or name}"), f"run_{name}")
-        click.get_current_context().obj.loaded()
+        if (ending := click.get_current_context().obj) is not None:  # of a process of its own
+            ending.loaded()
         return int(run(Options(**{key: value for key, value in given.items() if value is not None})))
 
     return Command(name, params, callback=called, help=help, epilog=epilog)
