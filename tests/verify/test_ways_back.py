@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import re
 from collections.abc import Iterable, Iterator
 from functools import cache
@@ -10,6 +11,7 @@ import pytest
 
 from cornersmooth.cl import read
 from cornersmooth.model import Program
+from cornersmooth.pipeline import postprocess
 from cornersmooth.settings import Settings
 from cornersmooth.verify import verify
 from nc.cases import Case
@@ -84,9 +86,9 @@ def lines_of(cl: bytes, case: Case) -> tuple[str, ...]:
     return tuple(written(program(cl), case.choose(), Settings(tolerance=0.02))[0].splitlines())
 
 
-def wrong(cl: bytes, case: Case, lines: Iterable[str]) -> set[str]:
-    """Codes of what is found in a text whose head does not say who wrote it."""
-    text = "\n".join([*(re.sub("CORNERSMOOTH", "MADE", line) for line in lines), ""]).encode()
+def wrong(cl: bytes, case: Case, lines: Iterable[str], *, head: str = "MADE") -> set[str]:
+    """Codes of what is found in a text whose head says who wrote it, if need be another."""
+    text = "\n".join([*(re.sub("CORNERSMOOTH", head, line) for line in lines), ""]).encode()
     how = {"control": case.control, "machine": case.choose().machine, "tcp": case.tcp}
     return {problem.code for problem in verify(program(cl), text, tolerance=0.02, **how).problems}
 
@@ -108,6 +110,11 @@ def set_to(line: str, axis: str, value: str) -> str:
     return re.sub(_AXIS.format(axis), lambda word: f"{axis}{'+' if word[1] and value[0] != '-' else ''}{value} ", line)
 
 
+def at_feed(line: str) -> str:
+    """A block of a rapid as a feed move."""
+    return line.replace("FMAX", "F300") if "FMAX" in line else f"{line.replace('G0', 'G1')} F300."
+
+
 def over(lines: tuple[str, ...]) -> list[int]:
     """Blocks that lead over a first position."""
     rapid = [("G0" in line or "FMAX" in line) and has(line, "X") for line in lines]
@@ -115,7 +122,7 @@ def over(lines: tuple[str, ...]) -> list[int]:
 
 
 def mutants(lines: tuple[str, ...]) -> Iterator[tuple[str, list[str]]]:
-    """Wrong ways back at each first position of an upright tool: eight kinds for each."""
+    """Wrong ways back at each first position of an upright tool: nine kinds for each."""
     for k in over(lines):
         before, aside, down, behind = list(lines[:k]), lines[k], lines[k + 1], list(lines[k + 2 :])
         alone = re.sub(_TOOL_AXIS, "", without(down, "X", "Y"))
@@ -124,6 +131,9 @@ def mutants(lines: tuple[str, ...]) -> Iterator[tuple[str, list[str]]]:
         yield f"elsewhere: {k}", [*before, set_to(set_to(aside, "X", "500."), "Y", "900."), aside, down, *behind]
         yield f"X lost: {k}", [*before, without(aside, "X"), down, *behind]
         yield f"Y lost: {k}", [*before, without(aside, "Y"), down, *behind]
+        rapid = next(j for j, line in enumerate(behind) if ("G0" in line or "FMAX" in line) and has(line, "X"))
+        fed = [*behind[:rapid], at_feed(behind[rapid]), *behind[rapid + 1 :]]
+        yield f"the next rapid at feed: {k}", [*before, aside, down, *fed]
         yield f"too deep: {k}", [*before, aside, set_to(down, "Z", "-5."), down, *behind]
         turned = re.sub(r"(K|C3=|TZ\+?)1\.", r"\1-1.", aside).replace("+-", "-")
         turned = re.sub(r"(?<![A-Z])([AB][-+]?)0\.0", r"\g<1>40.0", turned)
@@ -139,7 +149,7 @@ def test_a_wrong_way_back_is_found(case: Case) -> None:
     assert len(over(lines)) == 3
     # three places: each kind of mutant at one of them, in turn
     chosen = [
-        mutant for k, mutant in enumerate(mutants(lines)) if THOROUGH or (k % 8 + k // 8 + CASES.index(case)) % 3 == 0
+        mutant for k, mutant in enumerate(mutants(lines)) if THOROUGH or (k % 9 + k // 9 + CASES.index(case)) % 3 == 0
     ]
     passed = [name for name, changed in chosen if not wrong(CL, case, changed)]
     assert passed == []
@@ -182,3 +192,46 @@ def test_a_rapid_elsewhere_behind_the_last_retract_is_found(case: Case) -> None:
     last = max(k for k, line in enumerate(lines) if re.search(r"G28|G53|SUPA|M91", line))
     last += lines[last].startswith("G91")
     assert wrong(CL, case, [*lines[: last + 1], aside, *lines[last + 1 :]])
+
+
+#: how our head begins, and the code of a block that is not on the list of what a control takes in its place
+_OURS, _NOT_LISTED = "CORNERSMOOTH", "CS571"
+
+
+@cache
+def with_head(cl: bytes, case: Case) -> tuple[str, ...]:
+    """What is written for it, with a head that says how it was made."""
+    stream = io.BytesIO()
+    postprocess(program(cl), stream, Settings(tolerance=0.02), form=case.choose(), verify=False)
+    return tuple(stream.getvalue().decode().splitlines())
+
+
+@pytest.mark.parametrize("case", [case for case in CASES if case.tcp], ids=str)
+def test_a_program_with_our_head_has_no_other_way_around_a_retract(case: Case) -> None:
+    lines = list(with_head(CL, case))
+    assert wrong(CL, case, lines, head=_OURS) == set()
+    first = over(tuple(lines))[0]
+    aside, down = lines[first], lines[first + 1]
+    retract = next(k for k, line in enumerate(lines) if re.search(r"G28|G53|SUPA|M91", line))
+    assert retract < first
+    ways = {
+        "in one block": [*lines[:first], *lines[first + 1 :]],
+        "down with rotary words": [*lines[:first], without(down, "X", "Y"), aside, *lines[first + 1 :]],
+        "without a retract": [*lines[:retract], *lines[retract + 1 :]],
+    }
+    if case.machine:
+        turn = next(line for line in lines if re.search(r"[AB]\+?0", line) and not has(line, "X"))
+        ways["turned under tip control"] = [*lines[:first], turn, *lines[first:]]
+    else:
+        del ways["down with rotary words"]
+    for name, changed in ways.items():
+        assert _NOT_LISTED in wrong(CL, case, changed, head=_OURS), name
+
+
+@pytest.mark.parametrize("case", [case for case in CASES if case.tcp], ids=str)
+def test_a_tilted_tool_of_a_program_with_our_head_comes_in_one_block(case: Case) -> None:
+    lines = list(with_head(TILTED, case))
+    assert wrong(TILTED, case, lines, head=_OURS) == set()
+    down = next(k for k, line in enumerate(lines) if has(line, "X") and has(line, "Z"))
+    aside = [*lines[:down], without(lines[down], "Z"), *lines[down:]]
+    assert _NOT_LISTED in wrong(TILTED, case, aside, head=_OURS)
