@@ -50,13 +50,13 @@ class _Shapes:
     def __len__(self) -> int:
         return len(self.element)
 
-    def only(self, chosen: Ints) -> Self:
+    def only(self, chosen: Ints | slice) -> Self:
         """Some of them."""
         return some_rows(self, chosen)
 
     def part(self, first: int, stop: int) -> Self:
         """Those that are elements from `first` to `stop`, the latter excluded."""
-        found = self.only(np.arange(*np.searchsorted(self.element, (first, stop))))
+        found = self.only(slice(*np.searchsorted(self.element, (first, stop)).tolist()))
         return replace(found, element=found.element - first)
 
     @classmethod
@@ -105,12 +105,18 @@ class Curves(_Shapes):
         size = self.points + self.order
         return np.cumsum(size) - size
 
-    def only(self, chosen: Ints) -> Self:
+    def only(self, chosen: Ints | slice) -> Self:
         """Some of them."""
-        place = ranges(self.first_point[chosen], self.points[chosen])
-        at = ranges(self.first_knot[chosen], (self.points + self.order)[chosen])
+        place, at = _parts(self.points, chosen), _parts(self.points + self.order, chosen)
         rows = {"point": place, "weight": place, "knot": at}
         return replace(self, **{name: values[rows.get(name, chosen)] for name, values in _stored(self).items()})
+
+
+def _parts(size: Ints, chosen: Ints | slice) -> Ints | slice:
+    """Rows of some parts of a table, all of whose parts have these sizes, one after another."""
+    if isinstance(chosen, slice):
+        return slice(int(size[: chosen.start].sum()), int(size[: chosen.stop].sum()))
+    return ranges((np.cumsum(size) - size)[chosen], size[chosen])
 
 
 @dataclass(frozen=True)

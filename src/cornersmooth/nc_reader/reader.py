@@ -115,7 +115,8 @@ class Reader:
     def _rows(self, table: Table) -> None:
         """Take a run of motion blocks."""
         # the first block that moves Z behind a retract is looked at with what it leads to
-        if table.closed and len(table) + len(self._waiting) > FEW_ROWS and not self.retracts.open:
+        leads = self.retracts.open and sum(map(len, self._waiting)) <= FEW_ROWS
+        if table.closed and len(table) + len(self._waiting) > FEW_ROWS and not leads:
             self._flush()
         self._waiting.append(table)
         self.blocks += len(table)

@@ -119,7 +119,7 @@ def _knot_curves(blocks: Blocks) -> Curves:
     bad = (single != order) | few | unclamped | np.logical_or.reduceat(falls | crowded, start)
     order, knot = _measurable(knot, start, order, points, bad)
     point_end = point_rows[np.cumsum(points) - 1]
-    return Curves(head, order, points, blocks.six[point_rows], weight, knot, point_end)
+    return Curves(head, order, points, blocks.six.take(point_rows, axis=0), weight, knot, point_end)
 
 
 def _crowded(knot: Floats, start: Ints, size: Ints, order: Ints) -> Bools:

@@ -72,7 +72,7 @@ def written_motion(nc: Elements, task: Task) -> Motion:
         return Motion(six, index, np.ones(len(nc)), index, bends)
     owner, fraction, last = divided(parts)
     bends = step_bend[owner]
-    tip, other = nc.tip[owner], nc.second[owner]
+    tip, other = nc.tip.take(owner, axis=0), nc.second.take(owner, axis=0)
     for group, at, inner, spans in curved:
         if not spans.shape[1]:
             continue
