@@ -39,7 +39,7 @@ def off(original, written, tool, edge, **asked):
 def test_a_plane_cut_by_a_straight_move_is_met_exactly(tool):
     path = [[0, 0, 0], [20, 0, 0], [50, 0, 0]]
     shift = np.array([0.0, 0.03, 0.0])
-    points, own, written = off(straight(path), straight(path + shift), tool, 12.0)
+    points, own, written = off(straight(path), straight(path + shift), tool, 12.0, stations=4)
     assert len(points) > 20
     # the points lie on the swept volume, and their normals across the motion
     np.testing.assert_allclose(own, 0.0, atol=1e-9)
@@ -79,7 +79,7 @@ def test_a_corner_of_a_cylinder_cut_off_by_a_line_is_known_in_closed_form(turn):
     written = straight([a, start, end, b])
     tool = Tool.of(2 * radius)
     # the outermost point of the corner: the line passes the corner at cut·sin(α/2)
-    points, own, _ = off(original, written, tool, 10.0)
+    points, own, _ = off(original, written, tool, 10.0, stations=4)
     outer = np.flatnonzero((points.station == 1) & (points.side == 1))
     assert len(outer) == 7
     undercut = distance_to_motion(points.point[outer], written, tool, 10.0, reach=5.0)
@@ -95,6 +95,19 @@ def test_a_corner_of_a_cylinder_cut_off_by_a_line_is_known_in_closed_form(turn):
         line = aside if 0.0 <= foot <= np.linalg.norm(end - start) else np.inf
         expected = min(line, radius if s >= cut else np.inf, np.linalg.norm((point[0] - start)[:2])) - radius
         assert distance_to_motion(point, written, tool, 10.0, reach=5.0) == pytest.approx(expected, abs=1e-6)
+
+
+def test_the_largest_overcut_is_found_within_an_inner_corner():
+    """It is where the two sides meet, at R / cos(α/2) from the corner, between the poses of long segments."""
+    radius, leg, cut, alpha = 3.0, 20.0, 2.0, np.radians(60.0)
+    ahead = np.array([np.cos(alpha), np.sin(alpha), 0.0])
+    legs = np.array([-leg, 0.0, 0.0]), leg * ahead
+    original = straight([legs[0], [0, 0, 0], legs[1]])
+    written = straight([legs[0], [-cut, 0.0, 0.0], cut * ahead, legs[1]])
+    _, own, over = off(original, written, Tool.of(2 * radius), 10.0)
+    deepest = radius + cut * np.sin(alpha / 2) - radius / np.cos(alpha / 2)
+    apart = leg / 500  # of 2,000 stations, half are in two segments
+    assert deepest - apart < -over[own > -1e-9].min() <= deepest + 1e-9
 
 
 def test_an_axis_that_turns_about_the_tip_leaves_a_plane_on_both_sides():

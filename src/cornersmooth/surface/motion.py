@@ -178,13 +178,13 @@ def envelope_points(
     """Points on the envelope of a motion, up to the cutting `edge`, mm, over the tip.
 
     There are `levels` points on the flank, and as many on a corner arc, at about `stations` places along the path:
-    middles of segments, and the corners between them, where the normal is that halfway between both sides.
+    within segments, evenly, and the corners between them, where the normal is that halfway between both sides.
     """
     out, up, drop = _levels(tool, edge, levels)
-    middle, corner = _stations(motion, stations)
-    sides = [_normals(motion, middle, np.full(len(middle), 0.5), out, up, drop)]
-    place = [motion.at(middle, np.full(len(middle), 0.5))]
-    order = [2 * middle]
+    within, share, corner = _stations(motion, stations)
+    sides = [_normals(motion, within, share, out, up, drop)]
+    place = [motion.at(within, share)]
+    order = [2 * within]
     if len(corner):
         before = _normals(motion, corner - 1, np.ones(len(corner)), out, up, drop)
         after = _normals(motion, corner, np.zeros(len(corner)), out, up, drop)
@@ -227,15 +227,21 @@ def _levels(tool: Tool, edge: float, levels: int) -> tuple[Floats, Floats, Float
     return tool.profile(arc, flank)
 
 
-def _stations(motion: RuledMotion, stations: int) -> tuple[Ints, Ints]:
-    """Segments whose middles, and segments at whose starts points are taken: evenly among all."""
+def _stations(motion: RuledMotion, stations: int) -> tuple[Ints, Floats, Ints]:
+    """Segments and shares of them, and segments at whose starts points are taken: evenly among all.
+
+    A segment has several where there are few: at inner corners most is cut too deep just where the next one begins to
+    cut.
+    """
     every = np.arange(len(motion))
-    corner = every[motion.joined]
     few = max(stations // 2, 1)
-    return tuple(  # type: ignore[return-value]
+    segment, corner = (
         rows if len(rows) <= few else rows[np.unique(np.linspace(0, len(rows) - 1, few).astype(np.int64))]
-        for rows in (every, corner)
+        for rows in (every, every[motion.joined])
     )
+    count = max(few // max(len(segment), 1), 1)
+    share = (np.arange(count) + 0.5) / count
+    return np.repeat(segment, count), np.tile(share, len(segment)), corner
 
 
 def _normals(motion: RuledMotion, segment: Ints, share: Floats, out: Floats, up: Floats, drop: Floats) -> Floats:
