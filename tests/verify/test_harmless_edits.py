@@ -150,6 +150,15 @@ def test_whole_numbers_may_have_zeros_before_them(control: str, zeros: tuple[str
     assert judged(tmp_path, control, zeros).startswith("PASSED")
 
 
+def test_the_state_that_curves_need_may_have_zeros_before_its_number(tmp_path: Path) -> None:
+    (tmp_path / "part.cls").write_text(CL)
+    text = _curves("mitsubishi", "g6.2")
+    assert "G5 P10000" in text
+    (tmp_path / "part.nc").write_text(text.replace("G5 P10000", "G5 P010000"))
+    found = run("verify", "part.cls", "part.nc", "-e", "0.02", "--control", "mitsubishi", cwd=tmp_path)
+    assert found.stdout.startswith(b"PASSED"), found.stdout
+
+
 @pytest.mark.parametrize("control", ["fanuc", "siemens", "linuxcnc"])
 def test_codes_may_have_zeros_before_them(control: str, tmp_path: Path) -> None:
     edits = [("^M8$", "M08"), (r" M3$", " M03"), ("^M5$", "M05")]

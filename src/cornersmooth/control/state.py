@@ -226,7 +226,7 @@ class State:
             value = word.spelling if value == "." else value
             changes, lettered = _change(group)
             if lettered and value is not None:
-                own = (other.text.replace(" ", "") for other in words if other.name in row.beside)
+                own = (other.spelling for other in words if other.name in row.beside)
                 value = " ".join((value, *own))
             # LinuxCNC takes the feed as zero behind any word of its kind, the same one included
             if self.groups.get(group) != value or value is None or group == "feed":
