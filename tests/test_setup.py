@@ -130,3 +130,12 @@ def test_feed_is_that_of_moves_without_one(tmp_path: Path) -> None:
     one = json.loads(run("setup", "bare.cls", "--feed", "3000", *how, cwd=tmp_path).stdout)
     other = json.loads(run("setup", "fed.cls", *how, cwd=tmp_path).stdout)
     assert one["today"]["seconds"] == pytest.approx(other["today"]["seconds"], rel=1e-9)
+
+
+def test_curves_have_no_rotary_words_and_are_planned_all_the_same(tmp_path: Path) -> None:
+    source = tmp_path / "impeller.cls"
+    source.write_bytes(beginning(IMPELLER, 40))
+    how = (source, "-f", "g6.2", "--limits", "table-ac", "--json")
+    found = json.loads(run("setup", *how, "--tilt", "0", cwd=tmp_path).stdout)
+    made = json.loads(run("smooth", *how, "-o", "part.nc", cwd=tmp_path).stdout)
+    assert found["today"]["seconds"] == pytest.approx(made["times"]["written_s"], rel=1e-3)

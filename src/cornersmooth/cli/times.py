@@ -329,7 +329,10 @@ _WORTH = 0.1
 def run_setup(given: Options) -> int:
     """Do the work of the command; return its exit code."""
     machine = given.load_limits()
-    form = choose_form(given.load_control(), given.form, machine=machine)
+    control = given.load_control()
+    wanted = control.forms.get(given.form or "")
+    curves = wanted is not None and bool(wanted.curve)  # have no rotary words
+    form = choose_form(control, given.form, machine=None if curves else machine)
     data, name = read_input(given.source, size_limit=not given.no_size_limit)
     with progress_bar(given.quiet) as progress:
         found = find_setups(
@@ -337,6 +340,7 @@ def run_setup(given: Options) -> int:
             form,
             given.settings(),
             given.path_limits(),
+            axes=machine,
             tilt=given.tilt,
             turns=not given.no_turn,
             plans=given.plans,

@@ -152,6 +152,7 @@ def find_setups(
     settings: Settings | None = None,
     limits: Limits | None = None,
     *,
+    axes: Machine | None = None,
     tilt: float = 45.0,
     turns: bool = True,
     plans: int = 6,
@@ -166,6 +167,8 @@ def find_setups(
     ----------
     form : Form
         What the program is written in, with the machine that it runs on.
+    axes : Machine, optional
+        The machine where the form names none, as curves do.
     tilt : float, degrees
         Tilts about X and Y are up to this, either way.
     turns : bool
@@ -178,7 +181,7 @@ def find_setups(
     Raises InputError: the machine reaches the poses of no setup. SettingsError CS263: the machine does not say how fast
     its axes may go.
     """
-    machine = form.machine
+    machine = form.machine if axes is None else axes
     if machine is None or not machine.dynamics:
         what = "the machine does not say how fast its axes may go"
         raise SettingsError("CS263", what, "name a machine whose file has [dynamics.X] and so on")
@@ -198,7 +201,7 @@ def find_setups(
 
     def plan(rating: Rating) -> Rating:
         try:
-            seconds = _planned(turned(program, rating.setup, pivot), form, settings, limits)
+            seconds = _planned(turned(program, rating.setup, pivot), form, settings, limits, machine)
             return replace(rating, seconds=seconds, why="")
         except InputError as error:
             return replace(rating, why=error.what)
@@ -218,7 +221,7 @@ def find_setups(
     rated |= {one.setup: one for one in planned}
     gone = sum(bool(one.why) for one in rated.values())
     if gone == len(rated):
-        _planned(program, form, settings, limits)  # which raises what is out of reach today
+        _planned(program, form, settings, limits, machine)  # which raises what is out of reach today
     return Setups(pivot, planned[0], tuple(best), len(rated), gone)
 
 
@@ -278,10 +281,10 @@ def _estimate(program: Program, machine: Machine, path: Path, settings: Settings
     return float((time * (ends[1:] + ends[:-1])).sum() / 2.0)
 
 
-def _planned(program: Program, form: Form, settings: Settings, limits: Limits) -> float:
+def _planned(program: Program, form: Form, settings: Settings, limits: Limits, axes: Machine) -> float:
     """Time of a program as it is written, s."""
     stream = io.BytesIO()
     path = smooth(program, settings, form=form)
     nc.write(path, stream, form=form)
-    timing = Timing.of(form, path.settings, limits)
+    timing = Timing.of(form, path.settings, limits, axes)
     return math.nan if timing is None else timing.written(stream.getvalue(), program)[0]
