@@ -321,7 +321,7 @@ def path_distances(smoothed: SmoothProgram, rows: Ints, *, dense: bool) -> tuple
             aslant |= np.abs(dot(along, off)) > _SQUARE * norm(along) * norm(off)
         chosen = chosen[aslant]
         number = lines_of(smoothed, rows[chosen]) if dense else np.full(len(chosen), _FINE)
-        for lines in np.flatnonzero(np.bincount(number)):
+        for lines in sorted(set(number.tolist())):
             some = chosen[number == lines]
             seen = _seen_from_corners(smoothed, rows[some], nodes(int(lines)))
             for error, (point, tip, lever) in zip(found, seen, strict=False):

@@ -259,7 +259,7 @@ def _fill_transitions(smoothed: SmoothProgram, segments: Segments, batch: _Batch
     poses, last = batch.poses[here], batch.last[here]
     rows = segments.row[poses].astype(np.int64)
     number = halves[rows]
-    for lines in np.flatnonzero(np.bincount(number)):
+    for lines in sorted(set(number.tolist())):
         chosen = np.flatnonzero(number == lines)
         u = nodes(int(lines))
         points, levers = construction.points(smoothed, rows[chosen], u)
@@ -275,7 +275,7 @@ def _fill_divided(smoothed: SmoothProgram, segments: Segments, batch: _Batch) ->
     """Inner points of the straight remainders that are written as several lines."""
     construction, tip = construction_of(smoothed.settings.method), smoothed.program.tip
     lines = np.where(segments.has_line[batch.poses] & (batch.last > batch.first), segments.lines[batch.poses], 1)
-    for number in np.flatnonzero(np.bincount(lines)):
+    for number in sorted(set(lines.tolist())):
         if number < 2:
             continue
         pose, first = batch.poses[lines == number], batch.first[lines == number]
