@@ -88,17 +88,14 @@ def _cells(row: Row, before: float) -> str:
     return f"{row.seconds:.1f} s (\N{MINUS SIGN}{100 * (1 - row.seconds / before):.0f} %) | {row.blocks:,}"
 
 
-def first_program(*more: str) -> tuple[str, str, str]:
-    """What the first command of README.md prints, and lines of the CL file and of the program; and the program.
-
-    `more` are further words for the command.
-    """
+def first_program() -> tuple[str, str, str]:
+    """What the first command of README.md prints, and lines of the CL file and of the program; and the program."""
     source = (SAMPLES / "impeller.cls").read_text()
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         Path("part.cls").write_text(source)
         said = io.StringIO()
         with contextlib.redirect_stderr(said):
-            assert run(["smooth", "part.cls", "-e", "0.01", "--limits", MACHINE, "-o", "part.nc", *more]) == 0
+            assert run(["smooth", "part.cls", "-e", "0.01", "--limits", MACHINE, "-o", "part.nc"]) == 0
         text = Path("part.nc").read_text()
     shown = (said.getvalue().splitlines()[:OUTPUT], [*source.splitlines()[CL_LINES], "", *text.splitlines()[BLOCKS]])
     output, lines = ("```text\n" + "\n".join(one) + "\n...\n```\n" for one in shown)

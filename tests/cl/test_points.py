@@ -179,6 +179,30 @@ def test_unused_columns_are_named():
     assert any("name, load" in finding.text for finding in program.findings)
 
 
+@pytest.mark.parametrize(
+    ("column", "cells", "line"),
+    [
+        ("tool", (1, 1, 2), 4),
+        ("T", (3, 3, 3, 1), 5),
+        ("spindle [rpm]", (8000, 9000, 8000), 3),
+        ("coolant", ("on", "ON", "off"), 4),
+        ("M", ("M8", "", ""), 3),
+    ],
+)
+def test_a_change_of_tool_or_speed_is_an_error(column: str, cells: tuple[object, ...], line: int):
+    text = f"x,y,z,i,j,k,{column}\n" + "".join(f"{n},0,0,0,0,1,{cell}\n" for n, cell in enumerate(cells))
+    with pytest.raises(InputError, match=rf":{line}: .*the column '{column.split()[0]}"):
+        read(text)
+
+
+@pytest.mark.parametrize(
+    ("column", "cells"), [("tool", (4, 4, 4)), ("t", (0, 0.5, 1.25)), ("coolant", ("on", "on", "On")), ("s", (0, 1, 2))]
+)
+def test_orders_that_never_change_and_times_are_columns_not_used(column: str, cells: tuple[object, ...]):
+    text = f"x,y,z,i,j,k,{column}\n" + "".join(f"{n},0,0,0,0,1,{cell}\n" for n, cell in enumerate(cells))
+    assert len(read(text)) == 3
+
+
 # text around the rows
 
 

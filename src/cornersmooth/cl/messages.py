@@ -106,6 +106,10 @@ ERRORS: Final[dict[str, tuple[str, str]]] = {
         "give the tool axis as a unit vector: x,y,z,i,j,k",
     ),
     "CS166": ("{cell!r} in the column {column!r} is neither rapid nor feed", "{want}"),
+    "CS191": (
+        "the column {column!r} changes, and a table of positions has no orders",
+        "write a table for each tool and speed, or take the column out",
+    ),
 }
 
 #: code: (severity, sentence)

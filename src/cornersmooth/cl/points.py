@@ -78,7 +78,7 @@ def looks_like_points(data: bytes) -> bool:
 def read_points(
     data: bytes, *, name: str, units: Units | None = None, lenient: bool = False, rules: TableRules = TableRules()
 ) -> Program:
-    """Read a CSV or column file: every row is a linear move to its pose, at feed or rapid (InputError CS150-CS166).
+    """Read a CSV or column file: every row is a linear move to its pose, at feed or rapid (InputError CS150-CS191).
 
     A column says which moves are rapid; where there is none, the first is, and all others are at feed. Columns are
     named by a header line (also one in a comment) or known from their number: 3 are tips with axis +Z, 6 are tip and
@@ -95,6 +95,10 @@ def read_points(
     if not len(values):
         raise error("CS150", name, 1)
     rows = _Rows(name, values, line, columns)
+    for column in columns.orders:
+        step = np.diff(values[:, column])
+        if step.any() and not (step > 0).all():  # what rises in every row is a time, a length or a counter
+            raise error("CS191", name, int(line[1:][step != 0][0]), column=columns.names[column])
     written = columns.units if units in (None, columns.units) else None  # else the header does not count
     factor = rules.scale * (columns.factor if written else 1.0)
     far = np.flatnonzero(np.abs(rows.take(columns.wanted)).max(axis=1) * max(factor, 1.0) > FARTHEST)

@@ -48,6 +48,13 @@ _PASSES = frozenset(
     """.split()
 )
 _COUNTERS = ("n", "no", "nr", "num", "number", "id", "idx", "index", "line", "row", "point", "pose", "t", "time")
+#: columns that order a tool, a speed, coolant or a function, which a table of positions does not carry to the control
+_ORDERS = frozenset(
+    """
+    t tool toolno toolnr toolnumber toolid toolname toolindex s spindle spindlespeed rpm coolant mist flood m mcode
+    mfunction aux
+    """.split()
+)
 
 #: units a header may state after a name, as in ``x [mm]``
 _LENGTHS: dict[str, tuple[Units, float]] = {
@@ -90,6 +97,8 @@ class Columns:
     rapid_as: Rapid = "word"
     rapid_name: str = ""  #: of that column, for messages
     passes: int | None = None  #: numbers the passes
+    orders: tuple[int, ...] = ()  #: of a tool, a speed or a function
+    names: tuple[str, ...] = ()  #: of all columns, for messages
     unused: tuple[str, ...] = ()  #: names of columns that are not read; counters and times are not counted among them
     units: Units | None = None  #: what the header says about units
     factor: float = 1.0  #: of lengths, to `units`
@@ -167,6 +176,8 @@ def from_header(text: str, file: str, line: int, rotary: tuple[str, ...] = ()) -
         rapid_as="word" if rapid is None else _RAPIDS[left[rapid]],
         rapid_name="" if rapid is None else names[rapid].strip(),
         passes=next((c for c, name in rest.items() if name in _PASSES), None),
+        orders=tuple(c for c, name in enumerate(left) if name in _ORDERS and c not in used),
+        names=tuple(name.strip() for name in names),
         unused=unused,
         units=next(iter(both), None),
         factor=next((factor for _, factor in found[False]), 1.0),

@@ -10,6 +10,7 @@ import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from zlib import crc32
 
 import numpy as np
 
@@ -79,7 +80,8 @@ def numbers(text: PointText, columns: Columns, file: str) -> tuple[Floats, Ints]
     """Read the rows of a cleaned file: (n, columns.width) float64, and the line of each.
 
     The columns say which of them must hold a number, and which may (the feed); whatever stands in the others becomes
-    NaN where it is no number. Raises InputError CS151, CS152, CS153, CS164, CS166 with the first row that does not fit.
+    NaN where it is no number. Words of a column of orders become numbers, the same for the same word.
+    Raises InputError CS151, CS152, CS153, CS164, CS166 with the first row that does not fit.
     """
     tables, lines = [], []
     first, start = text.first_line, 0
@@ -111,6 +113,9 @@ def careful(chunk: bytes, columns: Columns, first_line: int, file: str) -> tuple
         row = [_number(cell) for cell in cells]
         if columns.rapid is not None:
             row[columns.rapid] = _rapid(cells[columns.rapid], columns, file, first_line + offset)
+        for column in columns.orders:
+            if math.isnan(row[column]):  # a word: the same number for the same word
+                row[column] = -1.0 - crc32(cells[column].lower().encode())
         for column in used:
             if not math.isfinite(row[column]) and (cells[column] or column in columns.wanted):
                 cell = cells[column]
