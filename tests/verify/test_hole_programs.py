@@ -97,6 +97,7 @@ RANDOM_REFUSED_ONCE = {
     8601301: "words behind a tap that is left out, where the next rapid leads",
     8800022: "a bore whose way up ends where the next tool begins",
     9000032: "curves in lines that are not uniform: their number is negative, and counting them failed",
+    9000146: "taps left out, and a rapid along the tool where the next tool has a pose, too",
     8910507: "a tap left out, and a rapid to the same pose with the next tool, twice",
     8910811: "a tap left out, and a rapid over it by digits that an ε of a thousandth shows",
     8800032: "taps left out, and the same holes drilled from where the tool was before them",

@@ -168,7 +168,7 @@ class Parse:
             rapid = not lines.feeds(element)
             along.check_return(element, lines)
             due = self._due(following, element)
-            if self._reaches(due, element):
+            if self._reaches(due, element) and (due == following or self._is_there(due, element)):
                 break
             idle = lines.stands(element) or (rapid and stop >= 0 and lines.negligible(element))
             if idle and not (rapid and stop >= 0 and self._comes_down_first(stop, element)):
