@@ -14,6 +14,7 @@ from cornersmooth.control.table import table_of
 from cornersmooth.errors import Verdict
 from cornersmooth.kinematics import load_machine
 from cornersmooth.nc import choose_form, control_tables
+from cornersmooth.nc_reader.dialects import dialect_of
 from cornersmooth.pipeline import postprocess
 from cornersmooth.settings import Settings
 from cornersmooth.tables import Shelf
@@ -43,7 +44,7 @@ AIR = {
     "siemens": ('XAIR = ["M978"]', 'M978 = "coolant=XAIR;; compared"', ["M978", "M8", "M978", "M9"]),
     "haas": (
         'XAIR = ["M983"]',
-        'M983 = "coolant=XAIR;; compared"\nM984 = "coolant=OFF;; compared"',
+        'M983 = "coolant=XAIR;; compared"\nM984 = "coolant=-XAIR;; compared"',
         ["M983", "M984", "M8", "M9", "M983", "M984"],
     ),
 }
@@ -53,7 +54,7 @@ AIR = {
 def _with_air(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[None]:
     """Tables of both sides with one entry more; HEIDENHAIN has none."""
     written = Shelf.built_in
-    caches = (control_tables._built_in, word_tables.word_table, table_of)
+    caches = (control_tables._built_in, word_tables.word_table, table_of, dialect_of)
 
     def table(self: Shelf, name: str) -> str:
         text = written(self, name)

@@ -15,7 +15,7 @@ from typing import Final
 
 import numpy as np
 
-from cornersmooth.control.table import FRAME, PRESET, Group, Row, Table, group_of
+from cornersmooth.control.table import ENDS, FRAME, PRESET, Group, Row, Table, after_word, group_of
 from cornersmooth.control.words import Line, Word, filled
 from cornersmooth.model import Bools, Floats
 
@@ -224,6 +224,10 @@ class State:
         does: set[str] = set()
         for group, value in row.sets:
             value = word.spelling if value == "." else value
+            if ends := self.table.ends.get(group):
+                stays = after_word(self.groups[group], value, ends)
+                # another tool may have ended what only a word of its own ends
+                value = stays if stays == value or (value or "").startswith(ENDS) else None
             changes, lettered = _change(group)
             if lettered and value is not None:
                 own = (other.spelling for other in words if other.name in row.beside)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from cornersmooth.control.table import Means
+from cornersmooth.control.table import ENDS, Means, after_word
 from cornersmooth.nc_reader.elements import RETRACT, Event
 
 #: decimals of a spindle speed that count: FANUC's S takes whole numbers only
@@ -52,15 +52,22 @@ def of_m(value: float, means: Means) -> tuple[str, float | str]:
     return means.get(f"M{value:g}", ("auxiliary", value))
 
 
+def is_end(value: float | str) -> bool:
+    """Whether nothing turns or runs any more with a value."""
+    return value in ENDINGS or str(value).startswith(ENDS)
+
+
 def said(events: Sequence[Event], means: Means) -> list[Token]:
     """What the words of the NC program do, each before its element; `means` as of `Table.means`."""
     tokens: list[Token] = []
     chosen: float | None = None
+    ends = frozenset(value for kind, value in means.values() if kind == "coolant" and value.startswith(ENDS))
+    coolant: str | None = "OFF"
     words = [(event.letter, event.value) for event in events]
     changes = _CHANGE in words
     # R0 of M91, and what ends with the tool
     idle = [
-        word == ("G", 40.0) or word[0] == RETRACT or (word[0] == "M" and of_m(word[1], means)[1] in ENDINGS)
+        word == ("G", 40.0) or word[0] == RETRACT or (word[0] == "M" and is_end(of_m(word[1], means)[1]))
         for word in words
     ]
     for k, (event, word) in enumerate(zip(events, words, strict=True)):
@@ -72,8 +79,12 @@ def said(events: Sequence[Event], means: Means) -> list[Token]:
                 meaning = "next tool", value
         elif word == _CHANGE:
             meaning = None if chosen is None else ("tool", chosen)
+            coolant = "OFF"  # the change stops it
         elif letter == "M":
             meaning = of_m(value, means)
+            if meaning[0] == "coolant":
+                coolant = after_word(coolant, str(meaning[1]), ends)
+                meaning = "coolant", coolant or ""
         elif word == ("G", 4.0):
             meaning = "dwell", round(float(event.text))
         elif letter == "G" and value in _CODES:
