@@ -195,7 +195,7 @@ def run_one(data: bytes, options: dict[str, object], *, compare: bool) -> str:
 
 
 def _apt(data: bytes, *, fast: bool) -> object:
-    find_plain = bulk.find_plain if fast else lambda text, first: None
+    find_plain = bulk.find_plain if fast else lambda text: None
     try:
         with patch.object(bulk, "find_plain", find_plain):
             program = read_apt(clean(data, "fuzz"), name="fuzz")
