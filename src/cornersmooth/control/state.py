@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Final
 
 import numpy as np
 
-from cornersmooth.control.table import ENDS, FRAME, PRESET, Group, Row, Table, after_word, group_of
+from cornersmooth.control.table import FRAME, PRESET, Group, Means, Row, Table, group_of
 from cornersmooth.control.words import Line, Word, filled
 from cornersmooth.model import Bools, Floats
 
@@ -224,7 +224,7 @@ class State:
         does: set[str] = set()
         for group, value in row.sets:
             value = word.spelling if value == "." else value
-            if ends := self.table.ends.get(group):
+            if group == "coolant" and (ends := ends_of(self.table.means)):
                 stays = after_word(self.groups[group], value, ends)
                 # another tool may have ended what only a word of its own ends
                 value = stays if stays == value or (value or "").startswith(ENDS) else None
@@ -255,6 +255,22 @@ class State:
             self.place[letter] = math.nan if distance is None else given[letter] + added
         if 0 < len(VECTOR & named) < len(VECTOR):  # what the others are then is not known
             self.lose_place(VECTOR)
+
+
+#: before a value that a word of its own ends
+ENDS: Final = "-"
+
+
+def ends_of(means: Means) -> frozenset[str]:
+    """Values of coolant that each end one other alone, as `Table.means` has them."""
+    return frozenset(value for kind, value in means.values() if kind == "coolant" and value.startswith(ENDS))
+
+
+def after_word(before: str | None, value: str | None, ends: Set[str]) -> str | None:
+    """Return what holds in a group after a word for a value, where words for `ends` each end one value alone."""
+    if value is not None and value.startswith(ENDS):
+        return "OFF" if before in (PRESET, value.removeprefix(ENDS)) else before
+    return before if before is not None and ENDS + before in ends else value
 
 
 @cache

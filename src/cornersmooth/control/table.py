@@ -37,8 +37,7 @@ WORDS
     one that has that letter, ``G54.2 P0`` that word.
 EFFECTS
     ``GROUP=VALUE`` sets a modal group. The value ``.`` is the word itself, ``?`` is not known. All others: `LOSES`.
-    What is compared with the CL file names its word: ``coolant=FLOOD``, ``stop=OPSTOP``. ``coolant=-THRU`` ends that
-    value alone, and no other word does: `after_word`.
+    What is compared with the CL file names its word: ``coolant=FLOOD``; ``coolant=-THRU`` alone ends that value.
 LETTERS
     What belongs to the word in its block, and so is no place and no feed.
 RULES; WHAT IT IS
@@ -57,7 +56,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable, Iterable, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cache, cached_property, lru_cache
 from itertools import chain
@@ -157,17 +156,6 @@ LOSES: Final[Mapping[str, str]] = {
 #: groups and effects that the CL file has words for, and what effects are that have another name there
 _IN_CL: Final = frozenset(("spindle", "coolant", "stop", "end", "compensation", "register", "offset"))
 _ALIKE: Final = {"end": "anything", "register": "length", "offset": "length"}
-
-#: before a value that a word of its own ends
-ENDS: Final = "-"
-
-
-def after_word(before: str | None, value: str | None, ends: Set[str]) -> str | None:
-    """Return what holds in a group after a word for a value, where words for `ends` each end one value alone."""
-    if value is not None and value.startswith(ENDS):
-        return "OFF" if before in (PRESET, value.removeprefix(ENDS)) else before
-    return before if before is not None and ENDS + before in ends else value
-
 
 #: a number, where a row has a letter alone
 _NUMBER: Final = r"[-+]?[\d.]+"
@@ -384,12 +372,6 @@ class Table:
         """What words of the control do beside the motion, as the CL file has it."""
         effects = ((word, effect.partition("=")) for word, row in self.named.items() for effect in row.effects)
         return {word: (kind, value) for word, (kind, _, value) in effects if kind in _IN_CL and value not in (".", "?")}
-
-    @cached_property
-    def ends(self) -> Mapping[str, frozenset[str]]:
-        """Values that end one other value alone, by the groups that have such."""
-        sets = [one for row in self.named.values() for one in row.sets if (one[1] or "").startswith(ENDS)]
-        return {group: frozenset(value for name, value in sets if name == group and value) for group, _ in sets}
 
     @cached_property
     def _with_others(self) -> frozenset[str]:

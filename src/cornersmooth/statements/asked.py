@@ -12,7 +12,8 @@ from typing import Self
 
 import numpy as np
 
-from cornersmooth.control.table import ENDS, Means
+from cornersmooth.control.state import ENDS
+from cornersmooth.control.table import Means
 from cornersmooth.model import Ints, Move, Program, Statement
 from cornersmooth.statements import work_offset_of
 from cornersmooth.statements.tokens import SPEED_DECIMALS, Token, of_m

@@ -11,7 +11,8 @@ from dataclasses import dataclass, field
 from itertools import zip_longest
 from typing import Final
 
-from cornersmooth.control.table import ENDS, Means
+from cornersmooth.control.state import ENDS
+from cornersmooth.control.table import Means
 from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.statements.tokens import ENDINGS, Token
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from cornersmooth.control.table import ENDS, Means, after_word
+from cornersmooth.control.state import ENDS, after_word, ends_of
+from cornersmooth.control.table import Means
 from cornersmooth.nc_reader.elements import RETRACT, Event
 
 #: decimals of a spindle speed that count: FANUC's S takes whole numbers only
@@ -61,8 +62,7 @@ def said(events: Sequence[Event], means: Means) -> list[Token]:
     """What the words of the NC program do, each before its element; `means` as of `Table.means`."""
     tokens: list[Token] = []
     chosen: float | None = None
-    ends = frozenset(value for kind, value in means.values() if kind == "coolant" and value.startswith(ENDS))
-    coolant: str | None = "OFF"
+    ends, coolant = ends_of(means), "OFF"
     words = [(event.letter, event.value) for event in events]
     changes = _CHANGE in words
     # R0 of M91, and what ends with the tool
@@ -83,8 +83,8 @@ def said(events: Sequence[Event], means: Means) -> list[Token]:
         elif letter == "M":
             meaning = of_m(value, means)
             if meaning[0] == "coolant":
-                coolant = after_word(coolant, str(meaning[1]), ends)
-                meaning = "coolant", coolant or ""
+                coolant = after_word(coolant, str(meaning[1]), ends) or ""
+                meaning = "coolant", coolant
         elif word == ("G", 4.0):
             meaning = "dwell", round(float(event.text))
         elif letter == "G" and value in _CODES:

@@ -9,7 +9,8 @@ from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Final
 
-from cornersmooth.control.table import CONTROLS, ENDS, Table, table_of, word_table
+from cornersmooth.control.state import ENDS
+from cornersmooth.control.table import CONTROLS, Table, table_of, word_table
 from cornersmooth.control.words import Lexer, Line, Word, refused, tools_first
 from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.nc_reader.acts import Acts, Beside, Move, Running
