@@ -95,7 +95,6 @@ class Columns:
     feed: int | None = None
     rapid: int | None = None  #: says which moves are rapid, as `rapid_as` has it
     rapid_as: Rapid = "word"
-    rapid_name: str = ""  #: of that column, for messages
     passes: int | None = None  #: numbers the passes
     orders: tuple[int, ...] = ()  #: of a tool, a speed or a function
     names: tuple[str, ...] = ()  #: of all columns, for messages
@@ -174,7 +173,6 @@ def from_header(text: str, file: str, line: int, rotary: tuple[str, ...] = ()) -
     return Columns(
         *(len(names), tip, second, meaning, feed, rapid),
         rapid_as="word" if rapid is None else _RAPIDS[left[rapid]],
-        rapid_name="" if rapid is None else names[rapid].strip(),
         passes=next((c for c, name in rest.items() if name in _PASSES), None),
         orders=tuple(c for c, name in enumerate(left) if name in _ORDERS and c not in used),
         names=tuple(name.strip() for name in names),

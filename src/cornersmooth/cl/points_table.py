@@ -163,7 +163,7 @@ def _rapid(cell: str, columns: Columns, file: str, line: int) -> float:
     if word in _FEED_WORDS or (not word and columns.rapid_as == "flag"):
         return FED
     wanted = {"flag": "give 1 or 0", "code": "give G0 or G1", "word": "give rapid or feed in words"}
-    raise error("CS166", file, line, cell=cell, column=columns.rapid_name, want=wanted[columns.rapid_as])
+    raise error("CS166", file, line, cell=cell, column=columns.names[columns.rapid or 0], want=wanted[columns.rapid_as])
 
 
 def is_row(line: str) -> bool:

@@ -261,6 +261,11 @@ class State:
 ENDS: Final = "-"
 
 
+def is_off(value: float | str) -> bool:
+    """Whether a value of a group switches it off: any other, or one alone."""
+    return value == "OFF" or str(value).startswith(ENDS)
+
+
 def ends_of(means: Means) -> frozenset[str]:
     """Values of coolant that each end one other alone, as `Table.means` has them."""
     return frozenset(value for kind, value in means.values() if kind == "coolant" and value.startswith(ENDS))

@@ -12,7 +12,7 @@ from typing import Self
 
 import numpy as np
 
-from cornersmooth.control.state import ENDS
+from cornersmooth.control.state import is_off
 from cornersmooth.control.table import Means
 from cornersmooth.model import Ints, Move, Program, Statement
 from cornersmooth.statements import work_offset_of
@@ -320,8 +320,7 @@ def asked(asking: Asking, poses: Ints, means: Means) -> list[Token]:
     for k, one in enumerate(tokens):
         if one.kind == "auxiliary":
             kind, value = of_m(float(one.value), means)
-            value = "OFF" if str(value).startswith(ENDS) else value
-            tokens[k] = replace(one, kind=kind, value=value)
+            tokens[k] = replace(one, kind=kind, value="OFF" if is_off(value) else value)
     homes = {move[one.pose]: one.line for one in reversed(statements) if one.word == "GOHOME" and not one.args}
     tokens += [Token("home", "", place, line) for place, line in homes.items()]
     line = max((item.line for item in statements if item.word in ("FINI", "END")), default=0)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from itertools import zip_longest
 from typing import Final
 
-from cornersmooth.control.state import ENDS
+from cornersmooth.control.state import is_off
 from cornersmooth.control.table import Means
 from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.statements.tokens import ENDINGS, Token
@@ -254,7 +254,7 @@ def _counting(found: Iterable[Token], means: Means) -> Callable[[Token], bool]:
     """Whether a token is compared: the control has a word for it."""
     # what shifts the path counts wherever it is written
     shifted = {token.kind for token in found if token.kind == "compensation" and token.value != "OFF"}
-    ended = {(kind, "OFF") for kind, value in means.values() if value.startswith(ENDS)}
+    ended = {(kind, "OFF") for kind, value in means.values() if is_off(value)}
     sayable = {*shifted, *ended, *means.values()}
 
     def counts(token: Token) -> bool:

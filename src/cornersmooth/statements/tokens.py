@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from cornersmooth.control.state import ENDS, after_word, ends_of
+from cornersmooth.control.state import after_word, ends_of, is_off
 from cornersmooth.control.table import Means
 from cornersmooth.nc_reader.elements import RETRACT, Event
 
@@ -53,9 +53,10 @@ def of_m(value: float, means: Means) -> tuple[str, float | str]:
     return means.get(f"M{value:g}", ("auxiliary", value))
 
 
-def is_end(value: float | str) -> bool:
-    """Whether nothing turns or runs any more with a value."""
-    return value in ENDINGS or str(value).startswith(ENDS)
+def _is_idle(word: tuple[str, float], means: Means) -> bool:
+    """Whether a word is R0 of M91, or ends what ends with the tool."""
+    value = of_m(word[1], means)[1] if word[0] == "M" else ""
+    return word == ("G", 40.0) or word[0] == RETRACT or value in ENDINGS or is_off(value)
 
 
 def said(events: Sequence[Event], means: Means) -> list[Token]:
@@ -65,11 +66,7 @@ def said(events: Sequence[Event], means: Means) -> list[Token]:
     ends, coolant = ends_of(means), "OFF"
     words = [(event.letter, event.value) for event in events]
     changes = _CHANGE in words
-    # R0 of M91, and what ends with the tool
-    idle = [
-        word == ("G", 40.0) or word[0] == RETRACT or (word[0] == "M" and is_end(of_m(word[1], means)[1]))
-        for word in words
-    ]
+    idle = [_is_idle(word, means) for word in words]
     for k, (event, word) in enumerate(zip(events, words, strict=True)):
         letter, value = word
         meaning: tuple[str, float | str] | None = None

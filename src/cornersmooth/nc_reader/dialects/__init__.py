@@ -9,7 +9,7 @@ from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Final
 
-from cornersmooth.control.state import ENDS
+from cornersmooth.control.state import is_off
 from cornersmooth.control.table import CONTROLS, Table, table_of, word_table
 from cornersmooth.control.words import Lexer, Line, Word, refused, tools_first
 from cornersmooth.errors import InputError, SettingsError
@@ -69,7 +69,7 @@ class Dialect:
     def after_motion(self, letter: str, value: float) -> bool:
         """Whether a word acts after the motion of its block: M words that stop, end or switch off."""
         kind, stated = self.means.get(f"M{value:g}", ("", "")) if letter == "M" else ("", "")
-        return kind in ("stop", "end") or stated == "OFF" or stated.startswith(ENDS)
+        return kind in ("stop", "end") or is_off(stated)
 
     def acts(self, line: Line, state: Running) -> Acts:
         """Give out what a line that is no motion block does; each act is carried out before the next is wanted.
