@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import inspect
 import io
-import pickle
 import re
 import subprocess
 import sys
@@ -261,32 +260,10 @@ CS167 from_poses(TIPS, AXES, kind=[258] * 3)
 CS167 from_poses(TIPS, AXES, kind=[2.7] * 3)
 CS167 from_poses(TIPS, AXES, kind=[2])
 CS167 from_poses(TIPS, AXES, line=["a"] * 3)
-CS167 smooth(TIPS, Settings())
-CS167 smooth(program, 0.01)
-CS167 smooth(program, form="g1")
-CS167 postprocess(program, target, form="g1")
-CS167 postprocess(program, io.StringIO())
-CS167 postprocess(program, target, processes="2")
-CS167 write(smoothed, "part.nc", form=form)
-CS167 write(smoothed, io.StringIO(), form=form)
-CS167 write(program, io.BytesIO(), form=form)
-CS167 plan(program)
-CS167 plan(smoothed, machine="table-ac")
-CS167 direct(program, machine="table-ac")
 CS230 direct(program, Limits(feed=100), "foo")
-CS167 choose_form("fanuc", machine="table-ac")
-CS167 choose_form(5)
-CS167 sample(program)
-CS167 corner_table(program)
 CS167 corner_table(smoothed, rows=[99999])
 CS167 corner_table(smoothed, rows=[0.5])
-CS167 verify("part.cls", b"", tolerance=0.1)
-CS167 verify(program, "%\\nG1 X1\\n", tolerance=0.1)
-CS167 read(None)
-CS167 read(b"", operation=1)
-CS167 read(b"", spindle=1000)
 CS230 read(b"", units="cm")
-CS167 filter_program("G1 X1", form)
 CS202 Settings(tolerance="0.01")
 CS202 Settings(tolerance=None)
 CS202 Settings(axis_length=None)
@@ -306,8 +283,8 @@ def things() -> dict[str, object]:
     tips, axes = [[0, 0, 0], [9, 0, 0], [9, 9, 0]], [[0, 0, 1]] * 3
     program, form = cornersmooth.from_poses(tips, axes, feed=100), cornersmooth.choose_form("fanuc", "g1")
     smoothed = cornersmooth.smooth(program, form=form)
-    own = {"TIPS": tips, "AXES": axes, "program": program, "form": form, "smoothed": smoothed, "target": io.BytesIO()}
-    return {**{name: getattr(cornersmooth, name) for name in cornersmooth.__all__}, **own, "io": io}
+    own = {"TIPS": tips, "AXES": axes, "program": program, "form": form, "smoothed": smoothed}
+    return {**{name: getattr(cornersmooth, name) for name in cornersmooth.__all__}, **own}
 
 
 @pytest.mark.parametrize("line", WRONG.strip().splitlines())
@@ -323,4 +300,3 @@ def test_arguments_of_many_kinds_are_right(things: dict[str, object]) -> None:
     assert len(table["line"]) == 1
     assert cornersmooth.from_poses([[0, 0, 0]], [[0, 0, 1]], kind=np.array([1.0])).kind.dtype == np.uint8
     assert Settings(tolerance=np.float64(0.02), weights=[1, 1]).weights == (1.0, 1.0)
-    assert pickle.loads(pickle.dumps(cornersmooth.postprocess)) is cornersmooth.postprocess

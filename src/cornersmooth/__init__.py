@@ -18,7 +18,7 @@ Step by step, with the numbers in between; the form says which digits the contro
 - `filter_program` smooths the runs of a finished NC program
 - `plan` and `direct` say how long a machine takes for the smoothed and the original path, `compare` both
 - `choose_form`, `load_control` and `load_machine` take names or TOML files; `Frame` holds what stands around the motion
-- `CornersmoothError` is what everything here raises; its text says where, what, and what to do
+- `CornersmoothError` is raised for input, settings and output; its text says where, what, and what to do
 
 Nothing is imported before it is used, so that the command line answers at once.
 """
@@ -96,12 +96,7 @@ def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module 'cornersmooth' has no attribute {name!r}")
     module = import_module(f"cornersmooth.{_HOME[name]}")
-    found = module.Program.from_poses if name == "from_poses" else getattr(module, name)
-    if not isinstance(found, type):
-        from cornersmooth.errors import checked
-
-        found = globals()[name] = checked(found, __name__)
-    return found
+    return module.Program.from_poses if name == "from_poses" else getattr(module, name)
 
 
 def __dir__() -> list[str]:

@@ -10,12 +10,13 @@ that module with a `cornersmooth.smoothing.construction.Construction` named ``CO
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
+from numbers import Real
 from types import MappingProxyType
-from typing import Any, Literal, TypeVar
+from typing import Any, Final, Literal, TypeVar
 
-from cornersmooth.errors import SettingsError, shown, wanted
+from cornersmooth.errors import SettingsError
 
 
 @dataclass(frozen=True)
@@ -98,6 +99,25 @@ def key_of(name: str, unit: str) -> str:
     return f"{name}_{unit.replace('/', '_per_')}" if unit else name
 
 
+def _is_number(value: Any) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
+#: what fits an annotation, and how it is called
+_FITS: Final[dict[str, tuple[Callable[[Any], bool], str]]] = {
+    "float": (_is_number, "a number"),
+    "bool": (lambda value: isinstance(value, bool), "True or False"),
+    "str": (lambda value: isinstance(value, str), "a text"),
+    "tuple[float, float]": (
+        lambda value: isinstance(value, (tuple, list)) and len(value) == 2 and all(map(_is_number, value)),
+        "a tuple of two numbers",
+    ),
+    "tuple[str, ...]": (
+        lambda value: isinstance(value, (tuple, list)) and all(isinstance(one, str) for one in value),
+        "a tuple of texts",
+    ),
+}
+
 Record = TypeVar("Record", bound="OptionFields")
 
 
@@ -107,9 +127,10 @@ class OptionFields:
     def __post_init__(self) -> None:
         """Refuse values that do not fit the annotations of their fields (CS202)."""
         for item in self.__dataclass_fields__.values():  # type: ignore[attr-defined]
-            value = getattr(self, item.name)
-            if text := wanted(item.type, value):
-                raise SettingsError("CS202", f"{item.name} is {shown(value)}", f"give {text}")
+            value, hint = getattr(self, item.name), item.type.removesuffix(" | None")
+            fits, text = _FITS.get(hint, (lambda value: True, ""))
+            if not fits(value) and not (value is None and hint != item.type):
+                raise SettingsError("CS202", f"{item.name} is {value!r}", f"give {text}")
 
     def _value(self, name: str) -> Any:
         """Value of an option, or of that which counts instead."""

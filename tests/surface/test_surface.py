@@ -12,7 +12,7 @@ import cornersmooth
 from cornersmooth.errors import SettingsError
 from cornersmooth.geometry.tool import Tool, parse_tool, tools_of
 from cornersmooth.nc import choose_form, fit_settings
-from cornersmooth.surface import measure_surface, neighbouring_passes
+from cornersmooth.surface import measure_surface
 from cornersmooth.surface.motion import distance_to_motion, envelope_points, original_cuts
 from oracle.share import how_many, share
 
@@ -256,41 +256,6 @@ def test_distribution_of_real_paths_agrees_with_brute_force(name, tolerance, req
         point = found.points.point[row]
         expected = brute_force(point, written, tool, height) - brute_force(point, original, tool, height)
         assert found.off[row] == pytest.approx(expected, abs=1e-6)
-
-
-def to_and_fro(lift, pitch=0.1, lean=0.0):
-    """Rows of 20 mm side by side, each lifted by its own."""
-    x = np.linspace(0.0, 20.0, 21)
-    tips = [
-        np.column_stack((x[:: 1 - 2 * (row % 2)], np.full(21, row * pitch), np.full(21, up)))
-        for row, up in enumerate(lift)
-    ]
-    axis = np.array([0.0, np.sin(lean), np.cos(lean)])
-    return straight(np.concatenate(tips), axis)
-
-
-@pytest.mark.parametrize("lean", [0.0, 0.3])
-@pytest.mark.parametrize(("lift", "rms", "most"), [([0.003] * 6, 0.0, 0.0), ([0.0, 0.004] * 3, 0.004, 0.004)])
-def test_neighbouring_passes_differ_by_what_only_one_is_lifted(lift, rms, most, lean):
-    path = to_and_fro([0.0] * 6, lean=lean)
-    found = neighbouring_passes(path, to_and_fro(lift, lean=lean), 2.0, 4.0)
-    assert found.apart_mm == pytest.approx(0.1)
-    assert found.places >= 6 * 20
-    assert found.percentile_95_mm == pytest.approx(most, abs=1e-9)
-    assert found.rms_mm == pytest.approx(rms, abs=0.02 * rms + 1e-9)  # between rows the lift rises
-    assert found.max_mm == pytest.approx(most, abs=1e-9)
-
-
-def test_a_row_alone_has_no_neighbour_and_one_that_differs_is_found():
-    alone = to_and_fro([0.0])
-    assert neighbouring_passes(alone, alone, 2.0, 4.0) is None
-    assert neighbouring_passes(to_and_fro([0.0] * 3, pitch=5.0), to_and_fro([0.0] * 3, pitch=5.0), 2.0, 4.0) is None
-    again = to_and_fro([0.0] * 3, pitch=1e-13)  # the same row once more, but for rounding
-    assert neighbouring_passes(again, again, 2.0, 4.0) is None
-    path = to_and_fro([0.0] * 9)
-    found = neighbouring_passes(path, to_and_fro([0.0] * 4 + [0.005] + [0.0] * 4), 2.0, 4.0)
-    assert found.max_mm == pytest.approx(0.005, abs=1e-9)
-    assert 21 * 3 <= found.cl_line <= 21 * 6 + 1
 
 
 @pytest.mark.parametrize("gap", [False, True])

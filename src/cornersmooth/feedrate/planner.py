@@ -6,10 +6,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
+from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate.between import fastest
 from cornersmooth.feedrate.intervals import FINER, PLAIN, Intervals, Resolution, path_limits
 from cornersmooth.feedrate.machine_axes import MachineAxes, follow
@@ -79,7 +80,7 @@ def direct(
 ) -> TimeLaw:
     """Plan the motion along the original path.
 
-    It raises what `cornersmooth.feedrate.plan` does.
+    It raises what `cornersmooth.feedrate.plan` does, and SettingsError CS230 for another baseline.
 
     Parameters
     ----------
@@ -99,6 +100,8 @@ def direct(
     """
     limits = Limits() if limits is None else limits
     settings = Settings() if settings is None else settings
+    if baseline not in get_args(Baseline):
+        raise SettingsError("CS230", f"unknown baseline {baseline!r}", f"use one of {', '.join(get_args(Baseline))}")
     path = build_path(program, None, settings, limits, stop_everywhere=baseline == "exact_stop")
     return plan_along(path, limits, None if machine is None else follow(machine, path), progress=progress)
 

@@ -24,7 +24,6 @@ from cornersmooth.nc import write
 from cornersmooth.nc_reader import NcProgram
 from cornersmooth.page.scene import Pack, Subject, page_values
 from cornersmooth.pipeline import Result, read_back
-from cornersmooth.report.tables import passes_text
 from cornersmooth.report.verdict import LIMITS_TOLD, Saving, sharp_line, time_text
 from cornersmooth.settings import Limits, Settings
 from cornersmooth.verify import Verification
@@ -129,8 +128,7 @@ def _surface_text(surface: SurfaceMap) -> str:
     over, under = shown["overcut"]["max_mm"], shown["undercut"]["max_mm"]
     within = shown["within_tolerance_percent"]
     share = "" if within is None else f"; {within:.4g} % of {shown['points']:,} points within {surface.tolerance:g} mm"
-    rows = "" if surface.passes is None else f"; passes: {passes_text(surface.passes)}"
-    return f"the surface is overcut by up to {over:.4f} mm and undercut by up to {under:.4f} mm{share}{rows}"
+    return f"the surface is overcut by up to {over:.4f} mm and undercut by up to {under:.4f} mm{share}"
 
 
 def _page(

@@ -24,7 +24,7 @@ from cornersmooth.smoothing.segments import lines_of
 if TYPE_CHECKING:
     from cornersmooth.feedrate.timelaw import TimeLaw
     from cornersmooth.model import Program
-    from cornersmooth.surface import PassDifference, SurfaceMap
+    from cornersmooth.surface import SurfaceMap
     from cornersmooth.verify import Verification
 
 
@@ -133,22 +133,11 @@ def surface_lines(surface: SurfaceMap) -> Iterator[str]:
             f"{name:<18}largest {own['max_mm']:.6f} mm{where}, 95 % within {own['percentile_95_mm']:.6f} mm, "
             f"mean {own['mean_mm']:.6f} mm, {own['points']:,} points"
         )
-    yield f"{'passes':<18}{passes_text(surface.passes)}"
     if values["rms_mm"] is not None:
         yield f"{'all':<18}mean {values['mean_mm']:.6f} mm, root mean square {values['rms_mm']:.6f} mm"
         yield f"{'within':<18}{values['within_tolerance_percent']:.4g} % of the points within {surface.tolerance:g} mm"
         yield ""
         yield from _histogram(surface)
-
-
-def passes_text(passes: PassDifference | None) -> str:
-    """Say how differently neighbouring passes are off: where they are, rows show."""
-    if passes is None:
-        return "no pass has a neighbour"
-    return (
-        f"neighbours, {passes.apart_mm:.3g} mm apart, differ by {passes.rms_mm:.6f} mm (root mean square), "
-        f"95 % by at most {passes.percentile_95_mm:.6f} mm, the most {passes.max_mm:.6f} mm at CL line {passes.cl_line}"
-    )
 
 
 def _histogram(surface: SurfaceMap) -> Iterator[str]:
