@@ -82,7 +82,7 @@ def arc_about(number: int, seed: int) -> tuple[Program, Callable[[float], Floats
     rng = np.random.default_rng(seed)
     normal = np.eye(3)[number] * rng.choice([-1.0, 1.0])
     radius, sweep = 10 ** rng.uniform(-0.5, 2.5), math.radians(rng.uniform(2, 719))
-    height = rng.choice([0.0, 0.3, -2.0]) * radius
+    height = rng.choice([0.0, 0.03, -0.2]) * radius * sweep
     centre = rng.uniform(-100, 100, 3)
     arm = turned(normal, np.roll(np.eye(3)[number], 1) * radius, rng.uniform(0, 6))
 
@@ -164,6 +164,16 @@ def test_what_no_circle_can_be_becomes_lines(why: str, program: Program) -> None
     lines, written = text_of(program)
     assert codes(written) == {"CS314": 1}, why
     assert not [line for line in lines if line[:3] in ("G2 ", "G3 ")]
+
+
+@pytest.mark.parametrize(("control", "arcs"), [("fanuc", [True, False]), ("siemens", [True, True])])
+def test_a_steep_helix_is_lines_where_f_counts_in_its_plane(control: str, arcs: list[bool]) -> None:
+    """FANUC (1403#5 HTG 0) ran a rise of 15 mm on a quarter circle of 10 mm at 415 mm/min for F300."""
+    for rise, circles in zip((3.0, 15.0), arcs, strict=True):
+        program = one_arc((10.0, 0, 0), (0, 10.0, rise), (0, 0, 0), (0, 0, 1), math.pi / 2)
+        form, stream = choose_form(control, "g1"), io.BytesIO()
+        write(smooth(program, fit_settings(Settings(), form, "mm")), stream, form=form)
+        assert (b"\nG3 " in stream.getvalue()) is circles
 
 
 def test_turning_tool_axis_becomes_lines_with_the_axis_spread() -> None:

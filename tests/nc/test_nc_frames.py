@@ -92,7 +92,7 @@ def test_head_and_tail(control: str) -> None:
     ("statements", "left"),
     [
         ("FEDRAT/0.1,MMPR\nGOTO/9,0,0\n", ["G94", *UP, "G49"]),
-        ("CUTCOM/LEFT,ZXPLAN\nGOTO/9,0,0\n", ["G40", "G17", *UP, "G49"]),
+        ("CUTCOM/LEFT,XYPLAN\nGOTO/9,0,0\n", ["G40", *UP, "G49"]),
         ("CUTCOM/LEFT\nFEDRAT/0.1,MMPR\nGOTO/9,0,0\n", ["G40", "G94", *UP, "G49"]),
         ("CUTCOM/LEFT\nGOTO/9,0,0\nCUTCOM/OFF\n", ["G40", *UP, "G49"]),
         ("", [*UP, "G49"]),

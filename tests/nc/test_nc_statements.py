@@ -277,16 +277,23 @@ def test_end_in_the_middle_is_a_stop_and_m30_comes_once() -> None:
     assert [line for line in lines if line in ("M30", "M2", "M0")] == ["M0", "M30"]
 
 
-def test_cutter_compensation_names_register_and_plane() -> None:
+def test_cutter_compensation_names_its_register() -> None:
     cl = (
         "UNITS/MM\nLOADTL/4\nFEDRAT/100,MMPM\nGOTO/0,0,0\nCUTCOM/LEFT,XYPLAN\nGOTO/5,0,0\nGOTO/5,5,0\nCUTCOM/OFF\n"
-        "CUTCOM/RIGHT,ZXPLAN,14\nGOTO/9,5,0\nCUTCOM/OFF\nGOTO/0,0,0\nFINI\n"
+        "CUTCOM/RIGHT,XYPLAN,14\nGOTO/9,5,0\nCUTCOM/OFF\nGOTO/0,0,0\nFINI\n"
     )
     lines, written = text_of_cl(cl)
     kept = [line for line in lines if line[:3] in ("G40", "G41", "G42", "G18", "G17")]
-    assert kept == ["G41 D4", "G40", "G18", "G42 D14", "G40", "G17"]
+    assert kept == ["G41 D4", "G40", "G42 D14", "G40"]
     assert codes(written) == {"CS319": 2}
     assert "G1 X5.0000 Y0.0000 Z0.0000 I0.0000000 J0.0000000 K1.0000000" in lines
+
+
+@pytest.mark.parametrize("plane", ["ZXPLAN", "YZPLAN"])
+def test_cutter_compensation_is_in_xy_alone(plane: str) -> None:
+    """Programs with G18 before G41 were written, and verification refused each."""
+    with pytest.raises(InputError, match=f"CS336.*{plane}"):
+        text_of_cl(f"UNITS/MM\nLOADTL/4\nFEDRAT/100,MMPM\nGOTO/0,0,0\nCUTCOM/LEFT,{plane}\nGOTO/5,5,5\nFINI\n")
 
 
 def test_a_tool_along_z_is_compensated_without_tool_tip_control() -> None:

@@ -19,6 +19,7 @@ from cornersmooth.filter.motion import Job, says_motion
 from cornersmooth.filter.runs import ANGLES, ANY, NONE, TURNS, VECTOR, Reading, Run
 from cornersmooth.kinematics import tip_position, tool_axis
 from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.nc.circles import STEEPEST
 from cornersmooth.nc.control import Mode
 from cornersmooth.nc.rotary_rows import LARGEST_TURN, line_limits
 from cornersmooth.smoothing.fewest_pieces import PieceLimits, Pieces, Polyline, fewest_pieces
@@ -34,9 +35,6 @@ _MOST: Final = 9
 
 #: digits of radii after the point, at least, in mm and in inches: every control takes so many
 _RADIUS_DIGITS: Final = (3, 4)
-
-#: rad; slope up to which an arc rises where F counts in its plane alone: the tool is 2 % faster there than F says
-_SLOPE: Final = math.acos(1.0 / 1.02)
 
 #: what a run in time per block is left for
 TIMED: Final = "each cut says its own time (G93)"
@@ -119,7 +117,7 @@ def _texts(job: Job, reading: Reading, group: _Group) -> list[bytes | None]:
     digits = max(decimals[0], _RADIUS_DIGITS[group.unit != 1.0])
     if group.mode is not None:
         flat = bool(group.mode.arc_directions)
-        slope = _SLOPE if group.mode.feed_in_plane else math.inf
+        slope = STEEPEST if group.mode.feed_in_plane else math.inf
         step = group.unit * 10.0**-digits
         limits = PieceLimits(_USED * job.settings.tolerance, group.planes, flat, step, slope=slope)
         pieces = fewest_pieces(Polyline(group.unit * place[:, :3], fixed, begins), limits)

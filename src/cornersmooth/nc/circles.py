@@ -3,6 +3,7 @@
 A circular block gives its end point and its radius; the control makes of them, and of the point it stands at, a circle
 in the plane that is selected. So an arc is written that way where its axis is a coordinate axis of the words, where
 tool axis and rotary axes stand, and where the circle through the rounded numbers is within the tolerance of the arc.
+Where F counts in the plane of the circle alone, it must not rise by more than `STEEPEST`: the tool would be too fast.
 Where words of a second point would have to move with the tip, arcs are curves. All others become lines.
 """
 
@@ -13,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cornersmooth.arrays import norm
+from cornersmooth.arrays import dot, norm
 from cornersmooth.geometry.arcs import arc_lines, arc_points, arc_radii, arc_weights, curve_deviation, divided
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Keep, Program
 from cornersmooth.nc.form import Form
@@ -33,6 +34,9 @@ _SHORTEST_CHORD = 20
 
 #: how far an arc's axis may lean from a coordinate axis; the deviation is measured besides
 _UPRIGHT = 1e-6
+
+#: rad; slope up to which an arc rises where F counts in its plane alone: the tool is 2 % faster there than F says
+STEEPEST = math.acos(1.0 / 1.02)
 
 #: curve styles with weights
 _RATIONAL = ("g6.2", "bspline")
@@ -105,14 +109,16 @@ def plan_circles(
     digits = form.table.digits
     vectors = to_ticks(digits.vector_length * program.axis, digits.vector)
     modes = (form.mode, *(form.in_plane(upright=plane.upright) for plane in planes.planes))
-    able = [(bool(mode.arc_directions), mode.circles, mode.circles_in_xy) for mode in modes]
-    flat, circular, in_xy = np.array(able)[of + 1].T
+    able = [(bool(mode.arc_directions), mode.circles, mode.circles_in_xy, mode.feed_in_plane) for mode in modes]
+    flat, circular, in_xy, feed_in_plane = np.array(able)[of + 1].T
     keeps = inside | (vectors[arcs.pose] == vectors[arcs.pose - 1]).all(axis=1)
     if rotary is not None:
         keeps &= ~turned | (rotary.stand & _may_turn(form, rotary.angles, plane))
     keeps &= (radius < _LARGEST_RADIUS) & (ticks > 0)
     offset = program.keep[arcs.pose] == Keep.CUTTER_COMPENSATION
-    fits = circular & keeps
+    rise = np.abs(dot(program.tip[arcs.pose] - program.tip[arcs.pose - 1], arcs.normal))
+    steep = rise > math.tan(STEEPEST) * radius * arcs.sweep
+    fits = circular & keeps & ~(steep & feed_in_plane)
     # the plane of cutter compensation must not change under it, and it is XY
     fits &= unknown | (~(flat | in_xy | offset) | (plane == 0)) & (np.abs(height) > 1.0 - _UPRIGHT)
     blocks = np.where(fits, np.ceil(arcs.sweep / _LARGEST_SWEEP - 1e-9), 0.0).astype(np.int64)

@@ -119,6 +119,10 @@ REFUSALS: Final[dict[str, tuple[str, str]]] = {
         "{control} is given no cutter compensation, and the path would be cut without it",
         "let the CAM system put the cutter's radius into the path",
     ),
+    "CS336b": (
+        "cutter compensation in {plane}: controls are given it in XYPLAN alone",
+        "let the CAM system put the cutter's radius into the path",
+    ),
     "CS342": (
         "the hole cycle is not written: {why}",
         "give --skip-cycles to leave its holes out; the program says NOT DRILLED where they are",

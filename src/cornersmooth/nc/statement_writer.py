@@ -37,7 +37,7 @@ from cornersmooth.text import format_number
 
 #: words whose text is for the machinist: comments without the word
 _TEXT_WORDS = frozenset("$$ PPRINT REMARK TPRINT LETTER DISPLY".split())
-_PLANES = {"XYPLAN": 17, "ZXPLAN": 18, "YZPLAN": 19}  #: words for planes, with the G code of each
+_PLANES = {"XYPLAN", "ZXPLAN", "YZPLAN"}  #: words for planes
 _SILENT = frozenset({"END-OF-PATH", "FINI", "REWIND"})  #: words that say nothing beside what the text shows anyway
 
 
@@ -218,7 +218,7 @@ class StatementWriter:
         return [block.format(milliseconds=time, seconds=seconds) for block in self.words.dwell] if time else []
 
     def compensation(self, statement: Statement) -> list[str] | None:
-        """CUTCOM/LEFT|RIGHT[,plane][,n] and CUTCOM/OFF; CS336 for a control that is given none."""
+        """CUTCOM/LEFT|RIGHT[,XYPLAN][,n] and CUTCOM/OFF; CS336 for another plane, and a control that is given none."""
         if ends(statement):
             return (self.modals.set(compensation=()) or list(self.words.compensation_off)) or None
         names, numbers, words = words_of(statement), numbers_of(statement), self.words
@@ -226,8 +226,10 @@ class StatementWriter:
             raise refused("CS336", self.program, statement.line, control=self.form.control)
         side = {"LEFT": words.compensation_left, "RIGHT": words.compensation_right}.get((names or [""])[0])
         register = whole_number(numbers or [float(self.modals.offset)])
-        if not side or len(names) > 2 or not set(names[1:]) <= _PLANES.keys() or register is None:
+        if not side or len(names) > 2 or not set(names[1:]) <= _PLANES or register is None:
             return None
+        if names[1:] not in ([], ["XYPLAN"]):
+            raise refused("CS336b", self.program, statement.line, plane=names[1])
         entry = self.program.tip[max(statement.pose - 1, 0) : statement.pose + 1, :2]
         length = math.dist(*entry) if len(entry) == 2 else math.inf
         if words.compensation_entry and not length:
@@ -238,7 +240,7 @@ class StatementWriter:
         tip = self.modals.mode is not self.form.upright and self.form.orientation not in ("fixed", "machine")
         also = "it may be used with tool tip control (--cycles native does without, along Z), and that " if tip else ""
         self.findings.note("CS319", statement.line, also=also)
-        change = self.modals.set(plane=_PLANES[names[1]] if len(names) > 1 else FIRST_PLANE)
+        change = self.modals.set(plane=FIRST_PLANE)
         begun = self.modals.now["compensation"] = tuple(block.format(register=register) for block in side)
         return [*change, *begun]
 
