@@ -22,7 +22,6 @@ import cornersmooth as cs
 from cornersmooth import read
 from cornersmooth.cli import times
 from cornersmooth.cli.commands import COMMANDS
-from cornersmooth.cli.declared import GONE
 from cornersmooth.kinematics import parse_machine
 from cornersmooth.nc import parse_control
 from oracle.command import DONE, SCRIPT, SMALL, run
@@ -310,7 +309,7 @@ def test_what_the_declarations_of_options_make_is_here() -> None:
 
 def test_every_flag_that_a_help_or_a_page_names_exists() -> None:
     known = {flag for command in COMMANDS.values() for param in command.params for flag in param.opts}
-    known |= {"--help", "--help-all", "--version", *GONE}
+    known |= {"--help", "--help-all", "--version"}
     texts = {name: run(name, "--help-all").stdout.decode() for name in COMMANDS}
     texts |= {page.name: page.read_text() for page in (ROOT / "docs").glob("*.md")}
     #: of other programs

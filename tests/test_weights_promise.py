@@ -14,7 +14,6 @@ import cornersmooth
 from cornersmooth.model import Program, SmoothProgram
 from cornersmooth.nc import choose_form
 from oracle.chains import cl_text, random_chains
-from oracle.command import run
 from oracle.distance import deviation
 from oracle.files import cl_file, of_corpus
 from oracle.judge import feeds_out_of_place, judge, not_passed, runs_of
@@ -121,12 +120,3 @@ def test_weights_stand_in_the_text_with_three_decimals() -> None:
 def test_weights_are_refused_where_the_method_has_its_own() -> None:
     with pytest.raises(cornersmooth.CornersmoothError, match="leave out weights"):
         cornersmooth.Settings(method="global", weights=(1.0, 0.5))
-
-
-@pytest.mark.parametrize("option", ["--weights=1,2", "--axis-step=1", "--input-format=apt", "--skip-existing"])
-def test_options_that_went_are_wrong_usage(tmp_path: Path, option: str) -> None:
-    out = tmp_path / "out.nc"
-    result = run("smooth", ROOT / "samples" / "paper_table1.csv", option, "-o", out)
-    assert result.returncode == 2
-    assert f"{option.split('=')[0]} is no option any more\nhint: ".encode() in result.stderr
-    assert not out.exists()

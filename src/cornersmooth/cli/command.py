@@ -5,8 +5,6 @@ Their helps have the options under headings, those of every day first; shop sett
 
 from __future__ import annotations
 
-import os
-import sys
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from functools import cached_property
@@ -17,7 +15,7 @@ from typing import Any, Final, Literal, get_args, get_origin
 import click
 
 from cornersmooth.cli import shop
-from cornersmooth.cli.declared import FLAGS, GONE, HEADINGS, Declared
+from cornersmooth.cli.declared import FLAGS, HEADINGS, Declared
 from cornersmooth.cli.options import Options
 from cornersmooth.cli.parameters import ControlName, MachineName, Path
 
@@ -47,7 +45,6 @@ _ARGUMENTS: Final[dict[str, tuple[str, dict[str, Any]]]] = {
     "[CONTROL]": ("name", {"type": get_args(ControlName)[1], "required": False, "metavar": "[NAME|FILE]"}),
     "[MACHINE]": ("name", {"type": get_args(MachineName)[1], "required": False, "metavar": "[NAME|FILE]"}),
     "[CODE]": ("name", {"required": False}),
-    "SHELL": ("name", {"type": click.Choice(["bash", "zsh", "fish", "powershell"])}),
 }
 
 
@@ -76,8 +73,6 @@ class Command(click.Command):
                 if isinstance(param, _Setting) and wrong.option_name in param.opts:
                     key = shop.key(str(param.name))
                     ctx.fail(f"{wrong.option_name} is no option; write {key} into cornersmooth.toml (docs/settings.md)")
-            if wrong.option_name in GONE:
-                ctx.fail(f"{wrong.option_name} is no option any more; {GONE[wrong.option_name]}")
             raise
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -130,14 +125,9 @@ class _Setting(_Option):
 
 
 def write_part(formatter: click.HelpFormatter, heading: str, rows: list[tuple[str, str]]) -> None:
-    """Write names and their helps below a heading; a terminal shows both in colour."""
-    with formatter.section(_styled(heading, bold=True)):
-        formatter.write_dl([(_styled(name, fg="cyan"), text) for name, text in rows], col_max=_NAMES)
-
-
-def _styled(text: str, **style: Any) -> str:
-    coloured = sys.stdout is not None and sys.stdout.isatty() and "NO_COLOR" not in os.environ
-    return click.style(text, **style) if coloured and os.environ.get("TERM") != "dumb" else text
+    """Write names and their helps below a heading."""
+    with formatter.section(heading):
+        formatter.write_dl(rows, col_max=_NAMES)
 
 
 def new_command(

@@ -310,30 +310,11 @@ EXPLAIN = new_command(
     units="Units of a program that does not say them.",
 )
 
-COMPLETION = new_command(
-    "completion",
-    "SHELL",
-    "",
-    """
-    Print what makes SHELL (bash, zsh, fish, powershell) complete commands, options, names of controls, machines and
-    forms, and files.
-
-    \b
-    Examples:
-      eval "$(cornersmooth completion bash)"    # in ~/.bashrc
-      eval "$(cornersmooth completion zsh)"     # in ~/.zshrc, behind compinit
-      cornersmooth completion fish | source     # in ~/.config/fish/config.fish
-      cornersmooth completion powershell | Out-String | Invoke-Expression
-    """,
-    module="group",
-)
-
 #: as the list of them shows them
 GROUPS = {
     "Make programs": (SMOOTH, FILTER),
     "Check programs": (VERIFY, SURFACE),
     "Save time": (COMPARE, TIME, SETUP),
     "Look up": (INFO, CONTROLS, MACHINES, CONFIG, EXPLAIN),
-    "Shell": (COMPLETION,),
 }
 COMMANDS = {str(command.name): command for commands in GROUPS.values() for command in commands}

@@ -13,7 +13,6 @@ import click
 from cornersmooth.cli.parameters import (
     ControlName,
     Duration,
-    FormName,
     Length,
     MachineName,
     Path,
@@ -69,11 +68,11 @@ class Declared:
     # arguments
     inputs: tuple[str, ...] = ()
     source: str = ""
-    name: str | None = None  #: of a control, a machine, a code or a shell
+    name: str | None = None  #: of a control, a machine or a code
 
     tolerance: Length = declared("Everyday", Settings, "tolerance")
     axis_length: Length = declared("Everyday", Settings, "axis_length")
-    form: FormName | None = _everyday(
+    form: str | None = _everyday(
         "-f g1|g6.2|...",
         "Dense lines, or curves in the control's own form; 'cornersmooth controls' lists them. [default: g1]",
     )
@@ -301,15 +300,6 @@ PLANNED_HELPS = {
     item.name: f"With --feed-from-plan: {item.metadata['help'][:1].lower()}{item.metadata['help'][1:]}"
     for item in fields(Declared)
     if item.name in PLANNED.split()
-}
-#: options of earlier versions, and what takes their place
-GONE = {
-    "--input-format": "write --dialect points for a table of points",
-    "--skip-existing": "leave it out: outputs that are up to date stay, and others need --force",
-    **dict.fromkeys(("--weights", "--reversal-angle", "--axis-step"), "Settings of the library has it"),
-    **dict.fromkeys(
-        ("--vector-jerk", "--turn-speed", "--turn-accel", "--turn-jerk"), "limit the axes of a machine with --limits"
-    ),
 }
 #: the feed of commands that only plan
 FEED_OF_ALL = {"heading": "Limits", "help": Limits.__dataclass_fields__["feed"].metadata["help"]}

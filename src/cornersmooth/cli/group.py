@@ -1,28 +1,24 @@
-"""The group of all commands, how it is run, and what makes a shell complete words: click has none for PowerShell."""
+"""The group of all commands, and how it is run."""
 
 from __future__ import annotations
 
 import contextlib
 import errno
 import os
-import re
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from cornersmooth import __version__
 from cornersmooth.cli.command import write_part
 from cornersmooth.cli.commands import COMMANDS, GROUPS
-from cornersmooth.cli.options import Options
 from cornersmooth.cli.show import error_contents, print_message, say_json
 from cornersmooth.errors import EXIT_INTERNAL, CornersmoothError, SettingsError, internal_error, message
 from cornersmooth.system.output import ClosedPipe, reason
 
 if TYPE_CHECKING:
-    from click.shell_completion import CompletionItem
-
     from cornersmooth.cli import Shutdown
 
 #: as of a program that SIGINT has ended
@@ -33,29 +29,6 @@ EXIT_CLOSED_PIPE = 141
 
 #: what the system says where a disk, a share of it or a file is full, or the disk is broken
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
-
-#: variable by which a shell asks for words
-_ASKED: Final = "_CORNERSMOOTH_COMPLETE"
-
-#: without an answer PowerShell completes files
-_POWERSHELL: Final = """\
-Register-ArgumentCompleter -Native -CommandName %(prog_name)s -ScriptBlock {
-    param($word, $line, $cursor)
-    $env:%(complete_var)s = 'powershell_complete'
-    $env:COMP_WORDS = $line.ToString()
-    $env:COMP_CWORD = $word
-    try {
-        %(prog_name)s | ForEach-Object {
-            $value, $help = $_ -split "`t", 2
-            [System.Management.Automation.CompletionResult]::new($value, $value, 'ParameterValue', $help)
-        }
-    } finally {
-        Remove-Item Env:%(complete_var)s, Env:COMP_WORDS, Env:COMP_CWORD
-    }
-}
-"""
-#: a word of PowerShell: in quotes, or up to a blank; a backslash is one of a path
-_WORD: Final = re.compile(r"\"[^\"]*\"?|'[^']*'?|\S+")
 
 
 class _Group(click.Group):
@@ -109,8 +82,6 @@ def cli() -> None:
 
 def run(args: list[str] | None, ending: Shutdown) -> int:
     """Run the command line with the given arguments; returns the exit code."""
-    if os.environ.get(_ASKED, "").startswith("powershell"):
-        _add_powershell()
     try:
         result: Any = cli.main(args=args, standalone_mode=False, obj=ending)
         return result if isinstance(result, int) else 0
@@ -180,38 +151,3 @@ def _say(text: str) -> None:
     """Print an error; where standard error is full, the exit code must do."""
     with contextlib.suppress(OSError):
         print_message(text)
-
-
-def _add_powershell() -> None:
-    """Make PowerShell known to click, which answers it where it completes."""
-    from click.shell_completion import ShellComplete, add_completion_class
-
-    class PowerShell(ShellComplete):
-        name, source_template = "powershell", _POWERSHELL
-
-        def get_completion_args(self) -> tuple[list[str], str]:
-            """Words before the one that is completed, and that one, which PowerShell leaves out where it is empty."""
-            words = [word.strip("\"'") for word in _WORD.findall(os.environ["COMP_WORDS"])][1:]
-            begun = os.environ.get("COMP_CWORD", "").strip("\"'")
-            return (words[:-1] if begun and words[-1:] == [begun] else words), begun
-
-        def format_completion(self, item: CompletionItem) -> str:
-            """Value and help with a tab between; nothing for files."""
-            return "" if item.type != "plain" else f"{item.value}\t{item.help or item.value}"
-
-        def complete(self) -> str:
-            """Answers, a line each."""
-            return "\n".join(line for line in super().complete().split("\n") if line)
-
-    add_completion_class(PowerShell)
-
-
-def run_completion(given: Options) -> int:
-    """Do the work of the command; return its exit code."""
-    from click.shell_completion import get_completion_class
-
-    _add_powershell()
-    kind = get_completion_class(str(given.name))
-    assert kind is not None
-    click.echo(kind(cli, {}, "cornersmooth", _ASKED).source().rstrip())
-    return 0

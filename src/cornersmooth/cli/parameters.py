@@ -27,14 +27,14 @@ else:  # click before 8.4 has no type for what it gives
 class Value(_ParamType):
     """A value that a function reads from text; what its ValueError says is the message, and the name is in the help.
 
-    `complete` gives what a shell offers, as `click.ParamType.shell_complete` does without the parameter.
+    `complete` gives what a shell offers for a word that has been begun.
     """
 
     def __init__(
         self,
         name: str,
         read: Callable[[str], Any],
-        complete: Callable[[click.Context, str], list[CompletionItem]] | None = None,
+        complete: Callable[[str], list[CompletionItem]] | None = None,
     ) -> None:
         self.name, self._read, self._complete = name, read, complete
 
@@ -49,7 +49,7 @@ class Value(_ParamType):
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
         """Words that a shell offers."""
-        return self._complete(ctx, incomplete) if self._complete else []
+        return self._complete(incomplete) if self._complete else []
 
 
 def _length(text: str) -> float:
@@ -105,36 +105,15 @@ def _tool(text: str) -> Any:
 SHOP = "cornersmooth.shop"
 
 
-def _forms(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
-    """Names of the forms of the control that is chosen, or of all of them."""
+def _offer(kind: str, incomplete: str) -> list[CompletionItem]:
+    """Names of controls or of machines; else files."""
     from click.shell_completion import CompletionItem
 
-    from cornersmooth.errors import SettingsError
-    from cornersmooth.nc import control_names, load_control
+    from cornersmooth.kinematics import machine_names
+    from cornersmooth.nc import control_names
 
-    chosen = ctx.params.get("control")
-    try:
-        controls = [load_control(chosen) if isinstance(chosen, str) else chosen]
-    except SettingsError:
-        controls = [load_control(name) for name in control_names()]
-    names = {form for control in controls for form in getattr(control, "forms", ())}
-    return [CompletionItem(name) for name in sorted(names) if name.startswith(incomplete)]
-
-
-def _offer(kind: str, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
-    """Names of controls, and what else these are called, or of machines; else files."""
-    from click.shell_completion import CompletionItem
-
-    from cornersmooth.kinematics import load_machine, machine_names
-    from cornersmooth.nc import control_aliases, control_names, load_control
-
-    names, aliases = (control_names(), control_aliases()) if kind == "controls" else (machine_names(), {})
-    load: Callable[[str], Any] = load_control if kind == "controls" else load_machine
-    found = {name: load(name).description or None for name in names if name.startswith(incomplete)}
-    for file in getattr(ctx.meta.get(SHOP), "files", ()):
-        found |= {name: None for name in file.tables.get(kind, ()) if name.startswith(incomplete)}
-    items = [CompletionItem(name, help=text) for name, text in sorted(found.items())]
-    items += [CompletionItem(alias) for alias in sorted(aliases) if incomplete and alias.startswith(incomplete)]
+    names = control_names() if kind == "controls" else machine_names()
+    items = [CompletionItem(name) for name in names if name.startswith(incomplete)]
     return items or [CompletionItem(incomplete, type="file")]
 
 
@@ -146,6 +125,5 @@ ToolShape = Annotated[Any, Value("tool", _tool)]
 #: names; what they name is loaded when it is needed
 ControlName = Annotated[Any, Value("text", str, partial(_offer, "controls"))]
 MachineName = Annotated[Any, Value("text", str, partial(_offer, "machines"))]
-FormName = Annotated[str, Value("text", str, _forms)]
 #: whether a file can be read shows where it is read, with the exit code of inputs
 Path = Annotated[str, click.Path(readable=False)]

@@ -7,7 +7,6 @@ that name; tables of other commands may have other values.
 
 from __future__ import annotations
 
-import contextlib
 import os
 import stat
 from collections.abc import Callable, Iterable, Iterator
@@ -79,15 +78,10 @@ def parse_args(
 ) -> list[str]:
     """Read the options, then the shop settings that go with the input, which give what nobody has typed."""
     ctx.meta[_TYPED] = command_text(["cornersmooth", str(command.name), *args])
-    if not settable(command):
+    if not settable(command) or ctx.resilient_parsing:  # a shell wants to complete what is not whole yet
         return parse(ctx, args)
-    if not ctx.resilient_parsing:
-        _check_environment(command)
+    _check_environment(command)
     rest = parse(ctx, args)
-    if ctx.resilient_parsing:  # a shell wants to complete what is not whole yet
-        with contextlib.suppress(SettingsError):
-            _set_defaults(command, ctx)
-        return rest
     _set_defaults(command, ctx)
     for file in ctx.meta[SHOP].files:
         _name_strangers(file.path)
