@@ -18,7 +18,7 @@ from cornersmooth.errors import InputError
 from cornersmooth.filter.runs import ProgramReader
 from cornersmooth.nc_reader import read_nc
 from cornersmooth.nc_reader.dialects import dialect_of
-from cornersmooth.nc_words.blocks import WordRules
+from cornersmooth.nc_words.blocks import ruled_words
 
 GOLDEN = sorted((Path(__file__).parents[1] / "nc" / "golden").glob("*.nc"))
 AXES = ("X", "Y", "Z", "A", "C")
@@ -124,14 +124,13 @@ def test_a_table_that_is_like_another_has_its_rows_and_takes_some_back(
         shop, haas = table_of.__wrapped__("shop"), table_of("haas")
     finally:
         word_tables.word_table.cache_clear()
-    rules = [WordRules(table, dialect_of("haas").lexer, 0.01) for table in (shop, haas)]
-    (mine, _), (theirs, _) = (one.of(("G43.4", "H1")) for one in rules)
+    (mine, _), (theirs, _) = (ruled_words(table, ("G43.4", "H1")) for table in (shop, haas))
     assert mine[1].tip_on
     assert theirs[1] is UNLISTED
-    ((_, pallet),), ((_, any_function),) = (one.of(("M321",)) for one in rules)
+    ((_, pallet),), ((_, any_function),) = (ruled_words(table, ("M321",)) for table in (shop, haas))
     assert pallet.alone
     assert any_function.compared
-    assert [one.of(("G254",))[0][1] is UNLISTED for one in rules] == [True, False]
+    assert [ruled_words(table, ("G254",))[0][1] is UNLISTED for table in (shop, haas)] == [True, False]
     assert haas.row("G43.4") is UNKNOWN
     assert shop.row("G43.4").sets == (("tool_length", "."), ("tip", "angles"))
     assert shop.row("G43.4").beside == {"H"}

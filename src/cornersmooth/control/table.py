@@ -314,7 +314,7 @@ UNKNOWN: Final = Row(does=frozenset(("unknown",)))
 UNLISTED: Final = Row()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Table:
     """The rows of a control."""
 

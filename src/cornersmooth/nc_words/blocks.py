@@ -35,6 +35,24 @@ class Block:
         return " ".join(self.words)
 
 
+@lru_cache(_REMEMBERED)
+def ruled_words(table: Table, words: tuple[str, ...]) -> Ruled:
+    """Rows of the words of a block, or of the whole block where that is on the list.
+
+    Most blocks beside the motion are alike; those of cycles are not, but most of their words are.
+    """
+    text, ruled = " ".join(words), Ruled()
+    for row in table.blocks:
+        if row.pattern.fullmatch(text):
+            return [(text, row)]
+    for k, word in enumerate(words):
+        others = words[:k] + words[k + 1 :]
+        fitting = [row for row in table.accepting(word) if row.needs is None or any_of(row.needs, others)]
+        # what belongs beside another word comes first
+        ruled.append((word, min(fitting, key=lambda row: row.needs is None, default=UNLISTED)))
+    return ruled
+
+
 class WordRules:
     """Looks at blocks one by one, whatever is before them.
 
@@ -61,22 +79,6 @@ class WordRules:
     ) -> None:
         self._table, self._lexer, self._m_words, self._whole = table, lexer, m_words, whole
         self._rooms = {"length": tolerance, "angle": axis_tolerance}
-        # most blocks beside the motion are alike; those of cycles are not, but most of their words are
-        self.of = lru_cache(_REMEMBERED)(self._of)
-
-    def _of(self, words: tuple[str, ...]) -> Ruled:
-        """Rows of the words of a block, or of the whole block where that is on the list."""
-        text = " ".join(words)
-        for row in self._table.blocks:
-            if row.pattern.fullmatch(text):
-                return [(text, row)]
-        ruled: Ruled = []
-        for k, word in enumerate(words):
-            others = words[:k] + words[k + 1 :]
-            fitting = [row for row in self._table.accepting(word) if row.needs is None or any_of(row.needs, others)]
-            # what belongs beside another word comes first
-            ruled.append((word, min(fitting, key=lambda row: row.needs is None, default=UNLISTED)))
-        return ruled
 
     def problems(self, line: Line, block: Block, *, metric: bool) -> Iterator[Problem]:
         """What is wrong with a block by itself: words off the list, twice, without others or beside others."""

@@ -13,7 +13,7 @@ from cornersmooth.control.state import State
 from cornersmooth.control.table import UNLISTED, Row, any_of, shown, table_of, word_table
 from cornersmooth.control.words import Lexer, Line, Table
 from cornersmooth.errors import InputError
-from cornersmooth.nc_words.blocks import NOT_LISTED, Block, WordRules
+from cornersmooth.nc_words.blocks import NOT_LISTED, Block, WordRules, ruled_words
 from cornersmooth.nc_words.parts import Parts
 from cornersmooth.nc_words.states import LINEAR, ROTARY, MachinePositions, StateRules
 from cornersmooth.statements.comparison import KINDS
@@ -183,7 +183,7 @@ class WordCheck:
             if _CONTROL_CHARACTERS.search(comment):
                 self._wrong(NOT_LISTED, number, "a comment with a character that ends a block or is none")
         words = tuple(word.spelling for word in line.words) or (_TAPE,) * line.tape
-        block = Block(number, words, self._rules.of(words))
+        block = Block(number, words, ruled_words(states.machine.table, words))
         own = bool(words) and any(pattern.fullmatch(block.text) for pattern in self._own)
         if line.skipped and not own:
             self._wrong(NOT_LISTED, number, "block skip: what the control does depends on a switch")
@@ -203,7 +203,7 @@ class WordCheck:
             trusted = self._on_trust(line, block, before)
             if trusted is not line:  # what it establishes counts
                 states.machine, line = machine.after(trusted), trusted
-            ruled = self._rules.of(tuple(word.spelling for word in line.words))
+            ruled = ruled_words(machine.table, tuple(word.spelling for word in line.words))
         given = {word.name: word.value for word in line.words}
         if self._positions and not own:
             self._at_positions(block, given)
