@@ -175,7 +175,9 @@ def test_paths_of_klartext_that_are_not_known_lose_the_place() -> None:
     assert "".join(lines[12:]).encode() in found.data
 
 
-@pytest.mark.parametrize("jump", ["IF [#1 EQ 1] GOTO 12", "M99 P12", "M 099 P12", "N900 if[#1 eq 1]goto12"])
+@pytest.mark.parametrize(
+    "jump", ["IF [#1 EQ 1] GOTO 12", "M99 P12", "M 099 P12", "N900 if[#1 eq 1]goto12", "P12 M99", "M98 H12"]
+)
 def test_what_is_jumped_to_is_left(jump: str) -> None:
     lines = [f"N{k} {line}\n" for k, line in enumerate(RUN.splitlines(), start=1)]
     text = ISO.format(on="G43.4 H1", start="A20. C30.", cuts="".join(lines)).replace("M30", f"{jump}\nM30")

@@ -33,10 +33,12 @@ _WEAK_FEED: Final = re.compile(rb"(?i)F[ \t]*\d+(?![\d.])")
 #: what sends a control to other lines of the program; numbers of lines beside it, and a jump to a line that the
 #: program works out
 _JUMPS: Final = re.compile(
-    rb"(?i)(?:GOTO[BFCS]?|M[ \t]*0*(?:9[6-9]|198)(?!\d)|G[ \t]*0*6[56]|THEN|REPEATB?|CALL|UNTIL)[^\n]*"
+    rb"(?i)[^\n]*(?:GOTO[BFCS]?|M[ \t]*0*(?:9[6-9]|198)(?!\d)|G[ \t]*0*6[56]|THEN|REPEATB?|CALL|UNTIL)[^\n]*"
 )
-_TARGET: Final = re.compile(rb"(?i)(?:GOTO[BFCS]?|REPEATB?|LBL|(?<![A-Z])[NPQ])\s*(\d{1,9})")
-_COMPUTED: Final = re.compile(rb"(?i)GOTO[BFCS]?\s*[^\d\s]|M[ \t]*0*9[6-9][^\n]*P\s*[#\[]")
+_TARGET: Final = re.compile(rb"(?i)(?:GOTO[BFCS]?|REPEATB?|LBL|(?<![A-Z])[HNPQ])\s*(\d{1,9})")
+_COMPUTED: Final = re.compile(
+    rb"(?i)GOTO[BFCS]?\s*[^\d\s]|M[ \t]*0*9[6-9][^\n]*[HPQ]\s*[#\[]|[HPQ]\s*[#\[][^\n]*M[ \t]*0*9[6-9]"
+)
 
 
 #: the end of a program, or a block with a G word; words of a language are no block
