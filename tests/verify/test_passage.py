@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from cornersmooth.verify import passage as module
 from cornersmooth.verify.chain import Path, Sections
-from cornersmooth.verify.cl_motion import UNBOUND
+from cornersmooth.verify.motions import UNBOUND
 from cornersmooth.verify.passage import Passage
 from oracle.free_space import passes
 from verify.whole_passage import passage, whole_section

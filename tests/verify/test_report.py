@@ -7,6 +7,7 @@ import json
 
 import numpy as np
 import pytest
+from cornersmooth.verify.task import Original
 
 from cornersmooth.cli import run
 from cornersmooth.nc_reader import read_nc
@@ -14,7 +15,6 @@ from cornersmooth.nc_reader.tool import written_at
 from cornersmooth.report.paths import deviation_along
 from cornersmooth.report.tables import verification_csv
 from cornersmooth.verify import verify
-from cornersmooth.verify.cl_motion import original_motion
 from oracle.messages import one_line
 
 from .writing import encode, job
@@ -108,12 +108,12 @@ def test_distribution_along_the_path():
     pose = int(np.flatnonzero(program.line == along.cl_line[worst])[0])
     assert found.pose_tip[pose] == pytest.approx(along.tip[worst], abs=1e-9)
     # both poses of every row can be found again
-    nc, (motion, *_) = read_nc(encode(lines)), original_motion(program, 0.02, 10.0)
+    nc, motion = read_nc(encode(lines)), Original.of(program, 0.02, 10.0)
     sampled = np.flatnonzero(along.element >= 0)
     assert len(sampled) > 16 * program.chains[0, 1]
     written, _ = written_at(nc, along.element[sampled], along.fraction[sampled])
     owner = np.searchsorted(motion.pose, along.pose[sampled])
-    reached, _ = motion.at(owner, along.share[sampled])
+    reached, _ = written_at(motion.trail.nc, owner, along.share[sampled])
     np.testing.assert_allclose(np.linalg.norm(written - reached, axis=1), along.tip[sampled], atol=1e-9)
     assert "".join(verification_csv(program, found)).count("\n") == 1 + np.isfinite(found.pose_tip).sum()
     assert found.to_dict()["poses"] == len(program)

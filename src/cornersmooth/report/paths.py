@@ -99,7 +99,7 @@ def _of_elements(match: Match, offset: int, samples: int) -> Distribution:
     place, _ = together(match, six, place, vertex)
     gap = Gap.of(match.task, (six - match.path.at(place)).T)
     original = match.original
-    owner, fraction = original.move_at(place)
+    owner, fraction = original.trail.located(place)
     way = match.path.lengths_at(place)
     pose = original.pose[owner]
     places = pose, element + offset, original.program.line[pose], match.nc.line[element]

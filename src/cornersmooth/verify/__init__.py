@@ -13,7 +13,7 @@ every moment the tips are within the tolerance and the axis points are within th
 =================== ===================================================================================================
 what is decided     where
 =================== ===================================================================================================
-both as polylines   `cl_motion`, `motions`; how far they leave their chords, proved: `bending`
+both as polylines   `task`, `motions`; how far they leave their chords, proved: `bending`
 run beside another  `passage`: by a `chain` of nearest places, where that fails exactly (`free_space`)
 stretch by stretch  `parse`: which elements do the acts; `batches` cuts long stretches; `match`: its places
 retracts            `along_tool`: rapids beside them that posts add, and cuts that are left for them

@@ -19,11 +19,11 @@ from cornersmooth.verify.acts import Acts
 from cornersmooth.verify.along_tool import AlongTool
 from cornersmooth.verify.feeds import feed_at, out_of_hole
 from cornersmooth.verify.match import Batch
-from cornersmooth.verify.motions import written_motion
+from cornersmooth.verify.motions import ARITHMETIC
 from cornersmooth.verify.nearest import COLUMNS, largest_square, nearest_places
 from cornersmooth.verify.parse import BEFORE, Parse, Part
 from cornersmooth.verify.passage import AROUND, LONGER
-from cornersmooth.verify.task import ARITHMETIC, Task
+from cornersmooth.verify.task import Task
 
 #: elements in a batch; half as many where there are curves, which have more vertices
 BATCH: Final = 1 << 15
@@ -195,7 +195,7 @@ class Batches:
         """Say if between two stops one motion leaves the place where the other stands: CS535, CS536."""
         task, path, original = self.task, self.task.path, self.task.original
         part = self._ahead.part(self._element, element_last + 1)
-        motion = written_motion(part, task)
+        motion = self.task.motion(part)
         place = path.at(self._place[:1])
         if cl_moves:
             start, stop = int(self._place[0]), int(original.trail.last[move_last])

@@ -18,10 +18,10 @@ from cornersmooth.verify.chain import points_at
 from cornersmooth.verify.feeds import reach
 from cornersmooth.verify.findings import AXIS_OFF, Findings, Violation, Where
 from cornersmooth.verify.match import Match
-from cornersmooth.verify.motions import digit_errors, inner_points
+from cornersmooth.verify.motions import ARITHMETIC, digit_errors
 from cornersmooth.verify.nearest import COLUMNS, Metric, largest_square, nearest_places, on_segments
 from cornersmooth.verify.passage import AROUND, LONGER, LOOK_BACK, Break
-from cornersmooth.verify.task import ARITHMETIC, Task
+from cornersmooth.verify.task import Task
 
 #: places nearer to a vertex of the CL path are at it, in segments
 _HAIR: Final = 1e-9
@@ -91,7 +91,7 @@ def of_bent_steps(match: Match, ends: Reached, least: float) -> Reached:
     step = np.flatnonzero(match.step & (bend > 0.0) & (np.maximum(most[:-1], most[1:]) + bend > least))
     number = (step[:, None] + _INSIDE).ravel()
     vertex = number.astype(np.int64)
-    six = inner_points(match.nc, match.motion, match.task, number, match.first)
+    six = match.motion.at(number)
     start = match.place[vertex]
     place, away = together(match, six, start + (number - vertex) * (match.place[vertex + 1] - start), vertex)
     return Reached(vertex, six, Gap.of(match.task, away), place, True)
@@ -179,7 +179,7 @@ def _written(match: Match, place: Floats) -> Floats:
     segment = np.minimum(place.astype(np.int64), len(match.six) - 2)
     bent = np.flatnonzero((match.motion.bend[segment] > 0.0) & (place > segment) & (place < segment + 1))
     if len(bent):
-        points[bent] = inner_points(match.nc, match.motion, match.task, place[bent], match.first)
+        points[bent] = match.motion.at(place[bent])
     return points
 
 

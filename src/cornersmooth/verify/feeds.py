@@ -14,12 +14,12 @@ import numpy as np
 from cornersmooth.model import Bools, FeedMode, Floats, Ints
 from cornersmooth.nc_reader.elements import Element, Elements, Problem
 from cornersmooth.nc_reader.tool import directions
-from cornersmooth.verify.cl_motion import Original
 from cornersmooth.verify.findings import Findings, Runs
 from cornersmooth.verify.free_space import free_interval
 from cornersmooth.verify.match import Match
+from cornersmooth.verify.motions import ARITHMETIC
 from cornersmooth.verify.nearest import COLUMNS, on_segments
-from cornersmooth.verify.task import ARITHMETIC, Task
+from cornersmooth.verify.task import Original, Task
 
 #: places nearer to a vertex of the CL path are at it, in segments
 _HAIR: Final = 1e-9

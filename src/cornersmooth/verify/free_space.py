@@ -17,7 +17,7 @@ import numpy as np
 
 from cornersmooth.model import Floats, Ints
 from cornersmooth.verify.chain import Path
-from cornersmooth.verify.cl_motion import parts_of
+from cornersmooth.verify.motions import parts_of
 
 #: what is reached of a row: by segment of the path the lowest and the highest fraction
 Reached: TypeAlias = dict[int, tuple[float, float]]
@@ -34,8 +34,8 @@ _WIDER = 1.0 + 1e-6
 
 #: bend of steps where what can be reached is worked out exactly, in radii: it is taken off the radius; and the most
 #: parts of a step there
-FINE: Final = 1e-4
-_MOST_PARTS: Final = 64
+FINE: Final = 1e-5
+_MOST_PARTS: Final = 256
 
 #: gives points (k, 3h) of the own motion at vertex numbers (k,) with fractions of the steps behind them
 Inner = Callable[[Floats], Floats]

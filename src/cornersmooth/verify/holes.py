@@ -15,10 +15,9 @@ from cornersmooth.model import Bools, Floats, Ints, Move
 from cornersmooth.nc_reader.elements import Ahead, Element, Problem
 from cornersmooth.nc_reader.tool import beyond_digits, directions, leads_somewhere
 from cornersmooth.statements.cycles import Drilling
-from cornersmooth.verify.cl_motion import Original, selecting
-from cornersmooth.verify.motions import digit_errors
+from cornersmooth.verify.motions import ARITHMETIC, digit_errors
 from cornersmooth.verify.nearest import COLUMNS, on_segments
-from cornersmooth.verify.task import ARITHMETIC
+from cornersmooth.verify.task import Original, selecting
 
 #: how far above the last depth a rapid ends at least, as a share of a peck, and no more than so many mm; by how many mm
 #: the last peck may be deeper: nothing worth a peck is left

@@ -16,11 +16,10 @@ from numpy.typing import NDArray
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.elements import Elements
 from cornersmooth.verify.chain import Path, Sections, passed
-from cornersmooth.verify.cl_motion import Original
-from cornersmooth.verify.motions import Motion, inner_points, written_motion
+from cornersmooth.verify.motions import Motion
 from cornersmooth.verify.nearest import COLUMNS, Metric
 from cornersmooth.verify.passage import MOST_BREAKS, Break, Passage
-from cornersmooth.verify.task import Task
+from cornersmooth.verify.task import Original, Task
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,7 +57,7 @@ class Match(Batch):
         """Run the motions beside each other; nothing is looked at after `most` places where they part."""
         rows, lead = batch.stretches, int(batch.continued)
         part = batch.nc.part(lead, len(batch.nc))
-        motion = written_motion(part, task)
+        motion = task.motion(part)
         ends = motion.last[rows["first"] - lead], motion.last[rows["last"] - lead]
         place, breaks = np.zeros(0), []
         for k, (metric, (path, radius)) in enumerate(task.runs.items()):
@@ -66,7 +65,7 @@ class Match(Batch):
             sections = Sections(*ends, rows["start"][:, k], rows["end"][:, k], rows["guessed"])
 
             def inner(number: Floats, columns: slice = columns) -> Floats:
-                return inner_points(part, motion, task, number)[:, columns]
+                return motion.at(number)[:, columns]
 
             found = Passage(motion.six[:, columns], motion.bend, path, radius, sections, inner, most)
             place = place if k else found.place

@@ -7,7 +7,7 @@ vertices, as many as keep the bend (see `bending`) within a share of the toleran
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -15,30 +15,50 @@ from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.elements import Element, Elements
 from cornersmooth.nc_reader.tool import directions, groups, written_at
 from cornersmooth.verify.bending import arc_bend, curve_bend, turn_bend, wound_bend
-from cornersmooth.verify.cl_motion import UNBOUND, divided, parts_of
-from cornersmooth.verify.task import ARITHMETIC, Task
 
-#: bend of a step of the written motion, in tolerances (speed only: steps that are not proved are divided)
-WRITTEN_SHARE: Final = 1.0 / 8.0
+#: slack of arithmetic on coordinates that are a million times larger, mm
+ARITHMETIC: Final = 1e-9
 
-#: parts of an element, or of a curve between its knots, at first (speed only: as above)
-_MOST_PARTS: Final = 64
+#: bend of what has none, as where the axis turns over, mm: it is not proved and not divided
+UNBOUND: Final = 1e9
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Motion:
     """A motion as a polyline, v vertices."""
 
+    nc: Elements  #: (m,) what it is made of: the first of them only says where it begins
+    axis_length: float  #: mm: H
+    own_axis: bool  #: whether the axis points are H times the axis, wherever the tip is
     six: Floats  #: (v, 6) mm: tips and axis points
-    owner: Ints  #: (v,): the element that leads to each vertex, counted in the elements at hand
+    owner: Ints  #: (v,): the element that leads to each vertex
     fraction: Floats  #: (v,): where on it, 1 at its end
     last: Ints  #: (m,): vertex at the end of each element
     bend: Floats  #: (v - 1,) mm: of the step to the next vertex
 
+    def __len__(self) -> int:
+        return len(self.owner)
 
-def written_motion(nc: Elements, task: Task) -> Motion:
-    """Make the polyline of elements; the first of them only says where the motion begins."""
-    axis_length = task.axis_length
+    def located(self, place: Floats) -> tuple[Ints, Floats]:
+        """(k,) elements at vertex numbers with fractions of the steps behind them, and fractions of the elements."""
+        before = place.astype(np.int64)
+        after = np.minimum(before + 1, len(self) - 1)
+        owner = self.owner[after]
+        start = np.where(self.owner[before] == owner, self.fraction[before], 0.0)
+        return owner, start + (place - before) * (self.fraction[after] - start)
+
+    def at(self, place: Floats) -> Floats:
+        """(k, 6) tips and axis points there."""
+        return side_by_side(*written_at(self.nc, *self.located(place)), self.axis_length, self.own_axis)
+
+
+def motion_of(nc: Elements, axis_length: float, share: float, most: int, *, own_axis: bool) -> Motion:
+    """Make the polyline of elements.
+
+    The bends of its parts are at most `share`, mm, but where that takes more than `most` of them in an element, or in
+    a curve between its knots.
+    """
+    how: dict[str, Any] = {"nc": nc, "axis_length": axis_length, "own_axis": own_axis}
     second = nc.second - nc.tip if nc.second_is == "point" else nc.second
     bend = np.zeros(len(nc))
     bend[1:] = axis_length * turn_bend(second[:-1], second[1:])
@@ -53,23 +73,22 @@ def written_motion(nc: Elements, task: Task) -> Motion:
             bend[at] = arc + axis_length * wound_bend(second[at - 1], slope, arc)
     bend[:1] = 0.0
     bend = np.minimum(bend, UNBOUND)
-    share = WRITTEN_SHARE * task.tolerance
-    parts = parts_of(bend, share, _MOST_PARTS)
+    parts = parts_of(bend, share, most)
     step_bend = bend / parts**2
     curved = []
     for group in groups(nc.curves, np.flatnonzero(nc.curves.element > 0)):
         at = nc.curves.element[group.index]
         spans = np.minimum(curve_bend(group, nc.second_is, axis_length), UNBOUND)
-        inner = parts_of(spans.max(axis=1, initial=0.0), share, _MOST_PARTS)
+        inner = parts_of(spans.max(axis=1, initial=0.0), share, most)
         parts[at] = inner * max(spans.shape[1], 1)
         curved.append((group, at, inner, spans))
     if not len(nc) or parts.max() == 1:
         index = np.arange(len(nc))
-        six = task.six(nc.tip, directions(nc, nc.tip, nc.second))
+        six = side_by_side(nc.tip, directions(nc, nc.tip, nc.second), axis_length, own_axis)
         bends = step_bend[1:].copy()
         for _, at, _, spans in curved:
             bends[at - 1] = spans.max(axis=1, initial=0.0)
-        return Motion(six, index, np.ones(len(nc)), index, bends)
+        return Motion(**how, six=six, owner=index, fraction=np.broadcast_to(1.0, len(nc)), last=index, bend=bends)
     owner, fraction, last = divided(parts)
     bends = step_bend[owner]
     tip, other = nc.tip.take(owner, axis=0), nc.second.take(owner, axis=0)
@@ -91,20 +110,31 @@ def written_motion(nc: Elements, task: Task) -> Motion:
     axis = directions(nc, tip, other)
     if len(within):
         tip[within], axis[within] = written_at(nc, owner[within], fraction[within])
-    return Motion(task.six(tip, axis), owner, fraction, last, bends[1:])
+    six = side_by_side(tip, axis, axis_length, own_axis)
+    return Motion(**how, six=six, owner=owner, fraction=fraction, last=last, bend=bends[1:])
 
 
-def inner_points(nc: Elements, motion: Motion, task: Task, number: Floats, first: int = 0) -> Floats:
-    """(k, 6) points of a written motion at vertex numbers with fractions of the steps behind them.
+def parts_of(bend: Floats, share: float, most: int) -> Ints:
+    """(k,) number of equal parts whose bends are at most `share`; no more than `most`, then they bend more."""
+    parts = np.ceil(np.sqrt(np.minimum(bend / share, float(most) ** 2)))
+    return np.where(bend < UNBOUND, np.clip(parts, 1, most), 1).astype(np.int64)
 
-    The motion begins at the end of element `first`.
-    """
-    before = number.astype(np.int64)
-    after = np.minimum(before + 1, len(motion.owner) - 1)
-    owner = motion.owner[after]
-    start = np.where(motion.owner[before] == owner, motion.fraction[before], 0.0)
-    share = start + (number - before) * (motion.fraction[after] - start)
-    return task.six(*written_at(nc, owner + first, share))
+
+def divided(cuts: Ints) -> tuple[Ints, Floats, Ints]:
+    """Owner and fraction of every vertex, and each owner's last vertex, for given numbers of parts."""
+    last = np.cumsum(cuts) - 1
+    owner = np.repeat(np.arange(len(cuts)), cuts)
+    part = np.arange(len(owner)) - np.repeat(last + 1 - cuts, cuts) + 1
+    return owner, part / np.repeat(cuts, cuts), last
+
+
+def side_by_side(tip: Floats, axis: Floats, axis_length: float, own_axis: bool) -> Floats:
+    """(..., 6) tips and axis points, mm."""
+    six = np.empty((*tip.shape[:-1], 6))
+    for k in range(3):  # by columns: rows are too short to go along
+        six[..., k], other = tip[..., k], axis_length * axis[..., k]
+        six[..., 3 + k] = other if own_axis else other + tip[..., k]
+    return six
 
 
 def digit_errors(nc: Elements, element: Ints, tip: Floats, axis: Floats, axis_length: float) -> tuple[Bools, Floats]:

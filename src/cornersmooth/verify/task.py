@@ -6,18 +6,29 @@ import math
 from collections.abc import Sequence, Set
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final
+from typing import Final, Self
 
 import numpy as np
 
-from cornersmooth.model import Bools, Floats, Ints, Keep, Program
+from cornersmooth.arrays import some_rows
+from cornersmooth.model import Bools, FeedMode, Floats, Ints, Keep, Move, Program
+from cornersmooth.nc_reader.elements import Curves, Element, Elements, NcArcs, Problem
+from cornersmooth.settings import FLIP_ANGLE
 from cornersmooth.statements.asked import Asking
 from cornersmooth.verify.chain import Path
-from cornersmooth.verify.cl_motion import Original, original_motion
+from cornersmooth.verify.motions import ARITHMETIC, Motion, motion_of, side_by_side
 from cornersmooth.verify.nearest import COLUMNS, Metric
 
-#: slack of arithmetic on coordinates that are a million times larger, mm
-ARITHMETIC: Final = 1e-9
+#: bend of a segment in tolerances: it is taken off the tolerance where what can be reached is worked out exactly
+CL_SHARE: Final = 1.0 / 128.0
+
+#: parts of a CL move at most; what bends more is not proved
+_MOST_PARTS: Final = 1 << 13
+
+#: bend of a step of the written motion, in tolerances, and parts of an element, or of a curve between its knots, at
+#: first (speed only: steps that are not proved are divided)
+WRITTEN_SHARE: Final = 1.0 / 8.0
+_WRITTEN_PARTS: Final = 64
 
 #: how many tolerances tip and axis point may be away from one common pose, though each is near its own path
 APART: Final = 2.0
@@ -45,6 +56,57 @@ class Trust:
 
 #: nothing but the program counts
 TRUST: Final = Trust()
+
+
+@dataclass(frozen=True)
+class Original:
+    """The CL motion: its poses without those that are only stated, as elements and as a polyline."""
+
+    program: Program
+    pose: Ints  #: (m,): pose of every move; the first is where the motion starts
+    trail: Motion  #: owners are indices into `pose`
+
+    @classmethod
+    def of(cls, program: Program, tolerance: float, axis_length: float, *, own_axis: bool = False) -> Self:
+        """Make it of the poses of a program."""
+        stated = program.kind == Move.FROM
+        # an arc wants a start: where that is only stated the tool is sent there
+        stated[:-1] &= program.kind[1:] != Move.ARC
+        pose = np.flatnonzero(~stated)
+        nc = _moves(program, pose)
+        return cls(program, pose, motion_of(nc, axis_length, CL_SHARE * tolerance, _MOST_PARTS, own_axis=own_axis))
+
+
+def _moves(program: Program, pose: Ints) -> Elements:
+    """The moves to poses, as elements."""
+    chosen, none = selecting(pose), np.broadcast_to(0.0, len(pose))
+    kind = np.where(program.kind[chosen] == Move.RAPID, Element.RAPID, Element.LINE).astype(np.uint8)
+    row = np.flatnonzero(np.searchsorted(pose, program.arcs.pose))  # but one that begins nowhere
+    arcs = some_rows(program.arcs, row)
+    shapes = NcArcs(np.searchsorted(pose, arcs.pose), arcs.centre, arcs.normal, arcs.sweep)
+    kind[shapes.element] = Element.ARC
+    curves = Curves()
+    if (given := program.curves) is not None:
+        count = len(given)
+        points = given.bezier.reshape(-1, 6) - np.pad(given.bezier[..., :3], ((0, 0), (0, 0), (3, 0))).reshape(-1, 6)
+        four, knots = np.full(count, 4), np.tile(np.repeat((0.0, 1.0), 4), count)
+        curves = Curves(np.searchsorted(pose, given.pose), four, four, points, np.ones(4 * count), knots)
+        kind[curves.element] = Element.CURVE
+    return Elements(
+        kind=kind,
+        tip=program.tip[chosen],
+        second=program.axis[chosen],
+        line=program.line[chosen],
+        feed=program.feed[chosen],
+        per_revolution=program.feed_mode[chosen] == FeedMode.PER_REVOLUTION,
+        other_feed=none,
+        least_feed=none > 0.0,
+        feed_room=none,
+        second_room=none,
+        tip_room=none,
+        curves=curves,
+        arcs=shapes,
+    )
 
 
 @dataclass(frozen=True)
@@ -89,15 +151,14 @@ class Task:
         if axis_tolerance is not None:
             axis_length = length_of(tolerance, axis_tolerance)
         tolerance -= sagitta
-        original, tip, axis = original_motion(program, tolerance, axis_length)
-
-        def exact(place: Floats) -> Floats:
-            return side_by_side(*original.pose_at(place), axis_length, own_axis)
-
-        six = side_by_side(tip, axis, axis_length, own_axis)
-        del tip, axis  # before as much is needed for path lengths
-        path = Path.of(six, original.trail.bend, exact)
+        original = Original.of(program, tolerance, axis_length, own_axis=own_axis)
+        trail = original.trail
+        path = Path.of(trail.six, trail.bend, trail.at)
         return cls(original, path, _exact_poses(original), tolerance, axis_length, axis_tolerance, apart, sagitta)
+
+    def motion(self, nc: Elements) -> Motion:
+        """Make the polyline of elements of a program."""
+        return motion_of(nc, self.axis_length, WRITTEN_SHARE * self.tolerance, _WRITTEN_PARTS, own_axis=self.own_axis)
 
     def six(self, tip: Floats, axis: Floats) -> Floats:
         """(..., 6) tips and axis points side by side, mm."""
@@ -146,15 +207,6 @@ def length_of(tolerance: float, axis_tolerance: float) -> float:
     return tolerance / (2.0 * math.sin(math.radians(axis_tolerance) / 2.0))
 
 
-def side_by_side(tip: Floats, axis: Floats, axis_length: float, own_axis: bool) -> Floats:
-    """(..., 6) tips and axis points, mm."""
-    six = np.empty((*tip.shape[:-1], 6))
-    for k in range(3):  # by columns: rows are too short to go along
-        six[..., k], other = tip[..., k], axis_length * axis[..., k]
-        six[..., 3 + k] = other if own_axis else other + tip[..., k]
-    return six
-
-
 def _exact_poses(original: Original) -> Bools:
     program = original.program
     exact = np.ones(len(program), np.bool_)
@@ -166,3 +218,21 @@ def _exact_poses(original: Original) -> Bools:
         exact = np.cumsum(steps[:-1]) == 0
     exact |= (program.keep != Keep.NO) | program.acted[1:]
     return exact[original.pose]
+
+
+def selecting(pose: Ints) -> slice | Ints:
+    """What selects poses (m,): a slice, which copies nothing, where they follow one another, as nearly always."""
+    return slice(pose[0], pose[-1] + 1) if len(pose) and pose[-1] - pose[0] == len(pose) - 1 else pose
+
+
+def half_turns(program: Program) -> list[Problem]:
+    """Moves that no text can be measured against, with their CL lines: CS526.
+
+    Between opposite axes there is no great circle, and near them it hangs on the last digits of both.
+    """
+    found = program.axis_steps(np.isin(program.kind, (Move.LINEAR, Move.ARC)), FLIP_ANGLE)
+    text = "the tool axis turns by {:.4g} deg in one move, and which way a control turns is not defined"
+    return [
+        Problem("CS526", int(program.line[pose]), 0, text.format(turn))
+        for pose, turn in zip(*(values.tolist() for values in found), strict=True)
+    ]
