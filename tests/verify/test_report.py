@@ -7,7 +7,6 @@ import json
 
 import numpy as np
 import pytest
-from cornersmooth.verify.task import Original
 
 from cornersmooth.cli import run
 from cornersmooth.nc_reader import read_nc
@@ -15,6 +14,7 @@ from cornersmooth.nc_reader.tool import written_at
 from cornersmooth.report.paths import deviation_along
 from cornersmooth.report.tables import verification_csv
 from cornersmooth.verify import verify
+from cornersmooth.verify.task import Original
 from oracle.messages import one_line
 
 from .writing import encode, job

@@ -48,7 +48,7 @@ class Acts:
     left_out: list[Problem] = field(default_factory=list)
     moves_left_out: set[int] = field(default_factory=set)
     rewinds: list[tuple[int, int]] = field(default_factory=list)  #: NC lines where cuts are left, and where they go on
-    still: set[int] = field(default_factory=set)  #: elements that lead nowhere, as a rapid is put elsewhere
+    still: set[int] = field(default_factory=set)  #: elements that lead nowhere
     unlooked: list[tuple[int, str]] = field(default_factory=list)  #: what cannot be decided, and its NC line
     #: CS531 a rapid goes elsewhere, CS532 one is missing, CS533 one too many; CS536 a feed move too many; of holes
     problems: list[Problem] = field(default_factory=list)

@@ -14,10 +14,11 @@ import numpy as np
 
 from cornersmooth.model import Floats, Move
 from cornersmooth.nc_reader.elements import Ahead, Element, Elements, Event, Problem
-from cornersmooth.nc_reader.tool import directions
+from cornersmooth.nc_reader.tool import directions, leads_somewhere
 from cornersmooth.verify.acts import Acts
 from cornersmooth.verify.along_tool import AlongTool
 from cornersmooth.verify.feeds import feed_at, out_of_hole
+from cornersmooth.verify.holes import straight
 from cornersmooth.verify.match import Batch
 from cornersmooth.verify.motions import ARITHMETIC
 from cornersmooth.verify.nearest import COLUMNS, largest_square, nearest_places
@@ -47,6 +48,7 @@ class Batches:
         self.task, self._events, self.retracts = task, events, retracts
         self.acts = Acts()
         self.elements = 0
+        self.room = 0.0  #: mm: distance that the printed digits account for
         # the stretch that has no end yet: where it begins, as a move and in the text, and (3,) on the CL path, perhaps
         # guessed; and the last move that it may have
         self._move, self._element, self._move_last, self._place = -1, 0, -1, np.zeros(3)
@@ -62,10 +64,11 @@ class Batches:
     def of(self, chunks: Iterable[Elements]) -> Iterator[Batch]:
         """Give out all batches of a text."""
         original = self.task.original
-        ahead = self._ahead = Ahead(nc for nc in chunks if len(nc))
+        ahead = self._ahead = Ahead(self._standing(nc for nc in chunks if len(nc)))
         if ahead.has(0) and len(original.pose):
             along = AlongTool(ahead, self.retracts, self._events, self.acts)
             parse = Parse(self.task, ahead, self._events, along, self.acts)
+            self.room = parse.lines.room
             for part in parse.parts():
                 yield from self._take(part)
             yield from self._close(len(original.pose) - 1, ahead.count - 1)
@@ -79,6 +82,17 @@ class Batches:
             line = int(original.program.line[original.pose[0]])
             self.acts.problems.append(Problem("CS534", line, 0, "the program lacks motion of the CL file"))
         self.elements = ahead.count
+
+    def _standing(self, chunks: Iterable[Elements]) -> Iterator[Elements]:
+        """Give out elements, and take down which lead nowhere: a full circle ends where it begins, and does."""
+        offset, ends = 0, [np.full((1, 3), np.inf)] * 2
+        for nc in chunks:
+            ways = [np.diff(one, axis=0, prepend=before) for one, before in zip((nc.tip, nc.second), ends, strict=True)]
+            rows = np.flatnonzero(np.abs(ways[0][:, 0]) <= 2.0 * nc.tip_step)  # most do not, by X alone
+            rows = rows[straight(nc.kind[rows]) & ~leads_somewhere(nc, ways[0][rows], ways[1][rows])]
+            self.acts.still.update((offset + rows).tolist())
+            offset, ends = offset + len(nc), [nc.tip[-1:], nc.second[-1:]]
+            yield nc
 
     def _take(self, part: Part) -> Iterator[Batch]:
         """Take the stops among more elements."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass
 from itertools import chain
 from typing import Final, Self, TypeAlias
@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from cornersmooth.model import Bools, Floats, Ints, Move
 from cornersmooth.nc_reader.elements import Ahead, Element, Problem
-from cornersmooth.nc_reader.tool import beyond_digits, directions, leads_somewhere
+from cornersmooth.nc_reader.tool import beyond_digits, directions
 from cornersmooth.statements.cycles import Drilling
 from cornersmooth.verify.motions import ARITHMETIC, digit_errors
 from cornersmooth.verify.nearest import COLUMNS, on_segments
-from cornersmooth.verify.task import Original, selecting
+from cornersmooth.verify.task import Task, selecting
 
 #: how far above the last depth a rapid ends at least, as a share of a peck, and no more than so many mm; by how many mm
 #: the last peck may be deeper: nothing worth a peck is left
@@ -36,8 +36,9 @@ _Fault: TypeAlias = tuple[str, int, str, float]
 class HoleLines:
     """Compares ends of elements with poses and holes of the CL file; lengths in mm."""
 
-    def __init__(self, original: Original, ahead: Ahead, axis_length: float, tolerance: float) -> None:
-        self.ahead, self.axis_length, self.tolerance = ahead, axis_length, tolerance
+    def __init__(self, task: Task, ahead: Ahead, still: Set[int]) -> None:
+        original, axis_length, tolerance = task.original, task.axis_length, task.tolerance
+        self.ahead, self.axis_length, self.tolerance, self._still = ahead, axis_length, tolerance, still
         program, nc, chosen = original.program, ahead.nc, selecting(original.pose)
         self.tip, self.axis = program.tip[chosen], program.axis[chosen]
         self.line, self.kind = program.line[chosen], program.kind[chosen]
@@ -85,7 +86,7 @@ class HoleLines:
         # what the printed angles of a tilted plane leave open
         lean = np.where(nc.tip_room[own] > 0.0, nc.second_room[own], 0.0)
         over = self._above(moves, nc.tip[own], directions(nc, nc.tip[own], nc.second[own]), lean)
-        return np.where(_straight(nc.kind[own]), over, np.nan)
+        return np.where(straight(nc.kind[own]), over, np.nan)
 
     def _above(self, moves: Ints, tip: Floats, axis: Floats, lean: Floats | float = 0.0) -> Floats:
         """(k,) mm above the poses of holes at tips (k, 3); NaN beside a hole or with another axis."""
@@ -137,13 +138,7 @@ class HoleLines:
 
     def stands(self, element: int) -> bool:
         """Whether an element leads nowhere."""
-        return bool(self._of("standing", -1, element))
-
-    def standing(self, _: Ints, elements: Ints) -> Bools:
-        """(k,) whether elements lead nowhere: a full circle ends where it begins, and does."""
-        nc, own = self.ahead.nc, elements - self.ahead.base
-        ways = (values[own] - values[np.maximum(own - 1, 0)] for values in (nc.tip, nc.second))
-        return (own > 0) & _straight(nc.kind[own]) & ~leads_somewhere(nc, *ways)
+        return element in self._still
 
     def block(self, element: int) -> range:
         """Elements of the block of one: rotary words make several lines of it."""
@@ -162,7 +157,7 @@ class HoleLines:
         way = nc.tip[[max(own[0] - 1, 0), *own]]
         chord = np.zeros((len(own) - 1, 1), np.int64)
         _, beside = on_segments(way[1:-1, None], way[[0, -1]], chord, COLUMNS["tip"])
-        return bool(_straight(nc.kind[own]).all() and (beside <= self.tolerance**2).all())
+        return bool(straight(nc.kind[own]).all() and (beside <= self.tolerance**2).all())
 
     def in_line(self, move: int, other: int) -> bool:
         """Whether the pose of another move is in the line of a hole, as far as the digits show."""
@@ -368,6 +363,6 @@ def _gap(cycle: Drilling) -> float:
     return min(_ABOVE * min(cycle.steps, default=0.0), _LEAST_ABOVE)
 
 
-def _straight(kind: NDArray[np.uint8]) -> Bools:
+def straight(kind: NDArray[np.uint8]) -> Bools:
     """(k,) whether elements of some kinds are no arcs and no curves."""
     return (kind == Element.RAPID) | (kind == Element.LINE)

@@ -49,7 +49,7 @@ class Parse:
 
     def __init__(self, task: Task, ahead: Ahead, events: Sequence[Event], along: AlongTool, acts: Acts) -> None:
         self._task, self._ahead, self._words, self._along, self.acts = task, ahead, Words(events), along, acts
-        self.lines = HoleLines(task.original, ahead, task.axis_length, task.tolerance)
+        self.lines = HoleLines(task, ahead, acts.still)
         stops = Stops.of(task, self.lines)
         self.moves, self._move, self._hole, self._holes = stops.moves, stops.move, stops.hole, stops.holes
         self._fed, self._cycles, self._stated, self._loads = stops.fed, stops.cycles, stops.stated, stops.loads

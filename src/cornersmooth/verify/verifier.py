@@ -232,7 +232,7 @@ class Verifier:
 
         def items() -> Iterator[tuple[Batch | None, dict[str, Where], int]]:
             poses[:3], poses[3] = np.nan, 0.0  # not before other processes are forked, which would keep them
-            for number, batch in enumerate(batches.of(places.watch(chunks))):
+            for number, batch in enumerate(batches.of(chunks)):
                 wanted = batch if len(findings.breaks) < MOST_BREAKS else None
                 yield wanted, findings.worst.copy(), MORE_BREAKS if number else MOST_BREAKS
 

@@ -7,7 +7,7 @@ moves a word stands at a pose that is passed exactly.
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterable, Mapping, Sequence, Set
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import replace
 
 import numpy as np
@@ -15,8 +15,7 @@ import numpy as np
 from cornersmooth.control.table import Means
 from cornersmooth.control.words import distinct
 from cornersmooth.model import Bools, Ints, Move
-from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem
-from cornersmooth.nc_reader.tool import leads_somewhere
+from cornersmooth.nc_reader.elements import Event, Problem
 from cornersmooth.statements.asked import asked
 from cornersmooth.statements.comparison import Comparison, changed_unseen, without_word
 from cornersmooth.statements.tokens import Token, said
@@ -25,39 +24,10 @@ from cornersmooth.verify.findings import Findings
 
 
 class WordPlaces:
-    """Takes down which elements lead nowhere behind words as they are read; then compares the words."""
+    """Compares the words of a text with the statements of the CL file when all of it has been read."""
 
-    def __init__(self, batches: Batches, events: list[Event]) -> None:
+    def __init__(self, batches: Batches, events: Sequence[Event]) -> None:
         self._batches, self._task, self._events = batches, batches.task, events
-        self._room = 0.0  # what printed digits account for, mm
-        self._still: set[int] = set()  # elements behind words that lead nowhere
-        self._looked = 0  # words so far
-
-    def watch(self, chunks: Iterable[Elements]) -> Iterable[Elements]:
-        """Give out the elements of a text, and take down those behind words that lead nowhere."""
-        offset, before, waiting = 0, [np.full((1, 3), np.inf)] * 2, np.zeros(0, np.int64)
-        for nc in chunks:
-            axis_step = nc.second_step * (self._task.axis_length if nc.second_is == "vector" else 1.0)
-            self._room = min(nc.tip_step + axis_step, self._task.tolerance)
-            ends = nc.tip, nc.second
-            new = [event.element for event in self._events[self._looked :]]
-            self._looked = len(self._events)
-            rows = distinct(np.append(waiting, np.array(new, np.int64))) - offset
-            waiting = rows[rows >= len(nc)] + offset
-            rows = rows[rows < len(nc)]
-            while len(rows):
-                straight = (nc.kind[rows] == Element.RAPID) | (nc.kind[rows] == Element.LINE)
-                first = rows[:, None] == 0
-                begins = (np.where(first, old, end[rows - 1]) for end, old in zip(ends, before, strict=True))
-                ways = (end[rows] - begin for end, begin in zip(ends, begins, strict=True))
-                rows = rows[straight & ~leads_somewhere(nc, *ways)]
-                self._still.update((offset + rows).tolist())
-                rows = rows + 1
-                waiting = np.append(waiting, rows[rows == len(nc)] + offset)
-                rows = rows[rows < len(nc)]
-            before = [end[-1:] for end in ends] if len(nc) else before
-            offset += len(nc)
-            yield nc
 
     def problems(
         self,
@@ -76,7 +46,6 @@ class WordPlaces:
         """
         batches, original = self._batches, self._task.original
         program = original.program
-        self._still |= batches.acts.still
         # statements by the first move behind them that leads anywhere, words and retracts by the first such element
         places = np.searchsorted(original.pose, [one.pose for one in program.statements]).tolist()
         unique = distinct(np.array(places, np.int64))
@@ -162,7 +131,7 @@ class WordPlaces:
             here, before = pose[moves[rows]], pose[np.maximum(moves[rows] - 1, 0)]
             ways = (values[here] - values[first[rows]] for values in (program.tip, program.axis))
             way, turn = (np.linalg.norm(one, axis=1) for one in ways)
-            leads = (np.maximum(way, self._task.axis_length * turn) > self._room) | (moves[rows] == 0)
+            leads = (np.maximum(way, self._task.axis_length * turn) > self._batches.room) | (moves[rows] == 0)
             leads |= (program.kind[here] == Move.HOLE) | (program.kind[before] == Move.HOLE)
             rows = rows[~leads | np.isin(moves[rows], list(left_out))]
             moves[rows] += 1
@@ -171,7 +140,7 @@ class WordPlaces:
 
     def _moving(self, element: int) -> int:
         """The first element from one on that leads anywhere."""
-        while element in self._still:
+        while element in self._batches.acts.still:
             element += 1
         return element
 
