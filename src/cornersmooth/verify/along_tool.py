@@ -72,7 +72,10 @@ class AlongTool:
         if place == element:
             return False
         ahead.put(element, place)
-        nc, rows = ahead.nc, np.arange(max(element, 1), element + 1 + more) - ahead.base  # what leads nowhere is another now
+        nc, rows = (
+            ahead.nc,
+            np.arange(max(element, 1), element + 1 + more) - ahead.base,
+        )  # what leads nowhere is another now
         ways = (values[rows] - values[rows - 1] for values in (nc.tip, nc.second))
         moves = ~straight(nc.kind[rows]) | leads_somewhere(nc, *ways)
         self._acts.still.difference_update((rows[moves] + ahead.base).tolist())

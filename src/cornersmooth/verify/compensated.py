@@ -6,15 +6,16 @@ is hangs on the length of the block. So there a way that is divided is another w
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final
 
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints, Move, Program
-from cornersmooth.nc_reader.elements import Element, Elements, Event
+from cornersmooth.nc_reader.elements import Curves, Element, Elements, Event, NcArcs
 from cornersmooth.nc_reader.tool import leads_somewhere
 from cornersmooth.verify.findings import Findings
 from cornersmooth.verify.motions import digit_errors
@@ -54,67 +55,49 @@ class Compensated:
 
     def __init__(self, task: Task, events: Sequence[Event], found: Findings) -> None:
         self._task, self._events, self._found = task, events, found
-        self._poses, self._within = _compensated_poses(task.original.program)
-        self._state = _State()
-        self._read = self._next = self._line = 0
-        self._wrong = False
+        self._parts: list[Elements] = []
 
     def watch(self, chunks: Iterable[Elements]) -> Iterator[Elements]:
-        """Give out the elements of a program, and note the first block that is no move of the CL file."""
-        before, offset = np.full((1, 6), np.inf), 0
+        """Give out the elements of a program; then note the first block that is no move of the CL file."""
+        state, before, offset, read = _State(), np.full((1, 6), np.inf), 0, 0
         for nc in chunks:
-            if len(nc):
-                changes = self._changes(offset, offset + len(nc))
-                if changes or self._state.on or self._state.ending:
-                    ends = np.concatenate((before, np.hstack((nc.tip, nc.second))))
-                    self._compare(nc, self._rows(nc, np.diff(ends, axis=0), changes))
-                before = np.hstack((nc.tip[-1:], nc.second[-1:]))
+            stop = bisect_left(self._events, offset + len(nc), key=lambda event: event.element)
+            words, read = self._events[read:stop], stop
+            some = [one for one in words if one.letter == "G" and one.value in _WORDS]
+            changes = [(one.element - offset, _WORDS[one.value]) for one in some]
+            if len(nc) and (changes or state.on or state.ending):
+                ways = np.diff(np.hstack((nc.tip, nc.second)), axis=0, prepend=before)
+                under = state.feeds(changes, nc.kind == Element.RAPID, ways)
+                under &= leads_somewhere(nc, *np.hsplit(ways, 2)) | (nc.kind == Element.ARC)
+                under[:-1] &= nc.line[1:] != nc.line[:-1]  # rotary words make several lines of a block
+                bare = replace(nc, curves=Curves(), arcs=NcArcs())  # only ends are compared
+                self._parts += [bare.only(under)] if under.any() else []
+            before = np.hstack((nc.tip[-1:], nc.second[-1:])) if len(nc) else before
             offset += len(nc)
             yield nc
-        if self._line and self._next < len(self._poses) and not self._wrong:
-            self._say(self._line)
+        if self._parts:
+            self._compare(Elements.joined(self._parts), *_compensated_poses(self._task.original.program))
 
-    def _changes(self, offset: int, stop: int) -> list[tuple[int, bool]]:
-        """Words of compensation in front of elements from one on, which are counted from it, and whether on."""
-        changes: list[tuple[int, bool]] = []
-        for event in self._events[self._read :]:
-            if event.element >= stop:
-                break
-            self._read += 1
-            if event.letter == "G" and event.value in _WORDS:
-                changes.append((event.element - offset, _WORDS[event.value]))
-        return changes
-
-    def _rows(self, nc: Elements, ways: Floats, changes: list[tuple[int, bool]]) -> Ints:
-        """(k,) elements with which blocks end that lead somewhere under compensation, or end it."""
-        found = self._state.feeds(changes, nc.kind == Element.RAPID, ways)
-        found &= leads_somewhere(nc, *np.hsplit(ways, 2)) | (nc.kind == Element.ARC)
-        found[:-1] &= nc.line[1:] != nc.line[:-1]  # rotary words make several lines of a block
-        return np.flatnonzero(found)
-
-    def _compare(self, nc: Elements, rows: Ints) -> None:
-        """Compare blocks with the next moves of the CL file; arcs within may be written in parts."""
-        poses = self._poses
-        while len(rows) and not self._wrong:
-            chosen = poses[self._next : self._next + len(rows)]
-            right = self._exact(nc, rows[: len(chosen)], chosen)
+    def _compare(self, nc: Elements, poses: Ints, within: Bools) -> None:
+        """Compare blocks with moves of the CL file; arcs within may be written in parts. Nothing is behind a fault."""
+        rows, line = np.arange(len(nc)), 0
+        while len(rows):
+            right = self._exact(nc, rows[: len(poses)], poses[: len(rows)])
             count = int(np.argmin(np.append(right, False)))
-            self._next, self._line, rows = self._next + count, int(nc.line[rows[max(count - 1, 0)]]), rows[count:]
-            if len(rows) and (self._next == len(poses) or not self._within[self._next]):
-                self._say(int(nc.line[rows[0]]))
-            elif len(rows):
-                ends = np.flatnonzero(self._exact(nc, rows, np.full(len(rows), poses[self._next])))
-                rows = rows[int(ends[0]) if len(ends) else len(rows) :]
+            line = int(nc.line[rows[max(count - 1, 0)]])
+            rows, poses, within = rows[count:], poses[count:], within[count:]
+            if len(rows) and not within[:1].any():
+                self._found.unlooked.append((int(nc.line[rows[0]]), _WHAT))
+                return
+            ends = np.flatnonzero(self._exact(nc, rows, np.full(len(rows), poses[0]))) if len(rows) else rows
+            rows = rows[int(ends[0]) if len(ends) else len(rows) :]
+        if len(poses):
+            self._found.unlooked.append((line, _WHAT))
 
     def _exact(self, nc: Elements, rows: Ints, poses: Ints) -> Bools:
         """(k,) whether elements end exactly at poses."""
         program = self._task.original.program
         return digit_errors(nc, rows, program.tip[poses], program.axis[poses], self._task.axis_length)[0]
-
-    def _say(self, line: int) -> None:
-        """Note a line; nothing behind it is compared."""
-        self._found.unlooked.append((line, _WHAT))
-        self._wrong = True
 
 
 def _compensated_poses(program: Program) -> tuple[Ints, Bools]:
