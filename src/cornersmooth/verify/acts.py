@@ -6,7 +6,7 @@ from array import array
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Final, NamedTuple, Self
+from typing import Final, Self
 
 import numpy as np
 
@@ -21,16 +21,6 @@ from cornersmooth.verify.task import Task
 
 #: words that a hole may have: its dwell and its tap
 _IN_HOLES: Final = (("G", 4.0), ("G", 84.0))
-
-
-class Step(NamedTuple):
-    """A stop that is reached."""
-
-    move: int  #: the move that ends there
-    element: int  #: the element that ends there; the first one of a hole; the first feed move out of a hole
-    opens: bool  #: whether feed moves may follow, rather than a hole
-    last: int  #: last move before the next stop
-    within: bool = False  #: whether both motions pass a pose of a run there, where both files have words
 
 
 @dataclass

@@ -12,19 +12,21 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left, bisect_right
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from itertools import count, takewhile
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
 from cornersmooth.model import Move
-from cornersmooth.nc_reader.elements import Ahead, Element, Event
-from cornersmooth.nc_reader.tool import directions, moving_rapids
-from cornersmooth.verify.acts import Acts, Step, Stops, Words
+from cornersmooth.nc_reader.elements import Ahead, Element, Elements, Event, Problem
+from cornersmooth.nc_reader.tool import directions, leads_somewhere, moving_rapids
+from cornersmooth.verify.acts import Acts, Stops, Words
 from cornersmooth.verify.along_tool import AlongTool
+from cornersmooth.verify.batches import Stretches
 from cornersmooth.verify.feeds import feed_at, out_of_hole
-from cornersmooth.verify.holes import Hole, HoleLines
+from cornersmooth.verify.holes import Hole, HoleLines, straight
+from cornersmooth.verify.match import Batch
 from cornersmooth.verify.task import Task
 
 #: elements that are given out together
@@ -33,35 +35,68 @@ TOGETHER: Final = 1 << 14
 #: stops and elements behind a fault among which the next that fits is looked for
 _AFTER_FAULT: Final = 64
 
-#: elements before those that are certain that are still looked at
-BEFORE: Final = 16
 
+class Batches:
+    """Makes batches of the elements of a text, as they come, counted in all of it; `events`, `retracts` grow along."""
 
-class Part(NamedTuple):
-    """Elements that are certain: up to `stop`, that excluded."""
+    def __init__(self, task: Task, events: Sequence[Event], retracts: Sequence[int]) -> None:
+        self.task, self._events, self._retracts = task, events, retracts
+        self.acts = Acts()
+        self.elements = 0
+        self.room = 0.0  #: mm: distance that the printed digits account for
 
-    stop: int
-    steps: list[Step]
+    def of(self, chunks: Iterable[Elements]) -> Iterator[Batch]:
+        """Give out all batches of a text."""
+        original, acts = self.task.original, self.acts
+        ahead = Ahead(self._standing(nc for nc in chunks if len(nc)))
+        if ahead.has(0) and len(original.pose):
+            parse = Parse(self.task, ahead, self._events, self._retracts, acts)
+            self.room, stretches = parse.lines.room, parse.stretches
+            for stop in parse.parts():
+                yield from stretches.take(stop)
+            stretches.end(len(original.pose) - 1, ahead.count - 1)
+            stretches.leave()
+            yield from stretches.ready
+        elif ahead.count:
+            text = "motion that the CL file does not have"
+            acts.problems.append(Problem("CS534", 0, int(ahead.nc.line[0]), text))
+            while ahead.has(ahead.count):
+                ahead.forget(ahead.count - 1)
+        elif len(original.pose):
+            line = int(original.program.line[original.pose[0]])
+            acts.problems.append(Problem("CS534", line, 0, "the program lacks motion of the CL file"))
+        self.elements = ahead.count
+
+    def _standing(self, chunks: Iterable[Elements]) -> Iterator[Elements]:
+        """Give out elements, and take down which lead nowhere: a full circle ends where it begins, and does."""
+        offset, ends = 0, [np.full((1, 3), np.inf)] * 2
+        for nc in chunks:
+            ways = [np.diff(one, axis=0, prepend=before) for one, before in zip((nc.tip, nc.second), ends, strict=True)]
+            rows = np.flatnonzero(np.abs(ways[0][:, 0]) <= 2.0 * nc.tip_step)  # most do not, by X alone
+            rows = rows[straight(nc.kind[rows]) & ~leads_somewhere(nc, ways[0][rows], ways[1][rows])]
+            self.acts.still.update((offset + rows).tolist())
+            offset, ends = offset + len(nc), [nc.tip[-1:], nc.second[-1:]]
+            yield nc
 
 
 class Parse:
     """Goes through the acts of the CL file and the elements of a program, at least one, side by side."""
 
-    def __init__(self, task: Task, ahead: Ahead, events: Sequence[Event], along: AlongTool, acts: Acts) -> None:
-        self._task, self._ahead, self._words, self._along, self.acts = task, ahead, Words(events), along, acts
+    def __init__(self, task: Task, ahead: Ahead, events: Sequence[Event], retracts: Sequence[int], acts: Acts) -> None:
+        self._task, self._ahead, self._words, self.acts = task, ahead, Words(events), acts
+        self._along, self.stretches = AlongTool(ahead, retracts, events, acts), Stretches(task, ahead, acts)
         self.lines = HoleLines(task, ahead, acts.still)
         stops = Stops.of(task, self.lines)
         self.moves, self._move, self._hole, self._holes = stops.moves, stops.move, stops.hole, stops.holes
         self._fed, self._cycles, self._stated, self._loads = stops.fed, stops.cycles, stops.stated, stops.loads
-        self._steps: list[Step] = []
         self._given = 0  #: elements given out so far
         self._begun = -1  #: the element with which the run begins that goes on; -1 within a hole and in front of all
         self._from: tuple[int, ...] = ()  # the move and the element that a run of feed moves begins with
         # where a run may be divided next: first element and move, and how far the tool has gone, mm
         self._looked, self._cut_at, self._gone = 0, 0, 0.0
 
-    def parts(self) -> Iterator[Part]:
-        """Give out what is certain as it is read; all but the last `BEFORE` of that may be forgotten then."""
+    def parts(self) -> Iterator[int]:
+        """Give out up to which element, that excluded, all is certain: all but the last `BEFORE` may be forgotten."""
         stop, element, last = -1, 0, len(self.moves) - 1
         while True:
             stop, element = yield from self._run(stop, element)
@@ -78,14 +113,14 @@ class Parse:
                 break
             yield from self._certain(element)
         self._end_run(self._move[-1], element)
-        yield Part(element, self._steps)
+        yield element
 
-    def _certain(self, element: int) -> Iterator[Part]:
+    def _certain(self, element: int) -> Iterator[int]:
         if element - self._given >= TOGETHER:
-            yield Part(element, self._steps)
-            self._given, self._steps = element, []
+            yield element
+            self._given = element
 
-    def _run(self, stop: int, element: int) -> Generator[Part, None, tuple[int, int]]:
+    def _run(self, stop: int, element: int) -> Generator[int, None, tuple[int, int]]:
         """Go along feed moves, and the rapids behind them, up to a hole or to what is no act of the CL file."""
         ahead, lines, along = self._ahead, self.lines, self._along
         met = -1  # behind the last pose before a hole
@@ -159,7 +194,8 @@ class Parse:
                 self.acts.cuts.extend((move, one))
                 self._cut_at = move + 1
                 if move - 1 > self._move[stop] and one - 1 > self._begun:
-                    self._steps.append(Step(move - 1, one - 1, True, self._move[stop + 1] - 1, within=True))
+                    self.stretches.end(move - 1, one - 1)
+                    self.stretches.begin(move - 1, one - 1, self._move[stop + 1] - 1)
 
     def _pass_idle(self, stop: int, element: int) -> int:
         """First element from one on that leads anywhere: posts add others beside retracts."""
@@ -288,7 +324,8 @@ class Parse:
         """Take down a hole that some elements belong to."""
         lines, move = self.lines, self._move[stop]
         if self._begun >= 0:
-            self._steps.append(Step(move, begin, False, -1))
+            self.stretches.end(move - 1, begin - 1)
+            self.stretches.leave()
         self._end_run(move, begin)
         behind = end  # the way up is the hole's, wherever else it leads
         if self._over(stop, end) and not lines.feeds(end) and not self._hole[stop + 1]:
@@ -422,7 +459,8 @@ class Parse:
         if not up:
             self.acts.begins.extend((first, element))
         self._end_run(move, element)
-        self._steps.append(Step(move, element, True, last))
+        self.stretches.end(move - 1, element - 1)
+        self.stretches.begin(move, element, last)
         self._from = (first, element) if self._fed[stop] else ()
         self._begun, self._looked, self._cut_at, self._gone = element, element + 1, first + 1, 0.0
 
