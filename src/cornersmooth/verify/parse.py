@@ -226,7 +226,7 @@ class Parse:
         if not (there and lines.at(self._move[stop], element)):
             return False
         changed = stop > 0 and self._hole[stop - 1] and not self._has_tool(self._move[stop], element - 1)
-        return changed or not lines.stands(element)
+        return changed or not lines.stands(element) or not lines.at(self._move[stop], element - 1)
 
     def _drill(self, stop: int, begin: int) -> tuple[int, int]:
         """Take a hole: a cycle of the control, or what leads to its depth and out again, and the rapids behind that."""
@@ -335,7 +335,7 @@ class Parse:
         if any(one.code != "CS541" for one in found) and self._is_in_doubt(stop, begin):
             self.acts.unlooked.append((lines.nc_line(begin), "holes above one another in one line"))
             found = []
-        if self._along.next_retract(begin) != begin and (slant := lines.slant(move, begin)):
+        if hole.first == begin and self._along.next_retract(begin) != begin and (slant := lines.slant(move, begin)):
             text = f"a rapid goes aslant to a hole, {slant:.4f} mm: across at the higher level, then down"
             found.append(lines.problem("CS563", move, begin, text, slant))
         self.acts.problems += found

@@ -113,7 +113,7 @@ class WordPlaces:
         kept = (~rapid | (first == acts[:, 1])) & (np.diff(first, prepend=-1) > 0)
         pairs = zip(found.cuts[::2], found.cuts[1::2], strict=True)
         cuts = [(leading[move], self._moving(one)) for move, one in pairs]
-        begun = {*first.tolist()}
+        begun = {*first.tolist(), self._batches.elements}
         rows = [
             *np.column_stack((acts[:, 0], first))[kept].tolist(),
             *(one for one in cuts if one[1] not in begun),
@@ -123,8 +123,10 @@ class WordPlaces:
 
     def _leading(self, places: Ints, left_out: Set[int]) -> dict[int, int]:
         """The first moves from some on that lead anywhere, and are none that are left out."""
-        original = self._task.original
+        original, acts = self._task.original, self._batches.acts
         pose, program = original.pose, original.program
+        pairs = zip(acts.cuts[::2], acts.cuts[1::2], strict=True)
+        cuts = [move for move, element in pairs if element not in acts.still]  # the text leads somewhere behind these
         first, moves = pose[np.maximum(places - 1, 0)], places.copy()
         rows = np.flatnonzero(places < len(pose))
         while len(rows):
@@ -132,7 +134,7 @@ class WordPlaces:
             ways = (values[here] - values[first[rows]] for values in (program.tip, program.axis))
             way, turn = (np.linalg.norm(one, axis=1) for one in ways)
             leads = (np.maximum(way, self._task.axis_length * turn) > self._batches.room) | (moves[rows] == 0)
-            leads |= (program.kind[here] == Move.HOLE) | (program.kind[before] == Move.HOLE)
+            leads |= (program.kind[[here, before]] == Move.HOLE).any(axis=0) | np.isin(moves[rows], cuts)
             rows = rows[~leads | np.isin(moves[rows], list(left_out))]
             moves[rows] += 1
             rows = rows[moves[rows] < len(pose)]
