@@ -89,6 +89,9 @@ REFUSED_ONCE = {
     1530027: "a tool change for which the program has no way back: across at the higher level there, too",
     1700274: "the same, a tap that is left out behind it",
     1760354: "the same with a tilted tool",
+    1730122: "coolant ends between holes in one line, cycles of the control",
+    1770487: "coolant on for a tool with which nothing moves, in front of a feed move that leads nowhere",
+    1790297: "taps left out twice at one pose, and a rapid aslant up from there",
 }
 
 #: seeds of `random_programs.trial`, the same
@@ -101,6 +104,13 @@ RANDOM_REFUSED_ONCE = {
     8910507: "a tap left out, and a rapid to the same pose with the next tool, twice",
     8910811: "a tap left out, and a rapid over it by digits that an ε of a thousandth shows",
     8800032: "taps left out, and the same holes drilled from where the tool was before them",
+    8910896: "an optional stop and a pose a digit away, and a tool with which nothing moves",
+    8800136: "a dwell between poses that are a digit apart",
+    9500097: "taps left out, and a rapid to the same pose by a digit, before cycles of the control",
+    9600785: "a hole left to the pose that a rapid goes to by a digit",
+    9600644: "coolant off a digit before the end of the path, and another tool there",
+    9500337: "coolant a digit before a tool change",
+    9500600: "curves for an ε of 0.67 mm in digits of 1e-5: what is kept of ε is less than what bends take off it",
 }
 
 #: seeds that are refused still: a hole program, and programs at random
@@ -108,11 +118,10 @@ KNOWN = {
     1700133: "GOHOME behind three tools, the last of them the first: another speed holds on the way home",
     1503284: "a feed move to where the tool has been before its change: what leads nowhere in the CL file has no feed",
     1710186: "two optional stops around a tool that does nothing",
-    1730122: "coolant ends between holes in one line, cycles of the control",
     1003544: "a dwell behind a tap that is left out, and GOHOME twice around two that are, in its line",
-    8910896: "an optional stop and a pose a digit away, and a tool with which nothing moves",
     8600559: "a dwell between poses that are a digit apart: the text passes them in one",
-    8800136: "a dwell between poses that are a digit apart, the same",
+    9400011: "coolant and feeds between poses that are a digit apart",
+    1790243: "feeds to a hole down from home positions, GOHOME twice",
     8601699: "coolant at the end of a run between poses that are a digit apart: the text passes them in one",
 }
 

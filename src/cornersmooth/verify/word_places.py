@@ -133,8 +133,9 @@ class WordPlaces:
             here, before = pose[moves[rows]], pose[np.maximum(moves[rows] - 1, 0)]
             ways = (values[here] - values[first[rows]] for values in (program.tip, program.axis))
             way, turn = (np.linalg.norm(one, axis=1) for one in ways)
-            leads = (np.maximum(way, self._task.axis_length * turn) > self._batches.room) | (moves[rows] == 0)
-            leads |= (program.kind[[here, before]] == Move.HOLE).any(axis=0) | np.isin(moves[rows], cuts)
+            long = np.maximum(way, self._task.axis_length * turn)
+            leads = (long > self._batches.room) | (moves[rows] == 0) | ((long > 0.0) & np.isin(moves[rows], cuts))
+            leads |= (program.kind[[here, before]] == Move.HOLE).any(axis=0)
             rows = rows[~leads | np.isin(moves[rows], list(left_out))]
             moves[rows] += 1
             rows = rows[moves[rows] < len(pose)]
