@@ -241,7 +241,7 @@ def test_a_wrong_guess_lets_nothing_pass(used, monkeypatch, processes):
     assert right.passed
 
     for off in share((7.5, 0.0), 2) if processes != 1 else (7.5, 0.0):
-        monkeypatch.setattr(batches.Batches, "_guess", lambda *given, off=off: np.minimum(given[2] + off, given[3]))
+        monkeypatch.setattr(batches.Stretches, "_guess", lambda *given, off=off: np.minimum(given[2] + off, given[3]))
         assert verify(program, text, tolerance=TOLERANCE, processes=processes).verdict in ("FAILED", "NOT VERIFIED")
     for number in share((30, 1, 39), 3) if processes != 1 else (30, 1, 39):
         spoilt = text.replace(b"G1 X", b"G1 X9", number + 1).replace(b"G1 X9", b"G1 X", number)
