@@ -15,7 +15,7 @@ from cornersmooth.feedrate import Limits, TimeLaw, direct, plan
 from cornersmooth.model import Program
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
-from cornersmooth.times import compare, slowest
+from cornersmooth.times import compare
 from oracle.share import share
 
 TABLE_1 = Path(__file__).resolve().parents[2] / "samples" / "paper_table1.csv"
@@ -129,27 +129,3 @@ def test_contents(chain: Callable[[int], Program]) -> None:
     saved = contents["saving_percent"]["proportional"]["direct_exact_stop"]
     seconds = contents["seconds"]
     assert saved == pytest.approx(100 * (1 - seconds["proportional"] / seconds["direct_exact_stop"]))
-    assert set(contents["slowest"]) == set(seconds)
-    assert len(contents["slowest"]["proportional"]) == 10
-
-
-def test_slowest_places_add_up(chain: Callable[[int], Program]) -> None:
-    law = plan(smooth(chain(2), Settings(tolerance=0.05)))
-    places = slowest(law, 1000)
-    assert sum(place.seconds for place in places) == pytest.approx(law.total, rel=1e-9)
-    lost = [place.lost_seconds for place in places]
-    assert lost == sorted(lost, reverse=True)
-    assert sum(lost) == pytest.approx(law.total - law.length / law.path.speed[0])
-    assert min(lost) > -1e-6
-
-
-def test_slowest_is_the_sharpest() -> None:
-    tip = [[0, 0, 0], [20, 0, 0], [40, 1, 0], [40, 21, 0], [41, 41, 0]]
-    program = Program.from_poses(tip, [[0, 0, 1]] * 5, feed=1800.0, line=[11, 12, 13, 14, 15])
-    found = {place.line: place for place in slowest(direct(program, baseline="velocity_jump"))}
-    jump = 1000.0 * 0.002 / np.sqrt(2.0)  # speed at a corner of nearly 90 degrees
-    for line in (13, 14):
-        assert found[line].slowest_mm_per_s == pytest.approx(jump, rel=0.05)
-        assert found[line].lost_seconds > 0.05
-        assert [found[line].x, found[line].y] == tip[line - 11][:2]
-    assert max(found[12].slowest_mm_per_s, found[15].slowest_mm_per_s) < 1e-9

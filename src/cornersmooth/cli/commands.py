@@ -156,14 +156,14 @@ TIME = new_command(
     "time",
     "IN",
     f"tolerance axis_length axis_tolerance {LIMITS} control form machine method limits text text_machine block_time "
-    f"look_ahead {READING} tip_control as_json law csv force quiet verbose",
+    f"look_ahead {READING} tip_control as_json law csv force quiet",
     """
     Plan the CL file IN as it is and the program that the options write, under the same limits.
 
     The path of the CL file is planned twice: with a stop at the end of every move, and without. At corners, the
     velocity may then jump by what the acceleration allows in one period. The program is that of smooth with the same
-    options, or --text. -v adds the ideal curves of each method, which no control runs. Delays, tool changes and the
-    strokes of hole cycles are not counted. Limits are those of the tip, and of the axes of --limits or --machine.
+    options, or --text. Delays, tool changes and the strokes of hole cycles are not counted. Limits are those of the
+    tip, and of the axes of --limits or --machine.
     IN may be a finished NC program: its time as it is, and as filter smooths it, or beside that of --text.
 
     \b

@@ -114,11 +114,8 @@ class Declared:
     )
     quiet: bool = _output("-q", "Only errors.", False)
     verbose: int = _output("-v", "More: every finding, times of the stages.", 0, count=True)
-    law: Annotated[str, click.Choice(["direct_exact_stop", "direct_velocity_jump", *METHODS, "as_written"])] = _output(
-        "LAW",
-        "Motion that --csv writes: as_written, direct_exact_stop, direct_velocity_jump, or the curves of a method "
-        f"({', '.join(METHODS)}).",
-        "as_written",
+    law: Literal["direct_exact_stop", "direct_velocity_jump", "as_written"] = _output(
+        "LAW", "Motion that --csv writes: as_written, direct_exact_stop or direct_velocity_jump.", "as_written"
     )
     csv: Path | None = _output("", "Write the rows.")
     stations: Annotated[int, click.IntRange(1, 1_000_000)] = _output("N", "Places along the path.", 2000)

@@ -31,19 +31,16 @@ from cornersmooth.nc import choose_form, fit_settings
 from cornersmooth.nc_reader import read_nc
 from cornersmooth.pipeline import read_back
 from cornersmooth.report.verdict import limits_of, limits_text, times_text
-from cornersmooth.settings import METHODS
 from cornersmooth.system.processes import useful_processes
-from cornersmooth.times import Comparison, Timing, compare, slowest, stops, turning_seconds, without_holes, written_text
+from cornersmooth.times import BASELINES, Comparison, Timing, compare, stops, without_holes, written_text
 from cornersmooth.times.comparing import Row, Table, candidates, compare_programs, law_of_lines
 from cornersmooth.times.setup import Rating, Setups, find_setups
 
 _TITLES = {
     "direct_exact_stop": "direct, exact stop",
     "direct_velocity_jump": "direct, velocity jump",
-    **{name: f"curves, {name}" for name in METHODS},
     "as_written": "as written",
 }
-LAWS = tuple(_TITLES)
 
 
 def run_time(given: Options) -> int:
@@ -69,7 +66,7 @@ def run_time(given: Options) -> int:
         from cornersmooth.report.tables import timelaw_csv
 
         write_report(given.csv, timelaw_csv(compared.laws[given.law]))
-    say(given, compared.as_dict(), _tables(compared, bool(given.verbose)))
+    say(given, compared.as_dict(), _tables(compared))
     return 0
 
 
@@ -87,9 +84,8 @@ def _compare(data: bytes, name: str, given: Options) -> Comparison:
         nc = read_back(written_text(without_holes(program.with_feed(given.feed)), fitted, form), form, fitted)
     if not given.quiet:
         _tell_feeds(program, given.feed)
-    methods = tuple(METHODS) if given.verbose else tuple(name for name in METHODS if name == given.law)
     with progress_bar(given.quiet) as progress:
-        compared = compare(program, settings, limits, methods=methods, machine=axes, progress=progress)
+        compared = compare(program, settings, limits, methods=(), machine=axes, progress=progress)
         blocks = BlockLimits(given.block_time or 0.0, given.look_ahead)
         law = plan_text(nc, limits, name=given.text or name, blocks=blocks, settings=settings, machine=axes)
         return compared.with_text(law)
@@ -136,36 +132,25 @@ def _tell_feeds(program: Program, feed: float | None) -> None:
     print_message(message("warning", what, "CS311", place=place, count=len(without)))
 
 
-def _tables(compared: Comparison, verbose: bool) -> Iterator[str]:
-    """Times and savings; with `verbose` what was reached, and the places that lose most."""
+def _tables(compared: Comparison) -> Iterator[str]:
+    """Times and savings."""
     settings, saving = compared.settings, compared.saving_percent
     shown = times_text(compared.seconds, limiting(compared.laws["as_written"]))
     yield f"{shown}; {limits_of(None if compared.machine is None else compared.machine.name)}"
     own = settings.axis_tolerance
     second = f"axis point at {settings.axis_length:g} mm" if own is None else f"tool axis {own:g} deg"
     yield f"tolerance {settings.tolerance:g} mm, {second}"
-    yield f"{'':<22}{'time s':>10}{'saves % of':>11}{'saves % of':>14}{'stops':>6}{'turns s':>8}{'path mm':>9}"
+    yield f"{'':<22}{'time s':>10}{'saves % of':>11}{'saves % of':>14}{'stops':>6}{'path mm':>9}"
     yield f"{'':<22}{'':>10}{'exact stop':>11}{'velocity jump':>14}"
     for name, law in compared.laws.items():
         saved = saving.get(name, {})
         parts = "".join(
             f"{saved[base]:>{width}.1f}" if base in saved else f"{'':>{width}}"
-            for base, width in zip(LAWS[:2], (11, 14), strict=True)
+            for base, width in zip(BASELINES, (11, 14), strict=True)
         )
-        shown = f"{stops(law):>6}{turning_seconds(law):>8.1f}{law.length:>9.1f}"
+        shown = f"{stops(law):>6}{law.length:>9.1f}"
         yield f"{_TITLES[name]:<22}{law.total:>10.3f}{parts}{shown}"
     yield f"{'at constant feed':<22}{compared.constant_feed_seconds:>10.3f}"
-    if not verbose:
-        return
-    for name in ("direct_velocity_jump", "as_written"):
-        yield ""
-        yield f"where the time goes ({_TITLES[name]})"
-        yield f"{'line':>8}{'x':>12}{'y':>12}{'z':>12}{'time s':>10}{'lost s':>10}{'least mm/s':>12}"
-        for place in slowest(compared.laws[name]):
-            yield (
-                f"{place.line:>8}{place.x:>12.3f}{place.y:>12.3f}{place.z:>12.3f}"
-                f"{place.seconds:>10.3f}{place.lost_seconds:>10.3f}{place.slowest_mm_per_s:>12.2f}"
-            )
 
 
 #: options of this command that `smooth` has not, or that would write

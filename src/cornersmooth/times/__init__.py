@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -268,22 +268,6 @@ BASELINES = ("direct_exact_stop", "direct_velocity_jump")
 AS_WRITTEN = "as_written"
 
 
-class SlowMove(NamedTuple):
-    """A move that takes longer than its length over its feed: its CL line, where it ends (mm), what it takes and loses.
-
-    `slowest_mm_per_s` is the least speed at the ends of its parts.
-    """
-
-    line: int
-    x: float
-    y: float
-    z: float
-    seconds: float
-    lost_seconds: float
-    length_mm: float
-    slowest_mm_per_s: float
-
-
 @dataclass(frozen=True)
 class Comparison:
     """Time laws of one program."""
@@ -320,7 +304,7 @@ class Comparison:
         path = self.laws[BASELINES[0]].path
         return float((path.length / path.speed).sum())
 
-    def as_dict(self, slow_moves: int = 10) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, Any]:
         """Everything, plain; keys carry their unit."""
         source = self.program.source
         contents: dict[str, Any] = {
@@ -333,8 +317,6 @@ class Comparison:
             "constant_feed_seconds": self.constant_feed_seconds,
             "length_mm": {name: law.length for name, law in self.laws.items()},
             "stops": {name: stops(law) for name, law in self.laws.items()},
-            "turning_seconds": {name: turning_seconds(law) for name, law in self.laws.items()},
-            "slowest": {name: [move._asdict() for move in slowest(law, slow_moves)] for name, law in self.laws.items()},
         }
         if self.machine is not None:
             contents["machine"] = self.machine.name
@@ -391,32 +373,3 @@ def compare(
 def stops(law: TimeLaw) -> int:
     """How often the motion comes to rest between its start and its end."""
     return int((law.path.junction_speed[1:-1] == 0.0).sum())
-
-
-def turning_seconds(law: TimeLaw) -> float:
-    """Time in which the tip stands still while the axis turns, s.
-
-    The paper's method has such moments where neighbouring transitions use up a tip segment but not its axis-point
-    segment: what is left of the turn has to be made on the spot.
-    """
-    took = np.diff(law.times_at(law.edge))
-    return float(took[law.path.turning].sum())
-
-
-def slowest(law: TimeLaw, count: int = 10) -> list[SlowMove]:
-    """Moves that lose most time against their programmed speed, the worst first."""
-    path = law.path
-    if not len(path):
-        return []
-    times = law.times_at(law.edge)
-    speeds = law.kinematics(times)[1]
-    took = np.diff(times)
-    first = np.flatnonzero(np.concatenate(([True], path.move[1:] != path.move[:-1])))
-    seconds = np.add.reduceat(took, first)
-    lost = np.add.reduceat(took - path.length / path.speed, first)
-    length = np.add.reduceat(np.where(path.turning, 0.0, path.length), first)
-    least = np.minimum.reduceat(np.minimum(speeds[:-1], speeds[1:]), first)
-    pose = path.move[first]
-    columns = (path.program.line[pose], *path.program.tip[pose].T, seconds, lost, length, least)
-    rows = np.argsort(-lost, kind="stable")[:count]
-    return [SlowMove(*row) for row in zip(*(column[rows].tolist() for column in columns), strict=True)]
