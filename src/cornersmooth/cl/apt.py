@@ -41,9 +41,6 @@ _WITHIN_ARC: Final = GOTO_WORDS | frozenset(
     "$$ PAINT PPRINT REMARK DISPLY PARTNO TPRINT LETTER INTOL OUTTOL CUTTER TLDATA FEDRAT".split()
 )
 
-#: words within a MOVNRB record
-_WITHIN_SPLINE: Final = GOTO_WORDS | frozenset("MOVNRB $$ PPRINT REMARK DISPLY TPRINT".split())
-
 #: words of a NURBS record
 _WITHIN_CURVE: Final = frozenset({"KNOT", "CNTRL"})
 
@@ -105,9 +102,6 @@ def _plain(state: ReaderState, poses: Floats) -> None:
         raise error("CS118", state.file, int(poses[0, 6]), word="GOTO")
     if state.curve is not None:
         motion_statements.finish_curve(state)
-    if state.spline is not None:
-        motion_statements.pass_points(state, poses)
-        return
     state.arrive()
     state.take(poses)
 
@@ -125,8 +119,6 @@ def _obey(state: ReaderState, record: Record) -> None:
         return
     if state.arc is not None and word not in _WITHIN_ARC:
         raise state.fail("CS121", state.arc)
-    if state.spline is not None and word not in _WITHIN_SPLINE:
-        motion_statements.leave_spline(state, record)
     if record.points and word not in GOTO_WORDS:
         line, args = record.points[0]
         raise state.fail("CS105", record, line, text=joined(args))
@@ -155,8 +147,8 @@ def _end(state: ReaderState) -> None:
         motion_statements.finish_curve(state)
     if state.arc is not None:
         raise state.fail("CS121", state.arc)
-    if state.spline is not None:
-        raise error("CS128", state.file, state.spline.line, why="MOVNRB/OFF is missing")
+    if state.points_from is not None:
+        raise error("CS128", state.file, state.points_from[0], why="MOVNRB/OFF is missing")
 
 
 def _refused(record: Record, word: str) -> str | None:

@@ -138,6 +138,7 @@ FINDINGS: Final[dict[str, tuple[Severity, str]]] = {
     "CS148": ("warning", "FEDRAT without a unit is read in the unit of the file"),
     "CS149": ("note", "GOHOME without coordinates is kept as a statement"),
     "CS185": ("warning", "FROM is where the tool is not: it feeds on from where it is; put a RAPID after the FROM"),
+    "CS192": ("note", "MOVNRB: its points are read, not its curves"),
     "CS195": ("note", "lines of numbers alone are further points of the GOTO before them"),
     "CS194": ("warning", "RETRCT beyond the clearance plane: ignored"),
     "CS385": ("warning", "CYCLE without words is read as depth, feed, clearance; see that positions are tops of holes"),

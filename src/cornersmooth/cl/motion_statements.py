@@ -7,17 +7,15 @@ import re
 from dataclasses import replace
 from typing import Final
 
-import numpy as np
-
 from cornersmooth.cl.arcs import Arc, read_arc, read_drive_arc, read_helix
 from cornersmooth.cl.grammar import NUMBER, Argument, Record, joined, number
 from cornersmooth.cl.messages import error
-from cornersmooth.cl.nurbs import DEGREE, Cubic, Curve, Spline
+from cornersmooth.cl.nurbs import Cubic, Curve
 from cornersmooth.cl.poses import Vector, check_range
 from cornersmooth.cl.reader_state import ReaderState
 from cornersmooth.cl.state_statements import Handler
 from cornersmooth.cl.words import GOTO_WORDS
-from cornersmooth.model import MM_PER_UNIT, Floats, Ints, Move
+from cornersmooth.model import MM_PER_UNIT, Ints, Move
 
 #: X1,Y2,Z3 or X1,Y2,Z3,I0,J0,K1, separated by commas or blanks
 _AFTER: Final = r"\s*{}\s*=?\s*(" + NUMBER.pattern.replace("(", "(?:").replace("(?:?:", "(?:") + ")"
@@ -27,6 +25,9 @@ _LETTERED: Final = re.compile(
 
 #: mm: how far lines may be from curves
 CHORD: Final = 5e-4
+
+#: what MOVNRB has beside ON and OFF: kinds of curves, knots, control points of tip and second point, and the points
+_ROWS: Final = ("M3AXIS", "3AXIS", "M5AXIS", "5AXIS", 1.0, 2.0, 3.0, "NEXT")
 
 #: sine of the angle at which a tool axis meets a plane at least
 _PARALLEL: Final = 1e-6
@@ -49,9 +50,6 @@ def _goto(state: ReaderState, record: Record) -> None:
     if record.points and state.arc is None:
         state.note("CS195", record.points[0][0])
     poses = [(line, *_pose(state, record, args, line)) for line, args in ((record.line, record.args), *record.points)]
-    if state.spline is not None:
-        pass_points(state, np.array([(*tip, *(axis or (math.nan,) * 3), line) for line, tip, axis in poses]))
-        return
     if state.arc is not None:  # more points of one GOTO lie on the arc; the last one ends it
         state.arc = replace(state.arc, passes=tuple(state.system.point(tip) for _, tip, _ in poses[:-1]))
         poses = poses[-1:]
@@ -201,70 +199,23 @@ def _add_curve(state: ReaderState, curve: Cubic, line: int, lines: Ints) -> None
     check_range(curve.control.ravel().tolist(), state.file, int(lines[0]))
     state.curves.append(curve.placed(state.system, state.n - 1))
     held = state.held_axis()
-    for row, line in zip(curve.points[1:].tolist(), lines.tolist(), strict=True):
-        way = [b - a for a, b in zip(row[:3], row[3:], strict=False)]
-        length = math.hypot(*way)
-        axis = (way[0] / length, way[1] / length, way[2] / length) if way else held
-        state.add((row[0], row[1], row[2]), axis, line)
+    for (x, y, z), line in zip(curve.points[1:].tolist(), lines.tolist(), strict=True):
+        state.add((x, y, z), held, line)
 
 
 def _movnrb(state: ReaderState, record: Record) -> None:
-    """MOVNRB/...: rows of B-splines, then the same motion as points."""
-    option, spline = record.option, state.spline
-    if option in ("M3AXIS", "3AXIS", "M5AXIS", "5AXIS") and spline is None:
-        state.five_axes = "5" in str(option)
-    elif option == "ON" and spline is None:
+    """MOVNRB of Creo: rows of curves, then the same motion as points, which are read ("CL Output for NURBS")."""
+    if record.option == "ON" and state.points_from is None:
         _check_curve(state, record)
-        sizes = [int(value) for value in record.values if value == int(value)]
-        if len(record.values) != 5 or len(sizes) < 4 or record.values[2] != 0.0:
-            raise state.fail("CS128", record, why="MOVNRB/ON has order, knots, 0, control points and length")
-        state.spline = Spline(record.line, sizes[0], (sizes[1], sizes[3]), state.five_axes)
-    elif option in (1.0, 2.0, 3.0) and spline is not None and not spline.passing:
-        spline.rows[int(float(option))] += state.numbers(record, record.args[1:])
-    elif option == "NEXT" and spline is not None and not spline.passing:
-        if spline.complaint is not None:
-            raise error("CS128", state.file, spline.line, why=spline.complaint)
-        spline.passing = True
-    elif option == "OFF":
-        if spline is not None:
-            _end_spline(state, spline)
-    else:
+        _at_feed(state, record)
+        state.note("CS192", record.line)
+        state.points_from = record.line, state.n
+    elif record.option == "OFF":
+        if state.points_from is not None and state.points_from[1] == state.n:
+            raise state.fail("CS128", record, why="MOVNRB has no points")
+        state.points_from = None
+    elif record.option not in _ROWS:
         raise state.fail("CS128", record, why=f"MOVNRB/{joined(record.args[:1])} is not understood here")
-
-
-def pass_points(state: ReaderState, rows: Floats) -> None:
-    """Keep the points (m, 7) after MOVNRB/NEXT until its end."""
-    assert state.spline is not None
-    if not state.spline.passing:
-        raise error("CS128", state.file, int(rows[0, 6]), why="GOTO comes before MOVNRB/NEXT")
-    state.spline.points.append(rows)
-
-
-def leave_spline(state: ReaderState, record: Record) -> None:
-    """Go on with the points alone: a statement among them acts at its own place (InputError CS128)."""
-    spline, state.spline = state.spline, None
-    assert spline is not None
-    if not spline.passing:
-        raise state.fail("CS128", record, why=f"{record.word} comes before MOVNRB/NEXT")
-    for x, y, z, i, j, k, line in np.vstack(spline.points).tolist() if spline.points else ():
-        state.add((x, y, z), None if math.isnan(i) else (i, j, k), int(line))
-
-
-def _end_spline(state: ReaderState, spline: Spline) -> None:
-    """Add the curve, or the points where they are not on it."""
-    record = Record(spline.line, "MOVNRB")
-    _at_feed(state, record)
-    found = spline.cubic(np.array([*state.last_tip(), *state.last_axis]), _chord(state)) if spline.passing else None
-    if found is not None:
-        state.spline = None
-        _add_curve(state, found, spline.line, np.full(len(found.u) - 1, spline.line))
-        return
-    if not spline.points:
-        why = "it is not complete, or begins elsewhere than where the tool is"
-        raise state.fail("CS128", record, why=why)
-    why = "that does not pass by its points" if spline.order == DEGREE + 1 else f"of order {spline.order}"
-    state.note("CS144", spline.line, what=f"a curve of MOVNRB {why}")
-    leave_spline(state, record)
 
 
 def _at_feed(state: ReaderState, record: Record) -> None:

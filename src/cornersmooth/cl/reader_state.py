@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from cornersmooth.cl.arcs import Arc, ArcRule
 from cornersmooth.cl.grammar import Argument, Record, joined, number
 from cornersmooth.cl.messages import error, finding
-from cornersmooth.cl.nurbs import Cubic, Curve, Spline
+from cornersmooth.cl.nurbs import Cubic, Curve
 from cornersmooth.cl.poses import Poses, System, Vector
 from cornersmooth.errors import Finding, InputError
 from cornersmooth.model import Move, Statement, Units
@@ -36,8 +36,7 @@ class ReaderState(Poses):
     cycle: tuple[Argument, ...] = ()  #: arguments of the last CYCLE that says what to drill
     arc: Arc | None = None  #: waits for its end
     curve: Curve | None = None  #: waits for more control points
-    spline: Spline | None = None  #: MOVNRB, until OFF
-    five_axes: bool = False  #: MOVNRB has two curves
+    points_from: tuple[int, int] | None = None  #: line of MOVNRB/ON, and poses before it; None behind MOVNRB/OFF
     direction: tuple[str, Vector] | None = None  #: INDIRV or INDIRP, for the arc after it
     first_system: tuple[tuple[Argument, ...], System | None] | None = None  #: MSYS, MCS or MCSYS as written, and read
     offsets: dict[str, tuple[Argument, ...]] = field(default_factory=dict)  #: FIXTURE, WCS; $$-> CSYS, $$*CATIA0
