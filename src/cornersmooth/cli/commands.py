@@ -132,7 +132,7 @@ COMPARE = new_command(
     "compare",
     "IN",
     f"tolerance axis_length axis_tolerance control machine limits look_ahead feed {READING} tip_control "
-    "as_json csv force quiet verbose",
+    "as_json quiet verbose",
     """
     Write the CL file IN in every form, method and line density that the control can run, and compare the times.
 
@@ -145,7 +145,7 @@ COMPARE = new_command(
     \b
     Examples:
       cornersmooth compare part.cls --control siemens --limits table-ac
-      cornersmooth compare part.cls --control fanuc --limits mill.toml --csv p.csv
+      cornersmooth compare part.cls --control fanuc --limits mill.toml --json
       cornersmooth compare part.cls --control linuxcnc --machine xyzac-trt -v
       cornersmooth compare part.ngc --control linuxcnc --machine xyzac-trt
     """,

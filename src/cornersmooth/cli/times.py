@@ -14,7 +14,6 @@ from cornersmooth.cl import read
 from cornersmooth.cli.files import (
     check_inputs,
     check_path,
-    csv_table,
     naming,
     read_head,
     read_input,
@@ -154,7 +153,7 @@ def _tables(compared: Comparison) -> Iterator[str]:
 
 
 #: options of this command that `smooth` has not, or that would write
-_OWN = frozenset(("as_json", "csv", "verbose", "quiet", "force", "machine", "limits", "source", "look_ahead"))
+_OWN = frozenset(("as_json", "verbose", "quiet", "machine", "limits", "source", "look_ahead"))
 
 
 def run_compare(given: Options) -> int:
@@ -164,8 +163,6 @@ def run_compare(given: Options) -> int:
 
     source = given.source
     check_inputs(source)
-    if given.csv:
-        check_path(given.csv, [source], force=given.force)
     data, name, is_program = given.read()
     named, given = given.machine, options_for(data, name, given) if is_program else given
     machine, limits = given.load_machine(), given.load_limits()
@@ -199,20 +196,9 @@ def run_compare(given: Options) -> int:
     contents = table.as_dict()
     for row, text in zip(contents["rows"], commands, strict=True):
         row["command"] = text
-    if given.csv:
-        rows = [{title: row[name] for name, title in _COLUMNS.items()} for row in contents["rows"]]
-        write_report(given.csv, [csv_table(rows)])
     say(given, contents, _end(table, commands))
     return 0
 
-
-#: columns of the CSV file by what the rows call them
-_COLUMNS = {
-    **{name: name for name in "form words method lines verdict blocks bytes seconds saved".split()},
-    "tip": "tip_mm",
-    "axis_point": "axis_point_mm",
-    **{name: name for name in ("best", "command")},
-}
 
 #: columns and the room of their numbers; that of the others follows from the rows
 _HEAD = ("form", "words", "method", "lines", "blocks", "kB", "s", "saves", "tip mm", "axis mm")

@@ -80,10 +80,6 @@ def timelaw_csv(law: TimeLaw) -> Iterator[str]:
     return csv_text(len(times), columns)
 
 
-#: width of the longest bar of a histogram, and classes of the span of the surface
-_BAR, _CLASSES = 40, 20
-
-
 def verification_csv(program: Program, found: Verification) -> Iterator[str]:
     """Header, then a row for every pose that is passed at feed, in blocks of text; lengths are mm."""
     poses = np.flatnonzero(np.isfinite(found.pose_tip))
@@ -119,7 +115,7 @@ def surface_csv(surface: SurfaceMap) -> Iterator[str]:
 
 
 def surface_lines(surface: SurfaceMap) -> Iterator[str]:
-    """Table and histogram to read."""
+    """Table to read."""
     values = surface.as_dict()
     yield f"{'tool':<18}{surface.tool.describe()}, cutting edge {surface.edge:g} mm"
     elsewhere = values["points_cut_away_elsewhere"]
@@ -136,16 +132,6 @@ def surface_lines(surface: SurfaceMap) -> Iterator[str]:
     if values["rms_mm"] is not None:
         yield f"{'all':<18}mean {values['mean_mm']:.6f} mm, root mean square {values['rms_mm']:.6f} mm"
         yield f"{'within':<18}{values['within_tolerance_percent']:.4g} % of the points within {surface.tolerance:g} mm"
-        yield ""
-        yield from _histogram(surface)
-
-
-def _histogram(surface: SurfaceMap) -> Iterator[str]:
-    edges, counts = surface.histogram(_CLASSES)
-    most = max(int(counts.max(initial=0)), 1)
-    for count, low, high in zip(counts.astype(int).tolist(), edges[:-1].tolist(), edges[1:].tolist(), strict=True):
-        bar = "#" * -(-count * _BAR // most)
-        yield f"{low:>10.5f} to {high:>9.5f} mm {count:>8}  {bar}".rstrip()
 
 
 Column = NDArray[Any]

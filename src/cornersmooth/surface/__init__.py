@@ -68,9 +68,9 @@ class SurfaceMap:
         """Whether every point is known to be within the tolerance, give or take 1e-9 mm of arithmetic."""
         return bool((np.abs(self.off) <= self.tolerance + 1e-9).all())
 
-    def histogram(self, classes: int = _CLASSES) -> tuple[Floats, Floats]:
+    def histogram(self) -> tuple[Floats, Floats]:
         """Edges of equal classes, mm, and how many points are in each."""
-        counts, edges = np.histogram(self.off[self.known], bins=classes, range=(-self.span, self.span))
+        counts, edges = np.histogram(self.off[self.known], bins=_CLASSES, range=(-self.span, self.span))
         return edges, counts.astype(np.float64)
 
     def as_dict(self) -> dict[str, Any]:
