@@ -28,7 +28,7 @@ GIVEN_BY = {
     "compare": ("compare part.cls --control haas --limits table-ac -v",),
     "setup": ("setup part.cls --limits table-ac --plans 1",),
     "surface": ("surface part.cls part.nc --tool 6,3 --stations 50",),
-    "time": ("time part.cls --limits table-ac", "time part.cls --text part.nc", "time part.cls -v"),
+    "time": ("time part.cls --limits table-ac", "time part.cls --text part.nc"),
     "time_by_law": (
         "time part.cls --control linuxcnc --machine xyzac-trt --limits table-ac",
         "time part.nc --limits table-ac",

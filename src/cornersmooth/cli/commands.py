@@ -155,7 +155,7 @@ COMPARE = new_command(
 TIME = new_command(
     "time",
     "IN",
-    f"tolerance axis_length axis_tolerance {LIMITS} control form machine method limits text text_machine block_time "
+    f"tolerance axis_length axis_tolerance {LIMITS} control form machine method limits text block_time "
     f"look_ahead {READING} tip_control as_json law csv force quiet",
     """
     Plan the CL file IN as it is and the program that the options write, under the same limits.

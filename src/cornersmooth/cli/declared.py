@@ -232,9 +232,6 @@ class Declared:
         "D[,R[,TAPER[,LENGTH]]]",
         "Shape of the tool: diameter, corner radius, taper in degrees, length. [default: that of the file]",
     )
-    text_machine: MachineName | None = _reading(
-        "NAME|FILE", "Machine whose rotary words --text has. [default: that of its head, else --machine]"
-    )
 
     no_verify: bool = _verification("", "Do not read the program back and measure it before it takes its place.", False)
     strict: bool = _verification(

@@ -113,10 +113,9 @@ def _by_own_law(data: bytes, name: str, given: Options) -> int:
 
 
 def _as_text_was_made(given: Options) -> Options:
-    """Options to read the text by: the machine of its own option, else of its head, else the one planned for."""
-    made = read_provenance(read_head(given.text))
-    machine = given.text_machine or given.machine
-    if made is not None and not given.text_machine and made.machine in ("", *machine_names()):
+    """Options to read the text by: the machine of its head, else that of --machine."""
+    made, machine = read_provenance(read_head(given.text)), given.machine
+    if made is not None and made.machine in ("", *machine_names()):
         machine = made.machine or None  # another name is that of a file of the user's own
     return replace(given, machine=machine, no_tcp=made is not None and not made.tcp)
 
