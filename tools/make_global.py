@@ -15,12 +15,11 @@ import numpy as np
 
 import cornersmooth
 from cornersmooth import Program, Settings
-from cornersmooth.feedrate import Limits, TimeLaw, plan, plan_text
+from cornersmooth.feedrate import Limits, TimeLaw, direct, plan, plan_text
 from cornersmooth.kinematics import Machine, load_machine
 from cornersmooth.kinematics.machine import machine_table, parse_machine
 from cornersmooth.nc import choose_form
 from cornersmooth.nc_reader import read_nc
-from cornersmooth.times import compare
 
 ROOT = Path(__file__).resolve().parent.parent
 PATHS = {
@@ -75,7 +74,14 @@ def curves(folder: Path, tolerance: float) -> None:
     say(f"\n| ε {tolerance:g} mm | exact stop | velocity jump | zhang2016 | proportional | global | of proportional |")
     say("|---|---|---|---|---|---|---|")
     for name, program, machine in programs(folder):
-        seconds = compare(program, Settings(tolerance=tolerance), Limits(feed=FEED), machine=machine).seconds
+        settings, limits = Settings(tolerance=tolerance), Limits(feed=FEED)
+        laws = {
+            "direct_exact_stop": direct(program, limits, "exact_stop", settings=settings, machine=machine),
+            "direct_velocity_jump": direct(program, limits, "velocity_jump", settings=settings, machine=machine),
+        }
+        for method in METHODS[2:]:
+            laws[method] = plan(cornersmooth.smooth(program, settings.but(method=method)), limits, machine=machine)
+        seconds = {method: law.total for method, law in laws.items()}
         told = " | ".join(f"{seconds[method]:.2f}" for method in METHODS)
         say(f"| {name}, {len(program)} poses | {told} | {change(seconds['global'], seconds['proportional'])} |")
 

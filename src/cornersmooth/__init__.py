@@ -16,7 +16,7 @@ Step by step, with the numbers in between; the form says which digits the contro
 
 - `sample` gives points on the smoothed path, `corner_table` its corners
 - `filter_program` smooths the runs of a finished NC program
-- `plan` and `direct` say how long a machine takes for the smoothed and the original path, `compare` both
+- `plan` and `direct` say how long a machine takes for the smoothed and the original path
 - `choose_form`, `load_control` and `load_machine` take names or TOML files; `Frame` holds what stands around the motion
 - `CornersmoothError` is raised for input, settings and output; its text says where, what, and what to do
 
@@ -58,7 +58,6 @@ if TYPE_CHECKING:
     from cornersmooth.settings import Settings as Settings
     from cornersmooth.smoothing.sampling import PathPoints as PathPoints
     from cornersmooth.smoothing.sampling import sample as sample
-    from cornersmooth.times import compare as compare
     from cornersmooth.verify import Verification as Verification
     from cornersmooth.verify import verify as verify
 
@@ -81,7 +80,6 @@ _HOME = {
         "pipeline": "Result postprocess smooth",
         "report.tables": "corner_table",
         "settings": "Settings",
-        "times": "compare",
         "verify": "Verification verify",
     }.items()
     for name in names.split()

@@ -123,7 +123,7 @@ def test_the_machine_of_a_text_need_not_be_said_twice(tmp_path: Path, capsys: py
 def test_a_text_is_read_before_anything_is_planned(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("cornersmooth.cli.times.compare", None)
+    monkeypatch.setattr("cornersmooth.cli.times.direct", None)
     text = tmp_path / "o.nc"
     text.write_text("%\nO1\nG21 G90\nG1 X1 NONSENSE\nM30\n%\n")
     assert run(["time", TABLE_1, "--units", "mm", "--feed", "1800", "--text", str(text)]) == 3

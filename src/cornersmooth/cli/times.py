@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, get_args
 
 import click
 import numpy as np
@@ -22,16 +22,17 @@ from cornersmooth.cli.files import (
 from cornersmooth.cli.options import Options, typed
 from cornersmooth.cli.show import print_message, progress_bar, say, say_line
 from cornersmooth.errors import command_text, message
-from cornersmooth.feedrate import BlockLimits, limiting, plan_text
+from cornersmooth.feedrate import BlockLimits, direct, limiting, plan_text
+from cornersmooth.feedrate.planner import Baseline
 from cornersmooth.frame import read_provenance
 from cornersmooth.kinematics import machine_names
 from cornersmooth.model import Floats, Move, Program
 from cornersmooth.nc import choose_form, fit_settings
 from cornersmooth.nc_reader import read_nc
-from cornersmooth.pipeline import read_back
+from cornersmooth.pipeline import read_back, stage_of
 from cornersmooth.report.verdict import limits_of, limits_text, times_text
 from cornersmooth.system.processes import useful_processes
-from cornersmooth.times import BASELINES, Comparison, Timing, compare, stops, without_holes, written_text
+from cornersmooth.times import AS_WRITTEN, BASELINES, Comparison, Timing, stops, without_holes, written_text
 from cornersmooth.times.comparing import Row, Table, candidates, compare_programs, law_of_lines
 from cornersmooth.times.setup import Rating, Setups, find_setups
 
@@ -84,10 +85,15 @@ def _compare(data: bytes, name: str, given: Options) -> Comparison:
     if not given.quiet:
         _tell_feeds(program, given.feed)
     with progress_bar(given.quiet) as progress:
-        compared = compare(program, settings, limits, methods=(), machine=axes, progress=progress)
+        laws = {
+            name: direct(program, limits, kind, settings=settings, machine=axes, progress=stage_of(progress, name))
+            for name, kind in zip(BASELINES, get_args(Baseline), strict=True)
+        }
         blocks = BlockLimits(given.block_time or 0.0, given.look_ahead)
-        law = plan_text(nc, limits, name=given.text or name, blocks=blocks, settings=settings, machine=axes)
-        return compared.with_text(law)
+        laws[AS_WRITTEN] = plan_text(
+            nc, limits, name=given.text or name, blocks=blocks, settings=settings, machine=axes
+        )
+    return Comparison(program, settings, limits, laws, axes)
 
 
 def _by_own_law(data: bytes, name: str, given: Options) -> int:

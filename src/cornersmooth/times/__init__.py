@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from cornersmooth import nc, smoothing
 from cornersmooth.errors import CornersmoothError
-from cornersmooth.feedrate import BlockLimits, TimeLaw, direct, limiting, plan, plan_text
+from cornersmooth.feedrate import BlockLimits, TimeLaw, direct, limiting, plan_text
 from cornersmooth.feedrate.intervals import ROUGHLY, Resolution
 from cornersmooth.feedrate.linuxcnc import axis_limits, line_times, program_lines
 from cornersmooth.feedrate.machine_axes import follow
@@ -25,7 +24,7 @@ from cornersmooth.model import Floats, Ints, Move, Program
 from cornersmooth.nc import Form
 from cornersmooth.pipeline import Progress, read_back, stage_of
 from cornersmooth.report.verdict import Saving
-from cornersmooth.settings import AUTO, BOUNDS, CURVES_METHOD, DEFAULT_METHOD, METHODS, Limits, Settings
+from cornersmooth.settings import AUTO, BOUNDS, CURVES_METHOD, DEFAULT_METHOD, Limits, Settings
 from cornersmooth.system.processes import useful_processes
 
 #: name of the law of LinuxCNC's planner in the tables of controls
@@ -273,15 +272,10 @@ class Comparison:
     """Time laws of one program."""
 
     program: Program
-    settings: Settings  #: of the smoothing; its `method` is replaced by each method in turn
+    settings: Settings  #: of the smoothing
     limits: Limits
-    #: the two `BASELINES`, every method by its name, and `AS_WRITTEN` where there is a text
-    laws: Mapping[str, TimeLaw]
+    laws: Mapping[str, TimeLaw]  #: the two `BASELINES`, and others by their names, such as `AS_WRITTEN`
     machine: Machine | None = None  #: whose axes keep their limits
-
-    def with_text(self, law: TimeLaw) -> Comparison:
-        """Return the same with the time law of an NC text (`cornersmooth.feedrate.plan_text`)."""
-        return replace(self, laws={**self.laws, AS_WRITTEN: law})
 
     @property
     def seconds(self) -> dict[str, float]:
@@ -290,7 +284,7 @@ class Comparison:
 
     @property
     def saving_percent(self) -> dict[str, dict[str, float]]:
-        """Time saved by each method, and by the text, against each baseline, %."""
+        """Time saved against each baseline by what is none, %."""
         seconds = self.seconds
         return {
             name: {base: 100.0 * (1.0 - seconds[name] / seconds[base]) for base in BASELINES if seconds[base]}
@@ -321,53 +315,6 @@ class Comparison:
         if self.machine is not None:
             contents["machine"] = self.machine.name
         return contents
-
-
-def compare(
-    program: Program,
-    settings: Settings | None = None,
-    limits: Limits | None = None,
-    *,
-    methods: Sequence[str] = tuple(METHODS),
-    machine: Machine | None = None,
-    progress: Progress | None = None,
-) -> Comparison:
-    """Plan a program directly, with stops and with jumps of velocity, and the ideal curves of methods.
-
-    It raises what `cornersmooth.feedrate.plan` does.
-
-    Parameters
-    ----------
-    methods : sequence of str
-        Whose curves are planned.
-    progress : callable, optional
-        Called with (name of the law, work done, work in all).
-
-    Returns
-    -------
-    Comparison
-        Laws by name, their seconds, and what is saved.
-
-    Raises
-    ------
-    InputError, SettingsError
-        As of `plan`.
-    """
-    settings = Settings() if settings is None else settings
-    limits = Limits() if limits is None else limits
-
-    def step(name: str) -> Callable[[int, int], None] | None:
-        return None if progress is None else partial(progress, name)
-
-    stopping, jumping = BASELINES
-    laws = {
-        stopping: direct(program, limits, "exact_stop", settings=settings, machine=machine),
-        jumping: direct(program, limits, "velocity_jump", settings=settings, machine=machine, progress=step(jumping)),
-    }
-    for name in methods:
-        chosen = settings.but(method=name, **METHODS[name].prescribed)
-        laws[name] = plan(smoothing.smooth(program, chosen), limits, machine=machine, progress=step(name))
-    return Comparison(program, settings, limits, laws, machine)
 
 
 def stops(law: TimeLaw) -> int:
