@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from cornersmooth.cli import run
+from oracle import command
 from oracle.files import beginning
 from oracle.messages import one_line
 
@@ -156,3 +157,14 @@ def test_linuxcnc_is_timed_by_its_own_law(tmp_path: Path, capsys: pytest.Capture
     assert run(["time", str(part), *options, "--text", str(nc), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["seconds"] == pytest.approx(seconds, rel=1e-3)
     assert run(["time", str(part), *options, "--csv", str(tmp_path / "a.csv")]) == 2
+
+
+@pytest.mark.parametrize("control", [[], ["--control", "linuxcnc", "--machine", "xyzac-trt"]])
+def test_a_text_may_come_from_standard_input(tmp_path: Path, control: list[str]) -> None:
+    part, nc = tmp_path / "part.cls", tmp_path / "part.nc"
+    part.write_bytes(beginning(IMPELLER, 40))
+    assert command.run("smooth", part, *control, "-o", nc).returncode == 0
+    named = command.run("time", part, *control, "--text", nc, "--json")
+    piped = command.run("time", part, *control, "--text", "-", "--json", data=nc.read_bytes())
+    assert (piped.returncode, piped.stdout) == (0, named.stdout)
+    assert command.run("time", "-", *control, "--text", "-").returncode == 2

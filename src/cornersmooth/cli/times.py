@@ -13,9 +13,9 @@ import numpy as np
 from cornersmooth.cl import read
 from cornersmooth.cli.files import (
     check_inputs,
+    check_pair,
     check_path,
     naming,
-    read_head,
     read_input,
     write_report,
 )
@@ -45,10 +45,12 @@ _TITLES = {
 
 def run_time(given: Options) -> int:
     """Do the work of the command; return its exit code."""
-    inputs = [given.source, given.text] if given.text else [given.source]
-    check_inputs(*inputs)
+    if given.text:
+        check_pair(given)
+    else:
+        check_inputs(given.source)
     if given.csv:
-        check_path(given.csv, inputs, force=given.force)
+        check_path(given.csv, [given.source, given.text], force=given.force)
     data, name, is_program = given.read()
     if is_program:
         if given.csv:
@@ -76,8 +78,9 @@ def _compare(data: bytes, name: str, given: Options) -> Comparison:
     limits, settings = given.path_limits(), given.settings()
     program = read(data, name=name, **given.reading())
     if given.text:  # before anything that takes long
-        how = _as_text_was_made(given).reading_back()
-        nc = read_nc(given.text, **how, tolerance=settings.tolerance, axis_length=settings.axis_scale)
+        text, written = read_input(given.text)
+        how = _as_text_was_made(given, text).reading_back()
+        nc = read_nc(text, **how, name=written, tolerance=settings.tolerance, axis_length=settings.axis_scale)
     else:
         form = given.choose_form()
         fitted = fit_settings(settings, form, program.units)
@@ -105,8 +108,7 @@ def _by_own_law(data: bytes, name: str, given: Options) -> int:
     if timing is None:
         raise click.UsageError("name the machine with --machine; its table has to have [dynamics]")
     if given.text:
-        with open(given.text, "rb") as file:
-            text = file.read()
+        text, _ = read_input(given.text)
     else:
         text = written_text(program, settings, form)
     before, against = timing.unsmoothed(program)
@@ -118,9 +120,9 @@ def _by_own_law(data: bytes, name: str, given: Options) -> int:
     return 0
 
 
-def _as_text_was_made(given: Options) -> Options:
+def _as_text_was_made(given: Options, text: bytes) -> Options:
     """Options to read the text by: the machine of its head, else that of --machine."""
-    made, machine = read_provenance(read_head(given.text)), given.machine
+    made, machine = read_provenance(text), given.machine
     if made is not None and made.machine in ("", *machine_names()):
         machine = made.machine or None  # another name is that of a file of the user's own
     return replace(given, machine=machine, no_tcp=made is not None and not made.tcp)
