@@ -8,7 +8,6 @@ import pytest
 from cornersmooth.kinematics import (
     Machine,
     RotaryAxis,
-    inverse_time,
     load_machine,
     machine_names,
     machine_position,
@@ -180,8 +179,3 @@ def test_singular_poses_are_flagged():
     assert found.singular.tolist() == [True, True, False, False]
     assert found.pole_distance == pytest.approx([0, 0, 90, np.degrees(1e-6)])
     assert solutions(load_machine("nutated-bc"), axis).singular.tolist() == [True, False, False, False]
-
-
-def test_inverse_time_feed():
-    feed = inverse_time(np.array([10.0, 0, 0, 1]), np.full(4, 500.0), np.array([1.0, 90, 0, 90]), 3600.0)
-    assert feed.tolist() == [50, 40, np.inf, 40]

@@ -16,7 +16,7 @@ import click
 from cornersmooth.cli import shop
 from cornersmooth.cli.commands import COMMANDS
 from cornersmooth.cli.options import Options
-from cornersmooth.cli.show import finding_text, say, say_json, say_line
+from cornersmooth.cli.show import finding_text, say, say_line
 from cornersmooth.errors import InputError
 
 #: what the modes of a form are called for people
@@ -82,7 +82,7 @@ def _line(before: str, item: dict[str, Any]) -> str:
 def run_machines(given: Options) -> int:
     """Do the work of the command; return its exit code."""
     from cornersmooth.kinematics import load_machine, machine_names, machine_table
-    from cornersmooth.kinematics.posed import Posed, parse_pose
+    from cornersmooth.kinematics.posed import parse_pose, pose_facts, pose_lines
 
     name = given.name
     if given.table:
@@ -92,11 +92,8 @@ def run_machines(given: Options) -> int:
         raise click.UsageError("--pose needs the name of a machine")
     elif given.pose and name:
         machine = load_machine(name)
-        posed = Posed.of(machine, parse_pose(machine, given.pose))
-        if given.as_json:
-            say_json(posed.as_dict())
-        else:
-            click.echo(posed.describe())
+        facts = pose_facts(machine, parse_pose(machine, given.pose))
+        say(given, facts, pose_lines(facts), indent=4)
     else:
         found = [load_machine(one) for one in ([name] if name else machine_names())]
         lines = found[0].describe().splitlines() if name else [f"{one.name}: {one.description}" for one in found]

@@ -16,7 +16,6 @@ from cornersmooth.kinematics.machine import (
 from cornersmooth.kinematics.poses import (
     Solutions,
     check_travel,
-    inverse_time,
     machine_position,
     nose_position,
     solutions,
@@ -33,7 +32,6 @@ __all__ = [
     "check_dynamics",
     "check_travel",
     "endless",
-    "inverse_time",
     "load_machine",
     "machine_names",
     "machine_position",

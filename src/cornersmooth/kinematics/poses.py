@@ -84,11 +84,6 @@ def _with_one_axis(machine: Machine, axis: Floats) -> Solutions:
     return Solutions(angles, np.full(len(axis), np.inf), beyond)
 
 
-def pole_distance(machine: Machine, axis: Floats) -> Floats:
-    """Angle between tool axes and the nearest pole, as in `Solutions`: (n, 3) -> (n,) degrees."""
-    return solutions(machine, axis).pole_distance
-
-
 def _solve(frame: _Frame, axis: Floats, angles: Floats) -> Floats:
     """Put both pairs of angles (n, 2, 2) into `angles`; return ρ₁ (n,)."""
     x, y, z = (axis @ frame.first).T
@@ -304,17 +299,6 @@ def check_travel(machine: Machine, tip: Floats, angles: Floats, line: Ints, file
         file=file,
         line=int(line[row]) or None,
     )
-
-
-def inverse_time(length: Floats, feed: Floats, turn: Floats, rotary_feed: float) -> Floats:
-    """Feed words of G93, (n,) 1/min: so that the tip runs its way, mm, with its feed, mm/min; infinite for no move.
-
-    `turn` is the larger one of the two rotary axes, degrees, and `rotary_feed`, deg/min, what none of them exceeds: the
-    only limit where the tip stands still.
-    """
-    minutes = np.maximum(length / feed, turn / rotary_feed)
-    some = minutes > 0
-    return np.where(some, 1 / np.where(some, minutes, 1.0), np.inf)
 
 
 def _swing(machine: Machine, angles: Floats) -> Floats:

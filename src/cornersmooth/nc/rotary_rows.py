@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cornersmooth.arrays import norm, some_rows, spread, unit
-from cornersmooth.kinematics import inverse_time, machine_position, tip_position, tool_axis
+from cornersmooth.kinematics import machine_position, tip_position, tool_axis
 from cornersmooth.kinematics.machine import LINEAR
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program, SmoothProgram, rapid_moves
 from cornersmooth.nc.circles import ArcAngles
@@ -198,8 +198,7 @@ class _Chunk:
             return None
         way = np.maximum(np.where(still, norm(swing), length), digits)  # what is written at all moves by a digit
         rate = np.full(len(own), np.nan)
-        rate[chosen] = inverse_time(way[chosen], program.feed[own[chosen]], turn[chosen], _FASTEST_TURN)
-        rate[~np.isfinite(rate)] = np.nan
+        rate[chosen] = 1.0 / np.maximum(way[chosen] / program.feed[own[chosen]], turn[chosen] / _FASTEST_TURN)
         back = self.way.left[path.pose] & ~path.inserted
         if back.any():
             rate[back] = program.feed[own[back]] / form.rewind if timed is not None else np.nan

@@ -16,7 +16,6 @@ from cornersmooth.kinematics.poses import (
     angle_between,
     closest_second,
     passes_pole,
-    pole_distance,
     solutions,
     tool_axis,
 )
@@ -304,20 +303,14 @@ def pole_finding(
     """Cuts near the pole, where the first rotary axis turns fast: where, how close, how fast."""
     if len(machine.names) < 2:
         return ()
-    found = [np.zeros(0, np.int64)]
-    for begin in range(0, len(axis) - 1, CHUNK):
-        here = slice(begin, begin + CHUNK + 1)
-        turn, tilt = np.abs(np.diff(angles[here, 0])), norm(np.diff(axis[here], axis=0))
-        fast = (turn > NO_TURN) & (turn > NEAR_POLE * np.degrees(tilt)) & ~rapid[here][1:]
-        found.append(begin + np.flatnonzero(fast))
-    edges = np.concatenate(found)
+    turn, tilt = np.abs(np.diff(angles[:, 0])), norm(np.diff(axis, axis=0))
+    edges = np.flatnonzero((turn > NO_TURN) & (turn > NEAR_POLE * np.degrees(tilt)) & ~rapid[1:])
     if not len(edges):
         return ()
-    turns = np.abs(angles[edges + 1, 0] - angles[edges, 0])
-    lengths = norm(tip[edges + 1] - tip[edges])
+    turns, lengths = turn[edges], norm(tip[edges + 1] - tip[edges])
     rates = np.where(lengths > 0, turns / np.where(lengths > 0, lengths, 1.0), np.inf)
     worst = int(np.argmax(rates))
-    closest = float(min(pole_distance(machine, axis[edges]).min(), pole_distance(machine, axis[edges + 1]).min()))
+    closest = float(solutions(machine, axis[np.union1d(edges, edges + 1)]).pole_distance.min())
     name = machine.names[0]
     speed = f"{rates[worst]:.4g} deg/mm" if np.isfinite(rates[worst]) else "with the tip standing still"
     text = (
