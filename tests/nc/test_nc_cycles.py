@@ -209,6 +209,8 @@ def test_what_the_control_has_no_cycle_for_stays_plain_moves(cycle: str) -> None
     [
         ("SPINDL/500,RPM,CLW", "SPINDL/500,RPM,CCLW", "clockwise"),
         ("SPINDL/500,RPM,CLW", "SPINDL/OFF", "clockwise"),
+        # LinuxCNC: "Spindle turning counterclockwise in G84"
+        ("SPINDL/500,RPM,CLW", "SPINDL/500,RPM,CLW\nAUXFUN/4", "clockwise"),
         ("CYCLE/TAP", "CYCLE/TAP,BRKCHP", "not understood"),
         ("MMPM,500,RAPTO,5", "MMPM,500", "no such cycle"),
     ],

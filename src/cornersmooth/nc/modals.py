@@ -217,9 +217,9 @@ class Modals:
         return [*blocks, *home, *self.expand(steps, {**rotary, "rotary_zero": zero})]
 
     @property
-    def turning(self) -> bool:
-        """Whether the spindle turns at the next motion: it does, or goes on after a tool change."""
-        return bool(self.now["spindle"] or self._stopped.get("spindle"))
+    def turning(self) -> Blocks:
+        """Blocks by which the spindle turns at the next motion: it does, or goes on after a tool change."""
+        return tuple(self.now["spindle"] or self._stopped.get("spindle", ()))
 
     def switch(self, what: str, blocks: Blocks) -> None:
         """Take note of the blocks that turn the spindle or let the coolant flow, or of none where it stops."""

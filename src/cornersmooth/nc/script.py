@@ -211,8 +211,8 @@ class Script:
         kind = kind_of(cycle, motion.at.form, motion.program, poses)
         if not kind:
             return "", "a tap, and the control has no such cycle for it"
-        clockwise = self.statements.direction == "clockwise"
-        if cycle.tap and not (clockwise and motion.modals.speed and motion.modals.turning):
+        clockwise = {self.statements.words.clockwise} & {*" ".join(motion.modals.turning).split()}
+        if cycle.tap and not (clockwise and motion.modals.speed):
             return "", "a tap takes a spindle that turns clockwise at a known speed"
         if motion.at.plane is None:
             where = "the tool does not stay along Z between its changes, or nothing says that the rotary axes do"
@@ -232,7 +232,7 @@ class Script:
         motion.findings.note_each("CS347", program.line[poses])
         if kind == "tap":
             motion.findings.note_each("CS348", program.line[poses])
-        motion.note_cut(int(poses[0]), turning=motion.modals.turning)
+        motion.note_cut(int(poses[0]), turning=bool(motion.modals.turning))
         motion.say(motion.modals.set(plane=FIRST_PLANE))  # a cycle drills across the plane
         table, digits, speed = at.form.table.cycles, at.form.table.digits, motion.modals.speed or 0.0
         (feeds, modes), frame = hole_feeds(cycle, program, poses), np.eye(3) if at.plane is None else at.plane.frame
