@@ -29,7 +29,8 @@ def part(tmp_path: Path) -> Path:
 
 
 def test_every_row_is_a_program_and_the_best_is_marked_with_its_command(part: Path, tmp_path: Path) -> None:
-    given = ("compare", part, "-e", "0.02", "--control", "siemens", "--limits", "table-ac")
+    (tmp_path / "cornersmooth.toml").write_text("[controls.shop]\nlike = 'siemens'\n")
+    given = ("compare", part, "-e", "0.0198765432", "--control", "shop", "--limits", "table-ac")
     done = run(*given, "--json")
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
@@ -49,6 +50,7 @@ def test_every_row_is_a_program_and_the_best_is_marked_with_its_command(part: Pa
 
     name, *words = shlex.split(best["command"])
     assert name == "cornersmooth"
+    assert words[2:6] == ["--tolerance", "0.0198765432", "--control", "shop"]
     target = tmp_path / words[-1]
     said = run(*words[:-1], target, "--limits", "table-ac")
     assert said.returncode == 0, said.stderr

@@ -290,8 +290,8 @@ def _command(given: Options, row: Row, machine: Any, command: str, suffix: str) 
             if option.is_flag:
                 words.append(spelled)
             else:
-                number = ",".join(f"{part:g}" for part in one) if isinstance(one, tuple) else one
-                words += [spelled, f"{number:g}" if isinstance(number, float) else str(number)]
+                parts = one if isinstance(one, tuple) else (getattr(one, "name", one),)  # a control of one's own
+                words += [spelled, ",".join(f"{part:.12g}" if isinstance(part, float) else str(part) for part in parts)]
     called = machine if isinstance(machine, str) else getattr(machine, "name", "")
     options = list(row.options)
     if "--machine" in options:
