@@ -296,3 +296,16 @@ def test_what_smooth_wrote_has_no_more_lines(tmp_path: Path) -> None:
     assert run("filter", "part.ngc", *LINUXCNC, *EPS, "-o", "new.ngc", cwd=tmp_path).returncode == DONE
     before, after = ((tmp_path / name).read_bytes().count(b"\n") for name in ("part.ngc", "new.ngc"))
     assert after <= before
+
+
+def test_a_control_and_a_machine_of_the_shop_settings_are_taken(tmp_path: Path) -> None:
+    written(tmp_path, name_of(FANUC[1], FANUC[3]))
+    (tmp_path / "cornersmooth.toml").write_text(
+        "[smooth]\ncontrol = 'shop'\nmachine = 'mill'\n"
+        f"[controls.shop]\nlike = 'fanuc'\n[machines.mill]\nlike = '{FANUC[3]}'\n"
+    )
+    own = run("filter", "part.nc", *EPS, "-o", "own.nc", cwd=tmp_path)
+    assert own.returncode == DONE, own.stderr
+    assert b"own.nc  shop g1, mill" in own.stderr
+    assert run("filter", "part.nc", *FANUC, *EPS, "-o", "new.nc", cwd=tmp_path).returncode == DONE
+    assert (tmp_path / "own.nc").read_bytes() == (tmp_path / "new.nc").read_bytes()

@@ -306,7 +306,7 @@ def options_for(data: bytes, name: str, given: Options) -> Options:
 
     if is_cl_file(data[:HEAD]):  # who reads it will say so
         return given
-    if given.control.lower() in ALIKE:
+    if isinstance(given.control, str) and given.control.lower() in ALIKE:  # else one of the shop settings
         if given.limits:
             show.warn(f"times are those of LinuxCNC's law: that of {given.control} is not known", name)
         given = replace(given, control="linuxcnc")
