@@ -152,18 +152,14 @@ def _used(batch: Batch, step: Floats, inverse: Floats, beyond: Floats, bites: li
 
 def _normal_matrix(batch: Batch, c: Floats, stiffness: Floats, bites: list[Floats]) -> Floats:
     """(3, n) diagonals of the normal equations, from the stiffness (2, R, n) of all limits."""
-    pairs = [(i, j) for i in range(3) for j in range(i, 3)]
-    found = {pair: np.zeros(len(c)) for pair in pairs}
-    found[1, 1] += 0.25 * batch.weight * c**-2.5  # by the logarithm of c; 0.75 by c
+    found = np.zeros((3, 3, len(c)))
+    found[1, 1] = 0.25 * batch.weight * c**-2.5  # by the logarithm of c; 0.75 by c
     for rows, both, bite in zip(batch.rows, batch.by_rows(stiffness), bites, strict=True):
         whole = both[0] + both[1]
-        weighted = whole * rows.left
-        for i, j in pairs:
-            found[i, j] += (weighted[i] * rows.left[j]).sum(axis=0)
-        cross = bite * ((both[0] - both[1]) * rows.left).sum(axis=1)
+        found += np.einsum("irn,jrn->ijn", whole * rows.left, rows.left)
+        cross = bite * np.einsum("rn,irn->in", both[0] - both[1], rows.left)
         own = bite * bite * whole.sum(axis=0) * rows.right
-        for i, j in pairs:
-            found[i, j] += cross[i] * rows.right[j] + rows.right[i] * (cross[j] + own[j])
+        found += cross[:, None] * rows.right + rows.right[:, None] * (cross + own)
     bands = np.stack(
         (
             behind(found[0, 2]),
@@ -181,7 +177,7 @@ def _step(batch: Batch, c: Floats, factors: Floats | None, pressure: Floats | No
     force[1] = -0.5 * batch.weight * c**-1.5
     if pressure is not None:
         for rows, both, bite in zip(batch.rows, batch.by_rows(pressure), bites, strict=True):
-            force += ((both[0] - both[1]) * rows.left).sum(axis=1)
+            force += np.einsum("rn,irn->in", both[0] - both[1], rows.left)
             force += bite * both.sum(axis=(0, 1)) * rows.right
     gradient = force[1] + ahead(force[0]) + behind(force[2])
     step = np.zeros(len(c)) if factors is None else np.asarray(dpbtrs(factors, -gradient)[0], np.float64)

@@ -204,10 +204,7 @@ class Rows(NamedTuple):
 
     def values(self, around: Floats) -> tuple[Floats, Floats]:
         """Left sides (R, n), and right·c (n,), for coefficients (3, n) before, of and after each cell."""
-        left = self.left[0] * around[0]
-        for weight, c in zip(self.left[1:], around[1:], strict=True):
-            left += weight * c
-        return left, (self.right * around).sum(axis=0)
+        return np.einsum("irn,in->rn", self.left, around), np.einsum("in,in->n", self.right, around)
 
 
 #: weights of the coefficient of a cell itself

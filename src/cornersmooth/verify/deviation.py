@@ -131,8 +131,11 @@ def of_original(match: Match) -> Reached:
     return Reached(vertex, point, Gap.of(match.task, away.T), place, False)
 
 
-def nearest(match: Match, reached: Reached, rows: Ints, metric: Metric) -> Floats:
-    """(k,) distances of some rows from the nearest place of the other motion: of tips, or of axis points."""
+def nearest(match: Match, reached: Reached, rows: Ints, metric: Metric, least: float) -> Floats:
+    """(k,) distances of some rows from the nearest place of the other motion: of tips, or of axis points.
+
+    Where they are not above `least`, or not the largest, they may be too small by twice the bend of the motion.
+    """
     vertex, six, middle = reached.vertex[rows], reached.six[rows], reached.place[rows].astype(np.int64)
     if reached.mine:
         other, low, high = match.path.points, match.low[vertex], match.high[vertex]
@@ -147,9 +150,18 @@ def nearest(match: Match, reached: Reached, rows: Ints, metric: Metric) -> Float
         if match.task.apart:  # where each is run on its own, a tip that stands is passed
             more |= largest_square((six[far].T - points_at(other, best[far]))[COLUMNS[metric]]) > match.tolerance**2
         far, reach = far[more], 4 * reach
-    ends = np.maximum(best - 0.5, low), np.minimum(best + 0.5, high + 1.0)
-    at = match.path.at if reached.mine else lambda where: _written(match, where)
-    return _least(at, six, COLUMNS[metric], *ends)[1]
+    segment = np.clip((best + _SIDES / 2.0).astype(np.int64), low, high)  # that it is on, and that beside it
+    way = (other[segment + 1] - other[segment])[..., COLUMNS[metric]]
+    bend = (match.path if reached.mine else match.motion).bend[segment].max(axis=0)
+    chord = np.sqrt(largest_square((six.T - points_at(other, best))[COLUMNS[metric]]))
+    distance = chord - bend
+    if len(bent := np.flatnonzero((bend > 0.0) & (chord + bend > max(least, distance.max())))):
+        # farther along chords these alone are farther than the bends could take away
+        room = 2.0 * np.sqrt(bend * (chord + bend)) / np.maximum(np.linalg.norm(way, axis=2).min(axis=0), ARITHMETIC)
+        near = best + np.minimum(room, 0.5) * _SIDES
+        at = match.path.at if reached.mine else lambda where: _written(match, where)
+        distance[bent] = _least(at, six[bent], COLUMNS[metric], *np.clip(near, low, high + 1.0)[:, bent])[1]
+    return distance
 
 
 def _least(
@@ -342,7 +354,7 @@ def _largest(match: Match, found: Findings, reached: Reached, lines: Callable[[I
         rows, some = np.flatnonzero(known > found.worst[name].value), _SOME
         while len(rows):
             first = rows[np.argpartition(-known[rows], some)[:some]] if len(rows) > some else rows
-            off = np.minimum(nearest(match, reached, first, name), known[first])
+            off = np.minimum(nearest(match, reached, first, name, found.worst[name].value), known[first])
             found.note(name, off, *lines(first))
             rows = np.setdiff1d(rows[known[rows] > found.worst[name].value], first, assume_unique=True)
             some *= 4
