@@ -93,7 +93,7 @@ def test_cycles_go_with_tools_of_their_own_lengths() -> None:
 
 @pytest.mark.parametrize("lengths", ["", "1 = 120\n"])
 def test_a_tool_without_a_length_is_refused(lengths: str) -> None:
-    with pytest.raises(SettingsError, match="tool_lengths" if lengths else "one tool_length") as refused:
+    with pytest.raises(SettingsError, match="length of tool") as refused:
         lines_of(form_of("fanuc", machine(lengths)), CL)
     assert refused.value.code == "CS219"
     assert refused.value.line == 2 + CL[: CL.index("LOADTL/7")].count("\n") - 1

@@ -282,7 +282,7 @@ def _extra(table: Control, form: str, name: str) -> Extra:
 
 
 def check_program(form: Form, program: Program, settings: Settings) -> None:
-    """Refuse a program whose tool is not along Z where the form has no words for its axis (CS219)."""
+    """Refuse tools that are not along Z where there are no words for their axis, and unknown lengths (CS219)."""
     if form.orientation == "fixed":
         tilt = norm(program.axis - (0.0, 0.0, 1.0))
         tilt[program.kind == Move.FROM] = 0.0
@@ -296,19 +296,10 @@ def check_program(form: Form, program: Program, settings: Settings) -> None:
             what, line = f"the tool is not parallel to Z, and {words}", int(program.line[tilted[0]])
             raise SettingsError("CS219", what, hint, file=program.source.name, line=line)
     if form.orientation == "machine" and form.machine is not None and form.machine.swings_the_tool:
-        _check_lengths(form.machine, program)
-
-
-def _check_lengths(machine: Machine, program: Program) -> None:
-    """Refuse a program with tools whose lengths are not known, where these go into every position."""
-    loads, known = tool_loads(program), dict(machine.tool_lengths)
-    wrong = [one for one, (number, _) in loads if (number not in known if known else number != loads[0][1][0])]
-    file, line = program.source.name, wrong[0].line if wrong else 0
-    if wrong and known:
-        what = f"a tool that [tool_lengths] of {machine.name} does not have, and whose length goes into every position"
-        raise SettingsError("CS219", what, "write its length into the machine file", file=file, line=line)
-    if wrong:
-        tools = len({number for _, (number, _) in loads})
-        what = f"{tools} tools, and {machine.name} has one tool_length that goes into every position"
-        hint = "write [tool_lengths] into the machine file, or let the control keep the tool tip"
-        raise SettingsError("CS219", what, hint, file=file, line=line)
+        loads, lengths = tool_loads(program), dict(form.machine.tool_lengths)
+        known = lengths.keys() or {number for _, (number, _) in loads[:1]}  # one length is that of one tool
+        for statement, (number, _) in loads:
+            if number not in known:
+                what = f"the length of tool {number} goes into every position, and {form.machine.name} does not have it"
+                hint = "write [tool_lengths] into the machine file, or let the control keep the tool tip"
+                raise SettingsError("CS219", what, hint, file=program.source.name, line=statement.line)
