@@ -236,3 +236,109 @@ def test_curves_in_another_spelling_pass(control: str, form: str, rewrite: str, 
     (tmp_path / "part.nc").write_bytes(text.encode())
     found = run("verify", "part.cls", "part.nc", "-e", "0.02", "--control", control, cwd=tmp_path)
     assert found.stdout.startswith(b"PASSED"), found.stdout + found.stderr
+
+
+OTHER_SPELLINGS = [
+    ("siemens", (r"^G4 F0\.5$", "G4 F+0.5")),
+    ("siemens", ("^T4$", "T=4")),
+    ("siemens", (r"^T4$", 'MSG("TOOL 4")\nT4')),
+    ("siemens", (r"\A", "%_N_PART_MPF\n")),
+    ("fanuc", ("S3000 M3", "S+3000 M3")),
+    ("heidenhain", (r"TOOL CALL 4 Z(.*)$", r"TOOL CALL 04 Z\1")),
+    ("heidenhain", (r"\A(.*)$", r"\1\n1 BLK FORM 0.1 Z X-9 Y-9 Z-9\n2 BLK FORM 0.2 X+9 Y+9 Z+0")),
+    ("linuxcnc", (r"\A((?:.*\n)+)\Z", r"%\n\1%\n")),
+    ("linuxcnc", (r"\A", "\n%\n")),
+]
+
+
+@pytest.mark.parametrize(("control", "edit"), OTHER_SPELLINGS)
+def test_other_spellings_pass(control: str, edit: tuple[str, str], tmp_path: Path) -> None:
+    """With the digests of the head."""
+    assert judged(tmp_path, control, edit).startswith("PASSED")
+
+
+@pytest.mark.parametrize("control", ["fanuc", "haas", "mitsubishi", "siemens", "linuxcnc"])
+def test_what_holds_may_be_said_in_each_cut(control: str, tmp_path: Path) -> None:
+    """The blocks are read one by one then."""
+    (tmp_path / "part.cls").write_text(CL)
+    (tmp_path / "part.nc").write_text(re.sub("^G1 ", "G1 G90 ", right(control), flags=re.MULTILINE))
+    found = run("verify", "part.cls", "part.nc", *options(control), cwd=tmp_path)
+    assert found.stdout.startswith(b"PASSED"), found.stdout
+
+
+def test_linuxcnc_wants_its_mark_in_the_first_line(tmp_path: Path) -> None:
+    """It stops at one behind a comment ("Bad character '%' used")."""
+    assert judged(tmp_path, "linuxcnc", (r"\A\(", "%\n(")).startswith("PASSED")
+    assert judged(tmp_path, "linuxcnc", (r"\A(\(.*\n)", r"\1%\n")).startswith("FAILED")
+
+
+@pytest.mark.parametrize("control", ["fanuc", "haas", "mitsubishi", "siemens", "linuxcnc"])
+def test_an_arc_without_words_is_refused(control: str, tmp_path: Path) -> None:
+    """LinuxCNC stops there, and no program needs it."""
+    for code in ("G2", "G3 F900."):
+        assert judged(tmp_path, control, (r"^(G1 .*X20\..*)$", rf"\1\n{code}\nG1")).startswith("FAILED")
+
+
+TILTED = CL.replace("20,20,-3", "20,20,-3,0.0995037,0,0.9950372")
+RIGID = """LOAD/TOOL,9,ADJUST,9
+SPINDL/RPM,500,CLW
+RAPID
+GOTO/5,5,25,0,0,1
+CYCLE/TAP,FEDTO,8,MMPR,1.25,RAPTO,3,RTRCTO,25
+GOTO/5,5,0
+CYCLE/OFF
+FINI
+"""
+PLANE = """LOAD/TOOL,3,ADJUST,3
+SPINDL/RPM,8000,CLW
+RAPID
+GOTO/10,0,60,0.5,0,0.8660254
+FEDRAT/MMPM,800
+GOTO/10,0,10
+GOTO/10,25,10
+RAPID
+GOTO/40,25,61.961524
+FINI
+"""
+
+
+def edited(folder: Path, cl: str, how: tuple[str, ...], *edits: tuple[str, str]) -> str:
+    """As `judged`, of a program that is written with options of its own."""
+    on = ("-e", "0.02", *how)
+    (folder / "part.cls").write_text(cl)
+    made = run("smooth", "part.cls", *on, "-o", "part.nc", "--force", cwd=folder)
+    assert made.returncode == DONE, made.stderr
+    text = (folder / "part.nc").read_text()
+    for old, new in edits:
+        text, count = re.subn(old, new, text, count=1, flags=re.MULTILINE)
+        assert count
+    (folder / "part.nc").write_text(text)
+    return run("verify", "part.cls", "part.nc", *on[:4], cwd=folder).stdout.decode().splitlines()[0]
+
+
+def test_words_of_a_tap_may_be_spelt_otherwise(tmp_path: Path) -> None:
+    how = ("--control", "fanuc", "--cycles", "native")
+    assert edited(tmp_path, RIGID, how, ("^M29 S500$", "M29 S500.0")).startswith("PASSED")
+    assert edited(tmp_path, RIGID, how, ("^(G98 G84 .*) (F.*)$", r"\2 \1")).startswith("PASSED")
+    assert edited(tmp_path, RIGID, how, ("^G98 G84 ", "G98 G81 ")).startswith("FAILED")
+
+
+def test_numbers_of_a_tilted_plane_may_be_spelt_otherwise(tmp_path: Path) -> None:
+    how = ("--control", "fanuc", "--planes", "tilted")
+    assert edited(tmp_path, PLANE, how, (r"J30\.0000", "J030.")).startswith("PASSED")
+    assert edited(tmp_path, PLANE, how, (r"^G68\.2 X0\. ", "G68.2 X-0.0 ")).startswith("PASSED")
+    assert edited(tmp_path, PLANE, how, (r"^G68\.2 X0\. ", "G68.2 X0.1 ")).startswith("FAILED")
+
+
+@pytest.mark.parametrize(
+    ("control", "form", "word"),
+    [("siemens", "bspline", r" XH=\S+"), ("siemens", "poly", r" YH=\S+"), ("generic", "g6.2", r" U\S+")],
+)
+def test_a_second_point_without_all_its_words_is_not_verified(
+    control: str, form: str, word: str, tmp_path: Path
+) -> None:
+    """Where the others are left out, manuals do not say what holds."""
+    how = ("--control", control, "-f", form)
+    assert edited(tmp_path, TILTED, how).startswith("PASSED")
+    found = edited(tmp_path, TILTED, how, (rf"^(G0 X20.*?){word}", r"\1"))
+    assert "a second point without all its words" in found, found

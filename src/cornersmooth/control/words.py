@@ -33,8 +33,8 @@ MOTION_CODES = (0.0, 1.0, 2.0, 3.0, NURBS)
 BY_WORD: Final = "DC"
 
 
-#: zeros that say nothing in a whole number; that of a program, which is its name, has them
-_ZEROS: Final = re.compile(r"(?<=^[A-NP-Z])0+(?=\d+$)")
+#: a plus sign, which no code has, and zeros that say nothing in a whole number, but in the name of a program
+_ZEROS: Final = re.compile(r"(?<=^[A-NP-Z])0+(?=\d+$)|(?<=^[A-FH-LNP-Z])\+(?:0+(?=\d+$))?(?=[\d.])")
 
 
 class Word(NamedTuple):

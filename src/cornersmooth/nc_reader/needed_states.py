@@ -91,6 +91,11 @@ def control_problems(run: Run) -> Iterator[Problem]:
         kind, letters = ("angles" if state.rotary.tip_control else "off"), {*state.rotary.names}
     else:
         kind, letters = ("points", {*"UVW"}) if state.modal.points else ("vectors", {*"IJ"})
+    if kind == "points":
+        place, point = (~np.isnan([table.column(name) for name in names]) for names in ("XYZ", "UVW"))
+        lacks = (place | point).any(axis=0) & ~point.all(axis=0)
+        text = "a second point without all its words: manuals do not say what holds for the others"
+        yield from Problem.at("", lacks, table.line, text, most=1)
     if dialect.curves_need and state.machine.groups["smoothing"] != dialect.curves_need:
         text = f"a curve where {dialect.curves_need} must be in force"
         yield from Problem.at(CONTROL_WORDS, table.column("G") == NURBS, table.line, text, most=1)

@@ -88,6 +88,7 @@ class WordCheck:
         self._ends = tuple(map(re.compile, keys["end"]))
         self._wanted = tuple(map(re.compile, keys["begin"]))  # blocks of the begin that are still to come
         self._opening = ""
+        self._commented = False  # whether a comment has come
         self._tail: list[tuple[int, str]] = []
         self._before = Block(0)
         self._line = 0  # of the last block
@@ -188,6 +189,7 @@ class WordCheck:
         if line.skipped and not own:
             self._wrong(NOT_LISTED, number, "block skip: what the control does depends on a switch")
         if not words:
+            self._commented |= bool(line.comments)
             return line
         machine, before = states.machine, len(self.problems)
         after = machine.after(line)
@@ -292,6 +294,8 @@ class WordCheck:
             if missing:
                 self._states.unframed(NOT_LISTED, number, f"the program must begin with {shown(missing[0])}")
             self._wanted = wanted[place + 1 :]
+            if text == _TAPE and self._commented:
+                self._states.unframed(NOT_LISTED, number, "% where a comment is before it")
             if place < len(wanted):
                 self._opening = self._opening or text
                 return True

@@ -30,11 +30,12 @@ _GROUPS: Final = frozenset(("motion", "feed", "plane", "path", "compensation"))
 _WORDS: Final = frozenset(("T", "S"))
 _SWITCHED: Final = frozenset(("spindle", "coolant"))
 
-#: words that begin and end a program
-_FRAME: Final = re.compile("O$|(BEGIN|END) PGM")
+#: words that begin and end a program, or only show something
+_FRAME: Final = re.compile("O$|%|MSG|BLK FORM|(BEGIN|END) PGM")
 
 #: a word with a number; codes are in one spelling
 _NUMBER: Final = re.compile(r"([A-FH-LN-Z]+)([-+.\d]+)")
+_ZEROS: Final = re.compile(r"(?<![\w.])0+(?=\d)|(?<=[A-Z=+-])0+(?=\d)")
 
 #: letters of places, and of axes that turn
 _PLACES: Final = frozenset("XYZABCIJKUVW")
@@ -80,8 +81,7 @@ class Parts:
 
     def table(self, table: Table, machine: State) -> None:
         """Take a run of motion blocks; the machine is before it."""
-        rows = range(min(len(table), _APPROACH)) if self._above else range(1)
-        for row in rows if self._still or self._above else ():
+        for row in range(min(len(table), _APPROACH) if self._above else 1):
             self._moves(int(table.line[row]), set(table.row(row)))
         cuts = table.column("G") > 0.0
         if cuts.any() or (machine.groups["motion"] in CUTS and not (table.column("G") == 0.0).any()):
@@ -120,7 +120,9 @@ class Parts:
             self._moves(line.number, moved)
             if now["motion"] in CUTS:
                 self._cut(line.number)
-        turned = " ".join(f"{name}{machine.place[name]:g}" for name in _ROTARY if not math.isnan(machine.place[name]))
+        turned = " ".join(
+            f"{name}{machine.place[name] + 0.0:g}" for name in _ROTARY if not math.isnan(machine.place[name])
+        )
         if turned and (before["tip"] != now["tip"] or does & {"anything", "tool"}):
             self._take(line.number, turned)
 
@@ -139,6 +141,8 @@ class Parts:
 
     def _moves(self, line: int, names: set[str]) -> None:
         """Take a motion: on the way down from a retract with its letters, elsewhere the first behind a word alone."""
+        if not (self._still or self._above):
+            return
         self._flush(line)
         if self._above:
             self._take(line, "".join(sorted(_PLACES & names)))
@@ -195,9 +199,9 @@ class Parts:
 
 
 def _spelt(word: Word) -> str:
-    """A word, its number without a plus sign and zeros that say nothing."""
+    """A word, its numbers without plus signs and zeros that say nothing."""
     match = None if word.fixed else _NUMBER.fullmatch(word.spelling)
-    return f"{match[1]}{word.value + 0.0:.10g}{'.' * ('.' in match[2])}" if match else word.spelling
+    return f"{match[1]}{word.value + 0.0:.10g}{'.' * ('.' in match[2])}" if match else _ZEROS.sub("", word.spelling)
 
 
 def _alike(digests: Sequence[str], others: Sequence[str]) -> int:

@@ -224,7 +224,10 @@ class _SiemensLexer(Lexer):
             return _factors(match)
         if word := match["name"]:
             name = _NAMES.get(word, word if len(word) == 1 else "=")
-            return [fixed(match, name, float(match["given"])) if name == "SD" else number_of(match, "given", name)]
+            if name == "SD":
+                return [fixed(match, name, float(match["given"]))]
+            found = number_of(match, "given", name)
+            return [found if len(word) > 1 or word in "GM" else found._replace(text=f"{word}{match['given']}")]
         if letter := match["letter"]:
             if letter == "G":
                 return [fixed(match, "G", float(match["value"]))]
