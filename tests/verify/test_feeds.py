@@ -110,3 +110,29 @@ def test_every_move_under_a_long_block_has_its_feed() -> None:
     assert not verify(cl, _text([500, 150, 500], [0, -4, -6]), tolerance=0.02).problems
     for feeds, heights in (([500], [-6]), ([150], [-6]), ([500, 500], [0, -6]), ([500, 150], [0, -6])):
         assert [one.code for one in verify(cl, _text(feeds, heights), tolerance=0.02).problems] == ["CS541"]
+
+
+@pytest.mark.parametrize(
+    ("control", "height", "feed", "found"),
+    [
+        ("fanuc", -5, 300, ["CS541"]),
+        ("fanuc", -5, 286, []),
+        ("fanuc", -2, 300, []),  # 0.8 % faster
+        ("fanuc", 0, 300, []),
+        ("linuxcnc", -5, 300, []),
+        ("linuxcnc", -5, 286, ["CS541"]),
+    ],
+)
+def test_a_helix_is_faster_where_f_counts_in_its_plane(
+    control: str, height: float, feed: float, found: list[str]
+) -> None:
+    """F of FANUC counts along the arc, not along the helix (B-63324EN 4.5), unless 1403#5 is set."""
+    circle = f"FEDRAT/MMPM,300\nCIRCLE/0,0,0,0,0,1,10\nGOTO/0,10,{height}\n"
+    start = "LOAD/TOOL,4,ADJUST,4\nRAPID\nGOTO/10,0,0,0,0,1\n"
+    cl = read((start + circle + "RAPID\nGOTO/0,10,50\nFINI\n").encode(), name="part.cls")
+    assert len(cl.arcs.pose) == 1
+    arc = f"G3 X0. Y10. Z{height:g}. R10. F{feed:g}{'' if '.' in str(feed) else '.'}"
+    blocks = ["T4 M6", "G43 H4", "G0 X10. Y0.", "G0 X10. Y0. Z0.", arc, "G0 X0. Y10. Z50."]
+    text = encode([*HEAD, *blocks, *TAIL])
+    problems = verify(cl, text, tolerance=0.02, control=control, words=False).problems
+    assert [problem.code for problem in problems] == found, problems

@@ -7,6 +7,7 @@ between the two, any of the moves that the element may be on does.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -21,13 +22,17 @@ from cornersmooth.verify.motions import ARITHMETIC
 from cornersmooth.verify.nearest import COLUMNS, on_segments
 from cornersmooth.verify.task import Original, Task
 
+#: share by which the feed may be another on an arc that rises, where F counts in the plane of the circle alone
+_FASTER: Final = 0.02
+
 #: places nearer to a vertex of the CL path are at it, in segments
 _HAIR: Final = 1e-9
 
 
 def check_feeds(match: Match, found: Findings) -> None:
     """Every element must carry the feed of its moves: CS541 a wrong feed, CS542 none, CS543 the wrong feed mode."""
-    nc, feeding, task = match.nc, match.feeding, match.task
+    feeding, task = match.feeding, match.task
+    nc = _along_helices(match.nc) if task.feed_in_plane and len(match.nc.arcs) else match.nc
     element = np.flatnonzero(feeding) + match.first + 1
     if not len(element):
         return
@@ -66,6 +71,18 @@ def check_feeds(match: Match, found: Findings) -> None:
         each = zip(element[shown].tolist(), wrong[shown].tolist(), until[shown].tolist(), strict=True)
         problems = [_problem(match.original, nc, row, moves[one : last_one + 1]) for row, one, last_one in each]
         found.feeds = Runs(problems, begins=not good[0], ends=not good[-1])
+
+
+def _along_helices(nc: Elements) -> Elements:
+    """The same elements with feeds along steep arcs as they are where F counts in the plane of the circle alone."""
+    arcs = nc.arcs
+    way = nc.tip[arcs.element] - nc.tip[np.maximum(arcs.element - 1, 0)]
+    radius = np.linalg.norm(np.cross(arcs.normal, nc.tip[arcs.element] - arcs.centre), axis=1)
+    flat, faster = radius * arcs.sweep, np.ones(len(nc))
+    share = np.hypot(flat, np.einsum("ij,ij->i", way, arcs.normal)) / np.where(flat > 0.0, flat, np.inf)
+    faster[arcs.element] = np.maximum(share, 1.0)
+    room = np.nan_to_num(nc.feed) * np.minimum(faster - 1.0, _FASTER)
+    return replace(nc, feed=nc.feed * faster, other_feed=nc.other_feed * faster, feed_room=nc.feed_room + room)
 
 
 def _runs_between(task: Task, low: Floats, high: Floats) -> tuple[Ints, Ints]:

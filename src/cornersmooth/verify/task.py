@@ -129,6 +129,7 @@ class Task:
     apart: bool = False
     #: mm: how far the written motion may leave the lines that stand for it (rotary words)
     sagitta: float = 0.0
+    feed_in_plane: bool = False  #: whether F of an arc that rises counts in the plane of its circle alone
 
     @property
     def own_axis(self) -> bool:
@@ -145,6 +146,7 @@ class Task:
         *,
         apart: bool = False,
         sagitta: float = 0.0,
+        feed_in_plane: bool = False,
     ) -> Task:
         """Make it of ε; `axis_tolerance` in degrees takes the place of `axis_length`."""
         own_axis = axis_tolerance is not None
@@ -154,7 +156,8 @@ class Task:
         original = Original.of(program, tolerance, axis_length, own_axis=own_axis)
         trail = original.trail
         path = Path.of(trail.six, trail.bend, trail.at)
-        return cls(original, path, _exact_poses(original), tolerance, axis_length, axis_tolerance, apart, sagitta)
+        exact, axis = _exact_poses(original), (axis_length, axis_tolerance)
+        return cls(original, path, exact, tolerance, *axis, apart, sagitta, feed_in_plane)
 
     def motion(self, nc: Elements) -> Motion:
         """Make the polyline of elements of a program."""

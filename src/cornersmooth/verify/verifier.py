@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final, Self
 import numpy as np
 
 from cornersmooth.control.source import Source, readable_twice
+from cornersmooth.control.table import word_table
 from cornersmooth.control.words import distinct
 from cornersmooth.errors import SettingsError
 from cornersmooth.model import Program
@@ -161,12 +162,15 @@ class Verifier:
         options, text = self._options, self._text
         if isinstance(text, NcProgram):
             elements = Elements(**{column.name: getattr(text, column.name) for column in fields(Elements)})
-            task, read = self._task(rotary=text.rotary is not None, apart=apart), (text, len(text.curves))
+            task = self._task(rotary=text.rotary is not None, apart=apart, feed_in_plane=text.feed_in_plane)
+            read = text, len(text.curves)
             found = self._found(task, iter([elements]), list(text.events), text.retracts, lambda: read)
             words = "the words of the text: they are looked at where it is read, not afterwards"
             return found.not_verified(words if self._trust.words else "")
         text.begin()
-        task = self._task(rotary=options.machine is not None, apart=apart)  # while the text begins
+        feed_in_plane = word_table(options.dialect.control).get("feed_in_plane", False)
+        # while the text begins
+        task = self._task(rotary=options.machine is not None, apart=apart, feed_in_plane=feed_in_plane)
         rotary = options.rotary(Steps())
         lever = None if rotary is None else float(rotary.levers(task.path.points[:, :3]).max(initial=0.0))
         reader = Reader(self._name, options, lever)
@@ -203,11 +207,11 @@ class Verifier:
         text = f"work offset {found or 'none'} where the CL file asks for number {number}, {spellings(number)[0]}"
         return [Problem("CS559", 0, 0, text)]
 
-    def _task(self, *, rotary: bool, apart: bool) -> Task:
+    def _task(self, *, rotary: bool, apart: bool, feed_in_plane: bool) -> Task:
         options = self._options
         lengths = options.tolerance, options.axis_length, self._axis_tolerance
         taken = sagitta(options.tolerance) if rotary else 0.0
-        return Task.of(self._program, *lengths, apart=apart, sagitta=taken)
+        return Task.of(self._program, *lengths, apart=apart, sagitta=taken, feed_in_plane=feed_in_plane)
 
     def _found(
         self,
