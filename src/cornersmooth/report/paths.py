@@ -16,7 +16,7 @@ from cornersmooth.nc_reader.elements import Element, NcProgram
 from cornersmooth.nc_reader.tool import written_at
 from cornersmooth.verify.deviation import Gap, of_original, together
 from cornersmooth.verify.match import Match
-from cornersmooth.verify.nearest import nearest_places
+from cornersmooth.verify.motions import nearest_places
 from cornersmooth.verify.parse import Batches
 from cornersmooth.verify.task import Task
 

@@ -21,7 +21,7 @@ holes               `holes`; poses that are named by their digits: `motions`; to
 what parts          `deviation`: the lines and the distances; poses that must be exact
 feeds               `feeds`; where a vertex may also be: `match`
 words               package `nc_words`; what the CL file asks for: `statements`, and where: `word_places`
-findings            `findings`, `result`; the driver: `verifier`
+findings            `result`; the driver: `verifier`
 =================== ===================================================================================================
 
 A *place* is a segment of the CL path and a fraction of it. A *stop* is the end of a rapid, or the first pose.
@@ -29,8 +29,7 @@ A *stretch* is the run of feed moves between two stops. The *bend* of a step is 
 """
 
 from cornersmooth.system.processes import useful_processes
-from cornersmooth.verify.findings import Where
-from cornersmooth.verify.result import Verification
+from cornersmooth.verify.result import Verification, Where
 from cornersmooth.verify.task import Trust
 from cornersmooth.verify.verifier import Verifier, verify
 

@@ -17,8 +17,7 @@ from cornersmooth.nc_reader.tool import directions
 from cornersmooth.verify.acts import Acts
 from cornersmooth.verify.feeds import feed_at, out_of_hole
 from cornersmooth.verify.match import Batch
-from cornersmooth.verify.motions import ARITHMETIC
-from cornersmooth.verify.nearest import COLUMNS, largest_square, nearest_places
+from cornersmooth.verify.motions import ARITHMETIC, COLUMNS, largest_square, nearest_places
 from cornersmooth.verify.passage import AROUND, LONGER
 from cornersmooth.verify.task import Task
 

@@ -25,7 +25,7 @@ from functools import cached_property
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.verify.nearest import largest_square
+from cornersmooth.verify.motions import largest_square
 
 #: rows that are looked for together: at least, at first, at most (speed only)
 _BLOCKS = 64, 512, 8192

@@ -17,8 +17,8 @@ import numpy as np
 from cornersmooth.model import Bools, Floats, Ints, Move, Program
 from cornersmooth.nc_reader.elements import Curves, Element, Elements, Event, NcArcs
 from cornersmooth.nc_reader.tool import leads_somewhere
-from cornersmooth.verify.findings import Findings
 from cornersmooth.verify.motions import digit_errors
+from cornersmooth.verify.result import Findings
 from cornersmooth.verify.task import Task
 
 #: words of compensation, and whether they switch it on

@@ -9,9 +9,9 @@ import numpy as np
 from cornersmooth.model import Floats, Ints
 from cornersmooth.nc_reader.elements import Element, Elements
 from cornersmooth.nc_reader.tool import written_at
-from cornersmooth.verify.findings import Findings
 from cornersmooth.verify.match import Match
-from cornersmooth.verify.nearest import largest_square
+from cornersmooth.verify.motions import largest_square
+from cornersmooth.verify.result import Findings
 
 #: fraction of a bent element from whose first and last two parts its directions are worked out
 _SHORT: Final = 1e-4

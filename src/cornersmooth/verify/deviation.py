@@ -16,11 +16,18 @@ import numpy as np
 from cornersmooth.model import Floats, Ints
 from cornersmooth.verify.chain import points_at
 from cornersmooth.verify.feeds import reach
-from cornersmooth.verify.findings import AXIS_OFF, Findings, Violation, Where
 from cornersmooth.verify.match import Match
-from cornersmooth.verify.motions import ARITHMETIC, digit_errors
-from cornersmooth.verify.nearest import COLUMNS, Metric, largest_square, nearest_places, on_segments
+from cornersmooth.verify.motions import (
+    ARITHMETIC,
+    COLUMNS,
+    Metric,
+    digit_errors,
+    largest_square,
+    nearest_places,
+    on_segments,
+)
 from cornersmooth.verify.passage import AROUND, LONGER, LOOK_BACK, Break
+from cornersmooth.verify.result import AXIS_OFF, Findings, Violation, Where
 from cornersmooth.verify.task import Task
 
 #: places nearer to a vertex of the CL path are at it, in segments

@@ -15,11 +15,10 @@ import numpy as np
 from cornersmooth.model import Bools, FeedMode, Floats, Ints
 from cornersmooth.nc_reader.elements import Element, Elements, Problem
 from cornersmooth.nc_reader.tool import directions
-from cornersmooth.verify.findings import Findings, Runs
 from cornersmooth.verify.free_space import free_interval
 from cornersmooth.verify.match import Match
-from cornersmooth.verify.motions import ARITHMETIC
-from cornersmooth.verify.nearest import COLUMNS, on_segments
+from cornersmooth.verify.motions import ARITHMETIC, COLUMNS, on_segments
+from cornersmooth.verify.result import Findings, Runs
 from cornersmooth.verify.task import Original, Task
 
 #: share by which the feed may be another on an arc that rises, where F counts in the plane of the circle alone

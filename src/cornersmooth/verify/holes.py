@@ -15,8 +15,7 @@ from cornersmooth.model import Bools, Floats, Ints, Move
 from cornersmooth.nc_reader.elements import Ahead, Element, Problem
 from cornersmooth.nc_reader.tool import beyond_digits, directions
 from cornersmooth.statements.cycles import Drilling
-from cornersmooth.verify.motions import ARITHMETIC, digit_errors
-from cornersmooth.verify.nearest import COLUMNS, on_segments
+from cornersmooth.verify.motions import ARITHMETIC, COLUMNS, digit_errors, on_segments
 from cornersmooth.verify.task import Task, selecting
 
 #: how far above the last depth a rapid ends at least, as a share of a peck, and no more than so many mm; by how many mm

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.elements import Elements
 from cornersmooth.verify.chain import Path, Sections, passed
-from cornersmooth.verify.motions import Motion
-from cornersmooth.verify.nearest import COLUMNS, Metric
+from cornersmooth.verify.motions import COLUMNS, Metric, Motion
 from cornersmooth.verify.passage import MOST_BREAKS, Break, Passage
 from cornersmooth.verify.task import Original, Task
 

@@ -19,8 +19,7 @@ import numpy as np
 from cornersmooth.model import Floats, Ints
 from cornersmooth.verify.chain import Path, Sections, chain, points_at
 from cornersmooth.verify.free_space import FINE, Around, Inner, free_interval, lowest
-from cornersmooth.verify.motions import UNBOUND
-from cornersmooth.verify.nearest import largest_square
+from cornersmooth.verify.motions import UNBOUND, largest_square
 
 #: rows before one that is not proved from which on it is worked out exactly, one after the other; farther back nothing
 #: is looked at, and the answer is NOT VERIFIED

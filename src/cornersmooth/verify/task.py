@@ -16,8 +16,7 @@ from cornersmooth.nc_reader.elements import Curves, Element, Elements, NcArcs, P
 from cornersmooth.settings import FLIP_ANGLE
 from cornersmooth.statements.asked import Asking
 from cornersmooth.verify.chain import Path
-from cornersmooth.verify.motions import ARITHMETIC, Motion, motion_of, side_by_side
-from cornersmooth.verify.nearest import COLUMNS, Metric
+from cornersmooth.verify.motions import ARITHMETIC, COLUMNS, Metric, Motion, motion_of, side_by_side
 
 #: bend of a segment in tolerances: it is taken off the tolerance where what can be reached is worked out exactly
 CL_SHARE: Final = 1.0 / 128.0

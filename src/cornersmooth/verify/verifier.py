@@ -34,11 +34,10 @@ from cornersmooth.verify.compensated import Compensated
 from cornersmooth.verify.continuity import measure_continuity
 from cornersmooth.verify.deviation import check_breaks, measure_original, measure_written
 from cornersmooth.verify.feeds import check_feeds
-from cornersmooth.verify.findings import Findings, Where, problems_of
 from cornersmooth.verify.match import Batch, Match
 from cornersmooth.verify.parse import Batches
 from cornersmooth.verify.passage import MORE_BREAKS, MOST_BREAKS
-from cornersmooth.verify.result import Verification
+from cornersmooth.verify.result import Findings, Verification, Where, problems_of
 from cornersmooth.verify.task import TRUST, Task, Trust, half_turns, length_of
 from cornersmooth.verify.word_places import WordPlaces
 

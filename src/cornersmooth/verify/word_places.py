@@ -19,8 +19,8 @@ from cornersmooth.nc_reader.elements import Event, Problem
 from cornersmooth.statements.asked import asked
 from cornersmooth.statements.comparison import Comparison, changed_unseen, without_word
 from cornersmooth.statements.tokens import Token, said
-from cornersmooth.verify.findings import Findings
 from cornersmooth.verify.parse import Batches
+from cornersmooth.verify.result import Findings
 
 
 class WordPlaces:
