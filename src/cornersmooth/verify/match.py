@@ -17,7 +17,7 @@ from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.elements import Elements
 from cornersmooth.verify.chain import Path, Sections, passed
 from cornersmooth.verify.motions import COLUMNS, Metric, Motion
-from cornersmooth.verify.passage import MOST_BREAKS, Break, Passage
+from cornersmooth.verify.passage import Break, Passage
 from cornersmooth.verify.task import Original, Task
 
 
@@ -52,8 +52,8 @@ class Match(Batch):
     breaks: tuple[tuple[Metric, Break], ...]  #: where the motions part, and what does
 
     @classmethod
-    def of(cls, task: Task, batch: Batch, most: int = MOST_BREAKS) -> Self:
-        """Run the motions beside each other; nothing is looked at after `most` places where they part."""
+    def of(cls, task: Task, batch: Batch) -> Self:
+        """Run the motions beside each other."""
         rows, lead = batch.stretches, int(batch.continued)
         part = batch.nc.part(lead, len(batch.nc))
         motion = task.motion(part)
@@ -66,7 +66,7 @@ class Match(Batch):
             def inner(number: Floats, columns: slice = columns) -> Floats:
                 return motion.at(number)[:, columns]
 
-            found = Passage(motion.six[:, columns], motion.bend, path, radius, sections, inner, most)
+            found = Passage(motion.six[:, columns], motion.bend, path, radius, sections, inner)
             place = place if k else found.place
             breaks += [(metric, one) for one in found.breaks]
         return cls(task=task, motion=motion, place=place, breaks=tuple(breaks), **vars(batch))

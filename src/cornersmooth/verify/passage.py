@@ -11,12 +11,12 @@ place may be the wrong one, and it is *not proved*.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
-from cornersmooth.model import Floats, Ints
+from cornersmooth.model import Floats
 from cornersmooth.verify.chain import Path, Sections, chain, points_at
 from cornersmooth.verify.free_space import FINE, Around, Inner, free_interval, lowest
 from cornersmooth.verify.motions import largest_square
@@ -40,9 +40,8 @@ _TRIED: Final = 48
 #: segments around a break among which it is looked for where to go on, at most (as above)
 _WIDEST: Final = 1 << 16
 
-#: breaks after which nothing more is looked at: in all, and in a part of a motion after its first
+#: breaks after which nothing more is looked at
 MOST_BREAKS: Final = 100
-MORE_BREAKS: Final = 5
 
 
 @dataclass(frozen=True)
@@ -77,12 +76,11 @@ class Passage:
         #: (n,) a place on the path, segment plus fraction, for every vertex, ascending: the motions can be run beside
         #: each other through all of them. NaN where there is none, from a break on
         self.place = np.full(len(own), np.nan)
-        # sections: the first vertices that are not decided, and the last ones; places where they begin and end
-        self._first, self._last = sections.first.copy(), sections.last.copy()
-        self._begin, self._stop, self._guessed = sections.start.copy(), sections.stop, sections.guessed
+        # the first vertices are those that are not decided, and begin at these places
+        self._sections = replace(sections, first=sections.first.copy(), start=sections.start.copy())
         self._left = 0.0  # last place that was reached before a break
         section = 0
-        while section < len(self._first) and len(self.breaks) < most:
+        while section < len(self._sections.first) and len(self.breaks) < most:
             section = self._go_on(section)
 
     def _meets(self, row: int, place: float) -> bool:
@@ -92,34 +90,34 @@ class Passage:
 
     def _go_on(self, section: int) -> int:
         """Find places for vertices from the first of a section on, or a break; return the section to go on with."""
-        row, begin = int(self._first[section]), float(self._begin[section])
+        row, begin = int(self._sections.first[section]), float(self._sections.start[section])
         if np.isnan(self.place[row]) and not self._meets(row, begin):
-            return self._break(section, Break(row, begin, not self._guessed[section]))
-        bad = self._prove(section, row, begin)
+            return self._break(section, Break(row, begin, not self._sections.guessed[section]))
+        sections = self._sections.behind(section, row, begin)
+        own = np.ascontiguousarray(self._own[row:].T)
+        place, unproved = chain(own, self._bend[row:], self.path, self.radius, sections)
+        self.place[row:] = np.where(unproved | ~sections.of(np.arange(len(place)))[1], np.nan, place)
+        bad = row + np.flatnonzero(unproved)
         while len(bad):
-            one = int(np.searchsorted(self._first, bad[0], side="right")) - 1
+            one = int(np.searchsorted(self._sections.first, bad[0], side="right")) - 1
             gaps = np.flatnonzero(np.diff(bad) > LOOK_BACK[0])
-            last = min(int(bad[gaps[0] if len(gaps) else -1]), int(bad[0]) + _SOON, int(self._last[one]))
+            last = min(int(bad[gaps[0] if len(gaps) else -1]), int(bad[0]) + _SOON, int(self._sections.last[one]))
             found = self._repair(one, int(bad[0]), last)
             if isinstance(found, Break):
                 return self._break(one, found)
             bad = bad[bad > found]
-        return len(self._first)
-
-    def _prove(self, section: int, row: int, begin: float) -> Ints:
-        """Find places for vertices from one on by the chain; return those that it does not prove."""
-        sections = Sections(self._first, self._last, self._begin, self._stop, self._guessed).behind(section, row, begin)
-        own = np.ascontiguousarray(self._own[row:].T)
-        place, bad = chain(own, self._bend[row:], self.path, self.radius, sections)
-        self.place[row:] = np.where(bad | ~sections.of(np.arange(len(place)))[1], np.nan, place)
-        return row + np.flatnonzero(bad)
+        return len(self._sections.first)
 
     def _repair(self, section: int, first: int, last: int) -> int | Break:
         """Work out exactly how to come past some vertices; return one after them that has a place."""
-        known, end, stop = int(self._first[section]), int(self._last[section]), float(self._stop[section])
-        sure = not self._guessed[section]
+        known, end, stop = (
+            int(self._sections.first[section]),
+            int(self._sections.last[section]),
+            float(self._sections.stop[section]),
+        )
+        sure = not self._sections.guessed[section]
         if first == known:
-            return Break(first, float(self._begin[section]), sure)
+            return Break(first, float(self._sections.start[section]), sure)
         found = Break(first, float(self.place[first - 1]), False)
         for back in LOOK_BACK[: 2 if self.breaks else None]:
             begin = max(first - back, known)
@@ -180,8 +178,8 @@ class Passage:
 
         It gets a place: the nearest to where the path was left.
         """
-        path, end, left = self.path, int(self._last[section]), self.path.length_at(self._left)
-        bottom, top = int(self._begin[section]), math.ceil(self._stop[section])
+        path, end, left = self.path, int(self._sections.last[section]), self.path.length_at(self._left)
+        bottom, top = int(self._sections.start[section]), math.ceil(self._sections.stop[section])
         tried = row + np.unique(np.geomspace(1, max(end - row, 1), _TRIED).astype(np.int64)) - 1
         for width, rows in ((AROUND, tried), (AROUND * AROUND, tried[::6])):
             low, high = np.searchsorted(path.length, (left - width * self.radius, left + width * self.radius)).tolist()
@@ -196,8 +194,8 @@ class Passage:
                 free = np.flatnonzero(at <= other)
                 if len(free):
                     place = segments.start + free + np.clip(self._left - segments.start - free, at[free], other[free])
-                    self._first[section] = k
-                    self._begin[section] = self.place[k] = place[np.argmin(np.abs(place - self._left))]
+                    self._sections.first[section] = k
+                    self._sections.start[section] = self.place[k] = place[np.argmin(np.abs(place - self._left))]
                     return section
         self.place[end] = np.nan
         return section + 1

@@ -36,7 +36,7 @@ from cornersmooth.verify.deviation import check_breaks, measure_original, measur
 from cornersmooth.verify.feeds import check_feeds
 from cornersmooth.verify.match import Batch, Match
 from cornersmooth.verify.parse import Batches
-from cornersmooth.verify.passage import MORE_BREAKS, MOST_BREAKS
+from cornersmooth.verify.passage import MOST_BREAKS
 from cornersmooth.verify.result import Findings, Verification, Where, problems_of
 from cornersmooth.verify.task import TRUST, Task, Trust, half_turns, length_of
 from cornersmooth.verify.word_places import WordPlaces
@@ -233,28 +233,27 @@ class Verifier:
             chunks = (part.at_most() for part in chunks)
         chunks = Compensated(task, events, findings).watch(_watch_feeds(chunks, findings))
 
-        def items() -> Iterator[tuple[Batch | None, dict[str, Where], int]]:
+        def items() -> Iterator[tuple[Batch | None, dict[str, Where]]]:
             poses[:3], poses[3] = np.nan, 0.0  # not before other processes are forked, which would keep them
-            for number, batch in enumerate(batches.of(chunks)):
-                wanted = batch if len(findings.breaks) < MOST_BREAKS else None
-                yield wanted, findings.worst.copy(), MORE_BREAKS if number else MOST_BREAKS
+            for batch in batches.of(chunks):
+                yield batch if len(findings.breaks) < MOST_BREAKS else None, findings.worst.copy()
 
-        def work(item: tuple[Batch | None, dict[str, Where], int]) -> Findings:
+        def work(item: tuple[Batch | None, dict[str, Where]]) -> Findings:
             batch, found = item[0], Findings(item[1])
             if batch is not None:
-                match = Match.of(task, batch, item[2])
+                match = Match.of(task, batch)
                 for check in checks:
                     check(match, found)
             return found
 
-        for number, found in enumerate(map_in_processes(work, items(), min(self._processes, _READ_FOR))):
+        for found in map_in_processes(work, items(), min(self._processes, _READ_FOR)):
             if len(findings.breaks) >= MOST_BREAKS:
                 continue
             for some in found.poses:
                 poses[:, some[0].astype(np.int64)] = some[1:]
             found.poses = []
             findings.take(found)
-            if len(findings.breaks) >= MOST_BREAKS or (number and len(found.breaks) >= MORE_BREAKS):
+            if len(findings.breaks) >= MOST_BREAKS:
                 text = f"what comes after {len(findings.breaks)} places where the motions part"
                 findings.unlooked.append((findings.breaks[-1], text))
         nc, curves = said()
