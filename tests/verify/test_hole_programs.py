@@ -109,6 +109,7 @@ RANDOM_REFUSED_ONCE = {
     9500097: "taps left out, and a rapid to the same pose by a digit, before cycles of the control",
     9600785: "a hole left to the pose that a rapid goes to by a digit",
     9600644: "coolant off a digit before the end of the path, and another tool there",
+    9400011: "coolant and feeds between poses that are a digit apart",
     9500337: "coolant a digit before a tool change",
     9500600: "curves for an ε of 0.67 mm in digits of 1e-5: what is kept of ε is less than what bends take off it",
 }
@@ -120,7 +121,6 @@ KNOWN = {
     1710186: "two optional stops around a tool that does nothing",
     1003544: "a dwell behind a tap that is left out, and GOHOME twice around two that are, in its line",
     8600559: "a dwell between poses that are a digit apart: the text passes them in one",
-    9400011: "coolant and feeds between poses that are a digit apart",
     1790243: "feeds to a hole down from home positions, GOHOME twice",
     8601699: "coolant at the end of a run between poses that are a digit apart: the text passes them in one",
 }

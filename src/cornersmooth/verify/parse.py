@@ -190,7 +190,9 @@ class Parse:
             there = [move for move in near if move >= self._cut_at and lines.at(move - 1, one - 1)]
             if there:
                 way = gone[max(one - 1 - first, 0)] + length[last[self._move[stop]]]
-                move = min(there, key=lambda move: abs(length[last[move - 1]] - way))  # of those that are there again
+                # of those that are there again the nearest, and of those within the tolerance the first
+                off = np.abs(length[last[np.array(there) - 1]] - way)
+                move = there[int(np.argmin(np.maximum(off, self._task.tolerance)))]
                 self.acts.cuts.extend((move, one))
                 self._cut_at = move + 1
                 if move - 1 > self._move[stop] and one - 1 > self._begun:
