@@ -129,14 +129,9 @@ def some_poses(program: Program, first: int, stop: int) -> Program:
 
 
 def _some_curves(curves: Curves, first: int, stop: int) -> Curves:
-    """Those of moves between poses, which are counted from the first one on; whole runs only."""
-    runs = curves.runs
-    if runs is not None:
-        end = np.cumsum(runs.count)
-        runs = some_runs(runs, (runs.pose[end - runs.count] >= first) & (runs.pose[end - 1] < stop))
-        runs = replace(runs, pose=runs.pose - first) if len(runs) else None
+    """Those of moves between poses, which are counted from the first one on."""
     own = some_rows(curves, (curves.pose > first) & (curves.pose < stop))
-    return replace(own, pose=own.pose - first, runs=runs)
+    return replace(own, pose=own.pose - first)
 
 
 def some_runs(runs: Runs, which: Bools | Ints) -> Runs:

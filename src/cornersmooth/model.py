@@ -59,8 +59,7 @@ class Keep(IntEnum):
 
     NO = 0
     CUTTER_COMPENSATION = 1  #: the control offsets the path; rounding before the offset would be wrong
-    CURVE = 2  #: on a curve of the file that is written as it is
-    CONTRADICTION = 3  #: the reader found contradicting information here
+    CONTRADICTION = 2  #: the reader found contradicting information here
 
 
 #: words that act where the tool stands: what the NC program has words for, and orders to the machine that a person puts
@@ -119,7 +118,6 @@ class Curves:
 
     pose: Ints  #: (m,): Index of the pose that each piece ends in, ascending
     bezier: Floats  #: (m, 4, 6), mm: Its control points
-    runs: Runs | None  #: The same as B-splines, where a control may take them as they are; axis points 1 mm up
 
     def __len__(self) -> int:
         return len(self.pose)

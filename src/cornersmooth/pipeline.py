@@ -118,8 +118,7 @@ def smooth(
     settings = Settings() if settings is None else settings
     if form is not None:
         settings = nc.fit_settings(settings, form, program.units)
-    curves = form is not None and (form.curves or settings.lines == "dense")
-    smoothed = smoothing.smooth(program, settings, curves=curves, progress=progress, processes=processes)
+    smoothed = smoothing.smooth(program, settings, progress=progress, processes=processes)
     return smoothed if form is None else nc.within_reach(smoothed, form)
 
 

@@ -198,7 +198,7 @@ def test_smoothing_alone_waits_for_nothing_it_does_not_call(small: Path, tmp_pat
     modules = modules_of(["smooth", str(small), "-o", str(tmp_path / "out.nc")])
     assert "cornersmooth.verify" in modules
     unused = {f"cornersmooth.{name}" for name in "feedrate times rotary filter page surface cli.batch".split()}
-    assert not (unused | {"scipy", "rich", "concurrent.futures", "cornersmooth.smoothing.given_curves"}) & modules
+    assert not (unused | {"scipy", "rich", "concurrent.futures"}) & modules
 
 
 def test_version() -> None:

@@ -132,7 +132,7 @@ FINDINGS: Final[dict[str, tuple[Severity, str]]] = {
         "{word} changes the coordinates of what follows: ignored; see that the path is in one coordinate system",
     ),
     "CS144": ("warning", "{what}: ignored"),
-    "CS145": ("note", "NURBS curves become lines within {tolerance:g} mm where the program has no curves"),
+    "CS145": ("note", "NURBS curves become lines within {tolerance:g} mm"),
     "CS146": ("note", "{word} changes: positions and axes are read into {into}"),
     "CS147": ("warning", "the tool axis turns along an arc, and how it turns is not defined"),
     "CS148": ("warning", "FEDRAT without a unit is read in the unit of the file"),

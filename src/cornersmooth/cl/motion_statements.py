@@ -196,7 +196,7 @@ def _chord(state: ReaderState) -> float:
 def _add_curve(state: ReaderState, curve: Cubic, line: int, lines: Ints) -> None:
     """Add a curve that begins at a line of the file with its points (m,), of others."""
     state.note("CS145", line, tolerance=CHORD)
-    check_range(curve.control.ravel().tolist(), state.file, int(lines[0]))
+    check_range(curve.bezier.ravel().tolist(), state.file, int(lines[0]))
     state.curves.append(curve.placed(state.system, state.n - 1))
     held = state.held_axis()
     for (x, y, z), line in zip(curve.points[1:].tolist(), lines.tolist(), strict=True):

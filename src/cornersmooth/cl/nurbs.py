@@ -23,9 +23,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.arrays import joined_rows, norm
+from cornersmooth.arrays import norm
 from cornersmooth.cl.poses import AXIS_NOISE, System
-from cornersmooth.model import Curves, Floats, Ints, Move, Runs
+from cornersmooth.model import Curves, Floats, Ints, Move
 
 DEGREE: Final = 3
 
@@ -34,9 +34,6 @@ LEAST_STEP: Final = 1e-9
 
 #: lines for every control point at most; more would be no tool path
 MOST_LINES: Final = 1000
-
-#: steps of the parameter of a curve: knots are written with three decimals, and a control takes so long a curve at once
-_STEPS: Final = 4e6
 
 
 @dataclass
@@ -88,8 +85,6 @@ def bad_knots(knots: Floats) -> str | None:
 class Cubic:
     """A cubic B-spline of the tip in m pieces whose chords stay near; as written."""
 
-    knots: Floats  #: (c + 4,)
-    control: Floats  #: (c, 3)
     u: Floats  #: (m + 1,): ends of the pieces
     bezier: Floats  #: (m, 4, 3): control points of each piece
     first: int = 0  #: pose that it starts from
@@ -101,10 +96,8 @@ class Cubic:
 
     def placed(self, system: System, first: int) -> Cubic:
         """The same from a pose, in the first coordinate system."""
-        control, bezier = (
-            system.points(points.reshape(-1, 3)).reshape(points.shape) for points in (self.control, self.bezier)
-        )
-        return replace(self, control=control, bezier=bezier, first=first)
+        bezier = system.points(self.bezier.reshape(-1, 3)).reshape(self.bezier.shape)
+        return replace(self, bezier=bezier, first=first)
 
 
 def cubic(knots: Floats, control: Floats, tolerance: float) -> Cubic | None:
@@ -130,7 +123,7 @@ def cubic(knots: Floats, control: Floats, tolerance: float) -> Cubic | None:
     bezier = _bezier(spline(u), slope(u), u)
     if knots[len(control)] == knots[-1]:
         bezier[-1, 3] = control[-1]
-    return Cubic(knots, control, u, bezier)
+    return Cubic(u, bezier)
 
 
 def _bezier(points: Floats, slopes: Floats, u: Floats) -> Floats:
@@ -144,33 +137,18 @@ def curves_of(
     cubics: list[Cubic], scale: float, axis: Floats, exact: NDArray[np.bool_], kind: NDArray[np.uint8]
 ) -> Curves | None:
     """The curves of a program in mm, with points 1 mm up the tool axis; under cutter compensation they are lines."""
-    poses, pieces, runs = [], [], []
+    poses, pieces = [], []
     for one in cubics:
         pose = one.first + np.arange(len(one.u))
         turned = np.ptp(axis[pose], axis=0).max() > AXIS_NOISE
         elsewhere = kind[pose[0]] in (Move.FROM, Move.HOLE)  # the tool does not come from that pose
         if turned or elsewhere or exact[pose].any() or (kind[pose[1:]] != Move.LINEAR).any():
             continue
-        control, bezier = (_raised(scale * points, axis[pose[1]]) for points in (one.control, one.bezier))
         poses.append(pose[1:])
-        pieces.append(bezier)
-        runs += _as_run(one, pose, control)
-    if not poses:
-        return None
-    return Curves(np.concatenate(poses), np.concatenate(pieces), joined_rows(runs) if runs else None)
+        pieces.append(_raised(scale * one.bezier, axis[pose[1]]))
+    return Curves(np.concatenate(poses), np.concatenate(pieces)) if poses else None
 
 
 def _raised(points: Floats, axis: Floats) -> Floats:
     """Points (..., 3) of the tip, with second points 1 mm up the tool axis."""
     return np.concatenate((points, points + axis / np.linalg.norm(axis)), axis=-1)
-
-
-def _as_run(one: Cubic, pose: Ints, control: Floats) -> list[Runs]:
-    """The whole curve, where controls take it: clamped, and without repeated knots."""
-    inner = one.knots[DEGREE : len(control) + 1]
-    clamped = one.knots[0] == inner[0] and one.knots[-1] == inner[-1]
-    s, knot = (np.rint((u - inner[0]) * (_STEPS / (inner[-1] - inner[0]))) for u in (one.u, inner))
-    if not clamped or (np.diff(s) < 1.0).any() or (np.diff(knot) < 1.0).any():
-        return []
-    count, none = np.array([len(pose)]), np.zeros(1)
-    return [Runs(pose, count, s, 1.0 / _STEPS, knot, np.array([len(knot)]), control, none, none)]

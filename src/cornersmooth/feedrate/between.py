@@ -27,8 +27,8 @@ from cornersmooth.model import Floats, Ints
 
 #: limits solved together, cells times rows: the arrays of one window stay in the processor's cache
 WINDOW = 50_000
-#: quantities that are kept in the first round, and cells around that count when they are chosen
-_HELD, _NEAR = 2, 5
+#: quantities that are kept in the first round
+_HELD = 2
 #: how much stricter than seen limits are made
 _STRICTER = 1.003
 #: share of the limits that plans keep at all places, and of it that rows keep: the rest is for what lies in between
@@ -37,8 +37,8 @@ _USED = 0.998
 _EASE = 0.5
 #: Newton steps of one round: most take 15 to 30; where terms are huge and cancel, hundreds gain next to nothing
 _STEPS = 40
-#: cells on either side of one that is planned again at least
-_BESIDE = 8
+#: cells on either side of one that are planned again with it: they grow along the path, so many are a long way
+_BESIDE = 50
 
 
 def fastest(
@@ -56,14 +56,13 @@ def fastest(
         c = batch.start()
         solve_runs(batch, grid, c, progress)
         return batch, _within(c, batch.use(c), grid)
+    way = problem_of(grid, derivatives[:, :0], bounds[:, :0])
     batch = problem_of(_eased(grid, derivatives, bounds), derivatives[:, :0], bounds[:, :0])
     c = batch.start()
     solve_runs(batch, grid, c, gap=resolution.rough, most=_STEPS)
     most, stricter, first, last = _used(batch, c, grid, derivatives, bounds), np.ones(len(c)), grid.first, grid.last
     for number in range(max(resolution.rounds, 1)):
-        wide = np.pad(most, ((0, 0), (_NEAR // 2, _NEAR // 2)), mode="edge")
-        near = np.maximum.reduce([wide[:, k : k + most.shape[1]] for k in range(_NEAR)])
-        holding = np.argsort(-near, axis=0)[: _HELD + number]
+        holding = np.argsort(-most, axis=0)[: _HELD + number]
         own = (
             np.take_along_axis(part, holding[index], axis=1)
             for part, index in ((derivatives, np.s_[None, ..., None]), (bounds, np.s_[None]))
@@ -76,14 +75,14 @@ def fastest(
         if not resolution.rounds:
             return batch, c
         used = _used(batch, c, grid, derivatives, bounds)
-        share = np.maximum(used.max(axis=0), batch.use(c))
+        share = np.maximum(used.max(axis=0), way.use(c))
         beyond = np.flatnonzero(share > 1.0)
         if not len(beyond):
             break
         most = np.maximum(most, used)
         of_held = np.take_along_axis(used, holding, axis=0).max(axis=0) / _USED
         stricter = stricter * np.where(of_held > 1.0, _STRICTER * of_held, 1.0)
-        first, last = _around(beyond, batch, grid)
+        first, last = _around(beyond, grid)
     return batch, _within(c, share, grid)
 
 
@@ -92,15 +91,10 @@ def _within(c: Floats, share: Floats, grid: Grid) -> Floats:
     return c / np.maximum(np.maximum.reduceat(share, grid.first), 1.0)[grid.run]
 
 
-def _around(beyond: Ints, batch: Batch, grid: Grid) -> tuple[Ints, Ints]:
-    """First and last cells of stretches around some cells, long enough to brake before them and to speed up after."""
-    run = grid.run[beyond]
-    first, last = grid.first[run], grid.last[run]
-    of_run = {i: _braking_distance(batch, grid, *ends) for i, *ends in set(zip(run, first, last, strict=True))}
-    reach = np.array([of_run[i] for i in run])
-    low = np.searchsorted(grid.start, grid.start[beyond] - reach) - _BESIDE
-    high = np.searchsorted(grid.start, grid.start[beyond] + reach) + _BESIDE
-    low, high = np.maximum(low, first), np.minimum(high, last)
+def _around(cells: Ints, grid: Grid) -> tuple[Ints, Ints]:
+    """First and last cells of the stretches around some cells, `_BESIDE` on either side."""
+    run = grid.run[cells]
+    low, high = np.maximum(cells - _BESIDE, grid.first[run]), np.minimum(cells + _BESIDE, grid.last[run])
     apart = np.flatnonzero(low[1:] > high[:-1])
     return low[np.append(0, apart + 1)], high[np.append(apart, len(high) - 1)]
 

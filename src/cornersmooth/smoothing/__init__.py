@@ -10,35 +10,24 @@ import numpy as np
 from cornersmooth.errors import Finding, InputError
 from cornersmooth.model import Bools, Move, Program, SmoothProgram
 from cornersmooth.settings import FLIP_ANGLE, Settings
-from cornersmooth.smoothing.construction import construction_of, one_corner_each
+from cornersmooth.smoothing.construction import beside_chords, construction_of, one_corner_each
 
 
 def smooth(
     program: Program,
     settings: Settings | None = None,
     *,
-    curves: bool = False,
     progress: Callable[[int, int], None] | None = None,
     processes: int = 1,
 ) -> SmoothProgram:
     """Round every corner of the program within the tolerance; parameters as of `pipeline.smooth`.
 
-    With `curves` those of the CL file stay as they are. Corners that stay sharp have a status that says why.
-    CS183: the axis turns by nearly half a turn in one feed move.
+    Corners that stay sharp have a status that says why. CS183: the axis turns by nearly half a turn in one feed move.
     """
     settings = (Settings() if settings is None else settings).with_method()
     refuse_flips(program)
-    program, settings = one_corner_each(program, settings)
-    method = construction_of(settings.method)
-    if program.curves is None:
-        smoothed = method.smooth(program, settings, progress, processes)
-    else:
-        from cornersmooth.smoothing.given_curves import beside_chords, given_runs, with_runs, without
-
-        program, settings = beside_chords(program, settings)
-        program, settings, runs = given_runs(program, settings) if curves else (program, settings, None)
-        smoothed = method.smooth(program if runs is None else without(program, runs), settings, progress, processes)
-        smoothed = smoothed if runs is None else with_runs(smoothed, program, runs)
+    program, settings = beside_chords(*one_corner_each(program, settings))
+    smoothed = construction_of(settings.method).smooth(program, settings, progress, processes)
     if settings.axis_tolerance is not None:
         turned = settings.axis_scale * 2.0 * np.sin(smoothed.corners.orientation_error / 2.0)
         smoothed = replace(smoothed, corners=replace(smoothed.corners, axis_error=turned))

@@ -335,6 +335,20 @@ def one_corner_each(program: Program, settings: Settings) -> tuple[Program, Sett
     return replace(program, tip=tips, axis=axes, moved=moved), settings.but(pose_shift=float(moved.max()))
 
 
+def beside_chords(program: Program, settings: Settings) -> tuple[Program, Settings]:
+    """Take what the moves are off the curves of the file off ε, as `one_corner_each` does with what it moves."""
+    curves = program.curves
+    if curves is None:
+        return program, settings
+    tip, other = curves.bezier[..., :3], curves.bezier[..., 3:]
+    points = np.stack((tip, tip + settings.axis_length * (other - tip)))
+    off = 0.75 * norm(np.diff(points, 2, axis=2)).max(axis=(0, 2))  # see `verify.bending`
+    moved = np.zeros(len(program)) if program.moved is None else program.moved.copy()
+    for pose in (curves.pose - 1, curves.pose):
+        np.maximum.at(moved, pose, off)
+    return replace(program, moved=moved), settings.but(pose_shift=float(moved.max()))
+
+
 def _steps(program: Program, axis_length: float) -> Floats:
     """(n,) mm: how far tip or axis point go in the move into each pose; infinite where it is in no chain."""
     chains = program.chains

@@ -65,24 +65,6 @@ class _Excess:
         squared = self.axis_length * (self.axis_length + 2.0 * self(v)[0])
         return np.abs(np.sqrt(np.maximum(squared, 0.0)) - self.axis_length)
 
-    def only_roots(self, v: Floats) -> Floats:
-        """(m, g) roots, or the end nearest to one, where a polynomial surely never turns; NaN elsewhere.
-
-        Newton starts from the parameters (m,).
-        """
-        if len(self.below) > 1:
-            return np.full(self.above.shape[1:], np.nan)
-        slopes = self.above[1:] * np.arange(1.0, 7.0)[:, None, None]
-        least = slopes[0] + np.minimum(slopes[1:], 0.0).sum(axis=0)
-        most = slopes[0] + np.maximum(slopes[1:], 0.0).sum(axis=0)
-        turns = (least <= 0.0) & (most >= 0.0)
-        here = np.broadcast_to(self._place(v)[:, None], turns.shape)
-        for _ in range(_NEAR_STEPS):
-            value, slope, _ = _polynomial(self.above, here)
-            last, here = here, np.clip(here - value / np.where(turns, 1.0, slope), 0.0, 1.0)
-        near = ~turns & (np.abs(here - last) <= _SHORT)
-        return np.where(near, 1.0 - here / 2.0 if self.second else here / 2.0, np.nan)
-
     def _place(self, v: Floats) -> Floats:
         return 2.0 * (1.0 - v if self.second else v)
 
@@ -136,12 +118,7 @@ def synchronised(legs: Floats, lever: Floats, weights: Floats, u: Floats, axis_l
     last, before = np.zeros(len(lever)), 0.0
     for half in halves:
         own = (u > 0.5) == half.second
-        found = half.only_roots(u[own])
-        found[u[own] == 0.5] = 0.5
-        found = np.maximum.accumulate(found, axis=0)
-        rows = np.flatnonzero(np.isnan(found[-1:]).any(axis=0))
-        if len(rows):
-            found[:, rows] = _in_turn(replace(half, above=half.above[..., rows]), u[own], last[rows], before)
+        found = _in_turn(half, u[own], last, before)
         v[own], missing[own] = found, half.missing(found)
         if len(found):
             last, before = found[-1], u[own][-1]
@@ -154,7 +131,7 @@ def _dot(one: Floats, other: Floats) -> Floats:
 
 
 def _in_turn(half: _Excess, u: Floats, last: Floats, before: float) -> Floats:
-    """(m, g) v where the excess may turn: the root is followed from one parameter to the next, from `last` (g,) on."""
+    """(m, g) v: the root is followed from one parameter to the next, from `last` (g,) on."""
     v = np.full((len(u), len(last)), 0.5)
     low, high = float(half.second) / 2.0, (1.0 + half.second) / 2.0
     for j, step in enumerate(np.diff(u, prepend=before)):

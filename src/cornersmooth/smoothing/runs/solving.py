@@ -43,12 +43,7 @@ LEAST_SHARE = 0.5
 GAPS, MENDING_GAPS = (0.5, 0.1), (0.1,)
 
 #: how often pieces that are not proved are given less, and spans on either side that are solved anew with them
-MENDINGS, MENDED = 5, 16
-
-#: parts of the way from the fit to the solution that are tried where pieces are not proved otherwise, and the number
-#: of control points over which the rest of the way is gone
-BLENDS = (0.9, 0.75, 0.5, 0.0)
-FADE = 8
+MENDINGS, MENDED = 12, 16
 
 #: parts that every stretch is looked at in, first and where that is not enough
 PARTS, MORE_PARTS = 2, 12
@@ -109,14 +104,6 @@ def solve_runs(
         _solve(problem, windows, windows.free, control, tight, MENDING_GAPS, None, 1)
         changed = _touched(splines, pieces, windows.control[windows.free])
     run = splines.span_run[pieces.span]
-    for part in BLENDS:  # deviations are nearly linear in the control points, and the fit is well within ε
-        failed = np.flatnonzero((proven > limits).any(axis=1))
-        if not len(failed):
-            break
-        share = _fade(splines, pieces.span[failed], part)[:, None]
-        control = rough + share * (control - rough)
-        changed = _touched(splines, pieces, np.flatnonzero(share[:, 0] < 1.0))
-        proven[changed] = bounds(problem, control, changed)
     worst = np.zeros((len(lines.count), 2))
     np.maximum.at(worst, run, proven)
     tip, axis = worst[:, 0], worst[:, 1]
@@ -179,17 +166,6 @@ def _solve(
             progress(len(problem.lines.s) * done // total, len(problem.lines.s))
     if found:
         control[windows.control[own]] = np.concatenate(found)
-
-
-def _fade(splines: Splines, spans: Ints, part: float) -> Floats:
-    """(c,) `part` at the control points of the spans, rising to 1 over the `FADE` next ones."""
-    distance = np.full(len(splines.control_run), FADE, np.int64)
-    near, run = splines.span_control[spans], splines.span_run[spans]
-    first, end = splines.control_first[run], splines.control_first[run + 1]
-    for shift in range(1 - FADE, FADE + 4):
-        inside = (near + shift >= first) & (near + shift < end)
-        np.minimum.at(distance, (near + shift)[inside], max(0, -shift, shift - 3))
-    return part + (1.0 - part) * distance / FADE
 
 
 def _touched(splines: Splines, pieces: Pieces, control: Ints) -> Ints:
