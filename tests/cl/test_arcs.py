@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import io
 import math
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from cornersmooth import postprocess, verify
 from cornersmooth.cl import read
-from cornersmooth.errors import InputError
+from cornersmooth.errors import InputError, Verdict
 from cornersmooth.model import Arcs, Keep, Move, Program
+from cornersmooth.nc import choose_form
+from cornersmooth.report.verdict import sharp_rows
+from cornersmooth.settings import Settings
 
 HALF = math.sqrt(0.5)
 
@@ -224,6 +230,28 @@ def test_lines_near_a_curve_in_inches_of_few_digits(units: str) -> None:
     middle = (x[1:] + x[:-1]) / 2
     sag = 25.4 * np.abs(middle - middle**2 / 3 - (y[1:] + y[:-1]) / 2)
     assert 1e-4 < sag.max() <= 5e-4
+
+
+@pytest.mark.parametrize(("control", "form"), [("fanuc", "g1"), ("fanuc", "g6.2"), ("siemens", "bspline")])
+@pytest.mark.parametrize("tolerance", [0.02, 0.001])
+def test_what_is_written_keeps_the_tolerance_of_the_curve_itself(control: str, form: str, tolerance: float) -> None:
+    """Not of its chords; and corners where it begins and ends are rounded."""
+    text = "FEDRAT/MMPM,500.\nGOTO/-10.,0.,0.\nGOTO/0.,0.,0.\nNURBS/\nKNOT/1.\nCNTRL/10.,10.,0.\nCNTRL/20.,10.,0.\n"
+    result, stream = program(text + "CNTRL/30.,0.,0.\nGOTO/40.,0.,0.\n"), io.BytesIO()
+    made = postprocess(result, stream, Settings(tolerance=tolerance), form=choose_form(control, form))
+    assert made.verdict is Verdict.PASSED
+    assert len(sharp_rows(made.smoothed)) == 0
+    if form == "g1":
+        places = np.array(re.findall(rb"X(\S+) Y(\S+)", stream.getvalue()), float)
+        inside = places[(places[:, 0] > 1.0) & (places[:, 0] < 29.0)]
+        x, y = inside.T
+        slope = 1.0 - x / 15.0
+        off = np.abs(y - x + x**2 / 30.0) / np.hypot(1.0, slope)
+        assert len(inside) > 20
+        assert off.max() < tolerance
+        wrong = stream.getvalue().replace(b"Y%.4f" % y[9], b"Y%.4f" % (y[9] + 0.1))
+        found = verify(result, wrong, tolerance=tolerance, axis_length=10.0, control=control)
+        assert found.verdict is Verdict.FAILED
 
 
 def test_nx_nurbs_file(corpus: Path) -> None:
