@@ -159,8 +159,9 @@ def execute(line: str, folder: Path) -> None:
     mill = 'like = "table-ac"\n'
     (folder / "mill.toml").write_text(mill)
     (folder / "mine.toml").write_text(mill if command == "machines" else 'like = "siemens"\n')
-    if command == "setup" and "--help" not in words and not THOROUGH:
-        words += ["--plans", "1"]
+    fewer = {"setup": ["--plans", "1"], "surface": ["--stations", "100"]}
+    if "--help" not in words and "-h" not in words and not THOROUGH:
+        words += fewer.get(command, [])
     result = run(command, *words, *(["--force"] if with_force and "--force" not in words else []), cwd=folder)
     assert result.returncode == DONE, f"{line}: {result.stderr.decode()}"
 

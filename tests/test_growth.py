@@ -67,6 +67,6 @@ def whole(text: str) -> None:
 @pytest.mark.parametrize("what", list(INPUTS))
 def test_four_times_the_input_is_four_times_the_work(what: str) -> None:
     count, make = INPUTS[what]
-    whole(make(count))  # what is made once
+    whole(make(4 * count))  # what is made once, and what is remembered of words
     nothing, once, four = (lines(lambda n=n: whole(make(n))) for n in (1, count, 4 * count))
     assert four - nothing <= MOST * (once - nothing), (nothing, once, four)

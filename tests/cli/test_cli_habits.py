@@ -210,5 +210,5 @@ def test_small_outputs_say_what_is_true(tmp_path: Path) -> None:
     (tmp_path / "part.cls").write_bytes(SMALL)
     assert run("smooth", "part.cls", "-o", "part.nc", "-e", "0.02", cwd=tmp_path).returncode == DONE
     for tolerance, verdict, code in (("0.02", b"PASSED: ", 0), ("0.000001", b"FAILED: ", 1)):
-        made = run("surface", "part.cls", "part.nc", "--tool", "4,2", "-e", tolerance, cwd=tmp_path)
+        made = run("surface", *"part.cls part.nc --tool 4,2 --stations 100 -e".split(), tolerance, cwd=tmp_path)
         assert (made.returncode, made.stdout[:8]) == (code, verdict)

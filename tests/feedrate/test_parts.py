@@ -31,14 +31,14 @@ def rows(poses: int) -> Path:
 @cache
 def whole() -> float:
     """Seconds of a plan of all rows."""
-    path = rows(200)
+    path = rows(120)
     return plan_along(path, LIMITS, follow(load_machine("table-ac"), path)).total
 
 
 @pytest.mark.parametrize("enough", [1e-3, 0.04])
 def test_parts_take_what_the_whole_takes(monkeypatch: pytest.MonkeyPatch, enough: float) -> None:
     """All parts planned roughly and half of them closely, or no more than a looser error asks for."""
-    path = rows(200)
+    path = rows(120)
     axes = follow(load_machine("table-ac"), path)
     some = enough > 1e-3
     changed = {"PART": 12, "SHORTEST": 12, "ENOUGH": enough, "_ROUGHLY": (3, 9), "_CLOSELY": (2, 4), "_MOST_CLOSELY": 8}

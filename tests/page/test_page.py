@@ -352,7 +352,8 @@ def test_surface_command(tmp_path):
     assert run("smooth", source, "-e", "0.02", "-o", nc, "-q").returncode == 0
     names = ["map.json", "map.csv", "map.html"]
     reports = [word for name in names for word in ("--report", tmp_path / name)]
-    done = run("surface", source, nc, "-e", "0.02", *reports)
+    measured = ("surface", source, nc, "-e", "0.02", "--stations", "200")
+    done = run(*measured, *reports)
     assert done.returncode == 0, done.stderr
     said = done.stdout.decode()
     assert "ball 8 mm" in said
@@ -366,13 +367,13 @@ def test_surface_command(tmp_path):
     assert len(arrays["s_off"]) == told["points"] - told["points_beyond_reach"]
     assert "overcut by up to" in meta["verdict"]
     assert arrays["h_counts"].sum() == len(arrays["s_off"])
-    picture = run("surface", source, nc, "-e", "0.02", "--report", tmp_path / "map.png")
+    picture = run(*measured, "--report", tmp_path / "map.png")
     assert picture.returncode == 2
     assert b"let the name end in .json, .csv or .html" in picture.stderr
     # another tool; and a file that describes none
-    assert b"cutter 6 mm" in run("surface", source, nc, "-e", "0.02", "--tool", "6,1").stdout
+    assert b"cutter 6 mm" in run(*measured, "--tool", "6,1").stdout
     source.write_text(PATH.format(name="PART", comment="none").replace("TLDATA", "$$ TLDATA"))
-    done = run("surface", source, nc, "-e", "0.02")
+    done = run(*measured)
     assert done.returncode == 2
     assert b"--tool 10,5" in done.stderr
     assert run("surface", source, nc, "--tool", "x").returncode == 2

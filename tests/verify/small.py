@@ -45,7 +45,12 @@ def passes(text: str, lines: Sequence[str], control: str = "fanuc", *, skip: boo
 
 
 def found(text: str, lines: Sequence[str], control: str = "fanuc", *, skip: bool = False) -> Verification:
-    """What is found in a program."""
+    """What is found in a program; the right one is looked at once, however often it is asked for."""
+    return _found(text, tuple(lines), control, skip)
+
+
+@cache
+def _found(text: str, lines: tuple[str, ...], control: str, skip: bool) -> Verification:
     written = ("\n".join(lines) + "\n").encode()
     how = {"control": control, "machine": _machine(control), "skip_cycles": skip}
     return verify(program(text), written, tolerance=0.02, **how)
