@@ -54,14 +54,9 @@ _BESIDE = 1e-3
 def polynomial(points: Floats, weights: Floats | None = None, half: Ints | None = None) -> Floats:
     """Powers of t (g, d + 1, 4) of w·P and w; ``[:, k]`` belongs to t^k, the last coordinate is w.
 
-    Parameters
-    ----------
-    points : (g, d + 1, 3) float64
-        Bézier points, or the five control points of transitions (g, 5, 3).
-    weights : (g, d + 1) float64, optional
-        All 1 by default; w1 and w2 (g, 2) of transitions.
-    half : (g,) int64, optional
-        First (0) or second (1) halves of transitions; t runs with u on both.
+    From Bézier points (g, d + 1, 3) with weights (g, d + 1), all 1 by default; or from the five control points of
+    transitions (g, 5, 3) with w1 and w2 (g, 2), whose first (0) or second (1) `half` (g,) counts: t runs with u on
+    both.
     """
     if half is not None and weights is not None:
         weights = nurbs.full_weights(weights)

@@ -61,24 +61,11 @@ _STIFF = 1e8
 
 
 def solve(batch: Batch, c: Floats, gap: float = GAP, most: int = MAX_STEPS, begin: float = COLD) -> Floats:
-    """Fastest profile of every run.
+    """Fastest profile of every run: coefficients (n,) whose time is within about `gap` of the smallest on this grid.
 
-    Parameters
-    ----------
-    c : (n,) float64
-        Coefficients to start from; they may be beyond limits.
-    gap : float
-        Remaining duality gap over the time at which a profile is taken.
-    most : int
-        Newton steps after which it is taken in any case.
-    begin : float
-        Duality gap over the time to begin with.
-
-    Returns
-    -------
-    (n,) float64
-        Coefficients whose time is within about `gap` of the smallest on this grid. Where the start keeps all limits
-        with room to spare, they keep them too.
+    It starts from coefficients c (n,), which may be beyond limits, with the duality gap `begin` over the time. Where
+    they keep all limits with room to spare, what is found keeps them, too. After `most` Newton steps it is taken in
+    any case.
     """
     room, z = batch.slacks(c)
     slack = np.maximum(room, _ROOM * (room[0] + room[1]))

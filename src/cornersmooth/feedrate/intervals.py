@@ -91,10 +91,7 @@ class Quantities:
     def at(self, element: Ints, share: Floats) -> tuple[Floats, Floats]:
         """First three derivatives (3, d, ...) by the path coordinate, and Taylor series (4, ..., 3) of the tip.
 
-        Parameters
-        ----------
-        element, share : (...) int64 and float64
-            Places, as in `taylor_along`. Where the tip comes to a stand there are no derivatives: they are zero.
+        Places are as in `taylor_along`. Where the tip comes to a stand there are no derivatives: they are zero.
         """
         which, where = element.ravel(), share.ravel()
         if self.machine_axes is None:

@@ -96,13 +96,7 @@ class Lines:
 
 
 def line_times(lines: Lines, limits: AxisLimits) -> tuple[Floats, Floats]:
-    """(n,) start and end of every line, s.
-
-    Parameters
-    ----------
-    lines : Lines
-        Each must move.
-    """
+    """(n,) start and end of every line, s; each must move."""
     if not len(lines):
         return np.zeros(0), np.zeros(0)
     moves = _Moves.of(lines, limits)
@@ -169,15 +163,8 @@ class _Moves:
 def _corners(lines: Lines, limits: AxisLimits, moves: _Moves) -> tuple[Bools, Floats, Floats, Bools]:
     """What happens at the end of each line (``tpSetupTangent``, ``tpChooseBestBlend``, ``handleModeChange``).
 
-    Returns
-    -------
-    tangent : (n,) bool
-        Passed at a speed; else a parabolic blend or a stop.
-    corner_speed : (n,) float64
-        That speed.
-    braked : (n,) float64
-        Part of its acceleration that each line has: half where it blends.
-    stop : (n,) bool
+    Whether it is passed at a speed (else it is a parabolic blend or a stop), that speed, the part of its acceleration
+    that each line has (half where it blends), and whether the motion stops.
     """
     rapid, speed, turning = np.isinf(lines.feed), moves.speed, moves.turning
     stop = np.isnan(lines.blend)
@@ -280,10 +267,7 @@ def _in_turn(taken: Floats, overlap: Floats) -> tuple[Floats, Floats]:
 def axis_limits(machine: Machine, lines: Lines) -> AxisLimits:
     """Limits of the axes of a machine, as ``[AXIS_*]`` of its configuration has them.
 
-    Raises
-    ------
-    SettingsError
-        CS263: an axis that lines move has no velocity, or no acceleration.
+    CS263: an axis that lines move has no velocity, or no acceleration.
     """
     limits = {item.name: item.per_second for item in machine.dynamics}
     columns = np.array([limits.get(name, (np.inf,) * 3) for name in _AXES])
@@ -296,18 +280,9 @@ def axis_limits(machine: Machine, lines: Lines) -> AxisLimits:
 def program_lines(data: bytes, name: str | None = None) -> Lines:
     """Read the moves of a program; the motion stops at words M and T, at G4 and at moves of the machine.
 
-    What a block does, and what holds there, is that of `control.program.Stream`.
-
-    Parameters
-    ----------
-    name : str, optional
-        File name for messages.
-
-    Raises
-    ------
-    InputError
-        CS264: it has other motion than lines and arcs, or a line has no feed; what holds there is not known; loops,
-        calls of subprograms, variables.
+    What a block does, and what holds there, is that of `control.program.Stream`; `name` is that of the file, for
+    messages. CS264: it has other motion than lines and arcs, or a line has no feed; what holds there is not known;
+    loops, calls of subprograms, variables.
     """
     lexer, reader = dialect_of("linuxcnc", "ABC").lexer, _Reader()
     try:

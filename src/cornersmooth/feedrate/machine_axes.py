@@ -58,11 +58,7 @@ class MachineAxes:
     def orders(self, element: Ints, share: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """Positions (m, 5) of the axes and their first three derivatives by the path coordinate.
 
-        Parameters
-        ----------
-        element : (m,) int64
-        share : (m,) float64
-            Where on each element, as in `taylor_along`; infinite derivatives where the tip comes to a stand.
+        Places are as in `taylor_along`; where the tip comes to a stand derivatives are infinite.
         """
         position, speed, _ = self.series(element, share)
         return position[0], *taylor.by_way(position, speed)
@@ -157,12 +153,8 @@ class MachineAxes:
 def follow(machine: Machine, path: Path) -> MachineAxes:
     """Rotary solutions along a path.
 
-    Raises
-    ------
-    InputError
-        The machine does not reach a tool axis, or not within the limits of its rotary axes.
-    SettingsError
-        The machine has no dynamics.
+    InputError: the machine does not reach a tool axis, or not within the limits of its rotary axes. CS263: it has no
+    dynamics.
     """
     if not machine.dynamics:
         raise SettingsError(

@@ -98,16 +98,11 @@ def build_path(
     curves: Curves | None = None,
     stop_everywhere: bool = False,
 ) -> Path:
-    """Elements of the direct path (`corners` None) or of the smoothed one.
+    """Elements of the direct path (`corners` None) or of the smoothed one; errors: a feed move has no usable feed.
 
     Corners that stay sharp are passed with a change of velocity of at most ``accel · period``, reversals with a stop;
     with `stop_everywhere` every move ends with a stop. The curves of `runs` replace the segments that they belong to.
     A direct path may have `curves`, each a whole move.
-
-    Raises
-    ------
-    SettingsError
-        A feed move has no usable feed.
     """
     moves, start = _moves(program, settings)
     number = np.full(len(program), -1)

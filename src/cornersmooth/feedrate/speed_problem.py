@@ -54,13 +54,7 @@ class Grid:
 
 
 def make_grid(limits: Intervals, runs: Ints, resolution: Resolution) -> Grid:
-    """Cells for the given runs.
-
-    Parameters
-    ----------
-    runs : (r,) int64
-        Which runs, ascending.
-    """
+    """Cells for the given runs (r,), ascending."""
     begin, end = limits.edge[limits.run[runs]], limits.edge[limits.run[runs + 1]]
     accel, jerk = limits.accel[runs], limits.jerk[runs]
     # intervals of all runs, and the bound of the one before
@@ -317,12 +311,8 @@ class Batch:
 def problem_of(grid: Grid, derivatives: Floats, bounds: Floats) -> Batch:
     """The optimisation problem of all runs of a grid.
 
-    Parameters
-    ----------
-    derivatives : (3, d, n, 5) float64
-        First three derivatives of d quantities at `PLACES` of each cell.
-    bounds : (3, d, n) float64
-        Their limits of speed, acceleration and jerk.
+    From the first three derivatives (3, d, n, 5) of d quantities at `PLACES` of each cell, and their limits (3, d, n)
+    of speed, acceleration and jerk.
     """
     n, first, last = len(grid.start), grid.first, grid.last
     end = np.zeros(n, np.bool_)

@@ -65,13 +65,9 @@ def normalised(a: Floats) -> Floats:
 
 
 def by_way(a: Floats, speed: Floats) -> tuple[Floats, Floats, Floats]:
-    """First three derivatives by the way s of a series in u; infinite where ds/du is zero.
+    """First three derivatives by the way s of a series (4, m, d) in u, whose ds/du is the series `speed` (3, m).
 
-    Parameters
-    ----------
-    a : (4, m, d) float64
-    speed : (3, m) float64
-        Series of ds/du.
+    Infinite where ds/du is zero.
     """
     found, series = [], a
     with np.errstate(over="ignore", invalid="ignore"):
@@ -90,12 +86,8 @@ _STRAIGHT = 1e-12
 def taylor_along(path: Path, element: Ints, share: Floats, orders: int = ORDERS) -> tuple[Floats, Floats, Floats]:
     """Taylor series of tip and unit tool axis, (orders, m, 3) each, and of the coordinate's speed, (orders - 1, m).
 
-    Parameters
-    ----------
-    element : (m,) int64
-    share : (m,) float64
-        Where on each element: the part of its length for lines and arcs, the parameter t of its half for curves. Curves
-        of the paper's method are taken at v = u.
+    At shares (m,) of elements (m,): the part of the length of lines and arcs, the parameter t of the half of curves.
+    Curves of the paper's method are taken at v = u.
     """
     count = len(element)
     tip, lever = np.zeros((2, orders, count, 3))

@@ -262,22 +262,10 @@ def peak_speed(distance: Floats, speed: Floats, accel: Floats, jerk: Floats) -> 
 
 
 def rest_to_rest(distance: Floats, speed: Floats, accel: Floats, jerk: Floats) -> tuple[Floats, Floats, Floats]:
-    """Phases of the fastest motions from rest to rest.
+    """Phases of the fastest motions from rest to rest over distances (n,) above zero, in units that agree.
 
-    Parameters
-    ----------
-    distance : (n,) float64
-        Greater than zero.
-    speed, accel, jerk : (n,) float64 or float
-        Limits, in units that agree with the distance.
-
-    Returns
-    -------
-    duration : (n, 7) float64, s
-        Phases that are not needed have zero duration.
-    signed_jerk : (n, 7) float64
-    peak : (n,) float64
-        Speed in the fourth phase.
+    Durations (n, 7), s, zero for phases that are not needed; the jerk of each with its sign; speeds (n,) in the fourth
+    phase.
     """
     distance = np.asarray(distance, np.float64)
     speed, accel, jerk = (np.broadcast_to(np.asarray(x, np.float64), distance.shape) for x in (speed, accel, jerk))

@@ -198,16 +198,11 @@ def _stops(event: Event) -> bool:
 
 
 def within_blocks(path: Path, limits: Limits, known: BlockLimits, blocks: Floats) -> Path:
-    """The path with the speeds that the control's blocks allow.
+    """The path with the speeds that the control's blocks allow; `blocks` (n,) as in `WrittenMotion`.
 
     A block is passed in `block_time` at the soonest. At the end of each move the control must be able to stop within
     the blocks that it knows, with zero acceleration at both ends: over a length d that is the peak speed of the fastest
     motion from rest to rest over 2·d.
-
-    Parameters
-    ----------
-    blocks : (n,) float64
-        As in `WrittenMotion`.
     """
     if not len(path) or (known.block_time == 0.0 and known.look_ahead is None):
         return path
