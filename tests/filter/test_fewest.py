@@ -17,6 +17,7 @@ from cornersmooth.errors import Verdict
 from cornersmooth.filter import Filtered, filter_program, verify_programs
 from cornersmooth.filter.program import THREE_AXES
 from cornersmooth.filter.runs import ProgramReader
+from cornersmooth.nc import parse_control
 from filter.fine_programs import HEAD, NAMES, made, program, relief
 from filter.foreign import by_rs274, by_words, difference
 from oracle.command import DONE, run
@@ -329,3 +330,14 @@ def test_long_lines_without_tip_control_are_the_fewest_lines() -> None:
     assert found.verdict is Verdict.PASSED
     assert found.new_lines < 0.9 * found.lines
     assert not re.search(rb"\n(G1[78] )?G0?[23] ", found.data)
+
+
+@pytest.mark.parametrize(("own", "arcs"), [("", 0), ("[motion]\nfeed_in_plane = false\n", 2)])
+def test_a_steep_helix_has_arcs_where_f_counts_along_it(own: str, arcs: int) -> None:
+    """FANUC with HTG 1 says so by a table of its own, and verification takes its word."""
+    turn = np.linspace(0.0, np.pi, 120)
+    helix = np.stack((10.0 * np.cos(turn), 10.0 * np.sin(turn), -9.0 * turn), axis=1)
+    form = cs.choose_form(parse_control(f'like = "fanuc"\n{own}'), "g1", machine=THREE_AXES)
+    found = filter_program(program([helix]).encode(), form, cs.Settings(tolerance=0.005))
+    assert found.verdict is Verdict.PASSED
+    assert len(re.findall(rb"(?m)^G[23] ", found.data)) == arcs

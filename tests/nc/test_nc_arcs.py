@@ -19,7 +19,8 @@ from cornersmooth.errors import InputError
 from cornersmooth.geometry.arcs import arc_points
 from cornersmooth.kinematics import load_machine
 from cornersmooth.model import Program
-from cornersmooth.nc import choose_form, fit_settings, write
+from cornersmooth.nc import choose_form, fit_settings, parse_control, write
+from cornersmooth.pipeline import postprocess
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from cornersmooth.verify import verify
@@ -174,6 +175,18 @@ def test_a_steep_helix_is_lines_where_f_counts_in_its_plane(control: str, arcs: 
         form, stream = choose_form(control, "g1"), io.BytesIO()
         write(smooth(program, fit_settings(Settings(), form, "mm")), stream, form=form)
         assert (b"\nG3 " in stream.getvalue()) is circles
+
+
+def test_a_table_whose_f_counts_along_a_helix_has_it_as_an_arc() -> None:
+    """FANUC with HTG 1: `verify` takes its word for it, and says 415 mm/min without."""
+    form = choose_form(parse_control('like = "fanuc"\n[motion]\nfeed_in_plane = false\n'), "g1")
+    program = one_arc((10.0, 0, 0), (0, 10.0, 15.0), (0, 0, 0), (0, 0, 1), math.pi / 2)
+    stream = io.BytesIO()
+    found = postprocess(program, stream, form=form, processes=1)
+    assert b"\nG3 " in stream.getvalue()
+    assert found.verification is not None
+    assert found.verification.problems == ()
+    assert {one.code for one in verify(program, stream.getvalue(), tolerance=0.01).problems} == {"CS541"}
 
 
 def test_turning_tool_axis_becomes_lines_with_the_axis_spread() -> None:

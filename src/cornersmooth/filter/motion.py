@@ -80,7 +80,7 @@ def motion(job: Job, stretches: Sequence[Stretch], form: Form) -> NcProgram:
     nc, own = read_back(b"".join(parts), form, job.settings), np.concatenate(lines)
     nc.line[:] = own[nc.line - 1]
     problems = [replace(one, nc_line=int(own[one.nc_line - 1])) for one in nc.problems if own[one.nc_line - 1] > 0]
-    return replace(nc, problems=tuple(problems))
+    return replace(nc, problems=tuple(problems), feed_in_plane=form.mode.feed_in_plane)
 
 
 def program_of(nc: NcProgram, marks: bool = False) -> Program:

@@ -35,8 +35,9 @@ _SHORTEST_CHORD = 20
 #: how far an arc's axis may lean from a coordinate axis; the deviation is measured besides
 _UPRIGHT = 1e-6
 
-#: rad; slope up to which an arc rises where F counts in its plane alone: the tool is 2 % faster there than F says
-STEEPEST = math.acos(1.0 / 1.02)
+#: rad; slope up to which an arc rises where F counts in its plane alone: the tool is 2 % faster there than F says, less
+#: what the rounding of its numbers may add
+STEEPEST = math.acos(1.0 / 1.0199)
 
 #: curve styles with weights
 _RATIONAL = ("g6.2", "bspline")

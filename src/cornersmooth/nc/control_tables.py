@@ -190,7 +190,8 @@ def _trusted(given: Any, where: str, dialect: str) -> frozenset[str]:
     return frozenset(found)
 
 
-FRAME = "program frame"  #: name of the frame of the program in what is left to a table
+#: names of what is left to a table: the frame of the program, and whether F of a helix counts in its plane alone
+FRAME, HELICES = "program frame", "feed of helices"
 #: names of what verification leaves to a table that says it in its own way, and the blocks that say it, as `_blocks`
 #: names them
 _STATED: dict[tuple[str, ...], str] = {
@@ -213,7 +214,7 @@ def own_words(table: Control) -> tuple[str, ...]:
 
     Those are the blocks that the table has and the one that it is like has not, their braces as they are; names of
     kinds of statements that it says in its own way, with all blocks of these; `FRAME` where it has its own blocks
-    around the motion.
+    around the motion; `HELICES` where F of a helix does not count in its plane, as the control's does.
     """
     if not table.own:
         return ()
@@ -225,7 +226,13 @@ def own_words(table: Control) -> tuple[str, ...]:
         if any(own[key] != base[key] for key in both):
             names += kinds
             blocks += [block for key in both if kinds not in _NEW_ALONE for block in own[key]]
+    if _feed_in_plane(load_control(table.dialect)) and not _feed_in_plane(table):
+        names.append(HELICES)
     return (*dict.fromkeys(block for block in blocks if not re.fullmatch(r"\{\w+\}", block)), *dict.fromkeys(names))
+
+
+def _feed_in_plane(table: Control) -> bool:
+    return any(mode.feed_in_plane for form in table.forms.values() for mode in form.modes.values())
 
 
 def _blocks(table: Control) -> dict[str, Blocks]:

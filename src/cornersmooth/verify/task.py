@@ -53,6 +53,9 @@ class Trust:
     skip_cycles: bool = False
 
 
+#: name, in `Trust.trusted`, of a table whose F of a helix does not count in its plane as the control's does
+HELICES: Final = "feed of helices"
+
 #: nothing but the program counts
 TRUST: Final = Trust()
 

@@ -38,7 +38,7 @@ from cornersmooth.verify.match import Batch, Match
 from cornersmooth.verify.parse import Batches
 from cornersmooth.verify.passage import MOST_BREAKS
 from cornersmooth.verify.result import Findings, Verification, Where, problems_of
-from cornersmooth.verify.task import TRUST, Task, Trust, half_turns, length_of
+from cornersmooth.verify.task import HELICES, TRUST, Task, Trust, half_turns, length_of
 from cornersmooth.verify.word_places import WordPlaces
 
 if TYPE_CHECKING:
@@ -168,6 +168,7 @@ class Verifier:
             return found.not_verified(words if self._trust.words else "")
         text.begin()
         feed_in_plane = word_table(options.dialect.control).get("feed_in_plane", False)
+        feed_in_plane &= HELICES not in self._trust.trusted
         # while the text begins
         task = self._task(rotary=options.machine is not None, apart=apart, feed_in_plane=feed_in_plane)
         rotary = options.rotary(Steps())
