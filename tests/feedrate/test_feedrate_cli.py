@@ -56,6 +56,7 @@ def test_csv_holds_the_motion(tmp_path: Path, law: str) -> None:
     assert np.abs(np.diff(way[:-1], n=2)).max() / 0.002**2 <= 1000.0 * 1.001
     tip = np.column_stack((table["x_mm"], table["y_mm"], table["z_mm"]))
     assert np.linalg.norm(np.diff(tip, axis=0), axis=1).max() <= 30.0 * 0.002 * 1.001
+    assert command.run(*arguments[:-2], "-").stdout == path.read_bytes()  # and no table behind it
     assert run(arguments) == 4  # exists already
     assert run([*arguments, "--force"]) == 0
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from cornersmooth.cl import read
 from cornersmooth.cli.files import (
+    STANDARD,
     check_inputs,
     check_pair,
     check_path,
@@ -68,7 +69,8 @@ def run_time(given: Options) -> int:
         from cornersmooth.report.tables import timelaw_csv
 
         write_report(given.csv, timelaw_csv(compared.laws[given.law]))
-    say(given, compared.as_dict(), _tables(compared))
+    if given.csv != STANDARD:
+        say(given, compared.as_dict(), _tables(compared))
     return 0
 
 
@@ -296,7 +298,8 @@ def _command(given: Options, row: Row, machine: Any, command: str, suffix: str) 
     options = list(row.options)
     if "--machine" in options:
         options[options.index("--machine") + 1] = called
-    target = os.path.splitext(os.path.basename(given.source))[0] + (".smooth" if command == "filter" else "") + suffix
+    stem = "part" if given.source == STANDARD else os.path.splitext(os.path.basename(given.source))[0]
+    target = stem + (".smooth" if command == "filter" else "") + suffix
     return command_text(["cornersmooth", command, given.source, *words, *options, "-o", target])
 
 
