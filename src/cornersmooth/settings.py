@@ -10,7 +10,7 @@ that module with a `cornersmooth.smoothing.construction.Construction` named ``CO
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from numbers import Real
 from types import MappingProxyType
@@ -60,9 +60,6 @@ AUTO = "auto"
 #: of lines, and of curves
 DEFAULT_METHOD, CURVES_METHOD = "proportional", "global"
 
-#: as published
-PAPERS_METHOD = "zhang2016"
-
 
 def option(
     default: Any,
@@ -99,24 +96,18 @@ def key_of(name: str, unit: str) -> str:
     return f"{name}_{unit.replace('/', '_per_')}" if unit else name
 
 
-def _is_number(value: Any) -> bool:
-    return isinstance(value, Real) and not isinstance(value, bool)
+#: types of plain values, by the annotations of options
+_KINDS: Final = {"float": Real, "bool": bool, "str": str}
 
 
-#: what fits an annotation, and how it is called
-_FITS: Final[dict[str, tuple[Callable[[Any], bool], str]]] = {
-    "float": (_is_number, "a number"),
-    "bool": (lambda value: isinstance(value, bool), "True or False"),
-    "str": (lambda value: isinstance(value, str), "a text"),
-    "tuple[float, float]": (
-        lambda value: isinstance(value, (tuple, list)) and len(value) == 2 and all(map(_is_number, value)),
-        "a tuple of two numbers",
-    ),
-    "tuple[str, ...]": (
-        lambda value: isinstance(value, (tuple, list)) and all(isinstance(one, str) for one in value),
-        "a tuple of texts",
-    ),
-}
+def _fits(value: Any, hint: str) -> bool:
+    """Whether a value is what an annotation says: a plain value, or a tuple of such; any other annotation takes all."""
+    if hint.startswith("tuple["):
+        kinds = hint[len("tuple[") : -1].split(", ")
+        so_many = isinstance(value, (tuple, list)) and ("..." in kinds or len(value) == len(kinds))
+        return so_many and all(_fits(one, kinds[0]) for one in value)
+    return hint not in _KINDS or (isinstance(value, _KINDS[hint]) and (hint == "bool" or not isinstance(value, bool)))
+
 
 Record = TypeVar("Record", bound="OptionFields")
 
@@ -128,9 +119,8 @@ class OptionFields:
         """Refuse values that do not fit the annotations of their fields (CS202)."""
         for item in self.__dataclass_fields__.values():  # type: ignore[attr-defined]
             value, hint = getattr(self, item.name), item.type.removesuffix(" | None")
-            fits, text = _FITS.get(hint, (lambda value: True, ""))
-            if not fits(value) and not (value is None and hint != item.type):
-                raise SettingsError("CS202", f"{item.name} is {value!r}", f"give {text}")
+            if not _fits(value, hint) and not (value is None and hint != item.type):
+                raise SettingsError("CS202", f"{item.name} is {value!r}", f"give a {hint}")
 
     def _value(self, name: str) -> Any:
         """Value of an option, or of that which counts instead."""
@@ -139,13 +129,7 @@ class OptionFields:
         return getattr(self, item.metadata["instead"] or name) if value is None else value
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values in field order, for reports; keys carry their unit.
-
-        Returns
-        -------
-        dict
-            Numbers in the units of their keys, words, and None for what is not set.
-        """
+        """Plain values in field order, for reports: numbers in the units of their keys, words, None for nothing."""
         items = self.__dataclass_fields__.values()  # type: ignore[attr-defined]
         return {key_of(item.name, item.metadata["unit"]): self._value(item.name) for item in items}
 
@@ -259,7 +243,8 @@ class Settings(OptionFields):
             for number in value if isinstance(value, (tuple, list)) else () if value is None else (value,):
                 if not (math.isfinite(number) and low <= float(number) <= high):
                     raise SettingsError("CS202", f"{name} is {number:g}", f"give a value from {low:g} to {high:g}")
-        object.__setattr__(self, "weights", tuple(round(float(w), WEIGHT_DECIMALS) for w in self.weights))
+        # every control keeps three decimals (FANUC IS-B, reference manual B-63324EN/03 4.17)
+        object.__setattr__(self, "weights", tuple(round(float(w), 3) for w in self.weights))
         if self.axis_tolerance is not None:
             object.__setattr__(self, "axis_length", self._check_axis_tolerance(self.axis_tolerance))
         if self.tip_tolerance <= 0 or self.axis_point_tolerance <= 0:
@@ -274,13 +259,7 @@ class Settings(OptionFields):
         return all(getattr(self, name) == value for name, value in METHODS[method].prescribed.items())
 
     def with_method(self, *, curves: bool = False) -> Settings:
-        """Put a method in the place of "auto": what suits lines, or curves.
-
-        Returns
-        -------
-        Settings
-            The same where a method is named already.
-        """
+        """Put a method in the place of "auto": what suits lines, or curves; a method that is named already stays."""
         if self.method != AUTO:
             return self
         return self.but(method=CURVES_METHOD if curves and self._allows(CURVES_METHOD) else DEFAULT_METHOD)
@@ -385,9 +364,6 @@ class Settings(OptionFields):
         return replace(self, **changes)
 
 
-#: unit of each setting that has one
-UNITS = {item.name: item.metadata["unit"] for item in fields(Settings) if item.metadata["unit"]}
-
 #: What the axis point may be off, over ε, where the axis has a tolerance of its own. The larger, the less the way of
 #: the tip takes of what the axis may turn (a tenth of it at most), and the longer is H.
 AXIS_POINT_SHARES = 9.0
@@ -404,9 +380,6 @@ LARGEST_CHORD = 5e-4
 
 #: mm: on a shorter way the tip stands still, and no feed divides lines
 STANDING = 1e-9
-
-#: decimals of a weight that every control keeps (FANUC IS-B, reference manual B-63324EN/03 4.17)
-WEIGHT_DECIMALS = 3
 
 #: A feed move whose tool axis turns by more (degrees) is refused. Between opposite axes there is no great circle. Near
 #: them there is one, but it hangs on the last digits: in the middle of the turn, an error of the axes at both ends is

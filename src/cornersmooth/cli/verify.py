@@ -24,7 +24,6 @@ from cornersmooth.nc_reader import read_nc
 from cornersmooth.report import NcFile, cl_file, findings_table, record, sha256_of
 from cornersmooth.report.tables import verification_csv
 from cornersmooth.report.verdict import judge, trusted_blocks
-from cornersmooth.settings import UNITS
 from cornersmooth.system.processes import return_large_arrays
 from cornersmooth.verify import Verification, Where, useful_processes, verify
 from cornersmooth.verify.task import APART, length_of
@@ -95,7 +94,11 @@ def run_verify(given: Options) -> int:
             machine=None if machine is None else machine.name,
             tcp=not given.no_tcp,
         ),
-        settings={f"{name}_{UNITS[name]}": value for name, value in measures.items()},
+        settings={
+            "tolerance_mm": given.tolerance,
+            "axis_length_mm": given.axis_length,
+            "axis_tolerance_deg": given.axis_tolerance,
+        },
         findings=findings,
         command=command_line(),
         loosened=loose,

@@ -18,7 +18,7 @@ from cornersmooth.kinematics import Machine, with_dynamics
 from cornersmooth.model import Move, Program
 from cornersmooth.nc import Control, Form, choose_form
 from cornersmooth.pipeline import postprocess
-from cornersmooth.settings import CURVES_METHOD, DEFAULT_METHOD, PAPERS_METHOD, Settings
+from cornersmooth.settings import CURVES_METHOD, DEFAULT_METHOD, Settings
 from cornersmooth.system.processes import can_fork, map_in_processes, useful_processes
 from cornersmooth.times import Timing, without_holes
 
@@ -30,6 +30,9 @@ EQUAL = 1.03
 
 #: Most by which rough plans are too long: 0.9 to 5.1 % on the first 90 poses of the sample, FANUC with `table-ac`.
 ROUGH = 0.06
+
+#: the method as published
+_PAPERS = "zhang2016"
 
 #: block time that leaves the number of lines to the chord tolerance, s
 _BY_CHORD = 1.0
@@ -147,8 +150,8 @@ def candidates(control: Control, settings: Settings, machine: Machine | None) ->
             if words is not None and words.names and not rotary:
                 continue
             # the paper's, for comparison: no rotary words follow its curves, and one density of lines is enough
-            for method in (DEFAULT_METHOD, CURVES_METHOD, *(() if rotary else (PAPERS_METHOD,))):
-                for lines, changes, more in [*_densities(form)][: 1 if method == PAPERS_METHOD else None]:
+            for method in (DEFAULT_METHOD, CURVES_METHOD, *(() if rotary else (_PAPERS,))):
+                for lines, changes, more in [*_densities(form)][: 1 if method == _PAPERS else None]:
                     options = ("-f", name, *rotary, "--method", method, *more)
                     found.append(Candidate(form, settings.but(method=method, **changes), lines, options))
     return found
