@@ -103,7 +103,7 @@ class Cubic:
 def cubic(knots: Floats, control: Floats, tolerance: float) -> Cubic | None:
     """Cut a curve into pieces at its knots and where chords would leave it by more than a tolerance.
 
-    None if there would be more than `MOST_LINES` a control point.
+    It ends at its last control point. None if there would be more than `MOST_LINES` a control point.
     """
     from scipy.interpolate import BSpline  # which takes long to load
 
@@ -121,8 +121,7 @@ def cubic(knots: Floats, control: Floats, tolerance: float) -> Cubic | None:
     step = np.arange(pieces.sum()) - np.repeat(np.cumsum(pieces) - pieces, pieces)
     u = np.append(np.repeat(edges[:-1], pieces) + step * np.repeat(np.diff(edges) / pieces, pieces), edges[-1])
     bezier = _bezier(spline(u), slope(u), u)
-    if knots[len(control)] == knots[-1]:
-        bezier[-1, 3] = control[-1]
+    bezier[-1, 3] = control[-1]
     return Cubic(u, bezier)
 
 
