@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from cornersmooth.cl import read
+from cornersmooth.errors import Verdict
 from cornersmooth.model import Program
 from cornersmooth.settings import Settings
 from cornersmooth.verify import verify
@@ -136,3 +137,36 @@ def test_a_helix_is_faster_where_f_counts_in_its_plane(
     text = encode([*HEAD, *blocks, *TAIL])
     problems = verify(cl, text, tolerance=0.02, control=control, words=False).problems
     assert [problem.code for problem in problems] == found, problems
+
+
+PLUNGES = b"""LOADTL/4
+SPINDL/3000,RPM,CLW
+RAPID
+GOTO/-9,-9,20,0,0,1
+RAPID
+GOTO/-9,-9,2
+FEDRAT/MMPM,300
+GOTO/-9,-9,-3
+{}
+GOTO/20,0,-3
+GOTO/40,9,-3
+RAPID
+GOTO/40,9,50
+FINI
+"""
+
+
+@pytest.mark.parametrize("statement", [b"COOLNT/FLOOD", b"OPSTOP", b"SPINDL/900,RPM,CLW", b"CUTCOM/LEFT,4"])
+@pytest.mark.parametrize("feed", ["F30.", "F3000."])
+def test_the_last_block_before_a_word_within_a_run_has_its_feed(statement: bytes, feed: str) -> None:
+    """The pose of the word divides the run, and the block before it belongs to the part that ends there."""
+    part, case = read(PLUNGES.replace(b"{}", statement), name="part.cls"), Case("fanuc", "g1")
+    lines = written(part, case.choose(), Settings(tolerance=0.02))[0].splitlines()
+    how = {"tolerance": 0.02, "control": case.control}
+    assert verify(part, "\n".join(lines).encode(), **how).verdict is Verdict.PASSED
+    plunge = max(k for k, line in enumerate(lines) if line.startswith("G1 X-9.0000 Y-9.0000 Z-3.0000"))
+    cut = next(k for k in range(plunge + 1, len(lines)) if lines[k].startswith("G1 "))
+    for k, word in ((plunge, feed), (cut, "F300.")):
+        lines[k] = re.sub(r" F.*|$", f" {word}", lines[k], count=1)
+    found = verify(part, "\n".join(lines).encode(), **how)
+    assert {(one.code, one.nc_line) for one in found.problems} == {("CS541", plunge + 1)}

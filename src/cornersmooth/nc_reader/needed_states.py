@@ -92,8 +92,9 @@ def control_problems(run: Run) -> Iterator[Problem]:
     else:
         kind, letters = ("points", {*"UVW"}) if state.modal.points else ("vectors", {*"IJ"})
     if kind == "points":
-        place, point = (~np.isnan([table.column(name) for name in names]) for names in ("XYZ", "UVW"))
-        lacks = (place | point).any(axis=0) & ~point.all(axis=0)
+        given = {name: ~np.isnan(table.column(name)) for name in "XYZUVW"}
+        point = given["U"] & given["V"] & given["W"]
+        lacks = np.logical_or.reduce(list(given.values())) & ~point
         text = "a second point without all its words: manuals do not say what holds for the others"
         yield from Problem.at("", lacks, table.line, text, most=1)
     if dialect.curves_need and state.machine.groups["smoothing"] != dialect.curves_need:

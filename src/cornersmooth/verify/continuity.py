@@ -29,7 +29,8 @@ def measure_continuity(match: Match, found: Findings) -> None:
     six = match.six[ends] if len(ends) < len(match.six) else match.six
     square = largest_square((six[1:] - six[:-1]).T)
     square[(square == 0) | ~match.on[ends[1:]] | ~match.on[ends[:-1]]] = np.inf
-    square[match.section[ends[1:]] != match.section[ends[:-1]]] = np.inf
+    run = match.runs[0][ends]
+    square[run[1:] != run[:-1]] = np.inf
     _note(match, found, "shortest", -np.sqrt(square), chosen[1:] + first)
 
 
@@ -53,8 +54,8 @@ def _changes(match: Match) -> tuple[Ints, Floats]:
         arrive = leave.copy()
         leave[bent], arrive[bent] = _directions(nc, bent + first)
     feeding = np.concatenate((np.zeros(1, np.bool_), np.ones(lead, np.bool_), match.feeding))
-    stretch = match.section[end]
-    stretch = np.concatenate((stretch[:lead], stretch))
+    stretch = match.section[end]  # that in which the next element begins
+    stretch = np.concatenate((stretch[: 1 + lead], stretch[:-1]))
     size_in, size_out = (np.linalg.norm(way, axis=1) for way in (arrive, leave))
     moving = np.flatnonzero(feeding & (size_in > 0) & (size_out > 0))
     joined = stretch[moving[1:]] == stretch[moving[:-1]]

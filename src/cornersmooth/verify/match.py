@@ -113,7 +113,10 @@ class Match(Batch):
     @cached_property
     def step(self) -> Bools:
         """(v - 1,) whether each step is run beside the CL path."""
-        return self.on[1:] & self.on[:-1] & (self.section[1:] == self.section[:-1])
+        number, last = self.section[:-1], self.motion.last[self.stretches["last"] - self.first]
+        # a vertex where one stretch ends and another begins is of the latter, and the step to it of the former
+        inside: Bools = (number >= 0) & (np.arange(len(number)) < last[np.maximum(number, 0)])
+        return self.on[1:] & self.on[:-1] & inside
 
     @cached_property
     def feeding(self) -> Bools:
