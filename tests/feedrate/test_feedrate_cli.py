@@ -169,3 +169,17 @@ def test_a_text_may_come_from_standard_input(tmp_path: Path, control: list[str])
     piped = command.run("time", part, *control, "--text", "-", "--json", data=nc.read_bytes())
     assert (piped.returncode, piped.stdout) == (0, named.stdout)
     assert command.run("time", "-", *control, "--text", "-").returncode == 2
+
+
+def test_the_time_is_that_of_the_program_that_smooth_writes_with_the_same_limits(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    part = tmp_path / "part.cls"
+    part.write_bytes(beginning(IMPELLER, 60))
+    assert run(["smooth", str(part), "--limits", "table-ac", "-o", str(tmp_path / "part.nc"), "--json"]) == 0
+    written = json.loads(capsys.readouterr().out)
+    assert written["settings"]["method"] == "global"
+    assert run(["time", str(part), "--limits", "table-ac", "--json"]) == 0
+    planned = json.loads(capsys.readouterr().out)
+    assert planned["settings"]["method"] == "global"
+    assert planned["seconds"]["as_written"] == pytest.approx(written["times"]["written_s"], rel=1e-3)

@@ -33,7 +33,16 @@ from cornersmooth.nc_reader import read_nc
 from cornersmooth.pipeline import read_back, stage_of
 from cornersmooth.report.verdict import limits_of, limits_text, times_text
 from cornersmooth.system.processes import useful_processes
-from cornersmooth.times import AS_WRITTEN, BASELINES, Comparison, Timing, stops, without_holes, written_text
+from cornersmooth.times import (
+    AS_WRITTEN,
+    BASELINES,
+    Comparison,
+    Timing,
+    faster_method,
+    stops,
+    without_holes,
+    written_text,
+)
 from cornersmooth.times.comparing import Row, Table, candidates, compare_programs, law_of_lines
 from cornersmooth.times.setup import Rating, Setups, find_setups
 
@@ -84,9 +93,11 @@ def _compare(data: bytes, name: str, given: Options) -> Comparison:
         how = _as_text_was_made(given, text).reading_back()
         nc = read_nc(text, **how, name=written, tolerance=settings.tolerance, axis_length=settings.axis_scale)
     else:
-        form = given.choose_form()
+        form, own = given.choose_form(), without_holes(program.with_feed(given.feed))
+        if (named := given.load_limits()) is not None:  # as `smooth` does
+            settings = faster_method(own, settings, form, named)
         fitted = fit_settings(settings, form, program.units)
-        nc = read_back(written_text(without_holes(program.with_feed(given.feed)), fitted, form), form, fitted)
+        nc = read_back(written_text(own, fitted, form), form, fitted)
     if not given.quiet:
         _tell_feeds(program, given.feed)
     with progress_bar(given.quiet) as progress:
