@@ -313,7 +313,11 @@ def edited(folder: Path, cl: str, how: tuple[str, ...], *edits: tuple[str, str])
         text, count = re.subn(old, new, text, count=1, flags=re.MULTILINE)
         assert count
     (folder / "part.nc").write_text(text)
-    return run("verify", "part.cls", "part.nc", *on[:4], cwd=folder).stdout.decode().splitlines()[0]
+    return (
+        run("verify", "part.cls", "part.nc", *on[: 6 if "--machine" in how else 4], cwd=folder)
+        .stdout.decode()
+        .splitlines()[0]
+    )
 
 
 def test_words_of_a_tap_may_be_spelt_otherwise(tmp_path: Path) -> None:
@@ -342,3 +346,16 @@ def test_a_second_point_without_all_its_words_is_not_verified(
     assert edited(tmp_path, TILTED, how).startswith("PASSED")
     found = edited(tmp_path, TILTED, how, (rf"^(G0 X20.*?){word}", r"\1"))
     assert "a second point without all its words" in found, found
+
+
+@pytest.mark.parametrize(
+    ("control", "down"), [("fanuc", "G0 Z-50."), ("siemens", "G0 Z-50"), ("heidenhain", "9 L Z-50 FMAX")]
+)
+def test_no_rapid_comes_down_from_a_retract_before_a_tilted_plane(control: str, down: str, tmp_path: Path) -> None:
+    """Nothing says over what: it passed where the head has no digests."""
+    others = (r"^(\d+ )?[(;] ?PARTS=.*\n", "")
+    how = ("--control", control, "--machine", "table-ac", "--planes", "tilted")
+    assert edited(tmp_path, PLANE, how, others).startswith("PASSED")
+    assert edited(
+        tmp_path, PLANE, how, others, (r"^(\S*( PLANE SP|G68\.2|CYCLE800\(0).*)$", rf"{down}\n\1")
+    ).startswith("FAILED")

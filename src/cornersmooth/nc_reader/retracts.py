@@ -92,7 +92,7 @@ class Retracts:
 
     def _check(self, arrival: Floats, *, arrived: bool) -> None:
         """Complain of the rapids of a way back to an arrival (6,), NaN where it is open; the last of them `arrived`."""
-        aside = False
+        aside, nowhere = False, bool(np.isnan(arrival[:2]).any())  # over nothing that is known
         for k, (before, behind, line, free) in enumerate(self._way, 1 - len(self._way)):
             moved = ~np.isnan(behind) & (behind != before)
             sideways, down = bool(moved[:2].any()), bool(moved[2])
@@ -108,7 +108,7 @@ class Retracts:
                 ),
                 ((moved & ~there)[3:].any(), ("CS531", "the tool axis turns elsewhere on the way back from a retract")),
                 (
-                    early and (_elsewhere(before[:2], arrival[:2]) or _elsewhere(before[3:], arrival[3:])),
+                    early and (nowhere or _elsewhere(before[:2], arrival[:2]) or _elsewhere(before[3:], arrival[3:])),
                     ("CS531", "the tool comes down from a retract before it is over its position, with its axis there"),
                 ),
             ):
