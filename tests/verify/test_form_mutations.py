@@ -71,7 +71,7 @@ def test_every_mutant_that_matters_is_found(case: Case) -> None:
     lines = text_of(case, program)
     assert named_in(case, program, lines) == []
     chosen = share_of_kinds(mutants(case, lines), lambda mutant: mutant.kind, 20)
-    score = judge(program, lines, chosen, partial(text_of, case), partial(named_in, case))
+    score = judge(chosen, partial(named_in, case, program))
     print(f"\n{case}: {score}")
     assert score.missed == []
     assert sum(score.judged.values()) == len(chosen) >= 15
