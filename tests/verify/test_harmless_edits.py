@@ -359,3 +359,10 @@ def test_no_rapid_comes_down_from_a_retract_before_a_tilted_plane(control: str, 
     assert edited(
         tmp_path, PLANE, how, others, (r"^(\S*( PLANE SP|G68\.2|CYCLE800\(0).*)$", rf"{down}\n\1")
     ).startswith("FAILED")
+
+
+def test_a_cutting_edge_comes_after_the_retract_without_one(tmp_path: Path) -> None:
+    """D0 of the retract holds on where machine data do not choose D1 with the tool."""
+    others, how = (r"^; PARTS=.*\n", ""), ("--control", "siemens", "--cycles", "native")
+    assert edited(tmp_path, RIGID, how, others).startswith("PASSED")
+    assert edited(tmp_path, RIGID, how, others, (r"^D1\n", "")).startswith("FAILED")

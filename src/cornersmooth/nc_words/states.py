@@ -250,7 +250,7 @@ class StateRules:
 
     def _set(self, line: int, word: str, row: Row) -> None:
         """Take note of what a word begins and ends."""
-        if row.drops in self.machine.last_words:
+        if row.drops in self.machine.last_words or row.drops == "edge":  # D0 is a word, and holds on until the next
             self._ended[row.drops] = word
         self._ended.pop(row.group, None)
         off = row.off and row.pattern.fullmatch(word) is not None
