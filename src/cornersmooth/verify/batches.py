@@ -13,7 +13,6 @@ import numpy as np
 
 from cornersmooth.model import Floats, Move
 from cornersmooth.nc_reader.elements import Ahead, Element, Problem
-from cornersmooth.nc_reader.tool import directions
 from cornersmooth.verify.acts import Acts
 from cornersmooth.verify.feeds import feed_at, out_of_hole
 from cornersmooth.verify.match import Batch
@@ -129,7 +128,7 @@ class Stretches:
         They are looked for where they should be, and if nothing is near there on all that may have been passed.
         """
         path, nc = self.task.path, self._ahead.part(self._element, element + 1)
-        six = self.task.six(nc.tip, directions(nc, nc.tip, nc.second))
+        six = self.task.ends(nc, slice(None))
         gone, begin = float(np.linalg.norm(np.diff(six, axis=0), axis=1).sum()), path.length_at(float(start[0]))
         around, found = AROUND * self.task.radius, start.copy()
         for k, (metric, (_, radius)) in enumerate(self.task.runs.items()):

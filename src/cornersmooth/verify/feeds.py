@@ -14,7 +14,6 @@ import numpy as np
 
 from cornersmooth.model import Bools, FeedMode, Floats, Ints
 from cornersmooth.nc_reader.elements import Element, Elements, Problem
-from cornersmooth.nc_reader.tool import directions
 from cornersmooth.verify.free_space import free_interval
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.motions import ARITHMETIC, COLUMNS, on_segments
@@ -135,8 +134,7 @@ def reach(task: Task, six: Floats, place: Floats, limits: tuple[Ints, Ints], way
 
 def out_of_hole(task: Task, nc: Elements, element: int, move: int) -> float:
     """Place on the move after a hole that is nearest to the end of an element."""
-    tip, last = nc.tip[element : element + 1], task.original.trail.last
-    six = task.six(tip, directions(nc, tip, nc.second[element : element + 1]))
+    six, last = task.ends(nc, [element]), task.original.trail.last
     segment = np.arange(int(last[move]), int(last[move + 1]))
     share, square = on_segments(six[None], task.path.points, segment[None], COLUMNS["both"])
     nearest = int(np.argmin(square))
@@ -147,12 +145,8 @@ def feed_at(task: Task, nc: Elements, element: int, move: int, place: float) -> 
     """What is wrong with the feed of an element of which only the end is compared: it leads to a place of a move."""
     first = last = task.feed_runs[0][[move]]
     if task.path.segments > 0:
-        tip, at, limits = (
-            nc.tip[[element]],
-            np.array([place]),
-            (np.zeros(1, np.int64), np.array([task.path.segments - 1])),
-        )
-        six = task.six(tip, directions(nc, tip, nc.second[[element]]))
+        six, at = task.ends(nc, [element]), np.array([place])
+        limits = np.zeros(1, np.int64), np.array([task.path.segments - 1])
         first, last = _runs_between(task, *(reach(task, six, at, limits, way) for way in (-1, 1)))
     if (
         _fits(task.original, nc, element, np.array([move])).any()

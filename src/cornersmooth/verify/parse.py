@@ -20,7 +20,7 @@ import numpy as np
 
 from cornersmooth.model import Move
 from cornersmooth.nc_reader.elements import Ahead, Element, Elements, Event, Problem
-from cornersmooth.nc_reader.tool import directions, leads_somewhere, moving_rapids
+from cornersmooth.nc_reader.tool import leads_somewhere, moving_rapids
 from cornersmooth.verify.acts import Acts, Stops, Words
 from cornersmooth.verify.along_tool import AlongTool
 from cornersmooth.verify.batches import Stretches
@@ -180,8 +180,8 @@ class Parse:
             return
         lines, nc, base = self.lines, self._ahead.nc, self._ahead.base
         first = max(element - 1, base)
-        tip, second = (values[first - base : end - base] for values in (nc.tip, nc.second))
-        ways = np.linalg.norm(np.diff(self._task.six(tip, directions(nc, tip, second)), axis=0), axis=1)
+        ends = self._task.ends(nc, slice(first - base, end - base))
+        ways = np.linalg.norm(np.diff(ends, axis=0), axis=1)
         gone = self._gone + np.append(0.0, np.cumsum(ways))
         self._gone = float(gone[-1])
         length, last = self._task.path.length, self._task.original.trail.last

@@ -13,6 +13,7 @@ import numpy as np
 from cornersmooth.arrays import some_rows
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Keep, Move, Program
 from cornersmooth.nc_reader.elements import Curves, Element, Elements, NcArcs, Problem
+from cornersmooth.nc_reader.tool import directions
 from cornersmooth.settings import FLIP_ANGLE
 from cornersmooth.statements.asked import Asking
 from cornersmooth.verify.chain import Path
@@ -168,6 +169,10 @@ class Task:
     def six(self, tip: Floats, axis: Floats) -> Floats:
         """(..., 6) tips and axis points side by side, mm."""
         return side_by_side(tip, axis, self.axis_length, self.own_axis)
+
+    def ends(self, nc: Elements, rows: slice | list[int]) -> Floats:
+        """(k, 6) ends of elements."""
+        return self.six(nc.tip[rows], directions(nc, nc.tip[rows], nc.second[rows]))
 
     def degrees(self, off: Floats | float) -> Floats:
         """What axis points that are `off` by so many mm make of the axis, where that has a tolerance of its own."""
