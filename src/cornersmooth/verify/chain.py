@@ -183,6 +183,15 @@ class Sections:
         return Sections(first, self.last[number:] - row, start, self.stop[number:], self.guessed[number:])
 
 
+@dataclass(frozen=True)
+class Chain:
+    """Places of rows, and where they prove nothing."""
+
+    place: Floats  #: (n,): ascending
+    bad: Bools  #: (n,): whether the row, or the step from the row before it, is not proved
+    far: Bools  #: (n,): whether it is not because vertices are farther apart: dividing the step proves nothing
+
+
 def points_at(path: Floats, place: Floats) -> Floats:
     """(3h, k) points of a polyline (m + 1, 3h) at places."""
     k = np.minimum(place.astype(np.int64), len(path) - 2)
@@ -190,17 +199,10 @@ def points_at(path: Floats, place: Floats) -> Floats:
     return np.ascontiguousarray((start + (place - k)[:, None] * (path.take(k + 1, axis=0) - start)).T)
 
 
-def chain(own: Floats, bend: Floats, path: Path, radius: float, sections: Sections) -> tuple[Floats, Bools]:
+def chain(own: Floats, bend: Floats, path: Path, radius: float, sections: Sections) -> Chain:
     """Go along the own polyline, and take for each vertex the nearest place around where it should be.
 
     It has vertices (3h, n) and bends (n - 1,), mm. The first section begins at the first vertex, and is free there.
-
-    Returns
-    -------
-    place : (n,) float64
-        Places of the vertices, ascending.
-    bad : (n,) bool
-        Whether a vertex, or the step from the one before it, is not proved.
     """
     count = own.shape[1]
     step = own[:, 1:] - own[:, :-1]
@@ -222,7 +224,11 @@ def chain(own: Floats, bend: Floats, path: Path, radius: float, sections: Sectio
     beside = path.points.take(vertices, axis=0).T - own.take(rows, axis=1) - share * step.take(rows, axis=1)
     beside_square = largest_square(beside)
     bad[rows[beside_square > radius * radius] + 1] = True
+    far = bad
     if path.bent or bend.any():
+        far = away_square > radius * radius
+        least = np.sqrt(beside_square) - 4.0 * bend[rows] * share * (1.0 - share)
+        far[rows[least > radius] + 1] = True
         farthest = np.maximum(away_square[:-1], away_square[1:])
         np.maximum.at(farthest, rows, beside_square)
         bad |= _bent(bend, path, radius, place, (rows, vertices, share), (away, -beside), farthest)
@@ -230,7 +236,7 @@ def chain(own: Floats, bend: Floats, path: Path, radius: float, sections: Sectio
     firsts = sections.first[1:]
     bad[firsts] = largest_square(away[:, firsts]) > radius * radius  # the step to it is none of its section
     bad[0] = False
-    return place, bad
+    return Chain(place, bad, far)
 
 
 def _places(own: Floats, gone: Floats, path: Path, radius: float, where: tuple[Sections, Ints]) -> tuple[Floats, Bools]:

@@ -32,9 +32,9 @@ _HAIR = 1e-9
 #: share by which the radius is wider where it is looked which of the reached places lead on
 _WIDER = 1.0 + 1e-6
 
-#: bends of steps where what can be reached is worked out exactly, in radii: it is taken off the radius; at first, and
-#: where that does not do; and the most parts of a step there
-FINE: Final = 1e-2, 1e-5
+#: bend of steps where what can be reached is worked out exactly, in radii: it is taken off the radius; and the most
+#: parts of a step there
+FINE: Final = 1e-5
 _MOST_PARTS: Final = 256
 
 #: gives points (k, 3h) of the own motion at vertex numbers (k,) with fractions of the steps behind them
@@ -194,29 +194,29 @@ class Around:
     @classmethod
     def of(
         cls,
-        rows: tuple[Floats, Floats, int],
+        rows: tuple[Floats, Floats, Floats],
         path: Path,
         radius: float,
         start: float,
         top: int,
         inner: Inner | None,
-        fine: float,
     ) -> Around:
         """Rows against the path from the place of the first up to a vertex.
 
-        They are vertices (k, 3h), the bends (k - 1,) of their steps, and the number of the first for `Inner`. Bent
-        steps and segments are divided as `fine` as the radius wants it.
+        They are vertices (k, 3h), the bends (k - 1,) of their steps, and their numbers (k,) for `Inner`. Bent steps and
+        segments are divided, but no steps that are looked back on: of these nothing is known but their ends.
         """
-        own, bend, first = rows
+        own, bend, number = rows
         base = min(int(start), top - 1)
-        cl_side = parts_of(path.bend[base:top], fine * radius, _MOST_PARTS)
-        nc_side = parts_of(np.zeros(len(bend)) if inner is None else bend, fine * radius, _MOST_PARTS)
+        cl_side = parts_of(path.bend[base:top], FINE * radius, _MOST_PARTS)
+        known = np.zeros(len(bend)) if inner is None else np.where(number[:-1] < 0.0, 0.0, bend)
+        nc_side = parts_of(known, FINE * radius, _MOST_PARTS)
         at, places = np.append(0, np.cumsum(nc_side)), _divided(np.arange(base, top + 1), cl_side)
         points = np.empty((own.shape[1], at[-1] + 1))
         points[:, at] = own.T
         between = np.setdiff1d(np.arange(at[-1] + 1), at, assume_unique=True)
         if inner is not None and len(between):
-            points[:, between] = inner(_divided(np.arange(first, first + len(own)), nc_side)[between]).T
+            points[:, between] = inner(_divided(number, nc_side)[between]).T
         bends = np.repeat(bend / nc_side**2, nc_side), np.repeat(path.bend[base:top] / cl_side**2, cl_side)
         return cls(FreeSpace(points, path.at(places).T, radius, *bends), at, places, start)
 

@@ -16,10 +16,10 @@ from typing import Final
 
 import numpy as np
 
-from cornersmooth.model import Floats
+from cornersmooth.model import Floats, Ints
 from cornersmooth.verify.chain import Path, Sections, chain, points_at
 from cornersmooth.verify.free_space import FINE, Around, Inner, free_interval, lowest
-from cornersmooth.verify.motions import largest_square
+from cornersmooth.verify.motions import UNBOUND, largest_square
 
 #: rows before one that is not proved from which on it is worked out exactly, one after the other; farther back nothing
 #: is looked at, and the answer is NOT VERIFIED
@@ -30,6 +30,9 @@ _SOON: Final = 64
 
 #: radii of path length around a break where it is looked for what is off, and where to go on (which faults are named)
 AROUND: Final = 200.0
+
+#: parts that a bent step is divided into where it is not proved, as often as its bend is not fine
+PARTS: Final = 8
 
 #: how many times longer than some rows the path beside them may be; where it is longer, the answer may be NOT VERIFIED
 LONGER: Final = 4.0
@@ -72,16 +75,24 @@ class Passage:
     ) -> None:
         self.path, self.radius, self._inner = path, radius, inner
         self.breaks: list[Break] = []  #: where the motions part; nothing is looked at after `most`
+        # vertices, bends of the steps from them, their places, and their numbers, with fractions of those put between
         self._own, self._bend = own, bend
-        #: (n,) a place on the path, segment plus fraction, for every vertex, ascending: the motions can be run beside
-        #: each other through all of them. NaN where there is none, from a break on
-        self.place = np.full(len(own), np.nan)
-        # the first vertices are those that are not decided, and begin at these places
-        self._sections = replace(sections, first=sections.first.copy(), start=sections.start.copy())
+        self._place, self._number = np.full(len(own), np.nan), np.arange(len(own), dtype=np.float64)
+        # sections: the first vertices that are not decided, and the last ones; places where they begin and end
+        self._first, self._last = sections.first.copy(), sections.last.copy()
+        self._begin, self._stop, self._guessed = sections.start.copy(), sections.stop, sections.guessed
         self._left = 0.0  # last place that was reached before a break
         section = 0
-        while section < len(self._sections.first) and len(self.breaks) < most:
+        while section < len(self._first) and len(self.breaks) < most:
             section = self._go_on(section)
+
+    @property
+    def place(self) -> Floats:
+        """(n,) a place on the path, segment plus fraction, for every vertex, ascending.
+
+        The two motions can be run beside each other through all of them. NaN where there is none, from a break on.
+        """
+        return self._place[self._number == np.floor(self._number)]
 
     def _meets(self, row: int, place: float) -> bool:
         """Whether a vertex is near a place of the path."""
@@ -90,45 +101,106 @@ class Passage:
 
     def _go_on(self, section: int) -> int:
         """Find places for vertices from the first of a section on, or a break; return the section to go on with."""
-        row, begin = int(self._sections.first[section]), float(self._sections.start[section])
-        if np.isnan(self.place[row]) and not self._meets(row, begin):
-            return self._break(section, Break(row, begin, not self._sections.guessed[section]))
-        sections = self._sections.behind(section, row, begin)
-        own = np.ascontiguousarray(self._own[row:].T)
-        place, unproved = chain(own, self._bend[row:], self.path, self.radius, sections)
-        self.place[row:] = np.where(unproved | ~sections.of(np.arange(len(place)))[1], np.nan, place)
-        bad = row + np.flatnonzero(unproved)
+        row, begin = int(self._first[section]), float(self._begin[section])
+        if np.isnan(self._place[row]) and not self._meets(row, begin):
+            return self._break(section, Break(row, begin, not self._guessed[section]))
+        bad = self._prove(section, row, begin)
         while len(bad):
-            one = int(np.searchsorted(self._sections.first, bad[0], side="right")) - 1
+            one = int(np.searchsorted(self._first, bad[0], side="right")) - 1
             gaps = np.flatnonzero(np.diff(bad) > LOOK_BACK[0])
-            last = min(int(bad[gaps[0] if len(gaps) else -1]), int(bad[0]) + _SOON, int(self._sections.last[one]))
+            last = min(int(bad[gaps[0] if len(gaps) else -1]), int(bad[0]) + _SOON, int(self._last[one]))
             found = self._repair(one, int(bad[0]), last)
             if isinstance(found, Break):
                 return self._break(one, found)
             bad = bad[bad > found]
-        return len(self._sections.first)
+        return len(self._first)
+
+    def _prove(self, section: int, row: int, begin: float) -> Ints:
+        """Find places for vertices from one on by the chain; return those that it does not prove.
+
+        Bent steps are divided as long as they are what is in the way.
+        """
+        sections = self._sections().behind(section, row, begin)
+        found = chain(np.ascontiguousarray(self._own[row:].T), self._bend[row:], self.path, self.radius, sections)
+        _, inside = sections.of(np.arange(len(found.place)))
+        self._place[row:] = np.where(found.bad | ~inside, np.nan, found.place)
+        # whether more is wrong need not be known so well
+        bent = np.flatnonzero(found.bad & ~found.far & (not self.breaks)) + row
+        while len(bent) and self._inner is not None and self._divide(bent, self._inner):
+            bent = self._prove_again(row)
+        return self._missing(row)[0]
+
+    def _sections(self) -> Sections:
+        return Sections(self._first, self._last, self._begin, self._stop, self._guessed)
+
+    def _missing(self, row: int) -> tuple[Ints, Ints]:
+        """Vertices from one on that have no place, and their sections."""
+        rows = row + np.flatnonzero(np.isnan(self._place[row:]))
+        number, inside = self._sections().of(rows)
+        return rows[inside], number[inside]
+
+    def _prove_again(self, row: int) -> Ints:
+        """Find places by the chain for vertices that have none, from one on; return those where bends are in the way.
+
+        Each run of them is a section, between the two vertices around it.
+        """
+        rows, number = self._missing(row)
+        new = np.append(True, (np.diff(rows) > 1) | (np.diff(number) > 0))
+        first, number = rows[new] - 1, number[new]
+        last = np.minimum(rows[np.append(new[1:], True)] + 1, self._last[number])
+        known = (first >= self._first[number]) & ~np.isnan(self._place[np.maximum(first, 0)])
+        first, last, number = first[known], last[known], number[known]
+        if not len(first):
+            return first
+        stop = np.where(np.isnan(self._place[last]), self._stop[number], self._place[last])
+        size = last - first + 1
+        ends = np.cumsum(size)
+        at = np.repeat(first - ends + size, size) + np.arange(ends[-1])
+        sections = Sections(ends - size, ends - 1, self._place[first], stop, self._guessed[number])
+        bend = self._bend[np.minimum(at[:-1], len(self._bend) - 1)]
+        found = chain(np.ascontiguousarray(self._own[at].T), bend, self.path, self.radius, sections)
+        inner = np.ones(len(at), np.bool_)
+        inner[ends - size] = False
+        self._place[at[inner]] = np.where(found.bad, np.nan, found.place)[inner]
+        return at[found.bad & ~found.far & inner]
+
+    def _divide(self, bad: Ints, inner: Inner) -> bool:
+        """Put points into the bent steps to some vertices and from them; say whether there were any."""
+        steps = np.unique(np.concatenate((bad - 1, bad)))
+        steps = steps[steps < len(self._own) - 1]
+        steps = steps[(self._bend[steps] > FINE * self.radius) & (self._bend[steps] < UNBOUND)]
+        if not len(steps):
+            return False
+        share = np.arange(1, PARTS) / PARTS
+        begin, end = self._number[steps], self._number[steps + 1]
+        number = (begin[:, None] + share * (end - begin)[:, None]).ravel()
+        at = np.repeat(steps + 1, PARTS - 1)
+        self._own = np.insert(self._own, at, inner(number), axis=0)
+        self._number, self._place = np.insert(self._number, at, number), np.insert(self._place, at, np.nan)
+        for rows in (self._first, self._last):
+            rows += (PARTS - 1) * np.searchsorted(steps, rows)
+        bend = self._bend.copy()
+        bend[steps] /= PARTS**2
+        self._bend = np.insert(bend, at, bend[np.repeat(steps, PARTS - 1)])
+        return True
 
     def _repair(self, section: int, first: int, last: int) -> int | Break:
         """Work out exactly how to come past some vertices; return one after them that has a place."""
-        known, end, stop = (
-            int(self._sections.first[section]),
-            int(self._sections.last[section]),
-            float(self._sections.stop[section]),
-        )
-        sure = not self._sections.guessed[section]
+        known, end, stop = int(self._first[section]), int(self._last[section]), float(self._stop[section])
+        sure = not self._guessed[section]
         if first == known:
-            return Break(first, float(self._sections.start[section]), sure)
-        found = Break(first, float(self.place[first - 1]), False)
+            return Break(first, float(self._begin[section]), sure)
+        found = Break(first, float(self._place[first - 1]), False)
         for back in LOOK_BACK[: 2 if self.breaks else None]:
             begin = max(first - back, known)
             until = end if back > _SOON else min(last + _SOON, end)
             rows, steps = slice(begin, until + 1), slice(begin, until)
-            own, top = (self._own[rows], self._bend[steps], begin), self._within_reach(begin, until, stop)
-            for fine in FINE:
-                around = Around.of(own, self.path, self.radius, float(self.place[begin]), top, self._inner, fine)
-                goal = around.goal(self.place[rows], last - begin, math.nan if until < end else stop)
-                if goal is not None:
-                    return self._settle(begin, around, goal)
+            own = self._own[rows], self._bend[steps], self._number[rows]
+            top = self._within_reach(begin, until, stop)
+            around = Around.of(own, self.path, self.radius, float(self._place[begin]), top, self._inner)
+            goal = around.goal(self._place[rows], last - begin, math.nan if until < end else stop)
+            if goal is not None:
+                return self._settle(begin, around, goal)
             if not around.reached[0] and begin > known:  # what bends take off leaves nothing of that place
                 continue
             if around.reached[-1] and until < end:
@@ -143,7 +215,7 @@ class Passage:
 
     def _is_near(self, row: int, known: int, top: int) -> bool:
         """Whether a vertex may be near a place up to a vertex of the path, and not before that of an earlier one."""
-        bottom = min(int(self.place[known]), top - 1)
+        bottom = min(int(self._place[known]), top - 1)
         start = self.path.points[bottom:top].T
         way = self.path.points[bottom + 1 : top + 1].T - start
         low, high = free_interval(self._own[row][:, None], start, way, np.asarray(self.radius))
@@ -154,7 +226,7 @@ class Passage:
         path = self.path
         step = np.diff(self._own[begin : until + 1], axis=0)
         gone = float(np.sqrt(np.einsum("ij,ij->i", step, step)).sum())
-        length = path.length_at(float(self.place[begin])) + LONGER * gone + AROUND * self.radius
+        length = path.length_at(float(self._place[begin])) + LONGER * gone + AROUND * self.radius
         return min(int(np.searchsorted(path.length, length)) + 1, max(math.ceil(stop), 1))
 
     def _settle(self, begin: int, around: Around, goal: float) -> int:
@@ -162,15 +234,15 @@ class Passage:
         between = around.space.between(around.reached, around.inward(goal))
         count = int(np.searchsorted(around.at, len(between)))
         end = begin + count - 1
-        self.place[begin : end + 1] = [around.outward(lowest(between[k])) for k in around.at[:count].tolist()]
-        self.place[end] = goal
+        self._place[begin : end + 1] = [around.outward(lowest(between[k])) for k in around.at[:count].tolist()]
+        self._place[end] = goal
         return end
 
     def _break(self, section: int, found: Break) -> int:
         """Take down a break, and find where to go on: the section that it is in, or the next."""
-        self.breaks.append(found)
+        self.breaks.append(replace(found, row=int(np.ceil(self._number[found.row]))))
         self._left = found.place
-        self.place[found.row :] = np.nan
+        self._place[found.row :] = np.nan
         return self._resume(section, found.row)
 
     def _resume(self, section: int, row: int) -> int:
@@ -178,8 +250,8 @@ class Passage:
 
         It gets a place: the nearest to where the path was left.
         """
-        path, end, left = self.path, int(self._sections.last[section]), self.path.length_at(self._left)
-        bottom, top = int(self._sections.start[section]), math.ceil(self._sections.stop[section])
+        path, end, left = self.path, int(self._last[section]), self.path.length_at(self._left)
+        bottom, top = int(self._begin[section]), math.ceil(self._stop[section])
         tried = row + np.unique(np.geomspace(1, max(end - row, 1), _TRIED).astype(np.int64)) - 1
         for width, rows in ((AROUND, tried), (AROUND * AROUND, tried[::6])):
             low, high = np.searchsorted(path.length, (left - width * self.radius, left + width * self.radius)).tolist()
@@ -194,8 +266,8 @@ class Passage:
                 free = np.flatnonzero(at <= other)
                 if len(free):
                     place = segments.start + free + np.clip(self._left - segments.start - free, at[free], other[free])
-                    self._sections.first[section] = k
-                    self._sections.start[section] = self.place[k] = place[np.argmin(np.abs(place - self._left))]
+                    self._first[section] = k
+                    self._begin[section] = self._place[k] = place[np.argmin(np.abs(place - self._left))]
                     return section
-        self.place[end] = np.nan
+        self._place[end] = np.nan
         return section + 1
