@@ -19,6 +19,8 @@ from cornersmooth.model import Floats
 from cornersmooth.nc import choose_form
 from cornersmooth.pipeline import postprocess, read_back
 from cornersmooth.settings import Settings
+from cornersmooth.smoothing import smooth
+from cornersmooth.smoothing.construction import construction_of
 
 SAMPLES = Path(__file__).parents[2] / "samples"
 CORPUS = os.environ.get("CORNERSMOOTH_CORPUS", "")
@@ -67,3 +69,10 @@ def test_curves_join_with_no_kink_that_counts(file: Path) -> None:
     assert len(turn) > 3
     assert turn.max() < LARGEST
     assert not len(length) or length.min() > 0.005  # 50 steps of the digits
+
+
+@pytest.mark.parametrize("method", ["proportional", "zhang2016"])
+def test_no_corner_has_no_points(method: str) -> None:
+    smoothed = smooth(read(SAMPLES / "paper_table1.csv", units="mm"), Settings(method=method, tolerance=0.05))
+    tips, levers = construction_of(method).points(smoothed, np.zeros(0, np.int64), np.array([0.5, 1.0]))
+    assert tips.shape == levers.shape == (0, 3, 3)

@@ -185,7 +185,7 @@ class Proportional(Construction):
             legs[0, k] = here = values.take(pose, axis=0)
             np.multiply(here - values.take(before, axis=0), trim_in, out=legs[1, k])
             np.multiply(values.take(after, axis=0) - here, trim_out, out=legs[2, k])
-        tips, levers = (shares @ legs.reshape(3, -1)).reshape(-1, *legs.shape[1:]).transpose(1, 2, 0, 3)
+        tips, levers = (shares @ legs.reshape(3, -1)).reshape(len(shares), *legs.shape[1:]).transpose(1, 2, 0, 3)
         return tips, levers
 
     def divide(self, smoothed: SmoothProgram, segments: Segments, pose: Ints, number: int) -> tuple[Floats, Floats]:
