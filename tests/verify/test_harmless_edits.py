@@ -279,6 +279,7 @@ def test_an_arc_without_words_is_refused(control: str, tmp_path: Path) -> None:
         assert judged(tmp_path, control, (r"^(G1 .*X20\..*)$", rf"\1\n{code}\nG1")).startswith("FAILED")
 
 
+DWELL = CL.replace("GOTO/20,20,-3\n", "GOTO/20,20,-3\nDELAY/1\nGOTO/0,20,-3\n")
 TILTED = CL.replace("20,20,-3", "20,20,-3,0.0995037,0,0.9950372")
 RIGID = """LOAD/TOOL,9,ADJUST,9
 SPINDL/RPM,500,CLW
@@ -366,3 +367,11 @@ def test_a_cutting_edge_comes_after_the_retract_without_one(tmp_path: Path) -> N
     others, how = (r"^; PARTS=.*\n", ""), ("--control", "siemens", "--cycles", "native")
     assert edited(tmp_path, RIGID, how, others).startswith("PASSED")
     assert edited(tmp_path, RIGID, how, others, (r"^D1\n", "")).startswith("FAILED")
+
+
+@pytest.mark.parametrize("control", ["fanuc", "mitsubishi", "generic"])
+def test_a_curve_ends_before_other_words(control: str, tmp_path: Path) -> None:
+    """G06.2 is modal, and no other words may stand in it (B-63324EN 4.17)."""
+    how = ("--control", control, "-f", "g6.2")
+    assert edited(tmp_path, DWELL, how).startswith("PASSED")
+    assert edited(tmp_path, DWELL, how, (r"^G1\n(?=G4)", "")).startswith("FAILED")

@@ -13,7 +13,7 @@ import numpy as np
 
 from cornersmooth.control.source import Readable, read_lines
 from cornersmooth.control.state import State
-from cornersmooth.control.words import Line, Table, joined_tables, table_of
+from cornersmooth.control.words import MOTION_CODES, NURBS, Line, Table, joined_tables, table_of
 from cornersmooth.errors import InputError
 from cornersmooth.model import MM_PER_UNIT, Floats, Units
 from cornersmooth.nc_reader.acts import ASIDE, NOT_ABOVE, Act, Beside, Move, Running, Tilt, TiltedPlane, ToMachine
@@ -125,6 +125,10 @@ class Reader:
         """Take a line that is not part of a run."""
         self.blocks += 1
         self._flush()
+        if self.state.modal.code == NURBS and not any(
+            word[:1] == ("G",) and word.value in MOTION_CODES for word in line.words
+        ):
+            self._wrong("CS511", line, "words after a curve, which takes control points alone until G1 or G0 ends it")
         units, elements = self.units, self.elements
         self._take(line)
         try:
