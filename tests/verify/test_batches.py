@@ -20,7 +20,7 @@ from cornersmooth.nc import Frame, choose_form, fit_settings, write
 from cornersmooth.nc_reader import reader
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
-from cornersmooth.verify import Verifier, Where, batches, verifier, verify
+from cornersmooth.verify import Verifier, Where, stretches, verifier, verify
 from oracle.share import share
 
 from .writing import unit, wavy
@@ -43,7 +43,7 @@ def used(monkeypatch):
         found.append(count)
 
     monkeypatch.setattr(verifier, "map_in_processes", noted)
-    monkeypatch.setattr(batches, "BATCH", 150)
+    monkeypatch.setattr(stretches, "BATCH", 150)
     monkeypatch.setattr(reader, "GIVEN_OUT", 170)
     monkeypatch.setattr(verifier, "_LONG", 0)
     return found
@@ -88,7 +88,7 @@ def check(program, text, used, processes=1, batches_used=True, everywhere=True, 
     if processes == 1:  # else it is noted in another process
         assert used[-1] > 2 or not batches_used
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(batches, "BATCH", 1 << 16)
+        patch.setattr(stretches, "BATCH", 1 << 16)
         patch.setattr(reader, "GIVEN_OUT", 1 << 15)
         expected = verify(program, text, tolerance=TOLERANCE, **reading)
         assert used[-1] == 1
@@ -241,7 +241,7 @@ def test_a_wrong_guess_lets_nothing_pass(used, monkeypatch, processes):
     assert right.passed
 
     for off in share((7.5, 0.0), 2) if processes != 1 else (7.5, 0.0):
-        monkeypatch.setattr(batches.Stretches, "_guess", lambda *given, off=off: np.minimum(given[2] + off, given[3]))
+        monkeypatch.setattr(stretches.Stretches, "_guess", lambda *given, off=off: np.minimum(given[2] + off, given[3]))
         assert verify(program, text, tolerance=TOLERANCE, processes=processes).verdict in ("FAILED", "NOT VERIFIED")
     for number in share((30, 1, 39), 3) if processes != 1 else (30, 1, 39):
         spoilt = text.replace(b"G1 X", b"G1 X9", number + 1).replace(b"G1 X9", b"G1 X", number)

@@ -18,7 +18,7 @@ from cornersmooth.nc_reader import read_nc
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from cornersmooth.system import processes as crews
-from cornersmooth.verify import batches, verifier, verify
+from cornersmooth.verify import stretches, verifier, verify
 
 from .writing import wavy
 
@@ -125,7 +125,7 @@ def test_nobody_is_left_behind():
 
 
 def test_verification_is_the_same(monkeypatch):
-    monkeypatch.setattr(batches, "BATCH", 700)
+    monkeypatch.setattr(stretches, "BATCH", 700)
     monkeypatch.setattr(verifier, "_LONG", 0)
     tip, axis = wavy(1500)
     kind = np.where(np.arange(1500) % 60, Move.LINEAR, Move.RAPID).astype(np.uint8)

@@ -9,7 +9,7 @@ from cornersmooth.control import source
 from cornersmooth.model import Move, Program, Source, Statement
 from cornersmooth.nc_reader import reader
 from cornersmooth.nc_reader.elements import Ahead
-from cornersmooth.verify import batches, parse, verify
+from cornersmooth.verify import parse, stretches, verify
 
 from .writing import HEAD, TAIL, encode
 
@@ -230,7 +230,7 @@ def test_path_before_holes_is_measured_as_it_is_read(monkeypatch):
     monkeypatch.setattr(reader, "GIVEN_OUT", 4)
     monkeypatch.setattr(source, "CHUNK", 60)
     monkeypatch.setattr(parse, "TOGETHER", 4)
-    monkeypatch.setattr(batches, "BATCH", 40)
+    monkeypatch.setattr(stretches, "BATCH", 40)
     held = []
     part = Ahead.part
     monkeypatch.setattr(Ahead, "part", lambda ahead, *rows: (held.append(len(ahead.nc)), part(ahead, *rows))[1])

@@ -199,13 +199,13 @@ def test_arc_against_arc_and_against_chords(as_arc):
 
 @pytest.mark.parametrize(("size", "form"), covering_share(product([70, 300], ["g1", "g6.2"]), 3))
 def test_one_long_chain_that_is_cut_is_the_same_as_whole(form, size, monkeypatch):
-    from cornersmooth.verify import batches
+    from cornersmooth.verify import stretches
 
     tip, axis = corners(200, seed=4)
     program = Program.from_poses(tip, axis, feed=250.0)
     nc = read_nc(simple_text(tip, axis, 0.02, 10.0, form))
     whole = verify(program, nc, tolerance=0.02)
-    monkeypatch.setattr(batches, "BATCH", size)
+    monkeypatch.setattr(stretches, "BATCH", size)
     cut = verify(program, nc, tolerance=0.02)
     assert whole.problems == cut.problems == ()
     assert cut.max_tip_deviation_mm == pytest.approx(whole.max_tip_deviation_mm, abs=1e-12)

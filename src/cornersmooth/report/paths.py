@@ -14,10 +14,10 @@ from cornersmooth.geometry.arcs import poses_and_arcs
 from cornersmooth.model import Bools, Floats, Ints, Move, Program
 from cornersmooth.nc_reader.elements import Element, NcProgram
 from cornersmooth.nc_reader.tool import written_at
+from cornersmooth.verify.batches import Batches
 from cornersmooth.verify.deviation import Gap, of_original, together
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.motions import nearest_places
-from cornersmooth.verify.parse import Batches
 from cornersmooth.verify.task import Task
 
 #: segments on either side in which the common pose is looked for

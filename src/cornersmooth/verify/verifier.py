@@ -30,12 +30,12 @@ from cornersmooth.statements import spellings, work_offset_of
 from cornersmooth.statements.asked import not_understood_text
 from cornersmooth.statements.comparison import KINDS
 from cornersmooth.system.processes import Helper, can_fork, map_in_processes
+from cornersmooth.verify.batches import Batches
 from cornersmooth.verify.compensated import Compensated
 from cornersmooth.verify.continuity import measure_continuity
 from cornersmooth.verify.deviation import check_breaks, measure_original, measure_written
 from cornersmooth.verify.feeds import check_feeds
 from cornersmooth.verify.match import Batch, Match
-from cornersmooth.verify.parse import Batches
 from cornersmooth.verify.passage import MOST_BREAKS
 from cornersmooth.verify.result import Findings, Verification, Where, problems_of
 from cornersmooth.verify.task import HELICES, TRUST, Task, Trust, half_turns, length_of

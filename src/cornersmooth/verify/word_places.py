@@ -19,7 +19,7 @@ from cornersmooth.nc_reader.elements import Event, Problem
 from cornersmooth.statements.asked import asked
 from cornersmooth.statements.comparison import Comparison, changed_unseen, without_word
 from cornersmooth.statements.tokens import Token, said
-from cornersmooth.verify.parse import Batches
+from cornersmooth.verify.batches import Batches
 from cornersmooth.verify.result import Findings
 
 
