@@ -235,3 +235,22 @@ def test_a_tilted_tool_of_a_program_with_our_head_comes_in_one_block(case: Case)
     down = next(k for k, line in enumerate(lines) if has(line, "X") and has(line, "Z"))
     aside = [*lines[:down], without(lines[down], "Z"), *lines[down:]]
     assert _NOT_LISTED in wrong(TILTED, case, aside, head=_OURS)
+
+
+@pytest.mark.parametrize(
+    ("retract", "back"),
+    [
+        ("G91 G28 Z0.\nG49\nG90\n", "G0 X10. Y0.\nG43 Z-3. H1\n"),
+        ("G91 G28 Z0.\nG49\nG90\n", "G0 X10. Y0.\nG43 Z2. H1\nZ-3.\n"),
+        ("G91 G28 Z0.\nG49\nG90\n", "G0 X10. Y0.\nG43 Z2. H1\nG1 Z-3. F300.\n"),
+    ],
+)
+def test_a_cut_that_a_retract_leaves_alone_is_no_program_of_the_file(retract: str, back: str) -> None:
+    """A program of another post: the retract has its whole way back, and the CL file has none of it."""
+    cl = b"LOAD/TOOL,1\nSPINDL/RPM,3000,CLW\nRAPID\nGOTO/0,0,50,0,0,1\nRAPID\nGOTO/0,0,2\nFEDRAT/MMPM,300\n"
+    cl += b"GOTO/0,0,-3\nGOTO/10,0,-3\nGOTO/20,0,-3\nRAPID\nGOTO/20,0,50\nFINI\n"
+    head = "%\nO1\nG21 G17 G40 G49 G80 G90 G94\nG91 G28 Z0.\nG90\nT1 M6\nG54\nS3000 M3\nG0 X0. Y0.\nG43 Z50. H1\nZ2.\n"
+    cut, end = "G1 Z-3. F300.\nX10.\n{}G1 X20.\nG0 Z50.\n", "M5\nG91 G28 Z0.\nG49\nM30\n%\n"
+    right, wrong = (head + cut.format(more) + end for more in ("", retract + back))
+    assert verify(read(cl), right.encode(), tolerance=0.01).passed
+    assert not verify(read(cl), wrong.encode(), tolerance=0.01).passed

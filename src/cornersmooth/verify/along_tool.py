@@ -103,6 +103,11 @@ class AlongTool:
         self._left = -1
         return element - 1
 
+    def leave_cut(self, element: int) -> None:
+        """Take down that a cut is left where a retract comes before an element, if no rapid leads out of it."""
+        if not self._is(Element.RAPID, element - 1):
+            self._left, self._lift = element, 0.0
+
     def check_return(self, element: int, lines: HoleLines) -> None:
         """Complain of an element that goes on with a cut, but if the CL file has a pose where that was left: CS582."""
         rapid = self._is(Element.RAPID, element)

@@ -85,6 +85,7 @@ class Parse:
             if self._begun < 0 or (hole and not self._fed[stop]):  # no feed move may follow
                 return stop, self._pass_idle(stop, element)
             if along.next_retract(element) == element:
+                along.leave_cut(element)
                 behind = self._pass_idle(stop, element)
                 if behind == element and not lines.feeds(element) and lines.stands(element):
                     break
