@@ -67,7 +67,6 @@ COMMANDS = (
     Command("controls"),
     Command("machines table-ac"),
     Command("explain CS404"),
-    Command("completion bash"),
     Command("info part.cls", output="at 0.02 mm"),
     Command("config part.cls --json", same=False),
     Command("smooth part.cls -o part.nc"),
