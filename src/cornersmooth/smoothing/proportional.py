@@ -180,13 +180,12 @@ class Proportional(Construction):
         shares = nurbs.leg_coefficients(np.concatenate(([0.0], u)), np.array(settings.weights))
         pose, before, after = corners.pose[rows], corners.before[rows], corners.after[rows]
         trim_in, trim_out = corners.trim_in[rows, None], corners.trim_out[rows, None]
-        legs = np.empty((3, 2, len(rows), 3))
-        for k, values in enumerate((smoothed.program.tip, smoothed.program.axis)):
-            legs[0, k] = here = values.take(pose, axis=0)
-            np.multiply(here - values.take(before, axis=0), trim_in, out=legs[1, k])
-            np.multiply(values.take(after, axis=0) - here, trim_out, out=legs[2, k])
-        tips, levers = (shares @ legs.reshape(3, -1)).reshape(len(shares), *legs.shape[1:]).transpose(1, 2, 0, 3)
-        return tips, levers
+        legs = np.empty((2, len(rows), 3, 3))
+        for own, values in zip(legs, (smoothed.program.tip, smoothed.program.axis), strict=True):
+            own[:, 0] = here = values.take(pose, axis=0)
+            np.multiply(here - values.take(before, axis=0), trim_in, out=own[:, 1])
+            np.multiply(values.take(after, axis=0) - here, trim_out, out=own[:, 2])
+        return shares @ legs[0], shares @ legs[1]
 
     def divide(self, smoothed: SmoothProgram, segments: Segments, pose: Ints, number: int) -> tuple[Floats, Floats]:
         """Equal angles of the ruled motion: tan φ is linear in the fraction, φ the angle from the middle."""
