@@ -32,9 +32,7 @@ _WEAK_FEED: Final = re.compile(rb"(?i)F[ \t]*\d+(?![\d.])")
 
 #: what sends a control to other lines of the program; numbers of lines beside it, and a jump to a line that the
 #: program works out
-_JUMPS: Final = re.compile(
-    rb"(?i)[^\n]*(?:GOTO[BFCS]?|M[ \t]*0*(?:9[6-9]|198)(?!\d)|G[ \t]*0*6[56]|THEN|REPEATB?|CALL|UNTIL)[^\n]*"
-)
+_JUMPS: Final = re.compile(rb"(?i)GOTO[BFCS]?|M[ \t]*0*(?:9[6-9]|198)(?!\d)|G[ \t]*0*6[56]|THEN|REPEATB?|CALL|UNTIL")
 _TARGET: Final = re.compile(rb"(?i)(?:GOTO[BFCS]?|REPEATB?|LBL|(?<![A-Z])[HNPQ])\s*(\d{1,9})")
 _COMPUTED: Final = re.compile(
     rb"(?i)GOTO[BFCS]?\s*[^\d\s]|M[ \t]*0*9[6-9][^\n]*[HPQ]\s*[#\[]|[HPQ]\s*[#\[][^\n]*M[ \t]*0*9[6-9]"
@@ -163,7 +161,7 @@ class Stream:
 
 def _targets(text: Text, others: Sequence[bytes]) -> set[int]:
     """Lines to which the program may jump: those of all numbers beside jumps in some lines."""
-    jumps = [match[0] for match in map(_JUMPS.search, others) if match]
+    jumps = [line for line in others if _JUMPS.search(line)]
     if not jumps:
         return set()
     numbers = {int(word) for jump in jumps for word in _TARGET.findall(jump)}

@@ -17,9 +17,9 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.nc_reader.elements import Ahead, Element, Event, Problem
-from cornersmooth.nc_reader.tool import directions, leads_somewhere
+from cornersmooth.nc_reader.tool import directions
 from cornersmooth.verify.acts import Acts
-from cornersmooth.verify.holes import HoleLines, straight
+from cornersmooth.verify.holes import HoleLines, leads_nowhere
 
 #: how far, mm and rad, a way along the tool may be off it: printed digits
 _ASIDE, _TURN = 1e-3, 1e-3
@@ -72,14 +72,12 @@ class AlongTool:
         if place == element:
             return False
         ahead.put(element, place)
-        nc, rows = (
-            ahead.nc,
-            np.arange(max(element, 1), element + 1 + more) - ahead.base,
-        )  # what leads nowhere is another now
+        # what leads nowhere is another now
+        nc, rows = ahead.nc, np.arange(max(element, 1), element + 1 + more) - ahead.base
         ways = (values[rows] - values[rows - 1] for values in (nc.tip, nc.second))
-        moves = ~straight(nc.kind[rows]) | leads_somewhere(nc, *ways)
-        self._acts.still.difference_update((rows[moves] + ahead.base).tolist())
-        self._acts.still.update((rows[~moves] + ahead.base).tolist())
+        idle = leads_nowhere(nc, rows, *ways)
+        self._acts.still.difference_update((rows[~idle] + ahead.base).tolist())
+        self._acts.still.update((rows[idle] + ahead.base).tolist())
         return True
 
     def _left_at(self, element: int) -> int:

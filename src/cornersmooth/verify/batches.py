@@ -7,9 +7,8 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from cornersmooth.nc_reader.elements import Ahead, Elements, Event, Problem
-from cornersmooth.nc_reader.tool import leads_somewhere
 from cornersmooth.verify.acts import Acts
-from cornersmooth.verify.holes import straight
+from cornersmooth.verify.holes import leads_nowhere
 from cornersmooth.verify.match import Batch
 from cornersmooth.verify.parse import Parse
 from cornersmooth.verify.task import Task
@@ -47,12 +46,12 @@ class Batches:
         self.elements = ahead.count
 
     def _standing(self, chunks: Iterable[Elements]) -> Iterator[Elements]:
-        """Give out elements, and take down which lead nowhere: a full circle ends where it begins, and does."""
+        """Give out elements, and take down which lead nowhere."""
         offset, ends = 0, [np.full((1, 3), np.inf)] * 2
         for nc in chunks:
             ways = [np.diff(one, axis=0, prepend=before) for one, before in zip((nc.tip, nc.second), ends, strict=True)]
             rows = np.flatnonzero(np.abs(ways[0][:, 0]) <= 2.0 * nc.tip_step)  # most do not, by X alone
-            rows = rows[straight(nc.kind[rows]) & ~leads_somewhere(nc, ways[0][rows], ways[1][rows])]
+            rows = rows[leads_nowhere(nc, rows, ways[0][rows], ways[1][rows])]
             self.acts.still.update((offset + rows).tolist())
             offset, ends = offset + len(nc), [nc.tip[-1:], nc.second[-1:]]
             yield nc

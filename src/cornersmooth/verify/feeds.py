@@ -14,6 +14,7 @@ import numpy as np
 
 from cornersmooth.model import Bools, FeedMode, Floats, Ints
 from cornersmooth.nc_reader.elements import Element, Elements, Problem
+from cornersmooth.nc_reader.tool import cross
 from cornersmooth.verify.free_space import free_interval
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.motions import ARITHMETIC, COLUMNS, on_segments
@@ -75,7 +76,7 @@ def _along_helices(nc: Elements) -> Elements:
     """The same elements with feeds along steep arcs as they are where F counts in the plane of the circle alone."""
     arcs = nc.arcs
     way = nc.tip[arcs.element] - nc.tip[np.maximum(arcs.element - 1, 0)]
-    radius = np.linalg.norm(np.cross(arcs.normal, nc.tip[arcs.element] - arcs.centre), axis=1)
+    radius = np.linalg.norm(cross(arcs.normal, nc.tip[arcs.element] - arcs.centre), axis=1)
     flat, faster = radius * arcs.sweep, np.ones(len(nc))
     share = np.hypot(flat, np.einsum("ij,ij->i", way, arcs.normal)) / np.where(flat > 0.0, flat, np.inf)
     faster[arcs.element] = np.maximum(share, 1.0)

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cornersmooth.model import Bools, Floats, Ints, Move
-from cornersmooth.nc_reader.elements import Ahead, Element, Problem
-from cornersmooth.nc_reader.tool import beyond_digits, directions
+from cornersmooth.nc_reader.elements import Ahead, Element, Elements, Problem
+from cornersmooth.nc_reader.tool import beyond_digits, directions, leads_somewhere
 from cornersmooth.statements.cycles import Drilling
 from cornersmooth.verify.motions import ARITHMETIC, COLUMNS, digit_errors, on_segments
 from cornersmooth.verify.task import Task, selecting
@@ -85,7 +85,7 @@ class HoleLines:
         # what the printed angles of a tilted plane leave open
         lean = np.where(nc.tip_room[own] > 0.0, nc.second_room[own], 0.0)
         over = self._above(moves, nc.tip[own], directions(nc, nc.tip[own], nc.second[own]), lean)
-        return np.where(straight(nc.kind[own]), over, np.nan)
+        return np.where(_straight(nc.kind[own]), over, np.nan)
 
     def _above(self, moves: Ints, tip: Floats, axis: Floats, lean: Floats | float = 0.0) -> Floats:
         """(k,) mm above the poses of holes at tips (k, 3); NaN beside a hole or with another axis."""
@@ -156,7 +156,7 @@ class HoleLines:
         way = nc.tip[[max(own[0] - 1, 0), *own]]
         chord = np.zeros((len(own) - 1, 1), np.int64)
         _, beside = on_segments(way[1:-1, None], way[[0, -1]], chord, COLUMNS["tip"])
-        return bool(straight(nc.kind[own]).all() and (beside <= self.tolerance**2).all())
+        return bool(_straight(nc.kind[own]).all() and (beside <= self.tolerance**2).all())
 
     def in_line(self, move: int, other: int) -> bool:
         """Whether the pose of another move is in the line of a hole, as far as the digits show."""
@@ -362,6 +362,11 @@ def _gap(cycle: Drilling) -> float:
     return min(_ABOVE * min(cycle.steps, default=0.0), _LEAST_ABOVE)
 
 
-def straight(kind: NDArray[np.uint8]) -> Bools:
+def leads_nowhere(nc: Elements, rows: Ints, way: Floats, turn: Floats) -> Bools:
+    """(k,) whether elements, whose ways (k, 3) are given, lead nowhere; arcs and curves never do."""
+    return _straight(nc.kind[rows]) & ~leads_somewhere(nc, way, turn)
+
+
+def _straight(kind: NDArray[np.uint8]) -> Bools:
     """(k,) whether elements of some kinds are no arcs and no curves."""
     return (kind == Element.RAPID) | (kind == Element.LINE)

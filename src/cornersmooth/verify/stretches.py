@@ -67,7 +67,7 @@ class Stretches:
 
     def leave(self) -> None:
         """Nothing is run beside the path until the next stretch begins."""
-        self.flush()
+        self._flush()
         self._move = -1
 
     def begin(self, move: int, element: int, move_last: int) -> None:
@@ -99,7 +99,7 @@ class Stretches:
             self._cut(self._element + self._most, stop)
         waiting = self._pending
         if waiting and (element_last - waiting[0][0] > self._most or stop - waiting[0][2][0] > 2 * self._most):
-            self.flush()
+            self._flush()
         start, end = np.minimum(self._place, stop), np.full(3, float(stop))
         self._pending.append((self._element, element_last, start, end, stop, self._guessed))
 
@@ -110,13 +110,13 @@ class Stretches:
                 self._cut(self._element + self._most, int(self.task.original.trail.last[self._move_last]))
             return
         # nothing of the CL path is left for what is kept: it may only stay where it is
-        self.flush()
+        self._flush()
         self.end(self._move, last)
         self._element, self._continued = last, True
 
     def _cut(self, element: int, stop: int) -> None:
         """Give out a long stretch up to an element."""
-        self.flush()
+        self._flush()
         start = np.minimum(self._place, stop)
         end = self._guess(element, start, stop)
         self._make([(self._element, element, start, end, stop, True)], goes_on=True)
@@ -145,7 +145,7 @@ class Stretches:
             self._ratio = (path.length_at(float(found[0])) - begin) / gone
         return np.clip(found, start, stop)
 
-    def flush(self) -> None:
+    def _flush(self) -> None:
         """Make a batch of what waits."""
         if self._pending:
             self._make(self._pending)
