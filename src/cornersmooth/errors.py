@@ -78,8 +78,8 @@ class CornersmoothError(Exception):
     Parameters
     ----------
     code : str
-        Stable identifier such as ``"CS101"`` (100s, CS200, CS206 and CS209: CL input, other 200s: settings, 300s: NC
-        output, 400s: writing files, 500s: verification).
+        Stable identifier such as ``"CS101"`` (100s, CS200, CS206, CS209 and CS275: CL input, other 200s: settings,
+        300s: NC output, 400s: writing files, 500s: verification).
     what : str
         One clause, lower case, no full stop: what is wrong, with the offending value.
     hint : str

@@ -129,7 +129,8 @@ class Source:
 
     name: str = "<memory>"  #: File name without its folder, ``"<stdin>"`` for a stream
     format: str = "apt"  #: ``"apt"`` or ``"points"``
-    #: ``"nx"``, ``"catia"``, ``"creo"``, ``"solidworks"``, ``"hsm"``, ``"ncl"``, ``"makino"``, ``"plain"``, ``"csv"``.
+    #: ``"nx"``, ``"catia"``, ``"creo"``, ``"solidworks"``, ``"mfgsuite"``, ``"hsm"``, ``"ncl"``, ``"makino"``,
+    #: ``"plain"``, ``"csv"``.
     dialect: str = "plain"
     operation: int = 0  #: Number of the operation that was taken alone; 0 for the whole file
     operation_name: str = ""  #: Empty where the file gives none

@@ -244,7 +244,7 @@ def test_a_g_code_of_prefun_is_told_as_one() -> None:
         ("DRILL,FEDTO,5\nCYCLE/INIT\nCYCLE/ON,IPM,3", "DRILL,FEDTO,5,IPM,3"),
         ("ON,FEDTO,7", "ON,FEDTO,7"),
         ("DRILL,ON,DEPTH,12,PERMIN,85", "DRILL,DEPTH,12,PERMIN,85"),
-        ("DEEP,12,INCR,8,MMPM,85,1,RAPTO,3", "DEEP,DEPTH,12,INCR,8,MMPM,85,CLEAR,1,RAPTO,3"),
+        ("DEEP,12,INCR,8,MMPM,85,20,RAPTO,17", "DEEP,DEPTH,12,INCR,8,MMPM,85,RAPTO,3"),
         ("DRILL,-12,MMPM,85,1", "DRILL,-12,MMPM,85,1"),
     ],
 )

@@ -49,6 +49,11 @@ def check(program: Program) -> None:
     np.testing.assert_allclose(program.axis, AXES, atol=1e-15)
 
 
+def test_a_table_that_ends_in_a_number_is_to_check() -> None:
+    found = {end: cl.read(f"1,2,3\r\n4,5,6{end}".encode()).findings for end in ("", "\r\n", "\n# end")}
+    assert [[one.line for one in all_ if one.code == "CS275"] for all_ in found.values()] == [[2], [], []]
+
+
 # layouts
 
 

@@ -31,6 +31,16 @@ def words(result: Program) -> list[tuple[int, int, str]]:
     return [(statement.pose, statement.line, statement.word) for statement in result.statements]
 
 
+@pytest.mark.parametrize("ends", ["GOTO/5,6,7.1", "GOTO/5,6,$\n7.1", "GOTO/5,6,7. ", "GODLTA/7.1", "GOTO/1,1,1,0,0,1"])
+def test_a_file_that_ends_in_the_number_of_a_position_is_to_check(ends: str) -> None:
+    text = "UNITS/MM\nGOTO/1,2,3\n" + ends
+    for data in (text.encode(), gzip.compress(text.encode()), text.encode("utf-16")):
+        (found,) = (one for one in read(data).findings if one.code == "CS275")
+        assert (found.line, found.to_check) == (3, True)
+    for whole in ("\n", "\r", "\x1a", "\nFINI", "\nPAINT/COLOR,31", "\nEND-OF-PATH", " $$ 5"):
+        assert "CS275" not in codes(program(text + whole))
+
+
 # --- positions ---------------------------------------------------------------------------------------------------
 
 
@@ -716,7 +726,7 @@ def test_unknown_options(options: dict[str, str]) -> None:
         ("$$*         Pro/CLfile  Version 11.0", "creo"),
         ("PARTNO/1\nUNIT/MM\nCSI_SET_FLUTE_LENGTH/3.2", "solidworks"),
         ("CSI_SET_FLUTE_LENGTH/20.\nCSI_TOOL_PATH/Face2", "hsm"),
-        ("MCSYS/ NUM, 1, POINT, 0, 0, 0, VECTOR, 1, 0, 0, VECTOR, 0, 1, 0", "hsm"),
+        ("MCSYS/ NUM, 1, POINT, 0, 0, 0, VECTOR, 1, 0, 0, VECTOR, 0, 1, 0", "mfgsuite"),
         ("CSI_SET_FLUTE_LENGTH/20.", "plain"),
         ("MODE/MILL\nPARTNO/'x'", "hsm"),
         ("REMARK a.as  27-APR-2021  NCLCAM     2020.00", "ncl"),

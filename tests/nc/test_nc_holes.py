@@ -43,7 +43,7 @@ def heights(cl: str) -> tuple[list[str], dict[str, int]]:
     ("cycle", "expected"),
     [
         ("CYCLE/DRILL,FEDTO,10,MMPM,250,RAPTO,3", ["G0 30", "G0 3", "G1 -10", "G0 30"]),
-        ("CYCLE/DRILL,DEPTH,10,PERMIN,250,CLEAR,30,RETURN,30,RAPTO,3", ["G0 30", "G0 3", "G1 -10", "G0 30"]),
+        ("CYCLE/DRILL,DEPTH,10,PERMIN,250,CLEAR,30,RETURN,30,RAPTO,27", ["G0 30", "G0 3", "G1 -10", "G0 30"]),
         ("CYCLE/DRILL,DEPTH,4.6,PERREV,0.08,CLEAR,2,RETURN,0", ["G0 30", "G0 2", "G1 -4.6", "G0 30"]),
         ("CYCLE/DRILL,DEPTH,4.6,MMPR,0.08,CLEAR,2,RETURN,0", ["G0 30", "G0 2", "G1 -4.6", "G0 30"]),
         ("CYCLE/DRILL,FEDTO,10,RAPTO,3,RTRCTO,50,MMPM,250", ["G0 50", "G0 3", "G1 -10", "G0 50"]),
@@ -239,7 +239,7 @@ def test_holes_left_out_are_gone_over_as_high_as_the_tool_came(cycle: str, why: 
 #: CL text of cycles, and the heights that the tool goes to
 UNDERSTOOD = {
     "ISO 4343 begins a cycle with ON": (
-        "CYCLE/DRILL,ON,DEPTH,12,PERMIN,85,CLEAR,1,RAPTO,2,RETURN,20\nGOTO/10,0,0\n",
+        "CYCLE/DRILL,ON,DEPTH,12,PERMIN,85,CLEAR,5,RAPTO,3,RETURN,20\nGOTO/10,0,0\n",
         ["G0 2", "G1 -12", "G0 30"],
     ),
     "a fixed order: depth, unit, feed, clearance": (
@@ -247,11 +247,11 @@ UNDERSTOOD = {
         ["G0 1", "G1 -12", "G0 30"],
     ),
     "a fixed order with words after it": (
-        "CYCLE/DRILL, 12, MMPM, 85, 1, RAPTO, 3\nGOTO/10,0,0\n",
+        "CYCLE/DRILL, 12, MMPM, 85, 20, RAPTO, 17\nGOTO/10,0,0\n",
         ["G0 3", "G1 -12", "G0 30"],
     ),
     "a fixed order with pecks": (
-        "CYCLE/DEEP, 12, INCR, 8, MMPM, 85, 1, RAPTO, 3\nGOTO/10,0,0\n",
+        "CYCLE/DEEP, 12, INCR, 8, MMPM, 85, 20, RAPTO, 17\nGOTO/10,0,0\n",
         ["G0 3", "G1 -8", "G0 3", "G0 -7.5", "G1 -12", "G0 30"],
     ),
     "ON goes on with another depth": (
@@ -296,9 +296,36 @@ def test_numbers_whose_meaning_is_open_are_refused(cycle: str) -> None:
         heights(f"{PLAIN}RAPID\nGOTO/0,0,30\n{cycle}\nGOTO/10,0,0\nCYCLE/OFF\nFINI\n")
 
 
-def test_the_fixed_order_is_that_of_dialects_that_have_it() -> None:
+@pytest.mark.parametrize("head", [NX, "MODE/MILL\nUNITS/MM\n"], ids=["nx", "hsm"])
+def test_the_fixed_order_is_that_of_dialects_that_have_it(head: str) -> None:
+    """Autodesk's post of ISO 4343 has it, too, but writes the bottoms of holes: they were drilled twice as deep."""
     with pytest.raises(InputError, match="its words are not understood"):
-        heights(f"{NX}RAPID\nGOTO/0,0,30,0,0,1\nCYCLE/DRILL,12,MMPM,85,1\nGOTO/10,0,0\nCYCLE/OFF\n")
+        heights(f"{head}RAPID\nGOTO/0,0,30,0,0,1\nCYCLE/DRILL,12,MMPM,85,15,RAPTO,10\nGOTO/10,0,-12\nCYCLE/OFF\n")
+
+
+@pytest.mark.parametrize(
+    ("head", "cycle", "height"),
+    [
+        ("$$-> FEATNO / 1\n", "DEPTH,10,MMPM,250,CLEAR,5,RAPTO,1", "G0 4"),
+        ("$$-> FEATNO / 1\n", "DEPTH,10,MMPM,250,RAPTO,1", "G0 1"),
+        (
+            "MCSYS/NUM,1,POINT,0,0,0,VECTOR,1,0,0,VECTOR,0,1,0\n",
+            "DEPTH,10,PERMIN,250,CLEAR,15,RETURN,15,RAPTO,12",
+            "G0 3",
+        ),
+        ("MCSYS/NUM,1,POINT,0,0,0,VECTOR,1,0,0,VECTOR,0,1,0\n", "DEPTH,10,PERMIN,250,CLEAR,15,RETURN,20", "G0 15"),
+        ("CSI_TOOL_PATH/1\n", "FEDTO,10,MMPM,250,CLEAR,15,RETURN,15,RAPTO,3", "G0 3"),
+        ("$$-> FEATNO / 1\n", "DEPTH,10,MMPM,250,CLEAR,5,RAPTO,5", "RAPTO counts from CLEAR down"),
+    ],
+)
+def test_rapto_beside_clear_counts_from_there_down_but_in_camplete(head: str, cycle: str, height: str) -> None:
+    cl = f"{head}UNITS/MM\nRAPID\nGOTO/0,0,30,0,0,1\nCYCLE/DRILL,{cycle}\nGOTO/10,0,0\nCYCLE/OFF\nFINI\n"
+    if height.startswith("G0"):
+        found, _ = heights(cl)
+        assert found[found.index("G1 -10") - 1] == height
+    else:
+        with pytest.raises(InputError, match=height):
+            heights(cl)
 
 
 @pytest.mark.parametrize("cycles", ["moves", "native"])

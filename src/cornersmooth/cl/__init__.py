@@ -12,7 +12,7 @@ from cornersmooth.cl.cycles import order_of
 from cornersmooth.cl.dialects import NAMES as DIALECTS
 from cornersmooth.cl.dialects import apt_of_simulation_cld, is_simulation_cld, refuse_foreign
 from cornersmooth.cl.grammar import joined
-from cornersmooth.cl.messages import error
+from cornersmooth.cl.messages import error, finding
 from cornersmooth.cl.source import clean, load
 from cornersmooth.errors import SettingsError
 from cornersmooth.kinematics import Machine
@@ -25,6 +25,9 @@ FORMATS: Final = ("apt", "points")
 
 #: how much of a file decides on its format
 HEAD: Final = 1 << 16
+
+#: the end of an input that is cut short, or of one that ends in a number by chance
+_ENDS_IN_A_NUMBER: Final = re.compile(rb"[0-9.][ \t\0]*+\Z")
 
 #: a statement that only a CL file has
 _CL_STATEMENT: Final = re.compile(
@@ -148,6 +151,9 @@ def read(
             processes=processes,
         )
     program = replace(program, source=replace(program.source, name=os.path.basename(name), sha256=digest))
+    last, behind = int(program.line[-1]), program.statements[-1:]
+    if _ENDS_IN_A_NUMBER.search(data, max(0, len(data) - HEAD)) and not any(one.line >= last for one in behind):
+        program = replace(program, findings=(*program.findings, finding("CS275", last)))
     if operation is not None or tool_number is not None or spindle is not None:
         from cornersmooth.cl.operations import one_operation, with_tool
 

@@ -20,8 +20,8 @@ _UNITS: Final = frozenset("MMPM IPM PERMIN MMPR IPR PERREV".split())
 _STEPS: Final = frozenset("STEP INCR 1STPECK SUBPECK".split())
 #: words of which a later one takes the place of all the others
 _FAMILIES: Final = ({"FEDTO", "DEPTH"}, {"RTRCTO", "RETURN"}, _STEPS, {"RAPTO", "CLEAR"}, _UNITS, {"DWELL"})
-#: dialects in which numbers without words are those of `in_fixed_order`
-FIXED_ORDER: Final = ("plain", "hsm")
+#: Dialects in which RAPTO beside CLEAR is a height, too: CAMplete APT, PostWorks; NX has one of them
+_HEIGHTS: Final = ("nx", "ncl", "hsm")
 
 
 def order_of(text: str | None) -> tuple[str, ...]:
@@ -65,12 +65,30 @@ def plain_cycle(args: Sequence[Argument], dialect: str, order: tuple[str, ...] =
 
 
 def in_fixed_order(args: Sequence[Argument]) -> tuple[Argument, ...] | None:
-    """Arguments of Autodesk's ISO 4343 post with words: kind, depth, pecks, unit, feed, clearance; None for others."""
+    """Arguments of ISO 4343:1978 with words: kind, depth, pecks, unit, feed, clearance; None for others.
+
+    Autodesk's post of ISO 4343 has this order, too, but its positions are the bottoms of holes.
+    """
     unit = 4 if args[2:3] and args[2] in _STEPS else 2
     numbers = [value for value in (*args[1:2], *args[unit + 1 : unit + 3]) if isinstance(value, float)]
     if len(numbers) < 3 or args[0] not in _KINDS or args[unit] not in _UNITS or not numbers[0] > 0.0:
         return None
     return (args[0], "DEPTH", *args[1 : unit + 2], "CLEAR", *args[unit + 2 :])
+
+
+def feeding_from(args: Sequence[Argument], dialect: str) -> tuple[Argument, ...] | None:
+    """Arguments whose RAPTO is the height at which feeding begins; None where that is not above the hole.
+
+    Beside CLEAR it counts from there down (PTC Creo, CL output for holemaking cycles; Autodesk's posts Mori APT and
+    Common APT ISO 4343).
+    """
+    clear, down = _number_behind(args, "CLEAR"), _number_behind(args, "RAPTO")
+    if dialect in _HEIGHTS or clear is None or down is None:
+        return tuple(args)
+    at, rest = args.index("RAPTO"), [*args]
+    rest[at + 1] = clear - down
+    _drop(rest, "CLEAR", 2)
+    return tuple(rest) if down < clear else None
 
 
 def going_on(before: Sequence[Argument], args: Sequence[Argument]) -> tuple[Argument, ...]:

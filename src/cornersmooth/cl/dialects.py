@@ -35,7 +35,7 @@ class Dialect:
 
 
 #: in the order in which they are tried: the more telling fingerprint first. Each is written by one system alone:
-#: CSI_SET_ is not, SolidWorks CAM and Autodesk's CAMplete APT have it; Autodesk's posts are all of `hsm`
+#: CSI_SET_ is not, SolidWorks CAM and Autodesk's CAMplete APT have it; of Autodesk's posts Mori APT is `mfgsuite`
 DIALECTS: Final[tuple[Dialect, ...]] = (
     Dialect("makino", rb"^PPRINT/APTCL-SPEC, *MAKINO", decimals=7),
     Dialect(
@@ -48,13 +48,12 @@ DIALECTS: Final[tuple[Dialect, ...]] = (
     ),
     Dialect("catia", rb"^\$\$ +CATIA APT VERSION|^\$\$\*CATIA0", multax_off_known=True, decimals=5),
     Dialect("nx", rb"^[ \t]*(TOOL PATH/|TLDATA/|MSYS/|END-OF-PATH|PAINT/)"),
-    Dialect(
-        "hsm",
-        rb"^[ \t]*(MODE[ \t]*/[ \t]*(MILL|TURN)\b|MOVARC[ \t]*/|CSI_TOOL_PATH[ \t]*/|MCSYS[ \t]*/[ \t]*NUM\b)",
-        short_axis_up=True,
-        multax_off_known=True,
-        decimals=6,
-        strips_zeros=True,
+    *(
+        Dialect(name, mark, short_axis_up=True, multax_off_known=True, decimals=6, strips_zeros=True)
+        for name, mark in (
+            ("mfgsuite", rb"^[ \t]*MCSYS[ \t]*/[ \t]*NUM\b"),
+            ("hsm", rb"^[ \t]*(MODE[ \t]*/[ \t]*(MILL|TURN)\b|MOVARC[ \t]*/|CSI_TOOL_PATH[ \t]*/)"),
+        )
     ),
     Dialect(
         "solidworks",

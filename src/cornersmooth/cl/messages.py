@@ -141,6 +141,7 @@ FINDINGS: Final[dict[str, tuple[Severity, str]]] = {
     "CS192": ("note", "MOVNRB: its points are read, not its curves"),
     "CS195": ("note", "lines of numbers alone are further points of the GOTO before them"),
     "CS194": ("warning", "RETRCT beyond the clearance plane: ignored"),
+    "CS275": ("warning", "the file ends in this position, without a line end; see that its last number is whole"),
     "CS385": ("warning", "CYCLE without words is read as depth, feed, clearance; see that positions are tops of holes"),
     "CS180": ("warning", "the feeds are in {feeds} per minute, the positions are read in {units} as asked for"),
     "CS178": ("warning", "not in this program: {words} of the operations before, which may hold on"),

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.cl.bulk import FARTHEST
-from cornersmooth.cl.cycles import FIXED_ORDER, going_on, in_fixed_order, plain_cycle
+from cornersmooth.cl.cycles import feeding_from, going_on, in_fixed_order, plain_cycle
 from cornersmooth.cl.grammar import Argument, Record, joined, number
 from cornersmooth.cl.poses import IDENTITY, UNIT_TOLERANCE, UP, System, Vector, system_of
 from cornersmooth.cl.reader_state import ReaderState
@@ -289,9 +289,12 @@ def _cycle(state: ReaderState, record: Record) -> None:
     state.hole = record.option not in _ENDS
     state.set_kind(state.n)
     args = plain_cycle(record.args, state.dialect.name, state.cycle_order)
-    if state.dialect.name in FIXED_ORDER and (ordered := in_fixed_order(args)) is not None:
+    if state.dialect.name == "plain" and (ordered := in_fixed_order(args)) is not None:
         state.note("CS385", record.line)
         args = ordered
+    if (fed := feeding_from(args, state.dialect.name)) is None:
+        raise state.fail("CS115", record, want="RAPTO counts from CLEAR down: give the height over the hole as CLEAR")
+    args = fed
     if state.cycle and args[:1] == ("ON",):
         args = going_on(state.cycle, args)
     if state.hole and record.option != "INIT":  # by which SolidWorks announces one

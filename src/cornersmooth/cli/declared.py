@@ -192,8 +192,8 @@ class Declared:
 
     dialect: str | None = _reading(
         "NAME",
-        "CL dialect, instead of what the file looks like: nx, catia, creo, solidworks, hsm, ncl, makino or plain. "
-        "A table of points is 'points'.",
+        "CL dialect, instead of what the file looks like: nx, catia, creo, solidworks, mfgsuite, hsm, ncl, makino or "
+        "plain. A table of points is 'points'.",
     )
     units: Units | None = _reading("", "Units of the input, where it does not say or says it wrong.")
     arc_rule: Literal["left", "right", "tangent"] | None = _reading("", "Sense of CIRCLE about its axis.")

@@ -9,8 +9,8 @@ All distances count along the tool axis from the position that the CL file gives
 HSM's ``CLEAR`` is an absolute height and is passed over for its ``RAPTO`` and ``RETURN``.
 
 ``CYCLE/ON`` goes on with the last cycle; words after it (``CYCLE/ON,FEDTO,-74.5``) take the place of its own.
-``CYCLE/DRILL,ON,...`` is how ISO 4343 (10.8.7) begins one. Autodesk's ISO 4343 post has a fixed order, in which some
-numbers have no word: ``CYCLE/DRILL, 12, MMPM, 85, 1`` says depth, unit, feed and clearance.
+``CYCLE/DRILL,ON,...`` is how ISO 4343 (10.8.7) begins one. ISO 4343:1978 has a fixed order, in which some numbers have
+no word: ``CYCLE/DRILL, 12, MMPM, 85, 1`` says depth, unit, feed and clearance.
 
 Not understood, and so never drilled by guess: threads, bores that orient or stop the spindle, countersinks by
 diameter, other numbers without a word (CATIA's ``CYCLE/DRILL, 3.0, 5.0`` depends on the PP table). A plain ``TAP`` is
