@@ -19,7 +19,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.control.words import Lexer, Word, distinct
+from cornersmooth.arrays import distinct
+from cornersmooth.control.words import Lexer, Word
 from cornersmooth.errors import InputError
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.text.parse import DIGITS, LAST_DIGITS, Bytes, Words, join_digits, words_of

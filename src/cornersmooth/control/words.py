@@ -13,15 +13,12 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any, Final, NamedTuple, TypeAlias, TypeVar
+from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cornersmooth.errors import InputError
 from cornersmooth.model import Floats, Ints
-
-Numbers = TypeVar("Numbers", bound=NDArray[Any])
 
 #: code of FANUC's curves, and what stands for those of controls that say it in words
 NURBS, BSPLINE, POLY, SPL = 6.2, 901.0, 902.0, 903.0
@@ -119,12 +116,6 @@ def filled(values: Floats, before: float) -> tuple[Floats, Ints]:
         return values, row
     last = np.maximum.accumulate(np.where(missing, -1, row))
     return np.where(last < 0, before, values[last]), last
-
-
-def distinct(values: Numbers) -> Numbers:
-    """Different numbers, ascending; `np.unique` loads masked arrays, a twentieth of what a short run loads."""
-    ordered = np.sort(values, axis=None)
-    return ordered[np.append(True, ordered[1:] != ordered[:-1])[: len(ordered)]]
 
 
 @dataclass(frozen=True)

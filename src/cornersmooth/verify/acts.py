@@ -10,7 +10,7 @@ from typing import Final, Self
 
 import numpy as np
 
-from cornersmooth.control.words import distinct
+from cornersmooth.arrays import distinct
 from cornersmooth.model import Ints, Move
 from cornersmooth.nc_reader.elements import Event, Problem
 from cornersmooth.nc_reader.tool import beyond_digits

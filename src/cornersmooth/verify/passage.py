@@ -16,6 +16,7 @@ from typing import Final
 
 import numpy as np
 
+from cornersmooth.arrays import distinct
 from cornersmooth.model import Floats, Ints
 from cornersmooth.verify.chain import Path, Sections, chain, points_at
 from cornersmooth.verify.free_space import FINE, Around, Inner, free_interval, lowest
@@ -166,7 +167,7 @@ class Passage:
 
     def _divide(self, bad: Ints, inner: Inner) -> bool:
         """Put points into the bent steps to some vertices and from them; say whether there were any."""
-        steps = np.unique(np.concatenate((bad - 1, bad)))
+        steps = distinct(np.concatenate((bad - 1, bad)))
         steps = steps[steps < len(self._own) - 1]
         steps = steps[(self._bend[steps] > FINE * self.radius) & (self._bend[steps] < UNBOUND)]
         if not len(steps):
@@ -252,7 +253,7 @@ class Passage:
         """
         path, end, left = self.path, int(self._last[section]), self.path.length_at(self._left)
         bottom, top = int(self._begin[section]), math.ceil(self._stop[section])
-        tried = row + np.unique(np.geomspace(1, max(end - row, 1), _TRIED).astype(np.int64)) - 1
+        tried = row + distinct(np.geomspace(1, max(end - row, 1), _TRIED).astype(np.int64)) - 1
         for width, rows in ((AROUND, tried), (AROUND * AROUND, tried[::6])):
             low, high = np.searchsorted(path.length, (left - width * self.radius, left + width * self.radius)).tolist()
             segments = slice(max(low - 1, bottom), min(high + 1, top, low + _WIDEST))

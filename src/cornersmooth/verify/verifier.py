@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
+from cornersmooth.arrays import distinct
 from cornersmooth.control.source import Source, readable_twice
 from cornersmooth.control.table import word_table
-from cornersmooth.control.words import distinct
 from cornersmooth.errors import SettingsError
 from cornersmooth.model import Program
 from cornersmooth.nc_reader import program_of

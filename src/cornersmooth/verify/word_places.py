@@ -12,8 +12,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from cornersmooth.arrays import distinct
 from cornersmooth.control.table import Means
-from cornersmooth.control.words import distinct
 from cornersmooth.model import Bools, Ints, Move
 from cornersmooth.nc_reader.elements import Event, Problem
 from cornersmooth.statements.asked import asked
