@@ -17,6 +17,7 @@ import cornersmooth
 from careless import look_away
 from cornersmooth import CornersmoothError, Settings, VerdictError, pipeline
 from cornersmooth.cli import run
+from oracle.files import beginning
 
 SAMPLE = Path(__file__).resolve().parent.parent / "samples" / "impeller.cls"
 
@@ -135,12 +136,13 @@ def test_points_on_the_smoothed_path():
 
 
 def test_one_call_does_what_the_command_does(tmp_path, capsys):
-    out, ours = tmp_path / "command.nc", tmp_path / "call.nc"
-    assert run(["smooth", str(SAMPLE), "-e", "0.02", "-f", "g6.2", "-o", str(out), "-q"]) == 0
+    out, ours, source = tmp_path / "command.nc", tmp_path / "call.nc", tmp_path / SAMPLE.name
+    source.write_bytes(beginning(SAMPLE, 105))
+    assert run(["smooth", str(source), "-e", "0.02", "-f", "g6.2", "-o", str(out), "-q"]) == 0
     stages = set()
     form = cornersmooth.choose_form("fanuc", "g6.2")
     result = cornersmooth.postprocess(
-        SAMPLE, ours, Settings(tolerance=0.02), form=form, progress=lambda stage, done, total: stages.add(stage)
+        source, ours, Settings(tolerance=0.02), form=form, progress=lambda stage, done, total: stages.add(stage)
     )
     assert ours.read_bytes() == out.read_bytes()
     assert stages == {"reading", "smoothing", "writing", "verifying"}
@@ -149,7 +151,7 @@ def test_one_call_does_what_the_command_does(tmp_path, capsys):
     assert result.report()["verification"]["passed"]
     assert {finding.code for finding in result.findings} >= {"CS132", "CS317"}
     with pytest.raises(CornersmoothError, match="exists already"):
-        cornersmooth.postprocess(SAMPLE, ours)
+        cornersmooth.postprocess(source, ours)
     with pytest.raises(CornersmoothError, match="is the input"):
         cornersmooth.postprocess(ours, ours, force=True)
 

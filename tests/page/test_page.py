@@ -311,10 +311,10 @@ def test_a_page_and_its_report_give_one_verdict(command, tmp_path, monkeypatch):
 
 def test_the_time_is_that_of_the_whole_program_or_none(tmp_path, monkeypatch):
     source, nc = tmp_path / "long.cls", tmp_path / "long.nc"
-    rows = "".join(f"GOTO/{x}.0,{x % 2}.0,0.0\n" for x in range(31))
+    rows = "".join(f"GOTO/{x}.0,{x % 2}.0,0.0\n" for x in range(11))
     source.write_text(f"TOOL PATH/LONG,TOOL,T\nFEDRAT/MMPM,1500.0\n{rows}END-OF-PATH\n")
     verdicts = []
-    monkeypatch.setattr("cornersmooth.cli.job.TIMED_POSES", 30)
+    monkeypatch.setattr("cornersmooth.cli.job.TIMED_POSES", 10)
     for more in ((), ("CORNERSMOOTH_TIME=1",), ("-q",), ("CORNERSMOOTH_TIME=1", "--report", tmp_path / "long.html")):
         done = run("smooth", source, "-e", "0.02", "-o", nc, "--force", "--machine", "table-ac", *more)
         assert done.returncode == 0, done.stderr
