@@ -289,7 +289,11 @@ def test_the_feed_of_on_takes_the_place_of_the_first() -> None:
 
 
 @pytest.mark.parametrize(
-    "cycle", ["CYCLE/ON,FEDTO,7", "CYCLE/DRILL, 12, MMPM, 85", "CYCLE/DRILL,-12,MMPM,85,1", "CYCLE/DRILL,12,85,1"]
+    "cycle",
+    [
+        *("CYCLE/ON,FEDTO,7", "CYCLE/DRILL, 12, MMPM, 85", "CYCLE/DRILL,-12,MMPM,85,1", "CYCLE/DRILL,12,85,1"),
+        "CYCLE/DRILL,DEPTH,-12,MMPM,85,CLEAR,1",
+    ],
 )
 def test_numbers_whose_meaning_is_open_are_refused(cycle: str) -> None:
     with pytest.raises(InputError, match="its words are not understood"):

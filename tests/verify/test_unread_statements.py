@@ -58,6 +58,7 @@ UNREAD = (
     ),
     *(
         "COOLNT/FLOOD,MIST",
+        "COOLNT/FLOOD,OFF",
         "COOLNT/FLOOD,3",
         "COOLNT/OFF,FLOOD",
         "CSI_INSERT_CUSTOM_GCODE/G53 Z0.",

@@ -87,7 +87,7 @@ def read_cycle(given: Given | None, program: Program, speed: float | None) -> Cy
     depths = [values[word][0] for word in _DEPTHS if word in values]
     if not kinds or len(depths) != 1:
         return None
-    depth = -depths[0] if program.source.dialect == "nx" else abs(depths[0])
+    depth = -depths[0] if program.source.dialect == "nx" else values.get("DEPTH", (abs(depths[0]),))[0]
     returns = [values[word][0] for word in _RETURNS if word in values]
     hsm = program.source.dialect == "hsm"
     clearances = [values["RAPTO"][0]] if "RAPTO" in values else []

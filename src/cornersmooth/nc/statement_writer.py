@@ -179,10 +179,10 @@ class StatementWriter:
         words = words_of(statement)
         if not words and "/" not in statement.text:
             words = ["ON"]
-        kinds = [word for word in words if word not in ("ON", "OFF")] or words[:1]
+        kinds = [word for word in words if word != "ON"] or words[:1]
         if numbers_of(statement) or len(kinds) != 1:
             return None
-        if "OFF" in words or kinds == ["NOMORE"]:
+        if kinds[0] in ("OFF", "NOMORE"):
             off = self.modals.coolant_end()
             self.modals.switch("coolant", ())
             return list(off) or None

@@ -24,7 +24,7 @@ _MM_PER_MINUTE = {"SMM": 1000.0, "SFM": 304.8}
 #: words that ask for nothing, whatever is behind them. Any other word is compared, or is not understood
 NOTHING = frozenset(
     # texts, names, numbers of statements
-    "$$ PARTNO PPRINT REMARK LETTER TPRINT DISPLY END-OF-PATH OPNAME HEADER CSI_TOOL_PATH ISN SEQNO "
+    "$$ PARTNO PPRINT REMARK LETTER TPRINT DISPLY END-OF-PATH OPNAME HEADER CSI_TOOL_PATH OPERTN ISN SEQNO "
     # screen and plotter of the CAM system
     "PAINT PLOT OVPLOT PPLOT PLABEL LPRINT DRAFT DEBUG GOUGCK PALETTE "
     # tolerances of the path as it was made, stock, name of the machine
