@@ -307,6 +307,18 @@ def test_without_words_for_tip_control_it_has_to_be_said() -> None:
     assert filter_program(text, form, settings, tip_from_start=True).smoothed == 20
 
 
+@pytest.mark.parametrize(
+    "title", ["", "PROC BLADE SAVE DISPLOF\n", "%_N_BLADE_SPF\nPROC BLADE(REAL _DEEP)\nDEF INT N\n"]
+)
+def test_a_subprogram_of_siemens_begins_where_the_option_says(title: str) -> None:
+    words = cuts("G1 X{x:.3f} Y{y:.3f} Z{z:.3f} A={a:.3f} C={c:.3f}", feed="F1000")
+    text = f"{title}G90 G94 G71 G40\nORIAXES\nG1 X0 Y-1.5 Z20 A20 C30 F900\n{words}RET\n".encode()
+    form, settings = form_of("siemens", "table-ac"), cs.Settings(tolerance=EPS, lines="dense")
+    assert filter_program(text, form, settings).smoothed == 0
+    made = filter_program(text, form, settings, tip_from_start=True)
+    assert (made.verdict, made.smoothed) == (Verdict.PASSED, 24)
+
+
 def test_verify_finds_what_is_wrong_with_a_program_of_anybody() -> None:
     control, machine, text = PROGRAMS["fanuc words"]
     form, settings, old = form_of(control, machine), cs.Settings(tolerance=EPS, lines="dense"), text.encode()

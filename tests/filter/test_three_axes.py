@@ -194,6 +194,13 @@ def test_a_chamfer_leaves_the_rest_known(corner: str, tmp_path: Path) -> None:
     assert int(re.search(r"(\d+) of \d+ cuts smoothed", told)[1]) >= len(PASS)  # type: ignore[index]
 
 
+@pytest.mark.parametrize(("first", "smoothed"), [("RNDM=2", 0), ("RNDM=0.0", 19), ("RNDM=2\nG1 X0 Y5\nRNDM=0", 19)])
+def test_cuts_stay_where_the_program_rounds_all_corners(first: str, smoothed: int, tmp_path: Path) -> None:
+    """In fewer blocks the control would round them farther."""
+    told, _ = filtered(tmp_path, SIEMENS.format(f"{first}\n{CUTS}"), "--control", "siemens")
+    assert f" {smoothed} of " in told, told
+
+
 @pytest.mark.parametrize("control", ["fanuc", "linuxcnc"])
 @pytest.mark.parametrize("command", ["time", "compare", "filter"])
 def test_limits_without_an_axis_that_moves_are_refused(control: str, command: str, tmp_path: Path) -> None:

@@ -27,7 +27,7 @@ from cornersmooth.errors import InputError
 from cornersmooth.model import Ints
 
 #: lines before the first block: they name the program
-_TITLE: Final = re.compile(r"(?i)(%.*|[O:]\s*(\d+|<[^>]*>|[A-Z][^#\[(]*))")
+_TITLE: Final = re.compile(r"(?i)(%.*|PROC\s.*|[O:]\s*(\d+|<[^>]*>|[A-Z][^#\[(]*))")
 _WEAK_FEED: Final = re.compile(rb"(?i)F[ \t]*\d+(?![\d.])")
 
 #: what sends a control to other lines of the program; numbers of lines beside it, and a jump to a line that the

@@ -65,6 +65,9 @@ NO_CUT, PLAIN_CUT = 0, 1
 #: words beside an end that shape the corner there: it belongs to the blocks on both sides
 _CORNER_WORDS: Final = re.compile(rb"(?i),\s*[RC]\s*[\d.]|\b(?:RNDM?|CHF|CHR|FRCM?)\b")
 
+#: the word that shapes all corners from there on (Siemens), and its end
+_ALL_CORNERS: Final = re.compile(rb"(?i)\bRNDM[ \t]*=[ \t]*([0.]+(?![\d.]))?")
+
 
 @dataclass(frozen=True)
 class Run:
@@ -191,7 +194,7 @@ class ProgramReader:
         found.absent = tuple(letter for letter, named in _NAMED.items() if named.search(data) is None)
         still: dict[str, float] = dict.fromkeys(found.absent if self.wanted == ANY else (), 0.0)
         stream, stops_left, last, cause = self.stream(found), sorted(set(stops), reverse=True), self._first, ""
-        corners = _near([number for number, line in stream.others if _CORNER_WORDS.search(line)], len(found))
+        corners = _corners(stream.others, len(found))
         for item in stream:
             first, count = (item.first, len(item)) if isinstance(item, Rows) else (item.line, 1)
             if isinstance(item, Rows):
@@ -331,9 +334,12 @@ def _not_rigid(state: State) -> tuple[str, ...] | None:
     return None if None in values and not on else on
 
 
-def _near(lines: Sequence[int], count: int) -> Bools:
-    """(count,) whether a line, or the one before or after it, is one of some."""
-    near, at = np.zeros(count + 2, np.bool_), np.array(lines, np.int64)
-    for step in (0, 1, 2):
-        near[at + step] = True
-    return near[1:-1]
+def _corners(lines: Sequence[tuple[int, bytes]], count: int) -> Bools:
+    """(count,) whether a line, or the one before or after it, shapes corners by words, and all under RNDM."""
+    near, modal = np.zeros(count + 2, np.bool_), np.zeros(count, np.bool_)
+    for number, line in lines:
+        if _CORNER_WORDS.search(line):
+            near[number : number + 3] = True
+        if found := _ALL_CORNERS.search(line):
+            modal[number:] = found[1] is None
+    return near[1:-1] | modal
