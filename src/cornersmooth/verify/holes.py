@@ -81,11 +81,14 @@ class HoleLines:
 
     def heights(self, moves: Ints, elements: Ints) -> Floats:
         """(k,) mm above the poses of holes at the ends of straight elements; NaN beside a hole or with another axis."""
+        return np.where(_straight(self.ahead.nc.kind[elements - self.ahead.base]), self.ends(moves, elements), np.nan)
+
+    def ends(self, moves: Ints, elements: Ints) -> Floats:
+        """The same of elements of any kind."""
         nc, own = self.ahead.nc, elements - self.ahead.base
         # what the printed angles of a tilted plane leave open
         lean = np.where(nc.tip_room[own] > 0.0, nc.second_room[own], 0.0)
-        over = self._above(moves, nc.tip[own], directions(nc, nc.tip[own], nc.second[own]), lean)
-        return np.where(_straight(nc.kind[own]), over, np.nan)
+        return self._above(moves, nc.tip[own], directions(nc, nc.tip[own], nc.second[own]), lean)
 
     def _above(self, moves: Ints, tip: Floats, axis: Floats, lean: Floats | float = 0.0) -> Floats:
         """(k,) mm above the poses of holes at tips (k, 3); NaN beside a hole or with another axis."""
@@ -105,6 +108,10 @@ class HoleLines:
     def height(self, move: int, element: int) -> float:
         """Height of one element, as of `heights`."""
         return self._of("heights", move, element) if element >= 0 else math.nan
+
+    def begins(self, move: int, element: int) -> float:
+        """Height at which an element begins, whatever leads there."""
+        return self._of("ends", move, max(element - 1, 0))
 
     def over(self, move: int, element: int) -> bool:
         """Whether an element ends in the line of a hole."""
@@ -217,7 +224,7 @@ class Hole:
             bottom += 1
         inside = [k + 1 for k, height in over.items() if height < -lines.room] or fed[-1:] or [*over][:1] or [-1]
         moved = {k: height for k, height in over.items() if not lines.stands(k)}
-        before = lines.height(move, max(next(iter(moved)) - 1, 0)) if moved else math.nan
+        before = lines.begins(move, next(iter(moved))) if moved else math.nan
         feeds = [k for k in fed if k in moved]
         first = next(iter(over), -1)
         return cls(lines, move, cycle, first, bottom, min(inside[-1], elements.stop), before, moved, feeds)
@@ -283,7 +290,7 @@ class Hole:
             yield "CS563", first, "a feed move enters a hole from the side", math.nan
         if lines.feeds(first) and self.before < -room and behind_hole:
             yield "CS563", first, f"a rapid goes {-self.before:.4f} mm into the uncut hole", -self.before
-        if (begins := lines.height(move, max(feeds[0] - 1, 0))) > max(cycle.clearance, 0.0) + room:
+        if (begins := lines.begins(move, feeds[0])) > max(cycle.clearance, 0.0) + room:
             text = f"feeding begins {begins:.4f} mm above the hole, the cycle says {cycle.clearance:g} (RAPTO)"
             yield "CS564", feeds[0], text, math.nan
         if height[last] < -room:

@@ -223,7 +223,7 @@ class Parse:
         """First element from one on that does not go up along a hole, or belongs to the next one."""
         lines, move = self.lines, self._move[stop]
         while self._over(stop, end) and not lines.feeds(end):
-            rises = lines.height(move, end) > lines.height(move, end - 1)
+            rises = lines.height(move, end) > lines.begins(move, end)
             if not (rises or lines.stands(end)) or (self._words.acting(end) and self._over(stop + 1, end)):
                 break
             end += 1
@@ -288,7 +288,7 @@ class Parse:
         self._end_run(move, begin)
         behind = end  # the way up is the hole's, wherever else it leads
         if self._over(stop, end) and not lines.feeds(end) and not self._hole[stop + 1]:
-            behind += int(end == begin or lines.height(move, end) > lines.height(move, end - 1))
+            behind += int(end == begin or lines.height(move, end) > lines.begins(move, end))
         hole = Hole.of(lines, move, range(begin, behind), self._cycles[move])
         found = hole.problems()
         if any(one.code != "CS541" for one in found) and self._is_in_doubt(stop, begin):
