@@ -8,9 +8,10 @@ from functools import cache
 import pytest
 
 from cornersmooth.cl import read
+from cornersmooth.errors import Verdict
 from cornersmooth.model import Program
 from cornersmooth.settings import Settings
-from cornersmooth.verify import verify
+from cornersmooth.verify import Verification, verify
 from nc.cases import Case
 from nc.promise import written
 
@@ -65,11 +66,15 @@ def program() -> Program:
     return read(CL, name="part.cls")
 
 
-def codes(case: Case, lines: list[str]) -> set[str]:
+def found(case: Case, lines: list[str]) -> Verification:
     """What is found in a text."""
     how = {"control": case.control, "machine": case.choose().machine}
-    text = ("\n".join(lines) + "\n").encode()
-    return {problem.code for problem in verify(program(), text, tolerance=0.02, **how).problems}
+    return verify(program(), ("\n".join(lines) + "\n").encode(), tolerance=0.02, **how)
+
+
+def codes(case: Case, lines: list[str]) -> set[str]:
+    """Codes of what is found in a text."""
+    return {problem.code for problem in found(case, lines).problems}
 
 
 def swapped(lines: list[str], first: str, second: str) -> list[list[str]]:
@@ -101,6 +106,25 @@ def test_what_goes_off_at_a_stop_alone_need_not_be_said() -> None:
     stop = max(k for k, line in enumerate(lines) if line == "M0")
     assert lines[stop + 1] == "S1000 M3"
     assert codes(case, lines) == set()
+
+
+@pytest.mark.parametrize("case", CASES, ids=str)
+def test_what_a_stop_may_have_ended_is_not_known_to_go_on(case: Case) -> None:
+    lines = written(program(), case.choose(), Settings(tolerance=0.02))[0].splitlines()
+    stop = max(k for k, line in enumerate(lines) if re.fullmatch(rf"(\d+ )?({_STOP})", line))
+    assert re.fullmatch(r"(\d+ |S1000 )?M3", lines[stop + 1])
+    assert found(case, lines).verdict == Verdict.PASSED
+    assert found(case, [*lines[: stop + 1], *lines[stop + 2 :]]).verdict == Verdict.NOT_VERIFIED
+
+
+@pytest.mark.parametrize("case", CASES, ids=str)
+def test_what_stops_the_spindle_beside_a_cut(case: Case) -> None:
+    """The interpreter of LinuxCNC stops it before the cut, as Siemens does; TNC behind it; of others no manual says."""
+    lines = written(program(), case.choose(), Settings(tolerance=0.02))[0].splitlines()
+    off = next(k for k, line in enumerate(lines) if re.fullmatch(r"(\d+ )?M5", line))
+    beside = found(case, [*lines[: off - 1], f"{lines[off - 1]} M5", *lines[off + 1 :]])
+    wanted = {"linuxcnc": Verdict.FAILED, "siemens": Verdict.FAILED, "heidenhain": Verdict.PASSED}
+    assert beside.verdict == wanted.get(case.control, Verdict.NOT_VERIFIED)
 
 
 def test_a_stop_of_the_post_before_a_tool_change_is_none_of_the_cl_file() -> None:

@@ -16,7 +16,7 @@ from cornersmooth.settings import Settings
 from cornersmooth.verify import verify
 from oracle.share import share
 
-from .small import found, program, right
+from .small import codes, found, program, right
 
 ISO = ("fanuc", "haas", "linuxcnc", "mitsubishi")
 CONTROLS = (*ISO, "generic", "heidenhain", "siemens")
@@ -431,3 +431,44 @@ def test_the_length_of_the_first_tool_needs_its_word() -> None:
     lines = another_post(right(cl, "linuxcnc"))
     at = where(lines, r"^G43 H1$")
     assert not passes(cl, "linuxcnc", (*lines[:at], *lines[at + 1 :]))
+
+
+LEVELS = """LOADTL/3
+SPINDL/RPM,3000,CLW
+RAPID
+GOTO/40,40,50,0,0,1
+CYCLE/DRILL,RAPTO,2,FEDTO,7,MMPM,180,RTRCTO,20
+GOTO/60,40,0
+CYCLE/OFF
+RAPID
+GOTO/60,40,20
+RAPID
+GOTO/80,50,5
+CYCLE/DRILL,RAPTO,2,FEDTO,7,MMPM,180,RTRCTO,20
+GOTO/80,50,0
+GOTO/90,50,0
+CYCLE/OFF
+RAPID
+GOTO/90,50,70
+FINI
+"""
+
+
+@pytest.mark.parametrize("control", ISO)
+def test_a_rapid_ends_a_run_of_cycles_as_g80_does(control: str) -> None:
+    """Behind it G98 goes back to where the tool is then: here below the height of the cycle."""
+    lines = right(LEVELS, control, "native")
+    risen = [k for k, line in enumerate(lines) if re.match(r"G0 X80\S* Y50\S* Z20", line)]
+    low = [line for k, line in enumerate(lines) if k not in risen]
+    assert len(risen) == 1
+    assert "CS563" in codes(LEVELS, low, control)
+    low.remove("G80")
+    assert "CS563" in codes(LEVELS, low, control)
+
+
+@pytest.mark.parametrize("control", [one for one in CONTROLS if one != "generic"])
+def test_a_tap_of_the_control_is_right_handed(control: str) -> None:
+    text = HOLES.format("TAP,MMPR,1.5")
+    lines = [re.sub(r"\bM3$", "M4", line) for line in right(text, control, "native")]
+    assert "CS552" in codes(text, lines, control)
+    assert codes(text.replace("CLW", "CCLW"), lines, control) - {"CS567"} == {"CS566"}

@@ -204,7 +204,7 @@ def job(form, eps=0.02, h=10.0, seed=0):
         return rapid(tip[i], axis[i], h, form)
 
     text = [*HEAD, "T3 M6", "S12000 M3", "M8", "G43.5 H3" if form == "g1" else "G43 H3", go(0)]
-    text += [*chain(0, 13, True), "M1", *chain(13, 18, False), "G4 P1500", *chain(18, 23, False), "M9"]
+    text += [*chain(0, 13, True), "M1", "M3", "M8", *chain(13, 18, False), "G4 P1500", *chain(18, 23, False), "M9"]
     text += [go(24), go(25), "M7", go(26), *chain(26, 33, True), "M5", *TAIL]
     return program, text
 

@@ -138,6 +138,11 @@ class Reader:
             raise InputError(error.code, error.what, error.hint, file=self.name, line=error.line) from None
         if elements and self.units != units:
             self._wrong("CS504", line, "units are changed in the middle of the path")
+        if self.elements > elements and self.state.modal.code != 0.0 and not self.dialect.order:
+            means, words = self.dialect.means, [word.spelling for word in line.words]
+            text = "{} beside a feed move, which the machine runs before, with or after it"
+            spindle = [text.format(word) for word in words if means.get(word, ("",))[0] == "spindle"]
+            self.unlooked += [(line.number, one) for one in spindle]
         self.events += [replace(event, element=self.elements) for event in self.late]
         self.late = []
 

@@ -43,7 +43,7 @@ KINDS: Final = frozenset(_NAMES) - {"home"}
 #: kinds of which there may be others where the user says them in his own words, too
 _LOOSE: Final = frozenset(("tool", "next tool", "stop", "end"))
 
-#: states that a tool change stops
+#: states that a tool change stops, and on most machines a stop of the program
 _STOPPED: Final = ("spindle", "coolant")
 
 #: states that end with the program
@@ -84,6 +84,7 @@ class _Side:
     line: int = 0  #: of the last word that has been read
     #: spindle and coolant that are on with a tool since the last motion, and the words that do it
     running: dict[Key, Token] = field(default_factory=dict)
+    halted: dict[str, Token] = field(default_factory=dict)  #: states that were on at a stop, and it
 
     def value(self, kind: str) -> float | str | None:
         """What holds of a state; None for nothing."""
@@ -99,10 +100,14 @@ class _Side:
             self.read, self.line = self.read + 1, token.line or self.line
             if token.kind in _ACTIONS:
                 done.append((token, {kind: self.value(kind) for kind in _AT_PAUSES if kind not in self.unsure}))
+                if token.kind == "stop":
+                    self.halted |= {kind: token for kind in _STOPPED if self.value(kind) not in ENDINGS}
                 continue
             changes, self.held[token.kind] = token.value != self.value(token.kind), token
             self.unsure.discard(token.kind)
+            self.halted.pop(token.kind, None)
             if token.kind == "tool" and self.stops:
+                self.halted.clear()
                 self.held |= {kind: Token(kind, "OFF", token.place, 0) for kind in _STOPPED}
             elif token.kind == "tool":
                 self.unsure.update(_STOPPED)
@@ -136,6 +141,7 @@ class Comparison:
         self.cl = _Side([one for one in asked_for if counts(one) and one.kind not in own], stops=False)
         self.nc = _Side([one for one in found if counts(one) and one.kind not in own & _LOOSE], stops=True)
         self.problems: list[Problem] = []
+        self.unlooked: list[tuple[int, str]] = []  #: NC lines, and what is not known there
         self._moved = False
         self._agreed: _Held = {}  # words that were as wanted when they were met last
         self._named: set[tuple[Token | None, Token | None]] = set()
@@ -161,6 +167,9 @@ class Comparison:
                 self._agreed[kind] = self.nc.held[kind]
             elif wanted != value and (moves or (kind in _ENDED and wanted == "OFF")):
                 self._other(kind)
+            if moves and wanted == value and (stop := self.nc.halted.pop(kind, None)):
+                on, pause = (_NAMES[one][1].format(what) for one, what in ((kind, value), (stop.kind, stop.value)))
+                self.unlooked.append((stop.line, f"{on} after the {pause}, at which most machines stop it"))
 
     def in_hole(self, line: int, tokens: Iterable[Token], dwell: float, *, tap: bool) -> None:
         """Within a hole, which CL `line` asks for, the program says its dwell and its tap, and changes nothing else."""
@@ -171,6 +180,9 @@ class Comparison:
             requested, done = (list[_Done]((one, {}) for one in some if one.kind == kind) for some in both)
             self._same(requested, done)
         for one in nc_values:
+            if one.kind == "tap" and self.nc.value("spindle") == "CCLW":
+                text = "a tap of the control turns clockwise, and the spindle turns counterclockwise"
+                self.problems.append(Problem("CS566", line, one.line, text))
             if one.kind not in _IN_HOLES and (one.kind in _ACTIONS or one.value != self.nc.value(one.kind)):
                 code, name = _NAMES[one.kind]
                 self.problems.append(Problem(code, line, one.line, f"{name.format(one.value)} is said within a hole"))

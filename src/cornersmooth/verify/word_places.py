@@ -99,6 +99,7 @@ class WordPlaces:
                 cycle = holes[element].cycle
                 line = int(program.line[original.pose[holes[element].move]])
                 comparison.in_hole(line, within[element], cycle.dwell, tap=cycle.tap)
+        found.unlooked += comparison.unlooked
         hidden = changed_unseen(requested, leading, beyond) if batches.acts.moves_left_out else ""
         unsaid = "; ".join(filter(None, (without_word(cl_tokens, nc_tokens, means, own), hidden)))
         return comparison.problems, at_home, unsaid

@@ -48,6 +48,9 @@ class Dialect:
     curves_need: str = ""
     #: whether tip control is switched by blocks that the machine's file names
     switches: bool = False
+    #: when words for spindle and coolant act in a block that moves: "before" the motion, or "around" it: what stops
+    #: them behind it; empty where the machine decides
+    order: str = ""
     #: names of words whose events stand beside the motion, and of those that say nothing here
     beside: Set[str] = frozenset("MTS")
     others: Container[str] = "DN%"
@@ -67,9 +70,9 @@ class Dialect:
         return self.retracts and not self.switches
 
     def after_motion(self, letter: str, value: float) -> bool:
-        """Whether a word acts after the motion of its block: M words that stop, end or switch off."""
+        """Whether a word acts after the motion of its block: M words that stop, end, and most that switch off."""
         kind, stated = self.means.get(f"M{value:g}", ("", "")) if letter == "M" else ("", "")
-        return kind in ("stop", "end") or is_off(stated)
+        return kind in ("stop", "end") or (is_off(stated) and self.order != "before")
 
     def acts(self, line: Line, state: Running) -> Acts:
         """Give out what a line that is no motion block does; each act is carried out before the next is wanted.

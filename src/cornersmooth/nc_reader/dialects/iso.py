@@ -116,7 +116,8 @@ class Iso(Dialect):
             yield wrong("CS506", line, "a hole cycle at inverse time feed (G93)")
         if tap and self._rigid and not state.rigid:
             yield wrong("CS506", line, "a tap without M29, which turns the spindle with the feed")
-        state.height = modal.tip[2] if state.height is None else state.height
+        if state.height is None or not math.isnan(modal.code):  # G0 or G1 ends a run of cycles, too
+            state.height = modal.tip[2]
         feed = given.get("F", modal.feed)
         pitch = (feed if mode == "revolution" else feed / state.speed) if tap else None
         cycle = HoleCycle(
