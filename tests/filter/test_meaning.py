@@ -61,6 +61,11 @@ def between(*new: str) -> Callable[[Lines], Lines]:
     return rewritten
 
 
+def apart(line: str) -> list[str]:
+    """The words of a block of tools and spindles in blocks of their own."""
+    return line.split() if re.fullmatch(r"[ST]\d+ M\d", line) else [line]
+
+
 def turned(lines: Lines) -> Lines:
     """The words of each block in the order of the alphabet."""
     blocks = [re.fullmatch(r"[A-Z][-+.\d]+( [A-Z][-+.\d]+)+", line) for line in lines]
@@ -85,7 +90,15 @@ ISO: dict[str, Callable[[Lines], Lines]] = {
     "zeros before": each(r"\bS(\d+)\b", r"S0\1"),
 }
 HARMLESS = {
-    "fanuc words": ISO | {"comments": between("(A COMMENT)"), "comments behind": each(r"^(G.*)$", r"\1 (CUT)")},
+    "fanuc words": ISO
+    | {
+        "words that act alone": lambda lines: [new for line in lines for new in apart(line)],
+        "states said twice": lambda lines: [new for line in lines for new in [line] * (1 + (line in ("M8", "G54")))],
+        "marks of the transfer": lambda lines: [line for line in lines if line != "%"],
+        "a mark of the coding": lambda lines: ["\ufeff" + lines[0], *lines[1:]],
+        "M2 for M30": each("^M30$", "M2"),
+    }
+    | {"comments": between("(A COMMENT)"), "comments behind": each(r"^(G.*)$", r"\1 (CUT)")},
     "siemens words": {
         **{name: ISO[name] for name in ("block numbers", "G01 for G1", "more blanks", "empty lines", "lower case")},
         "comments": between("; a comment"),
@@ -172,6 +185,7 @@ HARMFUL = {
     "a feed without its point": once(r"F1000\.", "F10"),
     "a block that may be skipped": once("G49", "/G49"),
     "two lines the other way round": lambda lines: [*lines[:4], lines[5], lines[4], *lines[6:]],
+    "a tool behind its change": lambda lines: [new for line in lines for new in reversed(apart(line))],
     "more at the end": behind("^M30", "G0 Z-50."),
     "a rapid more": behind("^G0 Z50", "G0 X0. Y0."),
     "other units of a place": once(r"Z50\.", "Z50"),

@@ -13,6 +13,7 @@ import numpy as np
 from cornersmooth.arrays import norm, unit
 from cornersmooth.control.source import CHUNK
 from cornersmooth.control.state import VECTOR, State
+from cornersmooth.control.table import UNKNOWN, Row
 from cornersmooth.control.words import Word
 from cornersmooth.errors import CornersmoothError, InputError
 from cornersmooth.filter.motion import Job, Stretch, motion, motion_of_runs, program_of, says_motion
@@ -24,14 +25,20 @@ from cornersmooth.nc_reader.rotary import LINE_SHARE
 from cornersmooth.settings import Settings
 from cornersmooth.verify import Verification, verify
 
-#: what a line says: its words, in order
+#: what a line, or a part of it that may have a line of its own, says: its words, in order
 Meaning = tuple[tuple[str, str], ...]
 
-#: comments that a control acts on (LinuxCNC: MSG, DEBUG, PROBEOPEN, LOG, PY, ABORT)
-_ACTING: Final = re.compile(r"\s*([A-Za-z]+\s*,|PROBE|LOG)", re.IGNORECASE)
+#: comments that a control acts on (LinuxCNC: DEBUG, PROBEOPEN, LOG, PY, ABORT); MSG is shown
+_ACTING: Final = re.compile(r"\s*((?!MSG)[A-Za-z]+\s*,|PROBE|LOG)", re.IGNORECASE)
+
+#: effects that hang on the other words of a block
+_TOGETHER: Final = frozenset(("place", "turn", "machine", "shift", "dwell", "anything", "unknown"))
 
 #: words that may jump or call
 _JUMPS: Final = re.compile(r"GOTO|REPEAT|(?<!TOOL )CALL|\bM0*9[6-9]|\bM198|\bG0*6[56]\b|\bG7[0-3]\b.*P")
+
+#: what the words that end a program say
+_END: Final = "end"
 
 #: groups that blocks of a run may set
 _OF_MOTION: Final = frozenset(("motion", "distance", "feed", "plane", "path"))
@@ -106,7 +113,7 @@ def _found(
         line = int(np.searchsorted(new.start, begin))
         if new.start[line] == begin and (line == 0 or not first):
             return line, line + len(lines), None
-    wanted = [(line, stated) for line in lines if (stated := meanings.of_line(old.lines(line, line + 1)))]
+    wanted = [(line, one) for line in lines for one in meanings.of_line(old.lines(line, line + 1))]
     # plain cuts are looked at only where the first line is one
     cut = bool(wanted) and old.why[wanted[0][0]] == PLAIN_CUT
     best = (0, at)
@@ -114,9 +121,14 @@ def _found(
         stop, count = k, 0
         while stop < len(new) and count < len(wanted):
             stated = meanings.of_line(new.lines(stop, stop + 1))
-            if (stated or not (first or count)) and stated != wanted[count][1]:
+            if not (stated or first or count):
                 break
-            count, stop = count + bool(stated), stop + 1
+            if stated != [one for _, one in wanted[count : count + len(stated)]]:
+                again = count and len(stated) == 1 and stated[0] == wanted[count - 1][1]
+                if not (again and meanings.holds_on(stated[0])):
+                    break
+                stated = []
+            count, stop = count + len(stated), stop + 1
         more = (j for j in range(stop, len(new)) if last and meanings.of_line(new.lines(j, j + 1)))
         if count == len(wanted) and (left := next(more, None)) is None:
             return k, stop, None
@@ -247,6 +259,11 @@ def _left_otherwise(job: Job, run: Run, state: State, following: bytes) -> str:
     return ""
 
 
+def _acts_alone(row: Row) -> bool:
+    """Whether a word does the same in a block of its own."""
+    return row.listed and row.must is row.next is None and (row.changes_tool or _TOGETHER.isdisjoint(row.does))
+
+
 def _told(place: Mapping[str, float]) -> str:
     return " ".join(f"{axis}{value:g}" for axis, value in place.items() if not math.isnan(value))
 
@@ -255,8 +272,8 @@ def _told(place: Mapping[str, float]) -> str:
 class Meanings:
     """Reads lines of a program by what they say, whatever their spelling.
 
-    Block numbers, blanks, comments, leading zeros and the order of words in a block are no difference. Numbers of
-    blocks count where the program may jump to them.
+    Block numbers, blanks, comments, leading zeros and the order of words in a block are no difference. Words that act
+    alone may have blocks of their own. Numbers of blocks count where the program may jump to them.
     """
 
     reader: ProgramReader
@@ -270,24 +287,37 @@ class Meanings:
         plain = (reader.lexer.comment.sub(" ", line.decode("latin-1").upper()) for _, line in stream.others)
         return cls(reader, reader.start, any(_JUMPS.search(line) for line in plain))
 
-    def of_line(self, text: bytes) -> Meaning:
-        """What a line says; empty for nothing."""
+    def of_line(self, text: bytes) -> list[Meaning]:
+        """What a line says, in parts that may have lines of their own; empty for nothing."""
         lexer = self.reader.lexer
         try:
             line = lexer.line(text, 0, None)
         except InputError:
             plain = lexer.comment.sub(" ", text.decode("latin-1").upper())
             plain = plain if self.numbers else re.sub(r"^\s*N\d+\s*", "", plain)
-            return (("line", " ".join(plain.split())),) if plain.strip() else ()
-        words = sorted(map(self._of_word, line.words))
-        words += [("comment", one) for one in line.comments if _ACTING.match(one)]
-        words += [("skipped", "")] * line.skipped + [("tape", "")] * line.tape
-        number = line.block_number
-        return (*([("N", f"{number.value:g}")] if number and self.numbers else []), *words)
+            return [(("line", " ".join(plain.split())),)] if plain.strip() else []
+        words = sorted(map(self._of_word, line.words), key=lambda word: ("GTSM".find(word[0]), word))
+        more = [("comment", one) for one in line.comments if _ACTING.match(one)]
+        more += [("skipped", "")] * line.skipped + [("tape", "")] * line.tape
+        more += [("N", f"{number.value:g}")] if (number := line.block_number) and self.numbers else []
+        if not more and len(rows := self.state.rows(line.words)) == len(words):
+            if all(name == "MSG" for _, name, _ in rows):  # it is shown
+                return []
+            if all(word.name in "GTSM" and _acts_alone(row) for word, _, row in rows):
+                return [(word,) for word in words]
+        return [(*words, *more)] if words or more else []
+
+    def holds_on(self, meaning: Meaning) -> bool:
+        """Whether a block that is one word may come twice: it sets a state, but for feed modes, which may end F."""
+        name, value = meaning[0]
+        row = self.state.table.row(f"{name}{float(value):g}") if name in ("G", "M") and value != _END else UNKNOWN
+        return bool(row.sets) and not row.does and row.group != "feed"
 
     def _of_word(self, word: Word) -> tuple[str, str]:
         if len(word.name) > 1:
             return word.name, re.sub(r"\s+", "", word.text.upper())
+        if self.state.table.means.get(word.spelling, ("",))[0] == _END:
+            return word.name, _END
         return word.name, f"{word.value!r}{' without point' * self.reader.lexer.without_point(word)}"
 
     def is_motion(self, text: bytes) -> bool:

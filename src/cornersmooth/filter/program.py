@@ -36,6 +36,9 @@ THREE_AXES: Final = Machine("three axes", ())
 #: how many times more cuts than poses of CL files are looked at where times need no plan
 _BY_LAW: Final = 10
 
+#: marks of the coding and of the transfer at the begin and at the end of a program: the lines stay
+_MARKS: Final = re.compile(rb"\A(\xef\xbb\xbf)?(%[ \t\r]*(?=\n))?|(?<=\n)%[ \t\r\n]*\Z")
+
 #: by what part planned times may differ that are the same, and how much faster it must be with more lines: times are
 #: as near to those that are planned closely
 _EQUAL: Final = 1e-3
@@ -246,6 +249,7 @@ def verify_programs(
     `new_name` is for messages; the other parameters are those of `filter_program`.
     """
     settings = Settings() if settings is None else settings
+    old, new = (_MARKS.sub(b"", data) for data in (old, new))
     job, before = read_program(old, form, settings, tip_from_start=tip_from_start, inch=inch, processes=processes)
     whole = job.reader.read(new)
     refuse_no_program(whole, new_name)

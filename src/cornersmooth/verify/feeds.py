@@ -37,15 +37,14 @@ def check_feeds(match: Match, found: Findings) -> None:
         return
     start, end = match.motion.last[:-1][feeding], match.motion.last[1:][feeding]
     place = match.place[start], match.place[end]
-    # a planned feed of what does not move the tool, as a table that turns about it, tells nothing but a time
-    still = nc.least_feed[element] & (end == start + 1)  # a full circle has more vertices
-    planned = np.flatnonzero(still)
-    ways = match.six[end[planned]] - match.six[start[planned]]
-    still[planned] = np.linalg.norm(ways, axis=1) <= ARITHMETIC
-    good = still | (nc.kind[element] == Element.RAPID)
     wrong = np.full(len(element), -1)
     first, last = _runs_between(task, *place)
-    good |= (first == last) & _fits(task.original, nc, element, task.feed_runs[1][first])
+    good = (first == last) & _fits(task.original, nc, element, task.feed_runs[1][first])
+    good |= nc.kind[element] == Element.RAPID
+    # the feed of what does not move the tool, as a table that turns about it, tells nothing but a time
+    rows = np.flatnonzero(~good & (end == start + 1))  # a full circle has more vertices
+    ways = match.six[end[rows]] - match.six[start[rows]]
+    good[rows] = np.linalg.norm(ways, axis=1) <= ARITHMETIC
     until = wrong.copy()  # the last run whose feed would do, from `wrong` on
     if len(rows := np.flatnonzero(~good)):
         own = start[rows]
