@@ -59,7 +59,7 @@ def test_a_plane_cut_by_a_straight_move_is_met_exactly(tool):
 def test_a_ball_that_is_lifted_leaves_what_a_circle_leaves():
     ball, lift = Tool.of(8, 4), 0.02
     path = np.array([[0.0, 0, 0], [30, 0, 0]])
-    points, own, written = off(straight(path), straight(path + np.array([0.0, 0.0, lift])), ball, 10.0)
+    points, own, written = off(straight(path), straight(path + np.array([0.0, 0.0, lift])), ball, 10.0, stations=200)
     np.testing.assert_allclose(own, 0.0, atol=1e-9)
     x, z = points.point[:, 1], points.point[:, 2]
     low = z < 4.0
@@ -115,7 +115,7 @@ def test_an_axis_that_turns_about_the_tip_leaves_a_plane_on_both_sides():
     axes = np.stack((np.sin(angles), np.zeros(9), np.cos(angles)), axis=1)
     turning = through(np.zeros((9, 3)), axes)
     tool = Tool.of(6)
-    points, own, _ = off(turning, turning, tool, 12.0)
+    points, own, _ = off(turning, turning, tool, 12.0, stations=200)
     # the sides of the swept volume are the planes y = ±R
     flank = points.point[:, 2] > 0.5
     np.testing.assert_allclose(np.abs(points.point[flank, 1]), 3.0, atol=1e-12)
