@@ -302,3 +302,27 @@ def test_arguments_of_many_kinds_are_right(things: dict[str, object]) -> None:
     assert len(table["line"]) == 1
     assert cornersmooth.from_poses([[0, 0, 0]], [[0, 0, 1]], kind=np.array([1.0])).kind.dtype == np.uint8
     assert Settings(tolerance=np.float64(0.02), weights=[1, 1]).weights == (1.0, 1.0)
+
+
+class TakesAPart(io.RawIOBase):
+    """A raw stream that takes a part of what is written, as a pipe does when a signal comes."""
+
+    def __init__(self) -> None:
+        self.taken = b""
+
+    def writable(self) -> bool:
+        return True
+
+    def write(self, data: bytes, /) -> int:  # type: ignore[override]
+        self.taken += bytes(data[:1000])
+        return min(len(data), 1000)
+
+
+@pytest.mark.parametrize("verify", [True, False])
+def test_a_raw_stream_gets_all_of_the_program(verify: bool) -> None:
+    raw, whole = TakesAPart(), io.BytesIO()
+    cornersmooth.postprocess(BREAKING, raw, verify=verify)
+    cornersmooth.postprocess(BREAKING, whole, verify=verify)
+    assert len(raw.taken) > 1000
+    assert raw.taken == whole.getvalue()
+    assert not raw.closed

@@ -26,6 +26,8 @@ from oracle.command import (
     PATIENCE,
     SMALL,
     USAGE,
+    command,
+    environment,
     lock,
     message,
     only,
@@ -41,6 +43,23 @@ from oracle.nc_text import parse
 from oracle.share import covering_share
 
 # ---------------------------------------------------------------- 4: output
+
+
+def test_standard_output_without_buffers_takes_all_of_the_program_or_none_is_done(medium: Path) -> None:
+    """As in containers: what the pipe did not take at once was lost, with exit code 0."""
+    reading, writing = os.pipe()
+    os.set_blocking(writing, False)
+    ran = subprocess.run(
+        command("smooth", medium, "-o", "-"),
+        stdout=writing,
+        stderr=subprocess.PIPE,
+        env=environment(PYTHONUNBUFFERED="1"),
+        timeout=PATIENCE,
+        check=False,
+    )
+    os.close(writing)
+    os.close(reading)
+    assert (ran.returncode, b"error[CS404]: cannot write it" in ran.stderr) == (BAD_OUTPUT, True)
 
 
 def test_existing_out_is_refused_without_force(small: Path, tmp_path: Path) -> None:

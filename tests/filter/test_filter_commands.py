@@ -253,6 +253,7 @@ def test_blending_of_the_program_is_added_in_the_first_line(word: str, total: st
     ("control", "before", "total"),
     [
         ("siemens", "CYCLE832(0.01,_FINISH,1)", "0.02"),
+        ("siemens", "CTOL=0.03", "0.04"),
         ("heidenhain", "CYCL DEF 32.0 TOLERANCE\nCYCL DEF 32.1 T0.05", "0.06"),
         ("haas", "G187 P3 E0.025", "0.035"),
     ],

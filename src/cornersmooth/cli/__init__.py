@@ -9,6 +9,7 @@ other processes, removes the temporary files and leaves.
 from __future__ import annotations
 
 import gc
+import io
 import os
 import signal
 import sys
@@ -95,6 +96,8 @@ def main() -> NoReturn:
 
     if sys.stderr is None:  # closed by the caller; what goes there must not end up in the NC text
         sys.stderr = open(os.devnull, "w")  # noqa: SIM115
+    if sys.stdout is not None and isinstance(sys.stdout.buffer, io.RawIOBase):  # it may take a part of what is written
+        sys.stdout = io.TextIOWrapper(io.BufferedWriter(sys.stdout.buffer), sys.stdout.encoding, line_buffering=True)
     if sys.stdout is not None:  # a name outside the console's code page is shown escaped, as on standard error
         sys.stdout.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
     sys.exit(group.flushed(group.run(None, ending)))

@@ -46,7 +46,8 @@ _FASTER: Final = 1e-2
 
 #: words by which a program lets its control round within a tolerance
 _OWN: Final = re.compile(
-    rb"(G64[ \t]*P|CYCLE832[ \t]*\(|CYCL DEF 32\.1[ \t]*T|G187[^\n(]*E)[ \t]*(\d*\.?\d+)(?:[ \t]*Q[ \t]*(\d*\.?\d+))?"
+    rb"(G64[ \t]*P|CYCLE832[ \t]*\(|CTOL[ \t]*=|CYCL DEF 32\.1[ \t]*T|G187[^\n(]*E)[ \t]*(\d*\.?\d+)"
+    rb"(?:[ \t]*Q[ \t]*(\d*\.?\d+))?"
 )
 
 

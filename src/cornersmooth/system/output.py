@@ -11,6 +11,7 @@ from __future__ import annotations
 import contextlib
 import glob
 import hashlib
+import io
 import json
 import os
 import stat
@@ -186,7 +187,7 @@ def open_output(target: Target, *, hold: bool = False, replace: bool = True) -> 
                 yield output
             return
         # a stream, a device or a pipe cannot be replaced, only written to
-        with contextlib.nullcontext(cast(BinaryIO, target)) if path is None else open(path, "wb") as device:
+        with _whole(cast(BinaryIO, target)) if path is None else open(path, "wb") as device:
             if hold:
                 import shutil
                 import tempfile
@@ -211,6 +212,17 @@ def open_output(target: Target, *, hold: bool = False, replace: bool = True) -> 
         what = f"cannot write it: {reason(failure)}"
         name = path or str(getattr(target, "name", "<output>"))
         raise OutputError("CS404", what, "the old file, if any, is untouched", file=name) from failure
+
+
+@contextlib.contextmanager
+def _whole(stream: BinaryIO) -> Iterator[BinaryIO]:
+    """A stream that takes all that is written: a raw one, as under PYTHONUNBUFFERED, may take a part of it."""
+    if not isinstance(stream, io.RawIOBase):
+        yield stream
+        return
+    whole = io.BufferedWriter(stream)
+    yield whole
+    whole.detach()
 
 
 def write_mark(path: str, digest: str, mark: Mapping[str, str]) -> None:
