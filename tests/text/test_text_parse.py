@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cornersmooth.text import NumberError, parse, parse_numbers
+from cornersmooth.text import parse, parse_numbers
 
 FIELDS = st.one_of(
     st.from_regex(r"\A[+-]?[0-9]{1,12}\.[0-9]{0,20}\Z"),
@@ -54,10 +54,9 @@ def test_result_does_not_depend_on_the_block(monkeypatch: pytest.MonkeyPatch, bl
     whole = parse_numbers(text)
     monkeypatch.setattr(parse, "BLOCK", block)
     assert same_bits(parse_numbers(text), whole)
-    for bad, offset in ((b"1,2,\n,3", 5), (b"1 x", 2), (b"1,2,", 3), (b",1", 0), (b"1 , , ,2", 4)):
-        with pytest.raises(NumberError) as caught:
+    for bad in (b"1 x", b"1,2,1..2,3", b"12 -"):
+        with pytest.raises(ValueError):  # noqa: PT011
             parse_numbers(bad)
-        assert caught.value.offset == offset
 
 
 @pytest.mark.parametrize("text", [b"", b" ", b"\r\n\t "])
@@ -66,68 +65,52 @@ def test_no_numbers(text: bytes) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "offset"),
+    "text",
     [
-        (b"1,,2", 2),
-        (b"1, ,2", 3),
-        (b",1", 0),
-        (b" , 1", 1),
-        (b"1,2,", 3),
-        (b"1,2 ,\n", 4),
-        (b",", 0),
-        (b"1 2 nan 3", 4),
-        (b"1,inf", 2),
-        (b"1,1e400", 2),
-        (b"1,-1d999", 2),
-        (b"1_000", 0),
-        (b"0x10", 0),
-        (b"1.2.3", 0),
-        (b"12 1-2", 3),
-        (b"12 --2", 3),
-        (b"12 +-2", 3),
-        (b"12 -", 3),
-        (b"12 .", 3),
-        (b"12 -. 3", 3),
-        (b"12 e5", 3),
-        (b"12 1e", 3),
-        (b"12 1e5.0", 3),
-        (b"12 1e5d3", 3),
-        (b"12\x0b13", 0),
-        (b"12 \x00", 3),
-        (b"12 13;", 3),
-        ("12 ３".encode(), 3),
-        (b"GOTO/1,2,3", 0),
-        (b"1/2", 0),
+        b"1 2 nan 3",
+        b"1,inf",
+        b"1,1e400",
+        b"1,-1d999",
+        b"1_000",
+        b"0x10",
+        b"1.2.3",
+        b"12 1-2",
+        b"12 --2",
+        b"12 +-2",
+        b"12 -",
+        b"12 .",
+        b"12 -. 3",
+        b"12 e5",
+        b"12 1e",
+        b"12 1e5.0",
+        b"12 1e5d3",
+        b"12\x0b13",
+        b"12 \x00",
+        b"12 13;",
+        "12 ３".encode(),
+        b"GOTO/1,2,3",
+        b"1/2",
+        b"1..2",
     ],
 )
-def test_what_is_not_a_number_is_refused(text: bytes, offset: int) -> None:
-    with pytest.raises(NumberError) as caught:
-        parse_numbers(text)
-    assert caught.value.offset == offset
-    assert str(offset) in str(caught.value)
-
-
-def test_the_offset_counts_from_the_start_of_the_text() -> None:
+def test_what_is_not_a_number_is_refused(text: bytes) -> None:
     good = b"-12.5000,0.25,3\n" * 9000
     assert len(good) > 2 * parse.BLOCK
-    for bad, shift in ((b"1..2", 0), (b"1,,2", 2)):
-        with pytest.raises(NumberError) as caught:
-            parse_numbers(good + bad + b"\n" + good)
-        assert caught.value.offset == len(good) + shift
+    for whole in (text, good + text + b"\n" + good):
+        with pytest.raises(ValueError):  # noqa: PT011
+            parse_numbers(whole)
 
 
 @given(st.text(alphabet="0123456789+-.eEdD,, \n", max_size=12))
 def test_random_text_is_read_as_float_would_or_refused(text: str) -> None:
-    fields = [part.split() for part in text.split(",")]
     values: np.ndarray | None
     try:
-        values = expected([field for part in fields for field in part])
-        if (len(fields) > 1 and not all(fields)) or not np.isfinite(values).all():
-            values = None
+        values = expected(text.replace(",", " ").split())
+        values = values if np.isfinite(values).all() else None
     except ValueError:
         values = None
     if values is None:
-        with pytest.raises(NumberError):
+        with pytest.raises(ValueError):  # noqa: PT011
             parse_numbers(text.encode())
     else:
         assert same_bits(parse_numbers(text.encode()), values)

@@ -246,6 +246,6 @@ def _fast(chunk: bytes, width: int) -> tuple[Floats, Ints] | None:
     if (row != np.searchsorted(newline, cell[width - 1 :: width])).any() or (np.diff(row) == 0).any():
         return None
     try:
-        return parse_numbers(chunk.replace(b",", b" ")).reshape(-1, width), row  # a comma may end a row
+        return parse_numbers(chunk).reshape(-1, width), row
     except ValueError:
         return None

@@ -3,8 +3,8 @@
 The only place where a number is rounded for output.
 """
 
-from cornersmooth.text.parse import NumberError, parse_numbers
+from cornersmooth.text.parse import parse_numbers
 from cornersmooth.text.rows import RowFormat, interleave
 from cornersmooth.text.ticks import format_number, to_ticks
 
-__all__ = ["NumberError", "RowFormat", "format_number", "interleave", "parse_numbers", "to_ticks"]
+__all__ = ["RowFormat", "format_number", "interleave", "parse_numbers", "to_ticks"]

@@ -36,39 +36,23 @@ _POWER: Final = np.array([float(f"1e{n}") for n in range(23)])  #: powers of ten
 _EXACT: Final = 2.0**53  #: mantissas below are exact in float64
 
 
-class NumberError(ValueError):
-    """A field is empty or is no finite decimal number: what is wrong with it, and its byte offset, from 0."""
-
-    def __init__(self, what: str, offset: int) -> None:
-        self.what = what
-        self.offset = offset
-        super().__init__(what, offset)
-
-    def __str__(self) -> str:
-        """Text of the message."""
-        return f"{self.what} at byte {self.offset}"
-
-
 def parse_numbers(data: bytes) -> Floats:
     """(m,) all numbers of a text, each bit for bit what `float` makes of it.
 
-    Numbers stand between any mix of blanks, tabs, line ends and single commas. Exponents may be written with D.
-    NumberError for an empty field beside a comma, a field that is no number, or one that float64 cannot hold.
+    Numbers are between any mix of blanks, tabs, line ends and commas. Exponents may be written with D. ValueError for
+    a field that is no number, or one that float64 cannot hold: who reads it again with care says where.
     """
     text = np.frombuffer(data, np.uint8)
     # every separator is at or below the comma: never fewer places than numbers, and untouched ones cost no memory
     places = sum(np.count_nonzero(text[k : k + BLOCK] <= ord(",")) for k in range(0, len(text), BLOCK))
     numbers = np.empty(places + 1)
     count = start = 0
-    commas = 1  # since the last number; the start counts as one, so that a text may not begin with a comma
     while start < len(text):
         stop = _block_end(text, start)
-        found, commas = _parse_block(text[start:stop], start, commas)
+        found = _parse_block(text[start:stop])
         numbers[count : count + len(found)] = found
         count += len(found)
         start = stop
-    if count and commas:
-        raise NumberError("a comma without a number after it", data.rindex(b","))
     return numbers[:count]
 
 
@@ -84,8 +68,8 @@ def _block_end(text: Bytes, start: int) -> int:
     return len(text)
 
 
-def _parse_block(block: Bytes, offset: int, commas: int) -> tuple[Floats, int]:
-    """Parse the whole fields of a block that begins at `offset`; return them and the commas after the last one."""
+def _parse_block(block: Bytes) -> Floats:
+    """Parse the whole fields of a block."""
     area = np.zeros(_MARGIN + len(block) + 1, np.uint8)
     area[_MARGIN:-1] = block
     area[-1] = ord("\n")  # closes the last field
@@ -96,11 +80,10 @@ def _parse_block(block: Bytes, offset: int, commas: int) -> tuple[Floats, int]:
     end = special.compress(kind == _SEPARATOR)
     start = np.concatenate(([0], end[:-1] + 1))
     filled = start < end
-    commas = _count_commas(end, text.take(end) == ord(","), filled, offset, commas)
     if not filled.all():
         start, end = start.compress(filled), end.compress(filled)
     if not len(end):
-        return np.empty(0), commas
+        return np.empty(0)
 
     first = text.take(start)
     minus = first == ord("-")
@@ -126,25 +109,8 @@ def _parse_block(block: Bytes, offset: int, commas: int) -> tuple[Floats, int]:
     if careful.any():
         raw = block.tobytes()
         for i in np.flatnonzero(careful).tolist():
-            numbers[i] = _careful(raw[start[i] : end[i]], offset + int(start[i]))
-    return numbers, commas
-
-
-def _count_commas(end: Ints, comma: Bools, filled: Bools, offset: int, commas: int) -> int:
-    """Make sure that at most one comma stands between two numbers; return how many follow the last number.
-
-    `end` are the places of all separators of a block, `comma` says which are commas, `filled` which close a number.
-    `commas` stood between the last number and the block.
-    """
-    if not commas and filled[:-1].all():  # one separator after each number
-        return 0 if filled[-1] else int(comma[-2])
-    passed = commas + np.concatenate(([0], np.cumsum(comma)))
-    between = np.diff(passed[:-1][filled], prepend=0, append=passed[-1])
-    if between.max() > 1:
-        second = between[: np.argmax(between > 1)].sum() + 2  # the comma that is too many, counted with those before
-        place = end[comma][second - commas - 1]
-        raise NumberError("an empty field beside a comma", offset + int(place))
-    return int(between[-1])
+            numbers[i] = _careful(raw[start[i] : end[i]])
+    return numbers
 
 
 def _find_points(points: Ints, start: Ints, end: Ints) -> tuple[Ints, Bools]:
@@ -163,17 +129,11 @@ def _digits(area: Bytes, stop: Ints, count: Ints) -> Words:
     return join_digits(word)
 
 
-def _careful(field: bytes, offset: int) -> float:
+def _careful(field: bytes) -> float:
     """Read one field by `float`, once it is sure to be plain decimal."""
-    shown = field[:40].decode("latin-1")
-    try:
-        if field.translate(None, _ALPHABET):
-            raise ValueError
-        number = float(field.translate(_FORTRAN))
-    except ValueError:
-        raise NumberError(f"{shown!r} is not a number", offset) from None
+    number = float("nan" if field.translate(None, _ALPHABET) else field.translate(_FORTRAN))
     if not math.isfinite(number):
-        raise NumberError(f"{shown!r} is too large", offset)
+        raise ValueError(field)
     return number
 
 

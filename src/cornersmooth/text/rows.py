@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cornersmooth.errors import OutputError
 from cornersmooth.model import Bools, Ints
-from cornersmooth.text.ticks import MOST_DECIMALS, TICK_LIMIT
+from cornersmooth.text.ticks import TICK_LIMIT
 
 BLOCK: Final = 8192  #: rows laid out at a time
 GROUP: Final = 4  #: digits in a full group
@@ -29,13 +29,7 @@ Table = NDArray[np.unsignedinteger[Any]]  #: entries are unsigned integers of as
 
 @dataclass(frozen=True)
 class RowFormat:
-    """How the words of a row are written.
-
-    Raises
-    ------
-    ValueError
-        For words and decimals that do not match, zero bytes in words, or decimals out of range.
-    """
+    """How the words of a row are written."""
 
     words: tuple[bytes, ...]  #: What comes before each number, blanks included: ``(b"X", b" Y", b" Z")``
     decimals: tuple[int, ...]  #: Digits after the point of each number; 0 writes no point unless `trim`
@@ -43,13 +37,6 @@ class RowFormat:
     trim: bool = False  #: Drop trailing zeros but keep the point: ``12.``, ``0.5``
     #: Write ``0.5`` rather than ``.5``. A number never is without any digit: zero is ``0.`` at least where trimmed.
     leading_zero: bool = True
-
-    def __post_init__(self) -> None:
-        if len(self.words) != len(self.decimals):
-            raise ValueError(f"{len(self.words)} words with {len(self.decimals)} decimals")
-        if not all(0 <= places <= MOST_DECIMALS for places in self.decimals):
-            raise ValueError(f"decimals are {self.decimals}: give whole numbers from 0 to {MOST_DECIMALS}")
-        _refuse_zero_bytes(self.words)
 
     def rows(
         self,
@@ -67,8 +54,6 @@ class RowFormat:
         empty, too, the row begins without a blank. CS301 for ticks beyond `TICK_LIMIT`.
         """
         ticks = np.asarray(ticks, np.int64)
-        if ticks.ndim != 2 or ticks.shape[1] != len(self.words):
-            raise ValueError(f"ticks of shape {ticks.shape} for {len(self.words)} words")
         m = len(ticks)
         if not m:
             return b""
@@ -107,22 +92,11 @@ def interleave(which: Ints, rows: Sequence[list[bytes]]) -> bytes:
     return b"".join([next(following[own]) for own in which.tolist()])
 
 
-def _refuse_zero_bytes(texts: Sequence[bytes]) -> None:
-    """Raise ValueError where a text has a zero byte: it would be lost with those that fill up."""
-    for text in texts:
-        if b"\0" in text:
-            raise ValueError(f"zero byte in {text!r}")
-
-
 def _chosen(texts: Sequence[bytes], ids: ArrayLike, count: int) -> NDArray[np.void]:
     """(m,) text of each of so many rows, filled up with zero bytes; `ids` (m,) or () say which."""
-    given = np.asarray(ids)
-    own = np.full(count, given) if given.ndim == 0 else given
-    if own.shape != (count,):
-        raise ValueError(f"ids of shape {given.shape} for {count} rows")
-    if not 0 <= own.min() <= own.max() < len(texts):
-        raise IndexError(f"ids from {own.min()} to {own.max()} for {len(texts)} texts")
-    _refuse_zero_bytes(texts)
+    own = np.broadcast_to(ids, count)
+    if any(b"\0" in text for text in texts):  # it would be lost with those that fill up
+        raise ValueError("zero byte in a text")
     used = np.bincount(own, minlength=len(texts)).tolist()
     longest = max(len(text) for text, number in zip(texts, used, strict=True) if number)
     filled = b"".join(text[:longest].ljust(longest, b"\0") for text in texts)
