@@ -24,6 +24,8 @@ PARTS: Final = 8
 PARTS_WORD: Final = re.compile(r"\bPARTS=([0-9a-f.]+)", re.IGNORECASE)
 NO_PARTS: Final = ".".join(("000000",) * PARTS)
 
+#: what is no character of a word
+_STRANGE: Final = re.compile(r"[^\w.+-]", re.ASCII)
 _HASH = re.compile(r"\bSHA256=([0-9a-f]{64})\b", re.IGNORECASE)
 
 
@@ -54,10 +56,11 @@ class Provenance:
 
     def lines(self) -> tuple[str, ...]:
         """Texts of the comments."""
-        words = {word: write(getattr(self, name)) for word, name, write, _ in _FIELDS}
+        values = {word: write(getattr(self, name)) for word, name, write, _ in _FIELDS}
+        words = (f"{word}={_STRANGE.sub('_', text)}" for word, text in values.items() if text)
         mark = f"CORNERSMOOTH {self.version}:"
         lines = [mark]
-        for word in (f"{key}={_word(value)}" for key, value in words.items() if value):
+        for word in words:
             if len(f"{lines[-1]} {word}") > _LONGEST and lines[-1] != mark:
                 lines.append(mark)
             lines[-1] += f" {word}"
@@ -65,12 +68,6 @@ class Provenance:
         if self.parts:
             lines.append(f"PARTS={NO_PARTS}")
         return tuple(lines)
-
-
-def with_parts(head: bytes, digests: str) -> tuple[int, bytes] | None:
-    """Where the digests of parts stand in the beginning of a text, and what to write there; None for no such place."""
-    at = head.find(f"PARTS={NO_PARTS}".encode())
-    return None if at < 0 else (at, f"PARTS={digests}{NO_PARTS[len(digests) :]}".encode())
 
 
 def read_provenance(text: bytes) -> Provenance | None:
@@ -90,11 +87,6 @@ def read_provenance(text: bytes) -> Provenance | None:
         return Provenance(version=found["version"], sha256=digest[1].lower() if digest else "", **own)
     except (TypeError, ValueError):
         return None
-
-
-def _word(text: str) -> str:
-    """Name in the characters of a word."""
-    return re.sub(r"[^\w.+-]", "_", text, flags=re.ASCII)
 
 
 def _number(value: float | None) -> str:

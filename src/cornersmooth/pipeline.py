@@ -19,7 +19,7 @@ import numpy as np
 from cornersmooth import __version__, nc, smoothing
 from cornersmooth.cl import read
 from cornersmooth.errors import Finding, InputError, SettingsError, Verdict, VerdictError
-from cornersmooth.frame import HEAD, Provenance, with_parts
+from cornersmooth.frame import HEAD, NO_PARTS, Provenance
 from cornersmooth.model import Move, Program, SmoothProgram
 from cornersmooth.nc import Form, Frame, Written
 from cornersmooth.nc.program_frame import blend_word
@@ -80,7 +80,7 @@ class Result:
         dict
             Plain values; keys carry their unit (`report/report.schema.json`).
         """
-        return report(self, command=command, loosened=loosened, saving=saving, limits=limits)
+        return report(self, command, loosened, saving, limits)
 
 
 def smooth(
@@ -326,9 +326,9 @@ def _with_planned_feeds(text: bytes, program: Program, settings: Settings, form:
 def _put_parts(output: Output, digests: str) -> None:
     """Write the digests of the parts of a program into its head, which has room for them."""
     with open(output.path, "rb") as text:
-        found = with_parts(text.read(HEAD), digests)
-    if found is not None:
-        output.stream.patch(output.path, *found)
+        at = text.read(HEAD).find(f"PARTS={NO_PARTS}".encode())
+    if at >= 0:
+        output.stream.patch(output.path, at, f"PARTS={digests}{NO_PARTS[len(digests) :]}".encode())
 
 
 def _provenance(program: Program, settings: Settings, form: Form) -> Provenance:

@@ -22,15 +22,14 @@ from cornersmooth.filter.program import THREE_AXES, read_program, refuse_cl_file
 from cornersmooth.filter.runs import FILTERED, ProgramReader
 from cornersmooth.filter.times import Times
 from cornersmooth.frame import HEAD
-from cornersmooth.kinematics import Machine
+from cornersmooth.kinematics import Machine, with_dynamics
 from cornersmooth.nc import Form
 from cornersmooth.nc_reader import Problem
 from cornersmooth.nc_reader.recognition import is_cl_file, names_tip_control, needs_its_control, recognise_control
-from cornersmooth.report import Kind, NcFile, planned_times, record, sha256_of
+from cornersmooth.report import Kind, nc_file, planned_times, record, sha256_of
 from cornersmooth.report.verdict import Judgement, Saving
 from cornersmooth.settings import Settings
 from cornersmooth.system.output import FAILED, make_folder, open_output
-from cornersmooth.times.comparing import limits_machine
 from cornersmooth.verify import useful_processes
 
 #: names of NC programs, for folders
@@ -132,7 +131,7 @@ def _filter(job: files.Input, given: Options) -> Verdict:
         old,
         found,
         _judgement(found, old.settings.tolerance),
-        NcFile.of(path, output.stream.digest, old.form),
+        nc_file(path, output.stream.digest, old.form),
         job.reports,
         saving,
         summary={
@@ -167,7 +166,7 @@ def verify_with_program(data: bytes, name: str, given: Options) -> int:
     wrong, tolerance = found.checked.wrong, old.settings.tolerance
     judgement = Judgement(found.verdict, _to_check(found), 0, "", _problems(wrong) or _measured(found, tolerance))
     path = None if given.text == files.STANDARD else given.text
-    program = replace(NcFile.of(path, sha256_of(new), old.form), form=None)
+    program = nc_file(path, sha256_of(new), old.form) | {"form": None}
     contents = _reported("verify", old, found, judgement, program, given.reports)
     show_wrong(new_name, wrong)
     if given.as_json:
@@ -182,7 +181,7 @@ def _reported(
     old: OldProgram,
     found: Filtered,
     judgement: Judgement,
-    program: NcFile,
+    program: Mapping[str, Any],
     reports: Iterable[str],
     saving: Saving | None = None,
     **more: Any,
@@ -344,7 +343,7 @@ def how_read(given: Options) -> dict[str, Any]:
 
 def axes_of(given: Options) -> Machine:
     """Machine under whose limits a program is planned."""
-    axes = limits_machine(given.load_limits(), given.load_machine())
+    axes = with_dynamics(given.load_limits() or given.load_machine())
     if axes is None:
         raise click.UsageError("programs are planned within limits of axes: name a machine with [dynamics]: --limits")
     return axes

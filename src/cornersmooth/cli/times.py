@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any, get_args
 
 import click
@@ -195,15 +195,20 @@ def run_compare(given: Options) -> int:
         else:
             program = read(data, name=name, **given.reading()).with_feed(given.feed)
             tried = candidates(control, settings, limits if machine is None else machine)
-        layout = _Layout.of([Row.of(one) for one in tried])
+        columns = zip(_HEAD, *(_cells(Row.of(one)) for one in tried), strict=True)
+        widths = [max(room, *map(len, column)) for room, column in zip(_ROOM, columns, strict=True)]
 
         def watch(table: Table) -> None:
             """Print each row as soon as it is there."""
             if progress is not None:
                 progress("programs", len(table.rows), len(tried))
             if not given.as_json and not given.quiet:
-                for line in layout.row(table.rows[-1]) if table.rows else layout.head(table, bool(given.verbose)):
+                row = table.rows[-1] if table.rows else None
+                for line in () if row else _head(table, given.verbose):
                     say_line(line)
+                cells = zip(_cells(row) if row else _HEAD, widths, strict=True)
+                wrong = "" if row is None or row.usable else f"  {row.verdict}"
+                say_line("  ".join(f"{one:<{width}}" for one, width in cells).rstrip() + wrong)
 
         if is_program:
             table = compare_filtered(data, tried, axes, **how_read(given), watch=watch)
@@ -225,33 +230,13 @@ _HEAD = ("form", "words", "method", "lines", "blocks", "kB", "s", "saves", "tip 
 _ROOM = (0, 0, 0, 0, 9, 6, 8, 5, 7, 7)
 
 
-@dataclass(frozen=True)
-class _Layout:
-    """Widths of the columns, known before there is any row."""
-
-    widths: tuple[int, ...]
-
-    @classmethod
-    def of(cls, rows: Sequence[Row]) -> _Layout:
-        cells = [(row.form, _words(row), row.method, row.lines) for row in rows]
-        texts = [max(map(len, column)) for column in zip(*cells, strict=True)] + [0] * (len(_HEAD) - 4)
-        return cls(tuple(max(one, room, len(title)) for one, room, title in zip(texts, _ROOM, _HEAD, strict=True)))
-
-    def head(self, table: Table, verbose: bool) -> Iterator[str]:
-        """What holds for all rows, and the titles of the columns."""
-        if table.share < 1.0:
-            yield f"from {100.0 * table.share:.2g} % of the poses: whole runs from the middle of the part"
-        if verbose:
-            yield f"law of lines: {table.law}"
-        yield f"unsmoothed: {table.unsmoothed:.1f} s{', ' + table.against if table.against else ''}; saves in %"
-        yield self._line(_HEAD)
-
-    def row(self, row: Row) -> Iterator[str]:
-        """One line."""
-        yield self._line(_cells(row)) + ("" if row.usable else f"  {row.verdict}")
-
-    def _line(self, cells: Sequence[str]) -> str:
-        return "  ".join(f"{cell:<{width}}" for cell, width in zip(cells, self.widths, strict=True)).rstrip()
+def _head(table: Table, verbose: int) -> Iterator[str]:
+    """What holds for all rows."""
+    if table.share < 1.0:
+        yield f"from {100.0 * table.share:.2g} % of the poses: whole runs from the middle of the part"
+    if verbose:
+        yield f"law of lines: {table.law}"
+    yield f"unsmoothed: {table.unsmoothed:.1f} s{', ' + table.against if table.against else ''}; saves in %"
 
 
 def _end(table: Table, commands: list[str]) -> Iterator[str]:
@@ -268,19 +253,13 @@ def _end(table: Table, commands: list[str]) -> Iterator[str]:
                 yield f"  {reached.removeprefix('; ')}"
 
 
-def _words(row: Row) -> str:
-    return row.words.removeprefix("rotary words of ")
-
-
 def _cells(row: Row) -> tuple[str, ...]:
+    words = (row.form, row.words.removeprefix("rotary words of "), row.method, row.lines)
     if row.seconds is None or row.saved is None or row.tip is None:
-        return (row.form, _words(row), row.method, row.lines, *[""] * 6)
+        return (*words, *[""] * 6)
     share = 100.0 * row.saved / (row.seconds + row.saved) if row.seconds + row.saved else 0.0
     return (
-        row.form,
-        _words(row),
-        row.method,
-        row.lines,
+        *words,
         f"{row.blocks:,}",
         f"{row.bytes / 1000.0:.0f}",
         f"{'~' * row.about}{row.seconds:.1f}",

@@ -21,7 +21,7 @@ from cornersmooth.geometry.tool import Tool, tools_of
 from cornersmooth.model import Program
 from cornersmooth.nc import own_words
 from cornersmooth.nc_reader import read_nc
-from cornersmooth.report import NcFile, cl_file, findings_table, record, sha256_of
+from cornersmooth.report import cl_file, findings_table, record, sha256_of
 from cornersmooth.report.tables import verification_csv
 from cornersmooth.report.verdict import judge, trusted_blocks
 from cornersmooth.system.processes import return_large_arrays
@@ -86,14 +86,14 @@ def run_verify(given: Options) -> int:
         "verify",
         judge(found, findings),
         source=cl_file(program),
-        program=NcFile(
-            name=None if text == files.STANDARD else text,
-            sha256=sha256_of(nc) if isinstance(nc, bytes) or os.path.isfile(nc) else None,
-            control=control.name,
-            form=head.form,
-            machine=None if machine is None else machine.name,
-            tcp=not given.no_tcp,
-        ),
+        program={
+            "name": None if text == files.STANDARD else text,
+            "sha256": sha256_of(nc) if isinstance(nc, bytes) or os.path.isfile(nc) else None,
+            "control": control.name,
+            "form": head.form,
+            "machine": None if machine is None else machine.name,
+            "tcp": not given.no_tcp,
+        },
         settings={
             "tolerance_mm": given.tolerance,
             "axis_length_mm": given.axis_length,
@@ -215,7 +215,7 @@ def run_surface(given: Options) -> int:
 
         checked = verify(program, written, tolerance=given.tolerance, axis_length=given.axis_length, **how)
         findings = (*program.findings, *trusted_blocks(checked))
-        file = NcFile(written if isinstance(written, str) else None, None, given.load_control().name, None, None, True)
+        file = {"name": written if isinstance(written, str) else None, "control": given.load_control().name}
         judged = judge(checked, findings)
         contents = record("verify", judged, source=cl_file(program), program=file, settings={}, findings=findings)
         return verified_page(program, nc, checked, contents, surface=found)

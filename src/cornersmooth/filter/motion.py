@@ -57,7 +57,8 @@ def motion_of_runs(job: Job, reading: Reading, runs: Sequence[Run]) -> NcProgram
         text = reading.lines(run.first, run.stop)
         others = job.reader.wanted == ANY and TURNS.search(text)
         if others or run.state.groups["distance"] == "incremental":  # in places, with their own feeds
-            pairs = zip(in_places(job, run), run.feeds.tolist(), strict=True)
+            blocks = (_block(job, run, place, job.form, rapid=False) for place in run.place)
+            pairs = zip(blocks, run.feeds.tolist(), strict=True)
             text = b"".join(b"%b F%.9f\n" % pair for pair in pairs)
         stretches.append(Stretch(run, text, run.first + 1))
     return motion(job, stretches, job.form)
@@ -103,11 +104,6 @@ def program_of(nc: NcProgram, marks: bool = False) -> Program:
         statements=tuple(Statement(pose, 0, "PPRINT", ("RUN",), "RUN") for pose in starts),
         units=nc.units,
     )
-
-
-def in_places(job: Job, run: Run) -> list[bytes]:
-    """Blocks that go to the places of a run, without line ends."""
-    return [_block(job, run, place, job.form, rapid=False) for place in run.place]
 
 
 def _head(form: Form, *, inch: bool) -> bytes:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from cornersmooth.nc_reader.recognition import foreign_kind, is_cl_file
 from cornersmooth.settings import Settings
 from cornersmooth.system.processes import return_free_memory
 from cornersmooth.times import Timing
-from cornersmooth.times.comparing import MOST_POSES, Candidate, Row, Table, law_of_lines, with_rows
+from cornersmooth.times.comparing import MOST_POSES, Candidate, Row, Table, Watch, law_of_lines, with_rows
 
 #: the machine of a program that names no rotary axis
 THREE_AXES: Final = Machine("three axes", ())
@@ -238,12 +238,10 @@ def verify_programs(
     form: Form,
     settings: Settings | None = None,
     *,
-    tip_from_start: bool = False,
-    inch: bool = False,
     axes: Machine | None = None,
     paths: bool = False,
-    processes: int = 1,
     new_name: str = "the second program",
+    **how: Any,
 ) -> Filtered:
     """Compare a program with the one that it was made from, whoever made it.
 
@@ -251,7 +249,7 @@ def verify_programs(
     """
     settings = Settings() if settings is None else settings
     old, new = (_MARKS.sub(b"", data) for data in (old, new))
-    job, before = read_program(old, form, settings, tip_from_start=tip_from_start, inch=inch, processes=processes)
+    job, before = read_program(old, form, settings, **how)
     whole = job.reader.read(new)
     refuse_no_program(whole, new_name)
     where, wrong = places(before, whole, job.reader)
@@ -375,18 +373,15 @@ def compare_filtered(
     data: bytes,
     tried: Sequence[Candidate],
     axes: Machine,
-    *,
-    tip_from_start: bool = False,
-    inch: bool = False,
-    processes: int | None = None,
-    watch: Callable[[Table], None] | None = None,
+    watch: Watch | None = None,
+    **how: Any,
 ) -> Table:
     """Smooth, verify and plan the runs of a program in every way; other parameters as of `filter_program`.
 
     `tried` has at least one, in forms with the words of the program; `watch` as of `compare_programs`.
     CS265: the machine has no limits of axes; CS266: no cut can be smoothed; as `Times`.
     """
-    form, settings, how = tried[0].form, tried[0].settings, {"tip_from_start": tip_from_start, "inch": inch}
+    form, settings = tried[0].form, tried[0].settings
     job, old = read_program(data, form, settings, **how)
     timing = Timing.of(form, settings, axes=axes)
     if timing is None:
@@ -418,6 +413,4 @@ def compare_filtered(
             axis_point=None if point != point else point,
         )
 
-    return with_rows(
-        Table(before, "the program as it is", share, law_of_lines(timing), ()), tried, work, processes, watch
-    )
+    return with_rows(Table(before, "the program as it is", share, law_of_lines(timing), ()), tried, work, watch)

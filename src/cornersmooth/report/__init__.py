@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
@@ -26,21 +26,13 @@ if TYPE_CHECKING:
     from cornersmooth.pipeline import Result
 
 
-__all__ = ["SCHEMA", "NcFile", "corners_csv", "findings_table", "report", "report_json"]
+__all__ = ["SCHEMA", "corners_csv", "findings_table", "nc_file", "report", "report_json"]
 
 
 def report(
-    result: Result,
-    *,
-    command: str = "",
-    loosened: str = "",
-    saving: Saving | None = None,
-    limits: Machine | None = None,
+    result: Result, command: str, loosened: str, saving: Saving | None, limits: Machine | None
 ) -> dict[str, Any]:
-    """Everything that the JSON report of ``smooth`` says, as `cornersmooth.pipeline.Result.report` gives it.
-
-    Numbers are in mm, degrees and s as their keys name them; ``report.schema.json`` describes it.
-    """
+    """Everything that the JSON report of ``smooth`` says; see `cornersmooth.pipeline.Result.report`."""
     smoothed, form, found, findings = result.smoothed, result.form, result.verification, result.findings
     program, corners, dense = smoothed.program, smoothed.corners, not form.curve
     done, runs = corners.rounded, smoothed.runs
@@ -72,7 +64,7 @@ def report(
         "smooth",
         result.judgement,
         source=cl_file(program),
-        program=NcFile.of(result.path, result.sha256, form),
+        program=nc_file(result.path, result.sha256, form),
         settings=smoothed.settings.as_dict(),
         findings=findings,
         command=command,
@@ -110,8 +102,6 @@ def _largest(values: Floats) -> float:
 def _feed_length(smoothed: SmoothProgram) -> float:
     """Length of the linear and circular feed moves of the tip in the CL data, mm."""
     program = smoothed.program
-    if len(program) < 2:
-        return 0.0
     step = norm(np.diff(program.tip, axis=0))
     kind, from_kind = program.kind[1:], program.kind[:-1]
     straight = float(step[(kind == Move.LINEAR) & (from_kind != Move.FROM)].sum())
@@ -175,22 +165,16 @@ SCHEMA = "cornersmooth-report/2"
 Kind = Literal["smooth", "verify", "filter"]
 
 
-@dataclass(frozen=True)
-class NcFile:
-    """The NC program that a report is about."""
-
-    name: str | None  #: As the caller named it; None for a stream.
-    sha256: str | None
-    control: str
-    form: str | None  #: none where a program does not name it
-    machine: str | None  #: none without rotary words
-    tcp: bool  #: whether the control keeps the tool tip
-
-    @classmethod
-    def of(cls, name: str | None, sha256: str, form: Form) -> NcFile:
-        """A program of a form."""
-        machine = form.machine.name if form.machine is not None and form.rotary else None
-        return cls(name, sha256, form.control, form.name, machine, form.orientation != "machine")
+def nc_file(name: str | None, sha256: str, form: Form) -> dict[str, Any]:
+    """Give the NC program of a form that a report is about, by the name of the caller; None for a stream."""
+    return {
+        "name": name,
+        "sha256": sha256,
+        "control": form.control,
+        "form": form.name,
+        "machine": form.machine.name if form.machine is not None and form.rotary else None,
+        "tcp": form.orientation != "machine",
+    }
 
 
 def record(
@@ -198,14 +182,14 @@ def record(
     judgement: Judgement,
     *,
     source: Mapping[str, Any],
-    program: NcFile | None,
+    program: Mapping[str, Any],
     settings: Mapping[str, Any],
     findings: Iterable[Finding] = (),
     command: str = "",
     loosened: str = "",
     times: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
-    """Begin a report of a command on its input, as `cl_file` gives it, and the program that was written, if any.
+    """Begin a report of a command on its input, as `cl_file` gives it, and its program, as `nc_file` does.
 
     Names of settings end with their unit. `loosened` says what settings made looser than the default, `times` is as
     `planned_times` gives them.
@@ -216,12 +200,14 @@ def record(
     return {
         "schema": SCHEMA,
         "kind": kind,
-        **judgement.as_dict(),
+        "verdict": str(judgement.verdict),
         "verdict_text": text,
+        "to_check": judgement.to_check,
+        "left_out": judgement.left_out,
         "not_verified": judgement.unverified,
         "made_by": {"name": "cornersmooth", "version": __version__, "command": command or None},
         "input": dict(source),
-        "program": None if program is None else asdict(program),
+        "program": dict(program),
         "settings": dict(settings),
         "times": None if times is None else dict(times),
         "findings": findings_table(findings),

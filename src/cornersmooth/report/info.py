@@ -125,15 +125,14 @@ def _motion(program: Program, segments: _Segments) -> Record:
     feeds = [
         np.unique(program.feed[cutting & (program.feed_mode == mode) & np.isfinite(program.feed)]) for mode in FeedMode
     ]
-    corner = np.zeros(3)
     return {
         "moves": {kind.name.lower(): count for kind in Move if (count := int(np.count_nonzero(program.kind == kind)))},
         "chains": len(chains),
         "longest_chain_poses": int((chains[:, 1] - chains[:, 0] + 1).max(initial=0)),
         "feed_length_mm": float(segments.length[segments.linear].sum()),
         "rapid_length_mm": float(segments.length[program.kind[1:] == Move.RAPID].sum()),
-        "box_min_mm": (program.tip.min(axis=0) if len(program) else corner).tolist(),
-        "box_max_mm": (program.tip.max(axis=0) if len(program) else corner).tolist(),
+        "box_min_mm": program.tip.min(axis=0).tolist(),
+        "box_max_mm": program.tip.max(axis=0).tolist(),
         "feeds_mm_per_min": feeds[FeedMode.PER_MINUTE].tolist(),
         "feeds_mm_per_rev": feeds[FeedMode.PER_REVOLUTION].tolist(),
         "feed_moves_without_feed": int(np.count_nonzero(cutting & np.isnan(program.feed))),

@@ -147,11 +147,6 @@ class Judgement:
         """The first line of every output."""
         return f"{self.head}: {self.what}"
 
-    def as_dict(self) -> dict[str, Any]:
-        """Plain values, as reports begin with them."""
-        values = {"verdict": str(self.verdict), "verdict_text": self.text}
-        return values | {"to_check": self.to_check, "left_out": self.left_out}
-
 
 def judge(found: Verification | None, findings: Iterable[Finding] = (), unverified: str = "") -> Judgement:
     """Give the verdict on a program from what verification found, and what was noticed on the way to the program.

@@ -20,7 +20,7 @@ from cornersmooth.feedrate.parts import time_of_parts
 from cornersmooth.feedrate.path import Path, build_path
 from cornersmooth.feedrate.written import text_path
 from cornersmooth.kinematics import Machine, endless, tool_axis, with_dynamics
-from cornersmooth.model import Floats, Ints, Move, Program
+from cornersmooth.model import Floats, Move, Program
 from cornersmooth.nc import Form
 from cornersmooth.pipeline import Progress, read_back, stage_of
 from cornersmooth.report.verdict import Saving
@@ -246,16 +246,13 @@ def without_holes(program: Program) -> Program:
 def _from_to(program: Program, tip: Floats, axis: Floats) -> tuple[int, int]:
     """Rows of written poses that are the first and the last pose a program goes to; −1 where it goes another way."""
     gone_to = np.flatnonzero(program.kind != Move.FROM)[[0, -1]]  # no text goes to a FROM
-    begin, end = (_poses_at(tip, axis, program, pose) for pose in gone_to.tolist())
+    begin, end = (
+        np.flatnonzero((np.abs(np.hstack((tip - program.tip[pose], axis - program.axis[pose]))) < _SAME).all(axis=1))
+        for pose in gone_to.tolist()
+    )
     if not len(begin) or not len(end) or begin[0] >= end[-1]:
         return -1, -1
     return int(begin[0]), int(end[-1])
-
-
-def _poses_at(tip: Floats, axis: Floats, program: Program, pose: int) -> Ints:
-    """Rows that are a pose of the program."""
-    near = np.abs(tip - program.tip[pose]).max(axis=1) < _SAME
-    return np.flatnonzero(near & (np.abs(axis - program.axis[pose]).max(axis=1) < _SAME))
 
 
 SCHEMA = "cornersmooth-time/1"

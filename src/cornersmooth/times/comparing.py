@@ -14,12 +14,12 @@ from cornersmooth.arrays import some_poses
 from cornersmooth.errors import CornersmoothError, SettingsError, Verdict
 from cornersmooth.feedrate import BlockLimits
 from cornersmooth.feedrate.intervals import ROUGHLY, Resolution
-from cornersmooth.kinematics import Machine, with_dynamics
+from cornersmooth.kinematics import Machine
 from cornersmooth.model import Move, Program
 from cornersmooth.nc import Control, Form, choose_form
 from cornersmooth.pipeline import postprocess
 from cornersmooth.settings import CURVES_METHOD, DEFAULT_METHOD, Settings
-from cornersmooth.system.processes import can_fork, map_in_processes, useful_processes
+from cornersmooth.system.processes import map_in_processes, useful_processes
 from cornersmooth.times import Timing, without_holes
 
 #: poses of a part that are looked at; of longer ones whole runs from the middle
@@ -137,6 +137,10 @@ class Table:
         }
 
 
+#: called with the table, without rows first, and after each row
+Watch = Callable[[Table], None]
+
+
 def candidates(control: Control, settings: Settings, machine: Machine | None) -> list[Candidate]:
     """Forms, methods and line densities that a control can run, with tool vectors and with words of the machine."""
     found: list[Candidate] = []
@@ -175,22 +179,16 @@ def _densities(form: Form) -> Iterator[tuple[str, dict[str, Any], tuple[str, ...
 def compare_programs(
     program: Program,
     tried: list[Candidate],
-    axes: Machine | None = None,
+    axes: Machine,
     blocks: BlockLimits | None = None,
-    *,
-    processes: int | None = None,
-    watch: Callable[[Table], None] | None = None,
+    watch: Watch | None = None,
 ) -> Table:
     """Write, measure and plan every candidate, of which there is one at least; all moves of the program have a feed.
 
     Parameters
     ----------
-    axes : Machine, optional
+    axes : Machine
         Whose limits, in place of those of the machines of the forms.
-    processes : int, optional
-        As many as are useful by default; the rows do not depend on it.
-    watch : callable, optional
-        Called with the table, without rows first, and after each row.
 
     Raises SettingsError CS265: no axis of the machine has limits. CornersmoothError: the unsmoothed lines cannot be
     planned.
@@ -202,18 +200,42 @@ def compare_programs(
         raise SettingsError("CS265", "no limits of axes are known", "name a machine that has [dynamics] with --limits")
     unsmoothed, against = timing.unsmoothed(part)
 
+    def planned(row: Row, candidate: Candidate, text: bytes, resolution: Resolution | None = None) -> Row:
+        """Row with the time of its program; the law of a control takes no rough plan."""
+        fitted = nc.fit_settings(candidate.settings, candidate.form, part.units)
+        timing = Timing.of(candidate.form, fitted, axes=axes, blocks=blocks)
+        if timing is None:
+            return replace(Row.of(candidate), verdict="no limits of axes are known")
+        about = resolution is not None and not candidate.form.table.lines.planner
+        seconds, limits = timing.written(text, part, resolution=resolution)
+        kept = text if about else b""
+        return replace(row, seconds=seconds, saved=unsmoothed - seconds, limits=limits, about=about, text=kept)
+
     def work(candidate: Candidate) -> Row:
-        return _row(part, candidate, unsmoothed, axes, blocks)
+        row, stream = Row.of(candidate), io.BytesIO()
+        try:
+            result = postprocess(part, stream, candidate.settings, form=candidate.form, processes=1)
+            if (found := result.verification) is None:
+                return replace(row, verdict=result.unverified)
+            made = replace(
+                row,
+                verdict=str(result.verdict),
+                blocks=result.written.blocks,
+                bytes=len(stream.getvalue()),
+                tip=found.max_tip_deviation_mm,
+                axis_point=None if found.axis_tolerance is not None else found.max_axis_point_deviation_mm,
+            )
+            return planned(made, candidate, stream.getvalue(), ROUGHLY)
+        except CornersmoothError as failure:
+            return replace(row, verdict=getattr(failure, "what", str(failure)))
 
     def closely(number: int) -> Row:
-        timing, row = _timing(part, tried[number], axes, blocks), table.rows[number]
-        assert timing is not None
-        return _planned(row, timing, row.text, part, unsmoothed)
+        return planned(table.rows[number], tried[number], table.rows[number].text)
 
     begun = Table(unsmoothed, against, len(part) / max(len(program), 1), law_of_lines(timing), ())
-    table = with_rows(begun, tried, work, processes, watch)
+    table = with_rows(begun, tried, work, watch)
     leading = _leading(table.rows)
-    rows = dict(zip(leading, map_in_processes(closely, leading, _processes(processes)), strict=True))
+    rows = dict(zip(leading, map_in_processes(closely, leading, useful_processes()), strict=True))
     return replace(table, rows=tuple(rows.get(number, row) for number, row in enumerate(table.rows)))
 
 
@@ -226,24 +248,14 @@ def _leading(rows: Sequence[Row]) -> list[int]:
     return sorted(number for number in found if rows[number].about)
 
 
-def with_rows(
-    table: Table,
-    tried: Sequence[Candidate],
-    work: Callable[[Candidate], Row],
-    processes: int | None,
-    watch: Callable[[Table], None] | None,
-) -> Table:
-    """Add the row of every candidate, by as many processes as are useful where no number is given."""
+def with_rows(table: Table, tried: Sequence[Candidate], work: Callable[[Candidate], Row], watch: Watch | None) -> Table:
+    """Add the row of every candidate, by as many processes as are useful."""
     tell = watch or (lambda table: None)
     tell(table)
-    for row in map_in_processes(work, tried, _processes(processes)):
+    for row in map_in_processes(work, tried, useful_processes()):
         table = replace(table, rows=(*table.rows, row))
         tell(table)
     return table
-
-
-def _processes(wanted: int | None) -> int:
-    return (useful_processes() if wanted is None else wanted) if can_fork() else 1
 
 
 def law_of_lines(timing: Timing) -> str:
@@ -268,50 +280,3 @@ def _middle(program: Program) -> Program:
     first = int(before[-1]) if len(before) else wanted
     ends = rapids[(rapids > first) & (rapids <= first + MOST_POSES)]
     return some_poses(program, first, int(ends[-1]) if len(ends) else first + MOST_POSES)
-
-
-def _row(
-    program: Program,
-    candidate: Candidate,
-    unsmoothed: float,
-    axes: Machine | None,
-    blocks: BlockLimits | None,
-) -> Row:
-    settings, row = candidate.settings, Row.of(candidate)
-    try:
-        stream = io.BytesIO()
-        result = postprocess(program, stream, settings, form=candidate.form, processes=1)
-        timing, found = _timing(program, candidate, axes, blocks), result.verification
-        if timing is None or found is None:
-            return replace(row, verdict="no limits of axes are known")
-        row = replace(
-            row,
-            verdict=str(result.verdict),
-            blocks=result.written.blocks,
-            bytes=len(stream.getvalue()),
-            tip=found.max_tip_deviation_mm,
-            axis_point=None if settings.axis_tolerance is not None else found.max_axis_point_deviation_mm,
-        )
-        return _planned(row, timing, stream.getvalue(), program, unsmoothed, ROUGHLY)
-    except CornersmoothError as failure:
-        return replace(Row.of(candidate), verdict=getattr(failure, "what", str(failure)))
-
-
-def _timing(program: Program, candidate: Candidate, axes: Machine | None, blocks: BlockLimits | None) -> Timing | None:
-    fitted = nc.fit_settings(candidate.settings, candidate.form, program.units)
-    return Timing.of(candidate.form, fitted, axes=axes, blocks=blocks)
-
-
-def _planned(
-    row: Row, timing: Timing, text: bytes, program: Program, unsmoothed: float, resolution: Resolution | None = None
-) -> Row:
-    """Row with the time of its program; the law of a control takes no rough plan."""
-    about = resolution is not None and not timing.form.table.lines.planner
-    seconds, limits = timing.written(text, program, resolution=resolution)
-    kept = text if about else b""
-    return replace(row, seconds=seconds, saved=unsmoothed - seconds, limits=limits, about=about, text=kept)
-
-
-def limits_machine(limits: Machine | None, machine: Machine | None) -> Machine | None:
-    """Give the machine whose limits count: those that are named, else those of the machine of the words."""
-    return with_dynamics(limits if limits is not None else machine)

@@ -57,15 +57,12 @@ class Setup:
     @property
     def matrix(self) -> Floats:
         """(3, 3) rotation from today's coordinates of the part to those of the machine."""
-        return self._rotation.as_matrix()
+        return self.rotation.as_matrix()
 
     @property
-    def _rotation(self) -> Rotation:
+    def rotation(self) -> Rotation:
+        """The same."""
         return Rotation.from_euler("zxy", (self.turn, self.tilt_x, self.tilt_y), degrees=True)
-
-    def angle_to(self, other: Setup) -> float:
-        """Angle of the rotation from one setup to another, degrees."""
-        return math.degrees((self._rotation * other._rotation.inv()).magnitude())
 
 
 @dataclass(frozen=True)
@@ -249,7 +246,8 @@ def _chosen(ratings: Iterable[Rating], count: int, tilt: float) -> list[Rating]:
     for one in sorted(ratings, key=lambda one: one.rank):
         if len(found) > count or math.isinf(one.estimate):
             break
-        if all(one.setup.angle_to(other.setup) >= apart - 1e-6 for other in found):
+        turns = ((one.setup.rotation * other.setup.rotation.inv()).magnitude() for other in found)
+        if min(turns) >= math.radians(apart - 1e-6):
             found.append(one)
     return found[1:]
 
