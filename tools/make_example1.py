@@ -7,20 +7,33 @@ from __future__ import annotations
 
 import io
 import sys
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
-from cornersmooth import Settings, choose_form, read, smooth, write
+from cornersmooth import Settings, choose_form, read, smooth, verify, write
+from cornersmooth.model import Floats
 from cornersmooth.nc_reader import read_nc
-from cornersmooth.report.paths import Distribution, deviation_along
+from cornersmooth.report.paths import deviation_at
+from cornersmooth.verify.task import Task
 
 ROOT = Path(__file__).resolve().parent.parent
 TOLERANCES = (0.078, 0.15)
 WIDTH, HEIGHT, LEFT, TOP = 620.0, 190.0, 70.0, 40.0
 LENGTH, MOST = 12.2, 0.16  # mm along the path, mm of deviation
 BLUE, RED, GREY = "#1463b8", "#c8402f", "#9aa3ad"
+
+
+@dataclass(frozen=True)
+class Distribution:
+    """Deviations along the path: of the tip and of the axis point in mm, of the tool axis in degrees."""
+
+    way: Floats
+    tip: Floats
+    axis_point: Floats
+    angle: Floats
 
 
 def measure(tolerance: float) -> Distribution:
@@ -31,8 +44,17 @@ def measure(tolerance: float) -> Distribution:
     smoothed = smooth(program, Settings(tolerance=tolerance, method="zhang2016"), form=form)
     text = io.BytesIO()
     write(smoothed, text, form=form)
-    nc = read_nc(text.getvalue(), tolerance=tolerance)
-    return deviation_along(program, nc, tolerance=tolerance, samples=80)
+    nc, task = read_nc(text.getvalue(), tolerance=tolerance), Task.of(program, tolerance, 10.0)
+    along = deviation_at(task, nc, np.repeat(np.arange(len(nc)), 80), np.tile(np.arange(1, 81) / 80, len(nc)))
+    six = np.hstack((program.tip, program.tip + 10.0 * program.axis))
+    length = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(six, axis=0), axis=1))))
+    begin = length[np.maximum(along.pose - 1, 0)]
+    poses = verify(program, text.getvalue(), tolerance=tolerance)  # where the largest deviations are
+    way = np.concatenate((begin + along.share * (length[along.pose] - begin), length))
+    tip, axis_point = np.append(along.tip, poses.pose_tip), np.append(along.axis_point, poses.pose_axis_point)
+    order = np.argsort(way, kind="stable")
+    order = order[np.isfinite(way + tip)[order]]
+    return Distribution(way[order], tip[order], axis_point[order], np.append(along.angle, poses.pose_angle)[order])
 
 
 def graph(found: Distribution, tolerance: float, top: float) -> list[str]:

@@ -18,7 +18,7 @@ from cornersmooth.nc import choose_form, fit_settings, write
 from cornersmooth.nc_reader import read_nc
 from cornersmooth.nc_reader.elements import Element
 from cornersmooth.nc_reader.tool import written_at
-from cornersmooth.report.paths import deviation_along
+from cornersmooth.report.paths import deviation_at
 from cornersmooth.report.tables import path_distances, worst_corners
 from cornersmooth.settings import LARGEST_CHORD, Settings
 from cornersmooth.smoothing import smooth
@@ -152,8 +152,9 @@ def test_what_is_farthest_between_the_vertices_of_a_curve_is_measured() -> None:
     apart, _ = cKDTree(task.path.at(place)[:, 3:]).query(written[:, 3:], distance_upper_bound=0.02)
     measured = verify(program, stream.getvalue(), tolerance=0.01, axis_length=10.0)
     # where both are within ε at one moment, no amount at a common pose is beyond
-    together = deviation_along(program, text, tolerance=0.01)
-    assert max(together.tip.max(), together.axis_point.max()) <= 0.01 + 1e-6
+    every = np.repeat(np.arange(len(text)), 8), np.tile(np.arange(1, 9) / 8, len(text))
+    together = deviation_at(task, text, *every)
+    assert max(np.nanmax(together.tip), np.nanmax(together.axis_point)) <= 0.01 + 1e-6
     assert measured.together_axis_point.value <= 0.01 + 1e-6
     assert measured.max_axis_point_deviation_mm >= apart[np.isfinite(apart)].max() - 2e-5
 

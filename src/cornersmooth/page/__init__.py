@@ -12,7 +12,7 @@ import io
 import json
 import os
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -48,6 +48,7 @@ def smoothed_page(
     text = "; ".join((contents["verdict_text"], sharp_line(contents)))
     if saving is not None:
         text += "; " + time_text(saving, contents["times"]["limits"])
+    limits = () if saving is None else saving.limits[:LIMITS_TOLD]
     subject = Subject(
         program=result.program,
         nc=read_written(result),
@@ -58,10 +59,10 @@ def smoothed_page(
         machine=form.machine if axes is None else axes,
         planner=form.table.lines.planner,
         tool=tool,
+        limited_by=[name for name, _ in limits],
     )
     facts = [("method", settings.method), ("reversals", f"sharp above {settings.reversal_angle:g}°")]
-    limited_by = () if saving is None else [name for name, _ in saving.limits[:LIMITS_TOLD]]
-    return _page(subject, contents, text, form.machine, facts, limited_by=limited_by)
+    return _page(subject, contents, text, form.machine, facts)
 
 
 def read_written(result: Result) -> NcProgram:
@@ -82,40 +83,25 @@ def verified_page(
     found: Verification,
     contents: Mapping[str, Any],
     *,
-    machine: Machine | None = None,
-    planner: str = "",
-    tool: Tool | None = None,
-    surface: SurfaceMap | None = None,
     origin: str = "CL file",
-    runs: Sequence[tuple[int, int, int, int]] | None = None,
-    left: Sequence[Mapping[str, Any]] = (),
     saving: Saving | None = None,
+    **more: Any,
 ) -> str:
-    """Page of a program that somebody wrote: what its report says, with a map of the surface if there is one.
+    """Page of a program that somebody wrote: what its report says, and other fields of `Subject`.
 
-    What was filtered has an old program as its `origin`, its `runs` (first and last line in the old program and in the
-    new one), the cuts that are `left` as they were (count, line, reason), and the time that it saves.
+    What was filtered has an old program as its `origin`, and the time that it saves.
     """
     settings = Settings(tolerance=found.tolerance, axis_tolerance=found.axis_tolerance)
     settings = settings if found.axis_tolerance is not None else settings.but(axis_length=found.axis_length)
-    subject = Subject(
-        program=program,
-        nc=nc,
-        settings=settings,
-        verification=found,
-        machine=machine,
-        planner=planner,
-        tool=tool if surface is None else surface.tool,
-        surface=surface,
-        runs=runs,
-    )
+    subject = Subject(program, nc, settings, found, **more)
+    machine, surface = subject.machine, subject.surface
     facts, text = _measured_facts(found, origin.split()[0]), contents["verdict_text"]
     if saving is not None:
         text += "; " + time_text(saving, None if machine is None else machine.name)
     if surface is not None:
         text += "; " + _surface_text(surface)
         facts += [("tool", surface.tool.describe()), ("cutting edge", f"{surface.edge:g} mm")]
-    return _page(subject, contents, text, machine, facts, origin, left=left)
+    return _page(subject, contents, text, machine, facts, origin)
 
 
 #: problems and findings that a page lists
@@ -138,13 +124,10 @@ def _page(
     machine: Machine | None,
     facts: Iterable[tuple[str, str]],
     origin: str = "CL file",
-    *,
-    limited_by: Sequence[str] = (),
-    left: Sequence[Mapping[str, Any]] = (),
 ) -> str:
     """Page of a subject and its report; what is not known is left out of what is always in sight."""
     settings, program, source = subject.settings, subject.program, subject.program.source
-    written, sha256 = contents["program"] or {}, contents["input"]["sha256"]
+    written, sha256 = contents["program"], contents["input"]["sha256"]
     head = [
         (origin, source.name),
         ("control", written.get("control")),
@@ -172,7 +155,7 @@ def _page(
             if one["severity"] == "note"
         ],
     }
-    return document(*page_values(subject, story, limited_by=limited_by, left=left))
+    return document(*page_values(subject, story))
 
 
 def _problems(found: Verification | None, warnings: list[dict[str, Any]]) -> list[dict[str, Any]]:

@@ -101,6 +101,9 @@ class Subject:
     surface: SurfaceMap | None = None
     #: of a filtered program: first and last line of each run, in the old program and in the new one
     runs: Sequence[tuple[int, int, int, int]] | None = None
+    #: of a filtered program cuts that stay as they are: how many, first line, reason
+    left: Sequence[Mapping[str, Any]] = ()
+    limited_by: Sequence[str] = ()  #: limits that the verdict names, such as ``"jerk of C"``
 
 
 @dataclass(frozen=True)
@@ -121,8 +124,7 @@ class _View:
         """Both paths of a subject, planned; deviations at poses are those that were measured there."""
         program, settings, found = subject.program, subject.settings, subject.verification
         original = original_path(program)
-        task = {name: getattr(settings, name) for name in ("tolerance", "axis_length", "axis_tolerance")}
-        written = written_path(program, subject.nc, original, **task)
+        written = written_path(program, subject.nc, original, settings)
         planned = Planned({}, {}, None, (NOT_PLANNED,))
         if not subject.planner:
             machine = subject.machine
@@ -145,23 +147,13 @@ class _View:
         return cls(subject, original, written, planned, corners, seconds, places, centre)
 
 
-def page_values(
-    subject: Subject,
-    story: Mapping[str, Any],
-    *,
-    limited_by: Sequence[str] = (),
-    left: Sequence[Mapping[str, Any]] = (),
-) -> tuple[dict[str, Any], Pack]:
-    """Plain values and arrays of a page; `story` is what it says in words, its notes last.
-
-    `limited_by` are limits that the verdict names, such as ``"jerk of C"``, `left` of a filtered program cuts that stay
-    as they are: how many, first line, reason.
-    """
+def page_values(subject: Subject, story: Mapping[str, Any]) -> tuple[dict[str, Any], Pack]:
+    """Plain values and arrays of a page; `story` is what it says in words, its notes last."""
     view, pack = _View.of(subject), Pack()
     original, planned, seconds, corners = view.original, view.planned, view.seconds, view.corners
     _add_original(pack, view)
     _add_written(pack, view)
-    charts = _add_charts(pack, view, limited_by)
+    charts = _add_charts(pack, view)
     _add_corners(pack, view)
     meta: dict[str, Any] = {
         "schema": SCHEMA,
@@ -182,7 +174,7 @@ def page_values(
     }
     if subject.runs is not None:
         meta["runs"] = _runs(subject.runs, view.written, planned)
-        meta["left"] = [dict(one) for one in left]
+        meta["left"] = [dict(one) for one in subject.left]
     if subject.surface is not None:
         meta["surface"] = _add_surface(pack, subject.surface, view.centre)
     return meta, pack
@@ -199,7 +191,6 @@ def _add_original(pack: Pack, view: _View) -> None:
     pack.add("o_tip", original.tip[rows] - view.centre, "f4")
     pack.add("o_axis", original.axis[rows], "f4", _FINE)
     pack.add("o_way", original.way[original.pose[rows]], "f4")
-    pack.add("o_line", program.line[original.pose[rows]], "i4")
     pack.add("o_move", np.where(original.breaks, 0, np.where(original.rapid, 1, 2))[rows], "u1")
 
 
@@ -276,7 +267,7 @@ def _add_corners(pack: Pack, view: _View) -> None:
     pack.add("c_nc", corners.nc_line, "i4")
 
 
-def _add_charts(pack: Pack, view: _View, limited_by: Sequence[str]) -> dict[str, Any]:
+def _add_charts(pack: Pack, view: _View) -> dict[str, Any]:
     """Series of the charts along the way and over time; values come in pairs, so that no peak is lost."""
     original, written, planned, seconds = view.original, view.written, view.planned, view.seconds
     count = int(np.clip(_STEPS_PER_POSE * len(original.way), _STEPS, _MOST_STEPS))
@@ -307,7 +298,8 @@ def _add_charts(pack: Pack, view: _View, limited_by: Sequence[str]) -> dict[str,
             pack.add(f"{scale}_saved", np.round(saved, 3), "f4")
         if along:
             changes = {axis: _change(loads, axis) for axis in loads.get("written", ())}
-            named = [text[-1] for text in limited_by if text[-5:-1] == " of "]  # the axis that the verdict names first
+            # the axis that the verdict names first
+            named = [text[-1] for text in view.subject.limited_by if text[-5:-1] == " of "]
             rank = {axis: named.index(axis) if axis in named else len(named) for axis in changes}
             charts["axes"] = sorted(filter(changes.get, changes), key=lambda axis: (rank[axis], -changes[axis]))
     charts["speeds"] = list(planned.laws)
@@ -360,7 +352,8 @@ def _highest(values: Floats, where: Floats, steps: Floats) -> Floats:
 def _tools(view: _View) -> list[dict[str, Any]]:
     """Tools with the time from which each is used, and their outline for drawing."""
     subject, seconds = view.subject, view.seconds
-    found = [(0, subject.tool, 0)] if subject.tool is not None else tools_of(subject.program)
+    own = subject.tool if subject.surface is None else subject.surface.tool
+    found = tools_of(subject.program) if own is None else [(0, own, 0)]
     reached = np.maximum.accumulate(view.written.pose)
     tools = []
     for pose, tool, line in found:
@@ -392,7 +385,6 @@ def _add_surface(pack: Pack, surface: SurfaceMap, centre: Floats) -> dict[str, A
     rows = known[keep]
     pack.add("s_tip", points.point[rows] - centre, "f4")
     pack.add("s_off", surface.off[rows], "f4")
-    pack.add("s_line", points.line[rows], "i4")
     pack.add("s_station", points.station[rows], "i4")
     pack.add("s_level", 2 * points.level[rows] + points.side[rows], "u1")
     pack.add("h_edges", edges, "f4")

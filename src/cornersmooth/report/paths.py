@@ -9,13 +9,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cornersmooth.arrays import angle_between, dot, joined_rows, norm, some_rows
+from cornersmooth.arrays import angle_between, dot, norm
 from cornersmooth.geometry.arcs import poses_and_arcs
 from cornersmooth.model import Bools, Floats, Ints, Move, Program
 from cornersmooth.nc_reader.elements import Element, NcProgram
 from cornersmooth.nc_reader.tool import written_at
+from cornersmooth.settings import Settings
 from cornersmooth.verify.batches import Batches
-from cornersmooth.verify.deviation import Gap, of_original, together
+from cornersmooth.verify.deviation import Gap, together
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.motions import nearest_places
 from cornersmooth.verify.task import Task
@@ -25,85 +26,48 @@ _REACH = 2
 
 
 @dataclass(frozen=True)
-class Distribution:
-    """Deviations along the feed moves in path order: of written poses from the original, and of its poses from them."""
+class Deviation:
+    """How far written poses are from the original, at the poses of it that come nearest to tip and axis point together.
 
-    way: Floats  #: (k,) mm: length of the original path, rapids included, up to the original pose
+    k rows; all but the first two are NaN where nothing is compared, as in rapids.
+    """
+
+    pose: Ints  #: (k,): original pose that the original move leads to
+    share: Floats  #: (k,): where on the original move, 1 at its end; NaN where nothing is compared
     #: (k,) mm: axis points as in `Task`: with an axis tolerance, what the axis is off, where that shows as the
     #: tolerance
     tip: Floats
     axis_point: Floats
     angle: Floats  #: (k,) degrees
-    share: Floats  #: (k,): where on the original move, 1 at its end
-    fraction: Floats  #: (k,): where on the written element, as in `written_at`; 0 for rows of original poses
-    pose: Ints  #: (k,): original pose that the original move leads to
-    element: Ints  #: (k,): written element that was sampled, -1 for rows of original poses
-    cl_line: Ints  #: (k,)
-    nc_line: Ints  #: (k,)
-
-    def __len__(self) -> int:
-        return len(self.way)
 
 
-def deviation_along(
-    program: Program,
-    nc: NcProgram,
-    *,
-    tolerance: float,
-    axis_length: float = 10.0,
-    axis_tolerance: float | None = None,
-    samples: int = 8,
-) -> Distribution:
-    """Measure the deviation at `samples` even parameters of every path element, and at every original pose.
-
-    It is that at the poses of the original that come nearest to tip and axis point together.
-    """
-    task = Task.of(program, tolerance, axis_length, axis_tolerance)
-    parts = [Distribution(*np.zeros((6, 0)), *np.zeros((4, 0), np.int64))]
+def deviation_at(task: Task, nc: NcProgram, element: Ints, share: Floats) -> Deviation:
+    """Deviation of poses of a program that was read, given by path elements (k,), ascending, and shares of them."""
+    pose, numbers = np.zeros(len(element), np.int64), np.full((4, len(element)), np.nan)
     for batch in Batches(task, nc.events, nc.retracts).of([nc]):
-        matched = Match.of(task, batch)
-        parts += [_of_elements(matched, batch.offset, samples), _of_poses(matched)]
-    found = joined_rows(parts)
-    return some_rows(found, np.argsort(found.way, kind="stable"))
-
-
-def _of_poses(match: Match) -> Distribution:
-    reached = of_original(match)
-    original = match.original
-    pose = original.pose[original.trail.owner[reached.vertex]]
-    nc_line = match.nc_lines(np.minimum(reached.place.astype(np.int64) + 1, len(match.six) - 1))
-    gap, way = reached.gap, match.path.length[reached.vertex]
-    share, none = original.trail.fraction[reached.vertex], np.zeros(len(pose))
-    places = pose, np.full(len(pose), -1), original.program.line[pose], nc_line
-    return Distribution(way, gap.tip, gap.axis_point, np.degrees(gap.angle), share, none, *places)
-
-
-def _of_elements(match: Match, offset: int, samples: int) -> Distribution:
-    last = match.motion.last
-    start, end = last[:-1], last[1:]
-    feeding = np.flatnonzero((match.section[start] == match.section[end]) & (match.section[end] >= 0))
-    # where the motions part places are those between the next that are known
-    known, count = np.flatnonzero(match.on), len(match.place)
-    filled = np.interp(np.arange(count), known, match.place[known]) if len(known) else 1.0 * match.low
-    element = np.repeat(feeding + match.first + 1, samples)
-    share = np.tile(np.arange(1, samples + 1) / samples, len(feeding))
-    tip, axis = written_at(match.nc, element, share)
-    # somewhere between the places of the element's ends
-    low, high = filled[start[feeding]], filled[end[feeding]]
-    place = np.repeat(low, samples) + share * np.repeat(high - low, samples)
-    vertex = np.repeat(end[feeding], samples)
-    limits = match.low[vertex], match.high[vertex]
-    middle = np.clip(place.astype(np.int64), *limits)
-    six = match.task.six(tip, axis)
-    place = nearest_places(six, match.path.points, middle, _REACH, *limits)
-    place, _ = together(match, six, place, vertex)
-    gap = Gap.of(match.task, (six - match.path.at(place)).T)
-    original = match.original
-    owner, fraction = original.trail.located(place)
-    way = match.path.lengths_at(place)
-    pose = original.pose[owner]
-    places = pose, element + offset, original.program.line[pose], match.nc.line[element]
-    return Distribution(way, gap.tip, gap.axis_point, np.degrees(gap.angle), fraction, share, *places)
+        match = Match.of(task, batch)
+        last = match.motion.last
+        start, end = last[:-1], last[1:]
+        feeding = np.flatnonzero((match.section[start] == match.section[end]) & (match.section[end] >= 0))
+        own = feeding + match.first + 1
+        rows = np.flatnonzero(np.isin(element, own + batch.offset))
+        of, some = np.searchsorted(own, element[rows] - batch.offset), share[rows]
+        six = task.six(*written_at(match.nc, own[of], some))
+        # where the motions part places are those between the next that are known
+        known, count = np.flatnonzero(match.on), len(match.place)
+        filled = np.interp(np.arange(count), known, match.place[known]) if len(known) else 1.0 * match.low
+        # somewhere between the places of the element's ends
+        low, high = filled[start[feeding]][of], filled[end[feeding]][of]
+        vertex = end[feeding][of]
+        limits = match.low[vertex], match.high[vertex]
+        middle = np.clip((low + some * (high - low)).astype(np.int64), *limits)
+        place = nearest_places(six, match.path.points, middle, _REACH, *limits)
+        place, _ = together(match, six, place, vertex)
+        gap = Gap.of(task, (six - match.path.at(place)).T)
+        owner, fraction = match.original.trail.located(place)
+        pose[rows] = match.original.pose[owner]
+        numbers[:, rows] = fraction, gap.tip, gap.axis_point, np.degrees(gap.angle)
+    return Deviation(pose, *numbers)
 
 
 #: points on every line and on every curve or arc: so many in all, between the least and the most of each
@@ -143,7 +107,6 @@ class WrittenPath:
     axis: Floats  #: (m, 3)
     element: Ints  #: (m,): path element of the text, the first with a single point
     share: Floats  #: (m,): where on it, 1 at its end
-    end: Bools  #: (m,): whether the point is a vertex of the path: an end of a line, or any point of a curve
     rapid: Bools  #: (m,)
     pose: Ints  #: (m,): pose that the original move leads to which the point belongs to
     way: Floats  #: (m,) mm: length of the original tip path up to there; never falls
@@ -171,69 +134,44 @@ def original_path(program: Program) -> OriginalPath:
     return OriginalPath(tip, axis, pose, rapid, breaks, np.cumsum(step)[last])
 
 
-def written_path(
-    program: Program,
-    nc: NcProgram,
-    original: OriginalPath,
-    *,
-    tolerance: float,
-    axis_length: float,
-    axis_tolerance: float | None = None,
-) -> WrittenPath:
+def written_path(program: Program, nc: NcProgram, original: OriginalPath, settings: Settings) -> WrittenPath:
     """Points of a text that was read, each with its place on the original and its deviation."""
+    length, own_axis = settings.axis_length, settings.axis_tolerance
     bent = np.isin(nc.kind, (Element.ARC, Element.CURVE))
     share_of_each = _POINTS // max(len(nc), 1)
     lines = int(np.clip(share_of_each, *_ON_LINES)) if len(nc) < _MANY else 1
-    samples = lines
-    if bent.any():  # a multiple, so that points on lines are among those that are measured
-        samples *= -(-int(np.clip(share_of_each, *_ON_CURVES)) // lines)
     rapid = nc.kind == Element.RAPID
-    pieces = np.where(rapid, 1, np.where(bent, samples, lines))
+    pieces = np.where(rapid, 1, np.where(bent, int(np.clip(share_of_each, *_ON_CURVES)), lines))
     pieces[:1] = 1
     element = np.repeat(np.arange(len(nc)), pieces)
     share = (np.arange(len(element)) - np.repeat(np.cumsum(pieces) - pieces, pieces) + 1) / pieces[element]
     tip, axis = written_at(nc, element, share)
-    end = (share == 1.0) | bent[element]
-    curvature = _curvature(tip, end, rapid[element])
-    along = deviation_along(
-        program, nc, tolerance=tolerance, axis_length=axis_length, axis_tolerance=axis_tolerance, samples=samples
-    )
-    row = np.full(len(nc) * samples, -1, np.int64)
-    own = np.flatnonzero(along.element >= 0)
-    row[along.element[own] * samples + np.round(along.fraction[own] * samples).astype(np.int64) - 1] = own
-    at = row[element * samples + np.round(share * samples).astype(np.int64) - 1]
-    there = at >= 0
-    rows = at[there]
-    pose = np.zeros(len(element), np.int64)
-    pose[there] = along.pose[rows]
-    place = np.full(len(element), np.nan)
-    start = original.way[np.maximum(pose - 1, 0)]
-    place[there] = start[there] + along.share[rows] * (original.way[pose] - start)[there]
-    way = _continued(place, tip, original)
-    pose = np.where(there, pose, np.minimum(np.searchsorted(original.way, way), len(program) - 1))
-    tip_off, axis_off, angle_off = np.full((3, len(element)), np.nan)
-    tip_off[there], axis_off[there], angle_off[there] = along.tip[rows], along.axis_point[rows], along.angle[rows]
+    end = (share == 1.0) | bent[element]  # vertices of the path: ends of lines, and all points of curves
+    found = deviation_at(Task.of(program, settings.tolerance, length, own_axis), nc, element, share)
+    start = original.way[np.maximum(found.pose - 1, 0)]
+    way = _continued(start + found.share * (original.way[found.pose] - start), tip, original)
+    there = np.isfinite(found.share)
+    pose = np.where(there, found.pose, np.minimum(np.searchsorted(original.way, way), len(program) - 1))
     straight = np.flatnonzero(there & (program.kind[pose] == Move.LINEAR))
-    second = () if axis_tolerance is not None else ((axis_off, axis_length),)
+    second = () if own_axis is not None else ((found.axis_point, length),)
     for first in range(0, len(straight), _AT_ONCE):
         some = straight[first : first + _AT_ONCE]
-        for off, height in ((tip_off, 0.0), *second):
-            near = _distance(program, tip[some] + height * axis[some], pose[some], along.share[at[some]], height)
+        for off, height in ((found.tip, 0.0), *second):
+            near = _distance(program, tip[some] + height * axis[some], pose[some], found.share[some], height)
             off[some] = np.minimum(off[some], near)
     return WrittenPath(
         tip=tip,
         axis=axis,
         element=element,
         share=share,
-        end=end,
         rapid=rapid[element],
         pose=pose,
         way=way,
-        tip_off=tip_off,
-        axis_off=axis_off,
-        angle_off=angle_off,
+        tip_off=found.tip,
+        axis_off=found.axis_point,
+        angle_off=found.angle,
         feed=np.where(nc.per_revolution[element], np.nan, nc.feed[element]),
-        curvature=curvature,
+        curvature=_curvature(tip, end, rapid[element]),
         cl_line=program.line[pose],
         nc_line=nc.line[element],
     )
@@ -242,7 +180,7 @@ def written_path(
 def _distance(program: Program, points: Floats, pose: Ints, share: Floats, height: float) -> Floats:
     """Distance (k,) of points from the original path of the point at `height` on the tool axis.
 
-    The common pose that `deviation_along` finds serves tip and axis point together. Each alone is nearer, on the same
+    The common pose that `deviation_at` finds serves tip and axis point together. Each alone is nearer, on the same
     move or on one beside it; steps of Gauss and Newton find where.
     """
     least = np.full(len(points), np.inf)
