@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cornersmooth.cl import arcs as arc_geometry
 from cornersmooth.cl import motion_statements, state_statements
-from cornersmooth.cl.arcs import ArcRule
 from cornersmooth.cl.bulk import parts
 from cornersmooth.cl.dialects import DIALECTS, recognise
 from cornersmooth.cl.grammar import Decode, Record, joined, number, read_records
@@ -58,18 +57,8 @@ _CHOOSING: Final = frozenset({"LOAD", "SELECT", "MODE", "SET"})
 _STRANGE_PREFIXES: Final = ("TLON,", "TLLFT,", "TLRGT,", "TLOFF,")
 
 
-def read_apt(
-    data: bytes,
-    *,
-    name: str,
-    dialect: str | None = None,
-    units: Units | None = None,
-    arc_rule: ArcRule | None = None,
-    lenient: bool = False,
-    cycle_order: tuple[str, ...] = (),
-    processes: int = 1,
-) -> Program:
-    """Read an APT / CL text; parameters are those of `cornersmooth.cl.read`.
+def read_apt(data: bytes, *, name: str, dialect: str | None = None, processes: int = 1, **options: Any) -> Program:
+    """Read an APT / CL text; parameters are those of `cornersmooth.cl.read`, options such fields of `ReaderState`.
 
     The text has LF line ends (`cornersmooth.cl.source.clean` makes it so). Memory while reading: 5 bytes for a byte of
     a tool path of plain GOTO lines, at most 130 for any statements; the lines of a NURBS record may be
@@ -77,13 +66,11 @@ def read_apt(
     """
     refuse_program(data, name)
     known = next(one for one in DIALECTS if one.name == dialect) if dialect else recognise(data)
-    state = ReaderState(
-        file=name, dialect=known, wanted_units=units, arc_rule=arc_rule, lenient=lenient, cycle_order=cycle_order
-    )
+    state = ReaderState(file=name, dialect=known, **options)
     state.expect(data.count(b"GOTO"))
     decode = _decoder(data)
     for part in parts(data, processes):
-        if state.finished and lenient:
+        if state.finished and state.lenient:
             break
         if part.poses is not None:
             _plain(state, part.poses)

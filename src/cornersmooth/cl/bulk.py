@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from cornersmooth.model import Floats, Ints
+from cornersmooth.model import Floats
 from cornersmooth.system.processes import map_in_processes
 from cornersmooth.text import parse_numbers
 
@@ -93,7 +93,9 @@ def find_plain(text: bytes) -> list[tuple[int, int, int, Floats]] | None:
     if len(values) == 6 * len(poses):
         poses[:, :6] = values.reshape(-1, 6)
     else:
-        count = _numbers_of_lines(chosen)
+        letters = np.frombuffer(chosen, np.uint8)
+        ends = letters[(letters == ord(",")) | (letters == ord("\n"))] == ord("\n")
+        count = np.diff(np.flatnonzero(ends), prepend=-1)
         begin, six = np.cumsum(count) - count, count == 6
         poses[:, :3] = values[begin[:, None] + np.arange(3)]
         poses[six, 3:6] = values[begin[six, None] + np.arange(3, 6)]
@@ -105,9 +107,3 @@ def find_plain(text: bytes) -> list[tuple[int, int, int, Floats]] | None:
     poses[:, 6] = line + np.repeat(lines[:, 0] - np.cumsum(size) + size, counts)
     runs = zip(spans, lines[:, 1].tolist(), np.cumsum(counts).tolist(), counts, strict=True)
     return [(start, stop, after, poses[end - count : end]) for (start, stop), after, end, count in runs]
-
-
-def _numbers_of_lines(text: bytes) -> Ints:
-    letters = np.frombuffer(text, np.uint8)
-    ends = letters[(letters == ord(",")) | (letters == ord("\n"))] == ord("\n")
-    return np.diff(np.flatnonzero(ends), prepend=-1)

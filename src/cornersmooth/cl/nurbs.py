@@ -144,10 +144,6 @@ def curves_of(
         if turned or elsewhere or exact[pose].any() or (kind[pose[1:]] != Move.LINEAR).any():
             continue
         poses.append(pose[1:])
-        pieces.append(_raised(scale * one.bezier, axis[pose[1]]))
+        bezier = scale * one.bezier
+        pieces.append(np.concatenate((bezier, bezier + axis[pose[1]] / np.linalg.norm(axis[pose[1]])), axis=-1))
     return Curves(np.concatenate(poses), np.concatenate(pieces)) if poses else None
-
-
-def _raised(points: Floats, axis: Floats) -> Floats:
-    """Points (..., 3) of the tip, with second points 1 mm up the tool axis."""
-    return np.concatenate((points, points + axis / np.linalg.norm(axis)), axis=-1)

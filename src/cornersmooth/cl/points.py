@@ -147,14 +147,12 @@ def read_points(
 
 def _find_columns(text: table.PointText, name: str, machine: Machine | None) -> Columns:
     rotary = machine.names if machine is not None and len(machine.names) == 2 else ()
-    if text.header is not None and text.header_certain:
-        return points_header.from_header(text.header, name, text.header_line, rotary)
-    if not text.width:
-        raise error("CS150", name, 1)
     if text.header is not None:
         columns = points_header.from_header(text.header, name, text.header_line, rotary)
-        if columns.width == text.width:
+        if text.header_certain or columns.width == text.width:
             return columns
+    if not text.width:
+        raise error("CS150", name, 1)
     return points_header.from_width(text.width, name, text.row_line)
 
 

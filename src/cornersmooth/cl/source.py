@@ -7,7 +7,7 @@ import hashlib
 import io
 import os
 import zlib
-from typing import Final, Protocol
+from typing import IO, Final
 
 from cornersmooth.cl.messages import error
 
@@ -34,7 +34,6 @@ def load(
 
     Where no name is given it is the path itself, or ``"<memory>"``.
 
-
     Raises InputError CS100: the file cannot be read; CS103: it is no complete gzip file; CS199: with a limit of size it
     is larger than `LARGEST`, or a gzip file that grows 200-fold.
     """
@@ -58,11 +57,7 @@ def load(
     return data, name, digest
 
 
-class _Reader(Protocol):
-    def read(self, size: int, /) -> bytes: ...
-
-
-def read_bounded(file: _Reader, name: str, *, size_limit: bool = True, most: int = LARGEST) -> bytes:
+def read_bounded(file: IO[bytes] | gzip.GzipFile, name: str, *, size_limit: bool = True, most: int = LARGEST) -> bytes:
     """Read a file to its end, if it has one.
 
     Raises InputError CS199: it holds more than `most` bytes, and there is a limit of size.

@@ -257,11 +257,6 @@ def _comment(state: ReaderState, record: Record) -> None:
             state.matrix = None
 
 
-def _camera(state: ReaderState, record: Record) -> None:
-    """CAMERA/ and 12 numbers: what $$-> CSYS is where Creo writes words of GPOST."""
-    _same_system(state, record, "CSYS", [str(value) for value in state.numbers(record)])
-
-
 def _same_system(state: ReaderState, record: Record, word: str, given: list[str]) -> None:
     matrix = tuple(value for value in map(number, given) if value is not None)
     if _changes(state, word, matrix, matrix):
@@ -332,11 +327,6 @@ def _set(state: ReaderState, record: Record) -> None:
         raise state.fail("CS115", record, want="write absolute positions")
 
 
-def _trntyp(state: ReaderState, record: Record) -> None:
-    if record.args[:1] != ("WORLD",):
-        _frame(state, record)
-
-
 def _syn(state: ReaderState, record: Record) -> None:
     words = [value.strip("'").upper() for value in record.words]
     if words[:1] and words[0] in MOTION_WORDS:
@@ -371,13 +361,14 @@ KEPT: Final[dict[str, Handler]] = {
     "MCSYS": _mcsys,
     "CUTCOM": _cutcom,
     "SET": _set,
-    "TRNTYP": _trntyp,
+    "TRNTYP": lambda state, record: None if record.option == "WORLD" else _frame(state, record),
     "SYN": _syn,
     "FINI": lambda state, _: setattr(state, "finished", True),
     "SYS": _msys,
     "$$": _comment,
     "REMARK": _comment,
-    "CAMERA": _camera,
+    # and 12 numbers: what $$-> CSYS is where Creo writes words of GPOST
+    "CAMERA": lambda state, record: _same_system(state, record, "CSYS", [*map(str, state.numbers(record))]),
     "CLEARP": _clearance,
     "CLRSRF": _clearance,
     **dict.fromkeys(("FIXTUR", "FIXTURE", "WCS"), _offset),

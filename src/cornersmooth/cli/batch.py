@@ -44,68 +44,62 @@ _KILLED = -9
 _PR_SET_PDEATHSIG = 1
 
 
-class Batch:
-    """The jobs of one run: in so many processes, 0 for all cores, or on the cluster of a scheduler, where one is named.
+def run_batch(
+    jobs: list[Job],
+    rows: list[dict[str, Any]],
+    ending: Shutdown,
+    processes: int,
+    scheduler: str | None,
+    progress: Callable[[str, int, int], None] | None,
+) -> Iterator[Outcome]:
+    """Do jobs in so many processes, 0 for all cores, or on the cluster of a scheduler; outcomes in order of the inputs.
 
-    `progress` is called with the files that have ended, and with all.
+    A file that fails does not stop the others. `rows` gets that of each as it ends; `progress` is called with the files
+    that have ended, and with all.
     """
+    processes = min(processes or os.cpu_count() or 1, len(jobs))
+    if scheduler:
+        ends = run_on_cluster(jobs, scheduler)
+    elif processes == 1:
+        ends = ((place, run_job(job)) for place, job in enumerate(jobs))
+    else:
+        ends = _beside(jobs, processes, ending)
+    early: dict[int, Outcome] = {}
+    turn = 0
+    for ended, (place, outcome) in enumerate(ends, 1):
+        rows[place], early[place] = row_of(outcome), outcome
+        if progress is not None:
+            progress("files", ended, len(jobs))
+        while turn in early:
+            yield early.pop(turn)
+            turn += 1
 
-    def __init__(
-        self,
-        jobs: list[Job],
-        processes: int,
-        progress: Callable[[str, int, int], None] | None = None,
-        *,
-        scheduler: str | None = None,
-    ) -> None:
-        self.jobs, self._progress, self._scheduler = jobs, progress, scheduler
-        #: of each file, as `row_of` gives it; also of those that nothing was done with yet
-        self.rows = [row_of(Outcome(job, unfinished=True)) for job in jobs]
-        self._processes = min(processes or os.cpu_count() or 1, len(jobs))
 
-    def run(self, ending: Shutdown) -> Iterator[Outcome]:
-        """Outcomes in the order of the inputs; a file that fails does not stop the others."""
-        if self._scheduler:
-            ends = run_on_cluster(self.jobs, self._scheduler)
-        elif self._processes == 1:
-            ends = ((place, run_job(job)) for place, job in enumerate(self.jobs))
-        else:
-            ends = self._beside(ending)
-        early: dict[int, Outcome] = {}
-        turn = 0
-        for ended, (place, outcome) in enumerate(ends, 1):
-            self.rows[place], early[place] = row_of(outcome), outcome
-            if self._progress is not None:
-                self._progress("files", ended, len(self.jobs))
-            while turn in early:
-                yield early.pop(turn)
-                turn += 1
+def _beside(jobs: list[Job], processes: int, ending: Shutdown) -> Iterator[tuple[int, Outcome]]:
+    """Places and outcomes of jobs, each in a process of its own, as they end."""
+    running: dict[Helper, int] = {}
+    waiting = iter(enumerate(jobs))
 
-    def _beside(self, ending: Shutdown) -> Iterator[tuple[int, Outcome]]:
-        """Places and outcomes of jobs, each in a process of its own, as they end."""
-        running: dict[Helper, int] = {}
-        waiting = iter(enumerate(self.jobs))
+    def clean() -> None:
+        for helper, place in running.items():
+            helper.kill()
+            _remove_unfinished_of(jobs[place], helper)
 
-        def clean() -> None:
-            for helper, place in running.items():
-                helper.kill()
-                _remove_unfinished_of(self.jobs[place], helper)
-
-        ending.clean = clean
-        try:
-            while True:
-                for place, job in islice(waiting, self._processes - len(running)):
-                    helper = Helper(_run_with_parent)
-                    running[helper] = place
-                    helper.start(job)
-                if not running:
-                    return
-                for helper in first_ready(running):
-                    place = running.pop(helper)
-                    yield place, _outcome(self.jobs[place], helper)
-        finally:
-            for helper in running:
-                helper.end()
+    ending.clean = clean
+    try:
+        while True:
+            for place, job in islice(waiting, processes - len(running)):
+                helper = Helper(_run_with_parent)
+                running[helper] = place
+                helper.start(job)
+            if not running:
+                return
+            for helper in first_ready(running):
+                place = running.pop(helper)
+                yield place, _outcome(jobs[place], helper)
+    finally:
+        for helper in running:
+            helper.end()
 
 
 def _run_with_parent(job: Job) -> Outcome:
@@ -137,8 +131,7 @@ def _outcome(job: Job, helper: Helper) -> Outcome:
         _remove_unfinished_of(job, helper)
         how = f"exit code {code}" if code >= 0 else f"signal {-code}"
         how += ", as a system short of memory does" * (code == _KILLED)
-        what = f"the process working on it was ended ({how}); run it again"
-        return Outcome(job, 3, message("error", what, place=job.source))
+        return _failed(job, f"the process working on it was ended ({how}); run it again")
     return outcome
 
 
@@ -282,7 +275,7 @@ def run_on_cluster(jobs: list[Job], scheduler: str) -> Iterator[tuple[int, Outco
         places: dict[Any, int] = {}
 
         def submit(many: int) -> Iterator[Any]:
-            for place, job in (pair for _, pair in zip(range(many), waiting, strict=False)):
+            for place, job in islice(waiting, many):
                 task = client.submit(do, replace(job, run=run), here, proof, __version__, key=f"{run}-{place}")
                 places[task.key] = place
                 yield task
@@ -290,7 +283,12 @@ def run_on_cluster(jobs: list[Job], scheduler: str) -> Iterator[tuple[int, Outco
         ending = as_completed(submit(sum(client.nthreads().values()) + _AHEAD))
         for task in ending:
             place = places.pop(task.key)
-            outcome = _of_task(jobs[place], task)
+            try:
+                outcome: Outcome = task.result()
+            except Exception as failure:
+                what = (str(failure).strip().splitlines() or ["lost"])[0]
+                what = f"the cluster gave it up: {type(failure).__name__}, {what}; run it again"
+                outcome = _failed(jobs[place], what)
             for path in jobs[place].outputs:
                 remove_leftovers(path)  # of a worker that was lost
             yield place, outcome
@@ -349,18 +347,6 @@ def _proof_of_sharing(jobs: list[Job]) -> Iterator[str]:
         with open(path, "xb"):
             pass
         yield path
-
-
-def _of_task(job: Job, task: Any) -> Outcome:
-    """Outcome of a task, also where the cluster gave it up."""
-    try:
-        outcome: Outcome = task.result()
-    except Exception as failure:
-        what = str(failure).strip().splitlines()
-        return _failed(
-            job, f"the cluster gave it up: {type(failure).__name__}, {what[0] if what else 'lost'}; run it again"
-        )
-    return outcome
 
 
 def _failed(job: Job, what: str) -> Outcome:

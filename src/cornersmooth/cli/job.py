@@ -29,12 +29,11 @@ from cornersmooth.errors import (
     printable,
 )
 from cornersmooth.kinematics import Machine, with_dynamics
-from cornersmooth.model import Program
 from cornersmooth.nc import Form, Frame
 from cornersmooth.pipeline import Progress, Result, postprocess, timed
 from cornersmooth.report import corners_csv
 from cornersmooth.report.verdict import Saving
-from cornersmooth.settings import AUTO, TIMED_POSES, Settings
+from cornersmooth.settings import TIMED_POSES, Settings
 from cornersmooth.system.output import ClosedPipe, make_folder, read_mark, write_mark
 from cornersmooth.system.processes import return_large_arrays, useful_processes
 
@@ -186,12 +185,17 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> None:
         processes = useful_processes() if job.alone else 1
         program = read(source, name=name, processes=processes, **given.reading()).with_feed(given.feed)
     del source  # as large as all that is made of it
+    settings = job.settings
+    if job.axes is not None and job.plan_feeds is None:  # under limits those of the method whose lines are faster
+        from cornersmooth.times import faster_method
+
+        settings = faster_method(program, settings, form=job.form, axes=job.axes)
     text = io.BytesIO()
     try:
         result = postprocess(
             program,
             text if job.in_memory else target_of(job.target),
-            _settings_for(job, program),
+            settings,
             form=job.form,
             frame=job.frame,
             plan_feeds=job.plan_feeds,
@@ -232,15 +236,6 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> None:
     outcome.contents = contents
     table = partial(corners_csv, result.smoothed, dense=not result.form.curve)
     write_reports(replace, contents, table=table, page=page)
-
-
-def _settings_for(job: Job, program: Program) -> Settings:
-    """Settings of a job; under limits those of the method whose lines are faster."""
-    if job.axes is None or job.settings.method != AUTO or job.form.curves or job.plan_feeds is not None:
-        return job.settings
-    from cornersmooth.times import faster_method
-
-    return faster_method(program, settings=job.settings, form=job.form, axes=job.axes)
 
 
 def _failed(name: str, result: Result, failure: VerdictError) -> str:

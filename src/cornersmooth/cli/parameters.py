@@ -101,10 +101,6 @@ def _tool(text: str) -> Any:
     return parse_tool(text)
 
 
-#: key of the shop settings in a context
-SHOP = "cornersmooth.shop"
-
-
 def _offer(kind: str, incomplete: str) -> list[CompletionItem]:
     """Names of controls or of machines; else files."""
     from click.shell_completion import CompletionItem

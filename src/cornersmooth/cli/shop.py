@@ -17,7 +17,6 @@ from typing import Any
 import click
 
 from cornersmooth.cli.declared import FLAGS
-from cornersmooth.cli.parameters import SHOP
 from cornersmooth.cli.show import warn
 from cornersmooth.errors import SettingsError, command_text
 from cornersmooth.system.output import reason
@@ -69,8 +68,8 @@ class Shop:
     origins: dict[str, str] = field(default_factory=dict)
 
 
-#: key of the command line in a context
-_TYPED = f"{__name__}.typed"
+#: keys of the command line and of the shop settings in a context
+_TYPED, _SHOP = f"{__name__}.typed", f"{__name__}.shop"
 
 
 def parse_args(
@@ -83,7 +82,7 @@ def parse_args(
     _check_environment(command)
     rest = parse(ctx, args)
     _set_defaults(command, ctx)
-    for file in ctx.meta[SHOP].files:
+    for file in ctx.meta[_SHOP].files:
         _name_strangers(file.path)
     for param in command.params:
         if param.required and ctx.params[str(param.name)] is None:
@@ -98,7 +97,7 @@ def _set_defaults(command: click.Command, ctx: click.Context) -> None:
     first = next((ctx.params.get(str(one.name)) for one in command.params if isinstance(one, click.Argument)), None)
     first = first[0] if isinstance(first, tuple) and first else first
     shop = Shop(find_files(first if isinstance(first, str) and first != "-" else "."))
-    ctx.meta[SHOP] = shop
+    ctx.meta[_SHOP] = shop
     by_default = ctx.get_parameter_source("control") is click.core.ParameterSource.DEFAULT
     for name, value in _values(command, shop, None if by_default else ctx.params.get("control")).items():
         if ctx.get_parameter_source(name) is click.core.ParameterSource.DEFAULT:
@@ -147,7 +146,7 @@ def origin(ctx: click.Context, name: str) -> str:
     if source == click.core.ParameterSource.ENVIRONMENT:
         return variable(name)
     if source == click.core.ParameterSource.DEFAULT_MAP:
-        return str(ctx.meta[SHOP].origins[name])
+        return str(ctx.meta[_SHOP].origins[name])
     return "default"
 
 
@@ -191,7 +190,7 @@ def _values(command: click.Command, shop: Shop, control: str | None) -> dict[str
                 name = str(option.name)
                 values[name] = _checked(option, value, file.path, f"{table}.{word}")
                 shop.origins[name] = f"{file.path} [{table}]"
-            elif word.replace("_", "-") not in (known := _all_keys()):
+            elif word.replace("_", "-") not in (known := sorted(key(name) for name in FLAGS if name not in ONE_RUN)):
                 raise _unknown(file.path, f"{table}.{word}", word, known)
     return values
 
@@ -209,11 +208,6 @@ def key(name: str) -> str:
 def variable(name: str) -> str:
     """Name of an option in the environment."""
     return _PREFIX + key(name).replace("-", "_").upper()
-
-
-def _all_keys() -> list[str]:
-    """Keys of the options of all commands."""
-    return sorted(key(name) for name in FLAGS if name not in ONE_RUN)
 
 
 def _checked(option: click.Option, value: Any, file: str, where: str) -> Any:

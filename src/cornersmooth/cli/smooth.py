@@ -39,18 +39,19 @@ def run_smooth(given: Options) -> int:
     ending: Shutdown = click.get_current_context().obj
     worst = 0
     with show.progress_bar(given.quiet, rate=True) as progress:
-        running = batch.Batch(jobs, given.jobs, progress, scheduler=given.scheduler if given.jobs == 1 else None)
+        rows = [batch.row_of(Outcome(job, unfinished=True)) for job in jobs]
 
         def keep() -> None:
             if given.summary:
-                batch.write_summary(given.summary, running.rows)
+                batch.write_summary(given.summary, rows)
 
         def lines() -> list[str]:
-            return [] if given.quiet else [*map(printable, batch.end_lines(running.rows))]
+            return [] if given.quiet else [*map(printable, batch.end_lines(rows))]
 
         ending.keep = keep
-        ending.say = lambda: "\n".join((*lines(), batch.interrupted_line(running.rows)))
-        for outcome in running.run(ending):
+        ending.say = lambda: "\n".join((*lines(), batch.interrupted_line(rows)))
+        scheduler = given.scheduler if given.jobs == 1 else None
+        for outcome in batch.run_batch(jobs, rows, ending, given.jobs, scheduler, progress):
             printed = outcome.status != "error" and not given.quiet and (progress is None or given.verbose > 0)
             if printed:
                 show.print_line(batch.line_of(outcome))
@@ -59,7 +60,7 @@ def run_smooth(given: Options) -> int:
     ending.keep = None
     keep()
     if given.as_json:
-        show.say_json(batch.batch_report(running.rows))
+        show.say_json(batch.batch_report(rows))
     else:
         for line in lines():
             show.print_line(line)

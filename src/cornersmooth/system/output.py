@@ -130,29 +130,15 @@ class HashedStream:
 
     def check(self, path: str) -> None:
         """Compare what a file holds with what was written (OutputError CS407: somebody else has changed it)."""
-        heads = self._heads
+        hashes = [hashlib.new(_HASH, head) for head in self._heads]
         with open(path, "rb") as file:
-            same = file.read(len(heads[-1])) == heads[-1]
-        if len(heads) > 1 and os.path.getsize(path) > _AT_ONCE:
-            from concurrent.futures import ThreadPoolExecutor  # which takes long to load
-
-            with ThreadPoolExecutor(len(heads)) as pool:
-                digests = [*pool.map(lambda head: _digest(path, head), heads)]
-        else:
-            digests = [_digest(path, head) for head in heads]
-        if not same or digests[0] != self._hash.hexdigest():
+            same = file.read(len(self._heads[-1])) == self._heads[-1]
+            while more := file.read(_AT_ONCE):
+                for one in hashes:
+                    one.update(more)
+        if not same or hashes[0].digest() != self._hash.digest():
             raise OutputError("CS407", "the program was changed before it took its place", "try again", file=path)
-        self._now = digests[-1]
-
-
-def _digest(path: str, head: bytes) -> str:
-    """Hash of a file, if it began with other bytes of the same number."""
-    found = hashlib.new(_HASH, head)
-    with open(path, "rb") as file:
-        file.seek(len(head))
-        while more := file.read(_AT_ONCE):
-            found.update(more)
-    return found.hexdigest()
+        self._now = hashes[-1].hexdigest()
 
 
 @dataclass
