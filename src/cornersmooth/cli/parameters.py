@@ -30,12 +30,7 @@ class Value(_ParamType):
     `complete` gives what a shell offers for a word that has been begun.
     """
 
-    def __init__(
-        self,
-        name: str,
-        read: Callable[[str], Any],
-        complete: Callable[[str], list[CompletionItem]] | None = None,
-    ) -> None:
+    def __init__(self, name: str, read: Callable[[str], Any], complete: Callable[[str], Any] | None = None) -> None:
         self.name, self._read, self._complete = name, read, complete
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:

@@ -61,21 +61,13 @@ def progress_bar(quiet: bool, *, rate: bool = False) -> Iterator[Progress | None
     if quiet or not sys.stderr.isatty():
         yield None
         return
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        ProgressColumn,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
+    from rich import progress as rich
 
-    columns: list[ProgressColumn] = [TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn()]
-    columns.append(TimeElapsedColumn())
+    columns: list[rich.ProgressColumn] = [rich.TextColumn("{task.description}"), rich.BarColumn()]
+    columns += [rich.MofNCompleteColumn(), rich.TimeElapsedColumn()]
     if rate:
-        columns += [TextColumn("{task.fields[rate]}"), TimeRemainingColumn()]
-    with Progress(*columns, console=console(), transient=True) as bar:
+        columns += [rich.TextColumn("{task.fields[rate]}"), rich.TimeRemainingColumn()]
+    with rich.Progress(*columns, console=console(), transient=True) as bar:
         tasks: dict[str, Any] = {}
         begin = time.monotonic()
 

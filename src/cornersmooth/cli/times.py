@@ -11,15 +11,7 @@ import click
 import numpy as np
 
 from cornersmooth.cl import read
-from cornersmooth.cli.files import (
-    STANDARD,
-    check_inputs,
-    check_pair,
-    check_path,
-    naming,
-    read_input,
-    write_report,
-)
+from cornersmooth.cli import files
 from cornersmooth.cli.options import Options, typed
 from cornersmooth.cli.show import print_message, progress_bar, say, say_line
 from cornersmooth.errors import command_text, message
@@ -56,11 +48,11 @@ _TITLES = {
 def run_time(given: Options) -> int:
     """Do the work of the command; return its exit code."""
     if given.text:
-        check_pair(given)
+        files.check_pair(given)
     else:
-        check_inputs(given.source)
+        files.check_inputs(given.source)
     if given.csv:
-        check_path(given.csv, [given.source, given.text], force=given.force)
+        files.check_path(given.csv, [given.source, given.text], force=given.force)
     data, name, is_program = given.read()
     if is_program:
         if given.csv:
@@ -77,8 +69,8 @@ def run_time(given: Options) -> int:
     if given.csv:
         from cornersmooth.report.tables import timelaw_csv
 
-        write_report(given.csv, timelaw_csv(compared.laws[given.law]))
-    if given.csv != STANDARD:
+        files.write_report(given.csv, timelaw_csv(compared.laws[given.law]))
+    if given.csv != files.STANDARD:
         say(given, compared.as_dict(), _tables(compared))
     return 0
 
@@ -89,7 +81,7 @@ def _compare(data: bytes, name: str, given: Options) -> Comparison:
     limits, settings = given.path_limits(), given.settings()
     program = read(data, name=name, **given.reading())
     if given.text:  # before anything that takes long
-        text, written = read_input(given.text)
+        text, written = files.read_input(given.text)
         how = _as_text_was_made(given, text).reading_back()
         nc = read_nc(text, **how, name=written, tolerance=settings.tolerance, axis_length=settings.axis_scale)
     else:
@@ -121,7 +113,7 @@ def _by_own_law(data: bytes, name: str, given: Options) -> int:
     if timing is None:
         raise click.UsageError("name the machine with --machine; its table has to have [dynamics]")
     if given.text:
-        text, _ = read_input(given.text)
+        text, _ = files.read_input(given.text)
     else:
         text = written_text(program, settings, form)
     before, against = timing.unsmoothed(program)
@@ -182,13 +174,13 @@ def run_compare(given: Options) -> int:
     from cornersmooth.filter.program import compare_filtered
 
     source = given.source
-    check_inputs(source)
+    files.check_inputs(source)
     data, name, is_program = given.read()
     named, given = given.machine, options_for(data, name, given) if is_program else given
     machine, limits = given.load_machine(), given.load_limits()
     axes = axes_of(given)
     control, settings = given.load_control(), given.settings()
-    with naming(name), progress_bar(given.quiet or not given.as_json) as progress:
+    with files.naming(name), progress_bar(given.quiet or not given.as_json) as progress:
         if is_program:  # it has one kind of words, and lines
             tried = candidates(control, settings, machine)
             tried = [one for one in tried if one.form.machine == machine and not one.form.curves]
@@ -288,7 +280,7 @@ def _command(given: Options, row: Row, machine: Any, command: str, suffix: str) 
     options = list(row.options)
     if "--machine" in options:
         options[options.index("--machine") + 1] = called
-    stem = "part" if given.source == STANDARD else os.path.splitext(os.path.basename(given.source))[0]
+    stem = "part" if given.source == files.STANDARD else os.path.splitext(os.path.basename(given.source))[0]
     target = stem + (".smooth" if command == "filter" else "") + suffix
     return command_text(["cornersmooth", command, given.source, *words, *options, "-o", target])
 
@@ -304,7 +296,7 @@ def run_setup(given: Options) -> int:
     wanted = control.forms.get(given.form or "")
     curves = wanted is not None and bool(wanted.curve)  # have no rotary words
     form = choose_form(control, given.form, machine=None if curves else machine)
-    data, name = read_input(given.source, size_limit=not given.no_size_limit)
+    data, name = files.read_input(given.source, size_limit=not given.no_size_limit)
     with progress_bar(given.quiet) as progress:
         found = find_setups(
             read(data, name=name, **given.reading()).with_feed(given.feed),

@@ -11,7 +11,6 @@ import click
 
 from cornersmooth.cl import read
 from cornersmooth.cli import files
-from cornersmooth.cli.files import STANDARD, check_pair, read_input, write_reports
 from cornersmooth.cli.options import Options, take_head
 from cornersmooth.cli.shop import command_line, loosened
 from cornersmooth.cli.show import more, print_line, print_message, say, say_json, say_line, show_findings, warn
@@ -192,13 +191,13 @@ def run_surface(given: Options) -> int:
     from cornersmooth.report.tables import surface_csv, surface_lines
     from cornersmooth.surface import measure_surface
 
-    check_pair(given)
+    files.check_pair(given)
     source, text = given.source, given.text
     how = given.reading_back()
-    data, name = read_input(source, size_limit=not given.no_size_limit)
+    data, name = files.read_input(source, size_limit=not given.no_size_limit)
     program = read(data, name=name, **given.reading())
     tool = _tool(program, given.tool)
-    written = read_input(text)[0] if text == STANDARD else text
+    written = files.read_input(text)[0] if text == files.STANDARD else text
     nc = read_nc(written, tolerance=given.tolerance, axis_length=given.axis_length, **how)
     found = measure_surface(
         program,
@@ -220,7 +219,9 @@ def run_surface(given: Options) -> int:
         contents = record("verify", judged, source=cl_file(program), program=file, settings={}, findings=findings)
         return verified_page(program, nc, checked, contents, surface=found)
 
-    write_reports(dict.fromkeys(given.reports, True), found.as_dict(), table=partial(surface_csv, found), page=page)
+    files.write_reports(
+        dict.fromkeys(given.reports, True), found.as_dict(), table=partial(surface_csv, found), page=page
+    )
     first = f"{Verdict.of(problems=not found.kept)}: the surface is {'' if found.kept else 'not '}within the tolerance"
     say(given, found.as_dict(), (first, *surface_lines(found)), indent=18)
     return 0 if found.kept else 1
