@@ -40,7 +40,7 @@ def test_a_plane_cut_by_a_straight_move_is_met_exactly(tool):
     path = [[0, 0, 0], [20, 0, 0], [50, 0, 0]]
     shift = np.array([0.0, 0.03, 0.0])
     points, own, written = off(straight(path), straight(path + shift), tool, 12.0, stations=4)
-    assert len(points) > 20
+    assert len(points.line) > 20
     # the points lie on the swept volume, and their normals across the motion
     np.testing.assert_allclose(own, 0.0, atol=1e-9)
     assert abs(points.normal @ [1.0, 0.0, 0.0]).max() < 1e-12

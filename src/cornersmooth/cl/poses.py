@@ -64,8 +64,6 @@ IDENTITY: Final = System(np.eye(3), np.zeros(3))
 
 def system_of(values: list[float]) -> System | None:
     """Return the system of origin, X axis and Y axis, as NX writes MSYS; None where the axes are not orthonormal."""
-    if len(values) != 9:
-        return None
     origin, x, y = np.array(values).reshape(3, 3)
     if max(abs(x @ x - 1), abs(y @ y - 1), abs(x @ y)) > _SQUARE:
         return None

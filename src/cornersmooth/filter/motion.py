@@ -90,10 +90,9 @@ def program_of(nc: NcProgram, marks: bool = False) -> Program:
     CS503 where a block is no line, or where the stretches are not begun by rapids.
     """
     rapid = (nc.kind == Element.RAPID) | (nc.line < 0)
-    if not rapid[:1].all() or not np.isin(nc.kind, (Element.RAPID, Element.LINE)).all():
+    lines = np.isin(nc.kind, (Element.RAPID, Element.LINE))
+    if not rapid[:1].all() or not lines.all() or nc.second_is != "vector":
         raise InputError("CS503", "a block of a run is no line", "please report this with the program")
-    if nc.second_is != "vector":
-        raise InputError("CS503", "a run in points of the tool axis", "please report this with the program")
     starts = np.flatnonzero(np.diff(rapid, prepend=False) & rapid & marks).tolist()
     return Program.from_poses(
         nc.tip,

@@ -49,9 +49,6 @@ class CornerList:
     nc_line: Ints
     counts: dict[str, int]  #: all corners of the program by kind, listed or not; straight ones as ``"straight"``
 
-    def __len__(self) -> int:
-        return len(self.pose)
-
 
 def smoothed_corners(smoothed: SmoothProgram, found: Verification | None, *, dense: bool) -> CornerList:
     """Corners of a program that was smoothed here."""

@@ -168,9 +168,6 @@ class EnvelopePoints:
     side: Ints  #: 0 left of the motion, seen against the tool axis, 1 right
     line: Ints  #: (k,): CL line
 
-    def __len__(self) -> int:
-        return len(self.station)
-
 
 def envelope_points(
     motion: RuledMotion, tool: Tool, edge: float, *, levels: int = 7, stations: int = 2000
