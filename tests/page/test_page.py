@@ -381,3 +381,20 @@ def test_a_path_without_any_feed_move_has_a_page():
     assert meta["badge"] == "PASSED"
     assert not np.isfinite(arrays["w_off"]).any()
     assert len(arrays["c_line"]) == 0
+
+
+@pytest.mark.parametrize(
+    ("blocks", "there"), [("", False), ("G1 X0 Y0 Z10 F100\n", True), ("G0 X0 Y0 Z20\nG1 Z10 F100\n", True)]
+)
+def test_a_program_that_hardly_moves_has_a_page_and_one_that_does_not_has_none(blocks, there, tmp_path):
+    cl, nc, page = tmp_path / "p.cls", tmp_path / "p.nc", tmp_path / "p.html"
+    cl.write_text("LOADTL/1\nFEDRAT/MMPM,100\nGOTO/0,0,10,0,0,1\nFINI\n")
+    nc.write_text(f"%\nO1\nG90 G21 G94\n{blocks}M30\n%\n")
+    found = run("verify", str(cl), str(nc), "--report", str(page))
+    assert found.returncode == 1
+    assert page.exists() is bool(blocks)
+    assert (b"no page is written: the program does not move" in found.stderr) is not page.exists()
+    if not blocks:
+        cl.write_text("FROM/0,0,10,0,0,1\nFINI\n")
+        assert run("smooth", str(cl), "-o", str(tmp_path / "from.nc"), "--report", str(page)).returncode == 0
+        assert not page.exists()

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
-from cornersmooth.cli.show import print_line
+from cornersmooth.cli.show import print_line, warn
 from cornersmooth.errors import CornersmoothError, InputError, OutputError, SettingsError
 from cornersmooth.system import output
 
@@ -24,6 +24,9 @@ if TYPE_CHECKING:
     from cornersmooth.cli.options import Options
 
 STANDARD = "-"
+
+#: why there is no page of a program
+STILL = "the program does not move"
 
 
 def read_input(path: str, *, size_limit: bool = True) -> tuple[bytes, str]:
@@ -139,13 +142,19 @@ def write_reports(
     *,
     table: Callable[[], Iterable[str]] | None = None,
     page: Callable[[], str] | None = None,
+    no_page: str = "",
 ) -> None:
-    """Write reports in the forms that their names end in; of each path, whether it may be replaced."""
+    """Write reports in the forms that their names end in; of each path, whether it may be replaced.
+
+    `no_page` is why there is none.
+    """
     from cornersmooth.report import report_json
 
     for path, replace in paths.items():
         form = suffix_of(path)
-        if form == ".csv" and table is not None:
+        if form == ".html" and no_page:
+            warn(f"no page is written: {no_page}", path)
+        elif form == ".csv" and table is not None:
             write_report(path, table(), replace=replace)
         else:
             text = page() if form == ".html" and page is not None else report_json(contents)

@@ -222,11 +222,8 @@ def _reported(
             saving=saving,
         )
 
-    for path in reports:
-        if motions is None and files.suffix_of(path) == ".html":
-            show.warn("no page is written: no run differs", path)
-        else:
-            files.write_reports({path: True}, contents, page=page)
+    none = "no run differs" * (motions is None)
+    files.write_reports(dict.fromkeys(reports, True), contents, page=page, no_page=none)
     return contents
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from cornersmooth import __version__
 from cornersmooth.cl import read
 from cornersmooth.cl.apt import refuse_program
-from cornersmooth.cli.files import Input, check_path, read_input, suffix_of, target_of, write_reports
+from cornersmooth.cli.files import STILL, Input, check_path, read_input, suffix_of, target_of, write_reports
 from cornersmooth.cli.options import POINTS, Options
 from cornersmooth.cli.show import more
 from cornersmooth.errors import (
@@ -29,6 +29,7 @@ from cornersmooth.errors import (
     printable,
 )
 from cornersmooth.kinematics import Machine, with_dynamics
+from cornersmooth.model import Move
 from cornersmooth.nc import Form, Frame
 from cornersmooth.pipeline import Progress, Result, postprocess, timed
 from cornersmooth.report import corners_csv
@@ -235,7 +236,8 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> None:
     contents = result.report(command=job.command, loosened=job.loosened, saving=outcome.saving, limits=job.axes)
     outcome.contents = contents
     table = partial(corners_csv, result.smoothed, dense=not result.form.curve)
-    write_reports(replace, contents, table=table, page=page)
+    still = STILL * bool((program.kind == Move.FROM).all())
+    write_reports(replace, contents, table=table, page=page, no_page=still)
 
 
 def _failed(name: str, result: Result, failure: VerdictError) -> str:

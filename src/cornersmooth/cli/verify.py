@@ -119,9 +119,8 @@ def run_verify(given: Options) -> int:
             tool=given.tool,
         )
 
-    files.write_reports(
-        dict.fromkeys(given.reports, True), contents, table=partial(verification_csv, program, found), page=page
-    )
+    reports, table = dict.fromkeys(given.reports, True), partial(verification_csv, program, found)
+    files.write_reports(reports, contents, table=table, page=page, no_page=files.STILL * (not found.elements))
     for line in _problems(found, name, "<stdin>" if text == files.STANDARD else text, given.verbose):
         print_message(line)
     verdict = contents["verdict_text"]
@@ -219,9 +218,8 @@ def run_surface(given: Options) -> int:
         contents = record("verify", judged, source=cl_file(program), program=file, settings={}, findings=findings)
         return verified_page(program, nc, checked, contents, surface=found)
 
-    files.write_reports(
-        dict.fromkeys(given.reports, True), found.as_dict(), table=partial(surface_csv, found), page=page
-    )
+    reports, table = dict.fromkeys(given.reports, True), partial(surface_csv, found)
+    files.write_reports(reports, found.as_dict(), table=table, page=page, no_page=files.STILL * (not len(nc)))
     first = f"{Verdict.of(problems=not found.kept)}: the surface is {'' if found.kept else 'not '}within the tolerance"
     say(given, found.as_dict(), (first, *surface_lines(found)), indent=18)
     return 0 if found.kept else 1

@@ -127,9 +127,9 @@ class TimeLaw:
         Floats
             (m,) s, from 0 to `total`.
         """
+        if not len(self.speed):  # nothing moves
+            return np.zeros(np.shape(way))
         way = np.clip(np.asarray(way, np.float64), self.way[0], self.way[-1])
-        if not len(self.speed):
-            return np.zeros_like(way)
         phase = np.clip(np.searchsorted(self.way, way, side="right") - 1, 0, len(self.speed) - 1)
         gone = way - self.way[phase]
         v, rate = self.speed[phase], self.rate[phase]

@@ -24,6 +24,7 @@ from cornersmooth.nc import write
 from cornersmooth.nc_reader import NcProgram
 from cornersmooth.page.scene import Pack, Subject, page_values
 from cornersmooth.pipeline import Result, read_back
+from cornersmooth.report import plain
 from cornersmooth.report.verdict import LIMITS_TOLD, Saving, sharp_line, time_text
 from cornersmooth.settings import Limits, Settings
 from cornersmooth.verify import Verification
@@ -237,12 +238,12 @@ def document(meta: dict[str, Any], pack: Pack) -> str:
         f"default-src 'none'; img-src data:; style-src {_hash(styles)}; script-src {_hash(libraries)} {_hash(script)}; "
         "base-uri 'none'; form-action 'none'"
     )
-    values = json.dumps({**_shortened(meta), "arrays": pack.table}, ensure_ascii=True, allow_nan=False)
+    values = json.dumps({**plain(meta, _shown), "arrays": pack.table}, ensure_ascii=True, allow_nan=False)
     # within a script element only these could end it or begin a comment
     values = values.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
     parts = {
         "policy": policy,
-        "title": html.escape(_shortened(meta["title"])),
+        "title": html.escape(_shown(meta["title"])),
         "styles": styles,
         "libraries": libraries,
         "script": script,
@@ -261,16 +262,7 @@ def _hash(text: str) -> str:
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode('ascii')}'"
 
 
-def _shortened(value: Any) -> Any:
-    """The same values with long texts cut, and numbers that JSON has no word for as null."""
-    if isinstance(value, str):
-        # characters that are no text, such as halves of pairs out of names that are not UTF-8
-        value = value.encode("utf-8", "replace").decode("utf-8")
-        return value if len(value) <= _LONGEST else value[:_LONGEST] + " …"
-    if isinstance(value, dict):
-        return {str(key): _shortened(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_shortened(item) for item in value]
-    if isinstance(value, float) and value - value != 0.0:
-        return None
-    return value
+def _shown(text: str) -> str:
+    """A text without what is none, such as halves of pairs out of names that are not UTF-8, and not too long."""
+    text = text.encode("utf-8", "replace").decode("utf-8")
+    return text if len(text) <= _LONGEST else text[:_LONGEST] + " …"

@@ -136,7 +136,7 @@ class _View:
             corners = measured_corners(program, found)
         if subject.runs is not None:
             corners = replace(some_rows(corners, np.zeros(0, np.int64)), counts={})
-        centre = 0.5 * (program.tip.min(axis=0) + program.tip.max(axis=0)) if len(program) else np.zeros(3)
+        centre = 0.5 * (program.tip.min(axis=0) + program.tip.max(axis=0))
         seconds = feed_seconds(written, Limits.rapid) if planned.seconds is None else planned.seconds
         reached = np.maximum.accumulate(written.pose)
         places = np.maximum(np.searchsorted(reached, np.arange(len(program)), side="right") - 1, 0)
@@ -162,9 +162,9 @@ def page_values(subject: Subject, story: Mapping[str, Any]) -> tuple[dict[str, A
         "tolerance": subject.settings.tolerance,
         "axis_length": subject.settings.axis_length,
         "centre": view.centre.tolist(),
-        "seconds": float(seconds[-1]) if len(seconds) else 0.0,
+        "seconds": float(seconds[-1]),
         "timed": planned.seconds is not None,
-        "way": float(original.way[-1]) if len(original.way) else 0.0,
+        "way": float(original.way[-1]),
         "totals": {name: law.total for name, law in planned.laws.items()},
         "corners": None
         if subject.runs is not None
@@ -272,9 +272,9 @@ def _add_charts(pack: Pack, view: _View) -> dict[str, Any]:
     original, written, planned, seconds = view.original, view.written, view.planned, view.seconds
     count = int(np.clip(_STEPS_PER_POSE * len(original.way), _STEPS, _MOST_STEPS))
     charts: dict[str, Any] = {}
-    end = max(float(original.way[-1]) if len(original.way) else 0.0, _NO_WAY)
+    end = max(float(original.way[-1]), _NO_WAY)
     longest = max((law.total for law in planned.laws.values()), default=0.0)
-    longest = max(longest, float(seconds[-1]) if len(seconds) else 0.0, _NO_WAY)
+    longest = max(longest, float(seconds[-1]), _NO_WAY)
     for scale, last, where in (("way", end, written.way), ("time", longest, seconds)):
         steps = np.linspace(0.0, last, count + 1)
         pack.add(f"{scale}_x", np.linspace(0.0, last, 2 * count, endpoint=False), "f4")
@@ -340,10 +340,7 @@ def _change(loads: Mapping[str, Mapping[str, Floats]], axis: str) -> float:
 
 def _highest(values: Floats, where: Floats, steps: Floats) -> Floats:
     """Largest value at places within each step; between places that of the next; NaN where there is none."""
-    index = np.searchsorted(where, steps)
-    first = np.minimum(index[:-1], max(len(values) - 1, 0))
-    if not len(values):
-        return np.full(len(steps) - 1, np.nan)
+    first = np.minimum(np.searchsorted(where, steps)[:-1], len(values) - 1)
     bare = np.where(np.isfinite(values), values, -1.0)
     top = np.maximum.reduceat(bare, first)
     return np.where(top < 0.0, np.nan, top)
@@ -357,7 +354,7 @@ def _tools(view: _View) -> list[dict[str, Any]]:
     reached = np.maximum.accumulate(view.written.pose)
     tools = []
     for pose, tool, line in found:
-        place = min(int(np.searchsorted(reached, pose)), max(len(seconds) - 1, 0))
+        place = min(int(np.searchsorted(reached, pose)), len(seconds) - 1)
         length = max(3.0 * tool.diameter, 1.5 * subject.settings.axis_length)
         length = min(length, tool.length) if tool.length > tool.side_from else length
         steep = np.radians(tool.taper)
@@ -366,7 +363,7 @@ def _tools(view: _View) -> list[dict[str, Any]]:
         out, up, _ = tool.profile(sine, np.array([tool.side_from, max(length, tool.side_from + 1e-3)]))
         tools.append(
             {
-                "from_second": float(seconds[place]) if len(seconds) else 0.0,
+                "from_second": float(seconds[place]),
                 "text": tool.describe(),
                 "line": line,
                 "outline": [[0.0, 0.0], *np.stack((np.maximum(out, 0.0), up), axis=1).round(6).tolist()],

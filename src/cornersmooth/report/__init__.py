@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, Final, Literal
 
@@ -260,14 +260,17 @@ def findings_table(findings: Iterable[Finding]) -> list[dict[str, Any]]:
 
 def report_json(contents: Mapping[str, Any]) -> str:
     """Contents as JSON with a final line end; numbers that JSON has no word for (NaN, infinity) become null."""
-    return json.dumps(_plain(contents), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    return json.dumps(plain(contents), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any, shown: Callable[[str], str] = str) -> Any:
+    """The same in what JSON has words for; texts as they are `shown`."""
+    if isinstance(value, str):
+        return shown(value)
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {str(key): plain(item, shown) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
+        return [plain(item, shown) for item in value]
     if isinstance(value, float):
         return value if np.isfinite(value) else None
     return value

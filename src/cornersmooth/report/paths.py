@@ -138,7 +138,7 @@ def written_path(program: Program, nc: NcProgram, original: OriginalPath, settin
     """Points of a text that was read, each with its place on the original and its deviation."""
     length, own_axis = settings.axis_length, settings.axis_tolerance
     bent = np.isin(nc.kind, (Element.ARC, Element.CURVE))
-    share_of_each = _POINTS // max(len(nc), 1)
+    share_of_each = _POINTS // len(nc)
     lines = int(np.clip(share_of_each, *_ON_LINES)) if len(nc) < _MANY else 1
     rapid = nc.kind == Element.RAPID
     pieces = np.where(rapid, 1, np.where(bent, int(np.clip(share_of_each, *_ON_CURVES)), lines))
@@ -209,9 +209,9 @@ def _continued(place: Floats, tip: Floats, original: OriginalPath) -> Floats:
     """Places on the original for all points: between known ones in proportion to the way, and never falling."""
     length = np.cumsum(norm(np.diff(tip, axis=0, prepend=tip[:1])))
     known = np.flatnonzero(np.isfinite(place))
-    end = float(original.way[-1]) if len(original.way) else 0.0
+    end = float(original.way[-1])
     if not len(known):
-        return length * (end / length[-1] if length[-1:].any() else 0.0)
+        return length * (end / length[-1] if length[-1] else 0.0)
     first, last = known[0], known[-1]
     way = np.interp(length, length[known], np.maximum.accumulate(place[known]))
     way[:first] = np.maximum(place[first] - (length[first] - length[:first]), 0.0)

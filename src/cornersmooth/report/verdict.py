@@ -184,8 +184,6 @@ def judge(found: Verification | None, findings: Iterable[Finding] = (), unverifi
 def _problems_text(found: Verification) -> str:
     count = found.problem_count
     text = f"{count:,} {'problem' if count == 1 else 'problems'}"
-    if not found.problems:
-        return text
     first = found.problems[0]
     line = f" in NC line {first.nc_line}" if first.nc_line else ""
     return f"{text}, first{line}: {first.text.partition('; ')[0]}"

@@ -17,7 +17,7 @@ from cornersmooth.feedrate.intervals import ROUGHLY, Resolution
 from cornersmooth.feedrate.linuxcnc import axis_limits, line_times, program_lines
 from cornersmooth.feedrate.machine_axes import follow
 from cornersmooth.feedrate.parts import time_of_parts
-from cornersmooth.feedrate.path import Path, build_path
+from cornersmooth.feedrate.path import build_path
 from cornersmooth.feedrate.written import text_path
 from cornersmooth.kinematics import Machine, endless, tool_axis, with_dynamics
 from cornersmooth.model import Floats, Move, Program
@@ -207,24 +207,19 @@ def _in_parts(timing: Timing, text: bytes, program: Program, progress: Progress 
     limits, settings, machine, count = timing.limits, timing.settings, timing.machine, useful_processes()
     unsmoothed = build_path(program, None, settings, limits)
     written = text_path(read_back(text, timing.form, settings), limits, blocks=timing.blocks, settings=settings)
+    begin, end = _from_to(program, written.program.tip, written.program.axis)  # from the first to the last pose
+    ends = np.searchsorted(written.move, [begin, end], side="right").tolist()
+    own = written if begin < 0 else written.part(*ends)
     before, after = (
         time_of_parts(part, limits, follow(axes, path), processes=count, progress=stage_of(progress, stage))
         for path, part, axes, stage in (
             (unsmoothed, unsmoothed, machine, "planning unsmoothed"),
-            (written, _between(written, program), endless(machine), "planning as written"),
+            (written, own, endless(machine), "planning as written"),
         )
     )
     error = 100.0 * math.hypot(before.error / before.seconds, after.error / after.seconds)
     against = f"unsmoothed lines, both from plans of parts (within {2.0 * error:.1f} %)"
     return Saving(before.seconds, after.seconds, after.limiting, against)
-
-
-def _between(path: Path, program: Program) -> Path:
-    """The part of the path of a text from the first to the last pose that the program goes to."""
-    begin, end = _from_to(program, path.program.tip, path.program.axis)
-    if begin < 0:
-        return path
-    return path.part(*np.searchsorted(path.move, [begin, end], side="right").tolist())
 
 
 def written_text(program: Program, settings: Settings, form: Form) -> bytes:
