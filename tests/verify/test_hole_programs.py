@@ -1,6 +1,7 @@
 """What happens around holes is written and verified: each kind of program that was once refused, or written wrongly."""
 
 import io
+from typing import Any
 
 import pytest
 
@@ -8,7 +9,8 @@ from cornersmooth.cl import read
 from cornersmooth.nc import Frame, choose_form, fit_settings, write
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
-from cornersmooth.verify import verify
+from cornersmooth.verify import free_space, verify
+from cornersmooth.verify.free_space import free_interval
 from oracle.share import share
 from verify.hole_programs import hole_trial
 from verify.random_programs import trial
@@ -92,6 +94,8 @@ REFUSED_ONCE = {
     1730122: "coolant ends between holes in one line, cycles of the control",
     1770487: "coolant on for a tool with which nothing moves, in front of a feed move that leads nowhere",
     1790297: "taps left out twice at one pose, and a rapid aslant up from there",
+    1700133: "GOHOME behind three tools, the last of them the first: another speed holds on the way home",
+    3000034: "GOHOME behind two tools, the last of them the one before",
 }
 
 #: seeds of `random_programs.trial`, the same
@@ -112,17 +116,19 @@ RANDOM_REFUSED_ONCE = {
     9400011: "coolant and feeds between poses that are a digit apart",
     9500337: "coolant a digit before a tool change",
     9500600: "curves for an ε of 0.67 mm in digits of 1e-5: what is kept of ε is less than what bends take off it",
+    9800230: "an optional stop behind a pose and another by a digit, which the text has both",
 }
 
 #: seeds that are refused still: a hole program, and programs at random
 KNOWN = {
-    1700133: "GOHOME behind three tools, the last of them the first: another speed holds on the way home",
     1503284: "a feed move to where the tool has been before its change: what leads nowhere in the CL file has no feed",
     1710186: "two optional stops around a tool that does nothing",
     1003544: "a dwell behind a tap that is left out, and GOHOME twice around two that are, in its line",
     8600559: "a dwell between poses that are a digit apart: the text passes them in one",
     1790243: "feeds to a hole down from home positions, GOHOME twice",
     8601699: "coolant at the end of a run between poses that are a digit apart: the text passes them in one",
+    9800348: "coolant and a stop between poses that are a digit apart, to and fro: the text passes them in one",
+    3000168: "coolant on behind a tap that is left out, and nothing moves before the end",
 }
 
 
@@ -136,6 +142,23 @@ def test_program_passes(seed: int):
 def test_random_program_passes(seed: int):
     one = trial(seed)
     assert judged(one, read(one.cl.encode(), name="trial.cls"), oracle=False) == ("passed", "")
+
+
+@pytest.mark.parametrize("seed", [9800423, 9800764])
+def test_little_is_worked_out_exactly(seed: int, monkeypatch: pytest.MonkeyPatch):
+    """42 and 22 million pairs of a vertex and a segment were."""
+    cells = 0
+
+    def counted(*given: Any) -> Any:
+        nonlocal cells
+        found = free_interval(*given)
+        cells += found[0].size
+        return found
+
+    monkeypatch.setattr(free_space, "free_interval", counted)
+    one = trial(seed)
+    assert judged(one, read(one.cl.encode(), name="trial.cls"), oracle=False) == ("passed", "")
+    assert cells < 2_000_000
 
 
 @pytest.mark.parametrize("seed", KNOWN)

@@ -80,6 +80,7 @@ class _Side:
     stops: bool
     held: _Held = field(default_factory=lambda: {k: Token(k, value, -1, 0) for k, value in _AT_START.items()})
     unsure: set[str] = field(default_factory=set)
+    changes: int = 0  #: how many tool changes have been read
     read: int = 0
     line: int = 0  #: of the last word that has been read
     #: spindle and coolant that are on with a tool since the last motion, and the words that do it
@@ -99,11 +100,13 @@ class _Side:
             token = self.tokens[self.read]
             self.read, self.line = self.read + 1, token.line or self.line
             if token.kind in _ACTIONS:
-                done.append((token, {kind: self.value(kind) for kind in _AT_PAUSES if kind not in self.unsure}))
+                holds = {kind: self.value(kind) for kind in _AT_PAUSES if kind not in self.unsure}
+                done.append((token, holds | ({"tool": self.changes} if token.kind == "home" else {})))
                 if token.kind == "stop":
                     self.halted |= {kind: token for kind in _STOPPED if self.value(kind) not in ENDINGS}
                 continue
             changes, self.held[token.kind] = token.value != self.value(token.kind), token
+            self.changes += changes and token.kind == "tool"
             self.unsure.discard(token.kind)
             self.halted.pop(token.kind, None)
             if token.kind == "tool" and self.stops:

@@ -200,17 +200,19 @@ class Around:
         start: float,
         top: int,
         inner: Inner | None,
+        fine: float,
     ) -> Around:
         """Rows against the path from the place of the first up to a vertex.
 
         They are vertices (k, 3h), the bends (k - 1,) of their steps, and their numbers (k,) for `Inner`. Bent steps and
-        segments are divided, but no steps that are looked back on: of these nothing is known but their ends.
+        segments are divided until so `fine`, in radii, but no steps that are looked back on: of these nothing is known
+        but their ends.
         """
         own, bend, number = rows
         base = min(int(start), top - 1)
-        cl_side = parts_of(path.bend[base:top], FINE * radius, _MOST_PARTS)
+        cl_side = parts_of(path.bend[base:top], fine * radius, _MOST_PARTS)
         known = np.zeros(len(bend)) if inner is None else np.where(number[:-1] < 0.0, 0.0, bend)
-        nc_side = parts_of(known, FINE * radius, _MOST_PARTS)
+        nc_side = parts_of(known, fine * radius, _MOST_PARTS)
         at, places = np.append(0, np.cumsum(nc_side)), _divided(np.arange(base, top + 1), cl_side)
         points = np.empty((own.shape[1], at[-1] + 1))
         points[:, at] = own.T

@@ -103,7 +103,11 @@ class HoleLines:
         """Whether an element ends exactly at the pose of a move, or stands after one that does."""
         while element > self.ahead.base and not self._of("exact", move, element) and self.stands(element):
             element -= 1
-        return element >= 0 and bool(self._of("exact", move, element))
+        return element >= 0 and self.names(move, element)
+
+    def names(self, move: int, element: int) -> bool:
+        """Whether an element ends exactly at the pose of a move."""
+        return bool(self._of("exact", move, element))
 
     def height(self, move: int, element: int) -> float:
         """Height of one element, as of `heights`."""

@@ -144,7 +144,7 @@ class Parse:
         length, last = self._task.path.length, self._task.original.trail.last
         elements = sorted({event.element for event in self._words.between(element, end)})
         for one, near in zip(elements, lines.poses_near(elements, moves), strict=True):
-            there = [move for move in near if move >= self._cut_at and lines.at(move - 1, one - 1)]
+            there = [move for move in near if move >= self._cut_at and lines.names(move - 1, one - 1)]
             if there:
                 way = gone[max(one - 1 - first, 0)] + length[last[self._move[stop]]]
                 # of those that are there again the nearest, and of those within the tolerance the first
