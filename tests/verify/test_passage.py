@@ -162,11 +162,12 @@ def test_goes_on_behind_what_is_left_out_and_what_is_run_twice():
     assert any(165 <= row <= 175 for row in rows)
 
 
-def test_stops_after_the_last_break_it_names():
+def test_stops_after_the_last_break_it_names(monkeypatch):
     path = straight(200)
     own = path.copy()
     own[10::10, 2] += 0.5
-    found = passage(own, path, 0.1, most=3)
+    monkeypatch.setattr(module, "MOST_BREAKS", 3)
+    found = passage(own, path, 0.1)
     assert len(found.breaks) == 3
     assert np.isnan(found.place[41:]).all()
 

@@ -7,7 +7,7 @@ import numpy as np
 from cornersmooth.model import Floats
 from cornersmooth.verify.chain import Path, Sections
 from cornersmooth.verify.free_space import Inner
-from cornersmooth.verify.passage import MOST_BREAKS, Passage
+from cornersmooth.verify.passage import Passage
 
 
 def whole_section(last: int, start: float, stop: float, *, guessed: bool = False) -> Sections:
@@ -23,7 +23,6 @@ def passage(
     own_bend: Floats | None = None,
     path_bend: Floats | None = None,
     inner: Inner | None = None,
-    most: int = MOST_BREAKS,
 ) -> Passage:
     """Decide whether two polylines can be run beside each other within a radius, both forward only.
 
@@ -34,7 +33,7 @@ def passage(
     radius : float, mm
     own_bend, path_bend : (n - 1,), (m,) float64, mm, optional
         By how much the motions may leave each segment.
-    inner, most
+    inner
         As of `Passage`.
     """
     if len(path) == 1:
@@ -43,4 +42,4 @@ def passage(
         own, own_bend = np.repeat(own, 2, axis=0), None
     bend = np.zeros(len(own) - 1) if own_bend is None else own_bend
     section = whole_section(len(own) - 1, 0.0, len(path) - 1)
-    return Passage(own, bend, Path.of(path, path_bend), radius, section, inner, most)
+    return Passage(own, bend, Path.of(path, path_bend), radius, section, inner)

@@ -34,9 +34,8 @@ class Acts:
     #: poses within runs where both files have words: moves that statements are before, and elements behind
     cuts: array[int] = field(default_factory=lambda: array("q"))
     holes: list[Hole] = field(default_factory=list)
-    #: CS561 for holes that the program leaves out and may leave out if requested
-    left_out: list[Problem] = field(default_factory=list)
-    moves_left_out: set[int] = field(default_factory=set)
+    #: CS561 for holes that the program leaves out and may leave out if requested, by their moves
+    left_out: dict[int, Problem] = field(default_factory=dict)
     rewinds: list[tuple[int, int]] = field(default_factory=list)  #: NC lines where cuts are left, and where they go on
     still: set[int] = field(default_factory=set)  #: elements that lead nowhere
     unlooked: list[tuple[int, str]] = field(default_factory=list)  #: what cannot be decided, and its NC line

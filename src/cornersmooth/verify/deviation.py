@@ -404,6 +404,6 @@ def _passed_elsewhere(match: Match, vertex: int, tip: Floats, axis: Floats) -> b
     tips, axes = np.tile(tip, (len(ends), 1)), np.tile(axis, (len(ends), 1))
     exact, _ = digit_errors(match.nc, match.owner[ends], tips, axes, match.task.axis_length)
     ends = ends[exact]
-    limits, six, place = (match.lowest[ends], match.high[ends]), match.six[ends], match.place[ends]
+    limits, six, place = (match.low[ends], match.high[ends]), match.six[ends], match.place[ends]
     first, last = (reach(match.task, six, place, limits, way) for way in (-1, 1))
     return bool(((first <= vertex + _HAIR) & (vertex - _HAIR <= last)).any())

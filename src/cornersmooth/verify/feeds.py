@@ -48,7 +48,7 @@ def check_feeds(match: Match, found: Findings) -> None:
     until = wrong.copy()  # the last run whose feed would do, from `wrong` on
     if len(rows := np.flatnonzero(~good)):
         own = start[rows]
-        limits = match.lowest[own], match.high[own]
+        limits = match.low[own], match.high[own]
         six = match.six[own], match.six[end[rows]]
         from_, to = (where[rows] for where in place)
         latest, earliest = reach(task, six[0], from_, limits, 1), reach(task, six[1], to, limits, -1)

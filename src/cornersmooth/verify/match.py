@@ -146,13 +146,9 @@ class Match(Batch):
 
     @cached_property
     def low(self) -> Ints:
-        """(v,) first segment of the CL path in the stretch a vertex belongs to."""
-        return np.minimum(self.stretches["start"][np.maximum(self.section, 0), 0].astype(np.int64), self.high)
-
-    @cached_property
-    def lowest(self) -> Ints:
-        """(v,) first segment that a vertex may be on: where a batch begins at a cut, that is only guessed."""
-        return np.where(self.continued & (self.section == 0), 0, self.low)
+        """(v,) first segment of the CL path that a vertex may be on: where a batch begins at a cut, any."""
+        first = np.minimum(self.stretches["start"][np.maximum(self.section, 0), 0].astype(np.int64), self.high)
+        return np.where(self.continued & (self.section == 0), 0, first)
 
     @cached_property
     def high(self) -> Ints:

@@ -301,8 +301,7 @@ class Parse:
         begins = hole.first >= 0
         if hole.left_out:
             text = f"a hole of the CL file is not {'tapped' if hole.cycle.tap else 'drilled'}"
-            self.acts.left_out.append(lines.problem("CS561", move, hole.first, text))
-            self.acts.moves_left_out.add(move)
+            self.acts.left_out[move] = lines.problem("CS561", move, hole.first, text)
             begins = begins and self._words.tool_changes(hole.first) > self._words.tool_changes(hole.first - 1)
         elif begins:
             self.acts.holes.append(hole)
@@ -438,7 +437,7 @@ class Parse:
         holes = self.acts.holes
         if holes and (element <= holes[-1].leaves or lines.block(element).start <= holes[-1].leaves):
             return True
-        left_out = self._move[first] in self.acts.moves_left_out
+        left_out = self._move[first] in self.acts.left_out
         if self._words.acting(element) or not (left_out or element == begin or lines.feeds(element - 1)):
             return False
         move, came_from = self._move[first], nc.tip[max(begin - 1 - self._ahead.base, 0)]

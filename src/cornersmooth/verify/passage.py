@@ -73,10 +73,9 @@ class Passage:
         radius: float,
         sections: Sections,
         inner: Inner | None = None,
-        most: int = MOST_BREAKS,
     ) -> None:
         self.path, self.radius, self._inner = path, radius, inner
-        self.breaks: list[Break] = []  #: where the motions part; nothing is looked at after `most`
+        self.breaks: list[Break] = []  #: where the motions part; nothing is looked at after the most
         # vertices, bends of the steps from them, their places, and their numbers, with fractions of those put between
         self._own, self._bend = own, bend
         self._place, self._number = np.full(len(own), np.nan), np.arange(len(own), dtype=np.float64)
@@ -85,7 +84,7 @@ class Passage:
         self._begin, self._stop, self._guessed = sections.start.copy(), sections.stop, sections.guessed
         self._left = 0.0  # last place that was reached before a break
         section = 0
-        while section < len(self._first) and len(self.breaks) < most:
+        while section < len(self._first) and len(self.breaks) < MOST_BREAKS:
             section = self._go_on(section)
 
     @property

@@ -58,8 +58,8 @@ class Stretches:
 
     def take(self, stop: int) -> list[Batch]:
         """Give out what is ready where elements up to `stop`, that excluded, are certain."""
-        if self._move >= 0 and stop - 1 - self._element > self._most + self._most // 2:
-            self._cut_open(stop - 1)
+        if 0 <= self._move < self._move_last:
+            self._cut_up_to(stop - 1, self._move_last)
         wanted = [stop - BEFORE, *(one[0] - 2 for one in self._pending[:1])]
         self._ahead.forget(min([*wanted, self._element - 2] if self._move >= 0 else wanted))
         ready, self.ready = self.ready, []
@@ -94,33 +94,23 @@ class Stretches:
             self._stands(move_last, element_last, cl_moves=cl_moves)
         if not (cl_moves and nc_moves):
             return
-        stop = int(self.task.original.trail.last[move_last])
-        while element_last - self._element > self._most + self._most // 2:
-            self._cut(self._element + self._most, stop)
+        stop = self._cut_up_to(element_last, move_last)
         waiting = self._pending
         if waiting and (element_last - waiting[0][0] > self._most or stop - waiting[0][2][0] > 2 * self._most):
             self._flush()
         start, end = np.minimum(self._place, stop), np.full(3, float(stop))
         self._pending.append((self._element, element_last, start, end, stop, self._guessed))
 
-    def _cut_open(self, last: int) -> None:
-        """Give out what is kept of a stretch whose end is not known yet, but its last element."""
-        if self._move < self._move_last:
-            while last - self._element > self._most + self._most // 2:
-                self._cut(self._element + self._most, int(self.task.original.trail.last[self._move_last]))
-            return
-        # nothing of the CL path is left for what is kept: it may only stay where it is
-        self._flush()
-        self.end(self._move, last)
-        self._element, self._continued = last, True
-
-    def _cut(self, element: int, stop: int) -> None:
-        """Give out a long stretch up to an element."""
-        self._flush()
-        start = np.minimum(self._place, stop)
-        end = self._guess(element, start, stop)
-        self._make([(self._element, element, start, end, stop, True)], goes_on=True)
-        self._element, self._place, self._continued, self._guessed = element, end, True, True
+    def _cut_up_to(self, last: int, move_last: int) -> int:
+        """Give out a long stretch but its last elements, of those up to one; return the end of its last move."""
+        stop = int(self.task.original.trail.last[move_last])
+        while last - self._element > self._most + self._most // 2:
+            self._flush()
+            start, element = np.minimum(self._place, stop), self._element + self._most
+            end = self._guess(element, start, stop)
+            self._make([(self._element, element, start, end, stop, True)], goes_on=True)
+            self._element, self._place, self._continued, self._guessed = element, end, True, True
+        return stop
 
     def _guess(self, element: int, start: Floats, stop: int) -> Floats:
         """(3,) places near the end of an element on a stretch, which has run from places on: the nearest ones.

@@ -270,7 +270,7 @@ class Verifier:
         problems += batches.acts.problems + feeds + problems_of(findings.violations)
         problems += half_turns(program)
         if not self._trust.skip_cycles:
-            problems += batches.acts.left_out
+            problems += batches.acts.left_out.values()
         if self._trust.words and batches.elements:  # without any motion nothing has a place
             axes = () if self._machine is None else self._machine.axes
             clamps = {float(word[1:]) for axis in axes for word in axis.clamp or ()}

@@ -7,7 +7,7 @@ moves a word stands at a pose that is passed exactly.
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import replace
 
 import numpy as np
@@ -49,7 +49,7 @@ class WordPlaces:
         # statements by the first move behind them that leads anywhere, words and retracts by the first such element
         places = np.searchsorted(original.pose, [one.pose for one in program.statements]).tolist()
         unique = distinct(np.array(places, np.int64))
-        leading, beyond = self._leading(unique, set()), self._leading(unique, batches.acts.moves_left_out)
+        leading, beyond = self._leading(unique, ()), self._leading(unique, batches.acts.left_out)
         requested = [
             one
             for one in asked(self._task.asking, original.pose, means)
@@ -100,7 +100,7 @@ class WordPlaces:
                 line = int(program.line[original.pose[holes[element].move]])
                 comparison.in_hole(line, within[element], cycle.dwell, tap=cycle.tap)
         found.unlooked += comparison.unlooked
-        hidden = changed_unseen(requested, leading, beyond) if batches.acts.moves_left_out else ""
+        hidden = changed_unseen(requested, leading, beyond) if batches.acts.left_out else ""
         unsaid = "; ".join(filter(None, (without_word(cl_tokens, nc_tokens, means, own), hidden)))
         return comparison.problems, at_home, unsaid
 
@@ -122,7 +122,7 @@ class WordPlaces:
         ]
         return np.maximum.accumulate(np.array(sorted(rows, key=lambda row: row[1]), np.int64))
 
-    def _leading(self, places: Ints, left_out: Set[int]) -> dict[int, int]:
+    def _leading(self, places: Ints, left_out: Iterable[int]) -> dict[int, int]:
         """The first moves from some on that lead anywhere, and are none that are left out."""
         original, acts = self._task.original, self._batches.acts
         pose, program = original.pose, original.program
