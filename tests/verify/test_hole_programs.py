@@ -94,6 +94,7 @@ REFUSED_ONCE = {
     1730122: "coolant ends between holes in one line, cycles of the control",
     1770487: "coolant on for a tool with which nothing moves, in front of a feed move that leads nowhere",
     1790297: "taps left out twice at one pose, and a rapid aslant up from there",
+    1503284: "a feed move to where the tool has been before its change: what leads nowhere in the CL file has no feed",
     1700133: "GOHOME behind three tools, the last of them the first: another speed holds on the way home",
     3000034: "GOHOME behind two tools, the last of them the one before",
 }
@@ -121,7 +122,6 @@ RANDOM_REFUSED_ONCE = {
 
 #: seeds that are refused still: a hole program, and programs at random
 KNOWN = {
-    1503284: "a feed move to where the tool has been before its change: what leads nowhere in the CL file has no feed",
     1710186: "two optional stops around a tool that does nothing",
     1003544: "a dwell behind a tap that is left out, and GOHOME twice around two that are, in its line",
     8600559: "a dwell between poses that are a digit apart: the text passes them in one",
