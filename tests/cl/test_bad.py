@@ -49,7 +49,7 @@ def test_every_error_has_a_file() -> None:
         with pytest.raises(InputError) as caught:
             read(path)
         met.add(caught.value.code)
-    assert met == set(messages.ERRORS) - NOT_TEXT
+    assert met == {code[:5] for code in messages.ERRORS} - NOT_TEXT
 
 
 @pytest.mark.parametrize("data", [b"", b"\n \n", b"\x1a", b"\xef\xbb\xbf"])

@@ -297,6 +297,17 @@ def test_a_feed_that_is_not_understood_is_an_error(feed: str) -> None:
 # --- units -------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("head", ["MODE/MILL\n", "MCSYS/NUM,1,POINT,0,0,0,VECTOR,1,0,0,VECTOR,0,1,0\n"])
+def test_three_numbers_after_a_tilted_axis_are_none_of_autodesk(head: str) -> None:
+    """Its posts write six under MULTAX/ON; by MODE/MILL the file of another system was taken for theirs, along +Z."""
+    text = f"{head}UNITS/MM\nMULTAX/ON\nGOTO/0,0,5,0,0.6,0.8\n{{}}GOTO/1,0,0\nFINI\n"
+    with pytest.raises(InputError, match=r":5: error\[CS188\]: .* after the axis 0,0.6,0.8"):
+        program(text.format(""))
+    assert program(text.format(""), dialect="plain").axis[1].tolist() == [0, 0.6, 0.8]
+    assert program(text.format("MULTAX/OFF\n")).axis[1].tolist() == UP
+    assert program(text.format("GOTO/0,0,6,0,0,1\n")).axis[2].tolist() == UP
+
+
 def test_inch_files_are_converted_exactly() -> None:
     result = program("UNITS / INCHES\nFEDRAT/1.,IPM\nGOTO/0.1,1.,-3.3333\n")
     assert result.units == "inch"

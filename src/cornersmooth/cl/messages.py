@@ -66,6 +66,10 @@ ERRORS: Final[dict[str, tuple[str, str]]] = {
         "position without a tool axis after MULTAX/OFF: +Z (ISO 4343), or locked at {axis} (CATIA)",
         "say --dialect hsm for +Z, or --dialect catia for the locked axis",
     ),
+    "CS188b": (
+        "position without a tool axis after the axis {axis}: +Z, or that axis",
+        "write all six numbers, or say --dialect plain for that axis",
+    ),
     "CS197": (
         "tool axis {axis} after MULTAX/OFF, where ISO 4343 and CATIA read no axis",
         "put MULTAX/ON before it, or say --dialect catia to lock the axis as it was",
@@ -174,7 +178,7 @@ def error(code: str, file: str, line: int | None, **values: object) -> InputErro
     """Return the error of this code at FILE:LINE, ready to be raised."""
     what, hint = ERRORS[code]
     values = _cut(values)
-    return InputError(code, what.format(**values), hint.format(**values), file=file, line=line)
+    return InputError(code[:5], what.format(**values), hint.format(**values), file=file, line=line)
 
 
 def finding(code: str, line: int, count: int = 1, **values: object) -> Finding:

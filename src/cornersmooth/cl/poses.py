@@ -227,18 +227,24 @@ class Poses:
         if dropped.any():
             findings.append(finding("CS137", int(self.rows[off_axes[0][0], 6]), int(dropped.sum())))
             unit, given = unit[~dropped], given[~dropped]
-        axis = self._held(unit, given)
+        axis = self._held(unit, given, self.dialect.short_axis_up)
+        if self.dialect.axis_always:
+            held = self._held(unit, given, short_axis_up=False)
+            doubtful = (state == _FREE) & (np.abs(axis - held).max(axis=1, initial=0) > AXIS_NOISE)
+            if doubtful.any():
+                pose = int(doubtful.argmax())
+                raise error("CS188b", self.file, int(self.rows[pose, 6]), axis=_words(held[pose]))
         if not self.dialect.multax_off_known:
             self._check_off(axis, state, *off_axes)
         return self._placed(axis, System.vectors), findings
 
-    def _held(self, unit: Floats, given: Ints) -> Floats:
+    def _held(self, unit: Floats, given: Ints, short_axis_up: bool) -> Floats:
         """Axes of all poses, of which some are given."""
         if len(given) == self.n:
             return unit
         at = np.array([pose for pose, _ in self.axis_set])
         known = np.array([axis for _, axis in self.axis_set])
-        if not self.dialect.short_axis_up:
+        if not short_axis_up:
             order = np.argsort(np.concatenate((at, given)), kind="stable")  # what was set before a pose comes first
             at, known = np.concatenate((at, given))[order], np.concatenate((known, unit))[order]
         axis = known[np.searchsorted(at, np.arange(self.n), side="right") - 1]
@@ -255,7 +261,7 @@ class Poses:
             return
         pose = int(doubtful.argmax())
         at = np.flatnonzero(own == pose)
-        words = ",".join(f"{part:g}" for part in (unit[at[0]] if len(at) else axis[pose]))
+        words = _words(unit[at[0]] if len(at) else axis[pose])
         raise error("CS197" if len(at) else "CS188", self.file, int(self.rows[pose, 6]), axis=words)
 
     def _placed(self, rows: Floats, place: Callable[[System, Floats], Floats]) -> Floats:
@@ -281,6 +287,10 @@ class Poses:
                 raise error("CS111" if value == 0 else "CS112", self.file, line, length=value)
             findings.append(finding("CS139", line, int(wrong.sum()), length=value))
         return vector / length[:, None]
+
+
+def _words(axis: Floats) -> str:
+    return ",".join(f"{part:g}" for part in axis)
 
 
 def check_range(values: Iterable[float], file: str, line: int) -> None:
