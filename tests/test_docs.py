@@ -293,7 +293,7 @@ def test_dependencies_point_the_way_that_the_page_says() -> None:
 def imported(path: Path) -> Iterator[str]:
     """Packages and modules of cornersmooth that a file imports, but for what only types need."""
     tree = ast.parse(path.read_text())
-    for_types = [node for node in ast.walk(tree) if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test)]
+    for_types = [node for node in tree.body if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test)]
     left_out = {id(inside) for node in for_types for inside in ast.walk(node)}
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and node.module and id(node) not in left_out:
