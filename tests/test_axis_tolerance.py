@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import io
 import json
 import re
@@ -178,9 +179,11 @@ def test_settings_bring_both_tolerances_to_the_axis_point() -> None:
 
 
 def test_the_command_line_says_it_everywhere(tmp_path: Path) -> None:
-    out, report = tmp_path / "o.mpf", tmp_path / "r.json"
+    out, report, corners, poses = (tmp_path / name for name in ("o.mpf", "r.json", "c.csv", "p.csv"))
     options = ("--control", "siemens", "--method", "global", "--with", "cycle832")
-    made = run("smooth", SAMPLE, "-o", out, "--report", report, "--axis-tolerance", "0.4", *options)
+    made = run(
+        "smooth", SAMPLE, "-o", out, "--report", report, "--report", corners, "--axis-tolerance", "0.4", *options
+    )
     assert made.returncode == 0, made.stderr.decode()
     assert made.stderr.decode().startswith("PASSED, 1 to check  ")
     # what CYCLE832 allows adds to ε
@@ -193,11 +196,16 @@ def test_the_command_line_says_it_everywhere(tmp_path: Path) -> None:
     assert contents["settings"]["axis_tolerance_deg"] == 0.4
     assert contents["verification"]["axis_tolerance_deg"] == 0.4
     assert contents["verification"]["max_axis_point_deviation_mm"] is None
+    # the axis point has no path then: nothing is said of it
+    assert contents["summary"]["max_axis_error_mm"] is None
+    assert {corner["axis_error_mm"] for corner in contents["worst"]} == {None}
+    assert {row["axis_error_mm"] for row in csv.DictReader(corners.read_text().splitlines())} == {""}
     assert 0.2 < contents["verification"]["max_orientation_deviation_deg"] <= 0.4
     found = run("verify", SAMPLE, out)  # 0.4 degrees are looser than 0.01 mm at 10 mm
     assert (found.returncode, found.stdout.decode().partition(":")[0]) == (1, "NOT VERIFIED")
-    found = run("verify", SAMPLE, out, "--axis-tolerance", "0.4")
+    found = run("verify", SAMPLE, out, "--axis-tolerance", "0.4", "--report", poses)
     assert found.returncode == 0, found.stderr.decode()
+    assert {row["axis_point_deviation_mm"] for row in csv.DictReader(poses.read_text().splitlines())} == {""}
     assert "tool axis 0.4 deg" in found.stdout.decode()
     found = run("verify", SAMPLE, out, "--axis-tolerance", "0.1", "--report", tmp_path / "v.json")
     assert found.returncode == 1

@@ -9,7 +9,7 @@ import numpy as np
 
 from cornersmooth.arrays import angle_between, some_rows
 from cornersmooth.model import Bools, Floats, Ints, LimitedBy, Program, SmoothProgram, Status
-from cornersmooth.report.tables import corner_table
+from cornersmooth.report.tables import corner_table, path_distances
 from cornersmooth.report.verdict import other_corners, sharp_rows
 from cornersmooth.verify import Verification
 
@@ -70,7 +70,7 @@ def smoothed_corners(smoothed: SmoothProgram, found: Verification | None, *, den
     rounded = rounded[np.argsort(-off[rounded], kind="stable")][:_MOST_ROUNDED]
     rows = np.concatenate((np.flatnonzero(out), np.flatnonzero(sharp), rounded))
     table, nothing = corner_table(smoothed, rows, dense=dense), np.zeros(len(others.pose))
-    tip, axis = (np.append(table[name], nothing) for name in ("tip_error_mm", "axis_error_mm"))
+    tip, axis = (np.append(error, nothing) for error in path_distances(smoothed, rows, dense=dense))
     pose, own = np.append(corners.pose[rows], others.pose), corners.smoothed[rows]
     if found is not None:
         tip = np.where(np.isfinite(found.pose_tip[pose]), found.pose_tip[pose], tip)

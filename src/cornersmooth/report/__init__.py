@@ -16,7 +16,7 @@ from cornersmooth.errors import Finding, InputError
 from cornersmooth.geometry.arcs import arc_radii
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import Floats, Ints, Move, Program, SmoothProgram, Status, rapid_moves
-from cornersmooth.report.tables import Columns, corner_table, counts_of, csv_text, worst_corners
+from cornersmooth.report.tables import Columns, corner_table, counts_of, csv_text, or_empty, worst_corners
 from cornersmooth.report.verdict import Judgement, Saving, sharp_corners
 from cornersmooth.smoothing.construction import construction_of
 
@@ -38,7 +38,7 @@ def report(
     done, runs = corners.rounded, smoothed.runs
     worst = worst_corners(smoothed, dense=dense)
     sharp, listed = sharp_corners(smoothed)
-    own = smoothed.settings.axis_tolerance is not None  # bounds of runs hold at another distance from the tip then
+    axis_error = max(worst.axis_error, _largest(runs.axis_bound) if runs is not None else 0.0)
     summary: dict[str, Any] = {
         "method": smoothed.settings.method,
         "corners": len(corners),
@@ -48,7 +48,7 @@ def report(
         **counts_of(corners),
         "sharp": sharp,
         "max_tip_error_mm": max(worst.tip_error, _largest(runs.tip_bound) if runs is not None else 0.0),
-        "max_axis_error_mm": max(worst.axis_error, _largest(runs.axis_bound) if runs is not None and not own else 0.0),
+        "max_axis_error_mm": axis_error if smoothed.settings.axis_tolerance is None else None,
         "max_orientation_error_deg": float(np.degrees(_largest(corners.orientation_error))),
         "length_mm": _feed_length(smoothed),
         "blocks_in": int(np.count_nonzero(program.kind != Move.FROM)),
@@ -85,6 +85,7 @@ def corners_csv(smoothed: SmoothProgram, *, dense: bool = True) -> Iterator[str]
 
     def columns(part: slice) -> Columns:
         table = corner_table(smoothed, np.arange(*part.indices(count)), dense=dense)
+        table["axis_error_mm"] = or_empty("%.10g", table["axis_error_mm"])
         return {name: ("%.10g" if one.dtype.kind == "f" else "%s", one) for name, one in table.items()}
 
     return csv_text(count, columns)
@@ -92,7 +93,8 @@ def corners_csv(smoothed: SmoothProgram, *, dense: bool = True) -> Iterator[str]
 
 def _records(smoothed: SmoothProgram, rows: Ints, *, dense: bool) -> list[dict[str, Any]]:
     table = {name: column.tolist() for name, column in corner_table(smoothed, rows, dense=dense).items()}
-    return [dict(zip(table, values, strict=True)) for values in zip(*table.values(), strict=True)]
+    known = ((None if value != value else value for value in values) for values in zip(*table.values(), strict=True))
+    return [dict(zip(table, values, strict=True)) for values in known]
 
 
 def _largest(values: Floats) -> float:

@@ -51,6 +51,11 @@ def _written(form: str, names: str, *values: NDArray[Any]) -> Columns:
     return {name: (form, column) for name, column in zip(names.split(), values, strict=True)}
 
 
+def or_empty(form: str, values: NDArray[Any]) -> NDArray[Any]:
+    """Numbers as text; what is not known is empty."""
+    return np.array(["" if value != value else form % value for value in values.tolist()], np.str_)
+
+
 def timelaw_csv(law: TimeLaw) -> Iterator[str]:
     """The law at all multiples of its period and at its end as CSV text, a block of rows at a time.
 
@@ -86,11 +91,13 @@ def verification_csv(program: Program, found: Verification) -> Iterator[str]:
 
     def columns(part: slice) -> Columns:
         rows = poses[part]
-        off = found.pose_tip[rows], found.pose_axis_point[rows], found.pose_angle[rows]
+        axis = found.pose_axis_point[rows] if found.axis_tolerance is None else np.full(len(rows), np.nan)
         return (
             _written("%d", "pose cl_line nc_line", rows, program.line[rows], found.pose_nc_line[rows])
             | _written("%.6f", "x y z", *program.tip[rows].T)
-            | _written("%.7f", "tip_deviation_mm axis_point_deviation_mm orientation_deviation_deg", *off)
+            | _written("%.7f", "tip_deviation_mm", found.pose_tip[rows])
+            | _written("%s", "axis_point_deviation_mm", or_empty("%.7f", axis))
+            | _written("%.7f", "orientation_deviation_deg", found.pose_angle[rows])
         )
 
     return csv_text(len(poses), columns)
@@ -101,14 +108,13 @@ def surface_csv(surface: SurfaceMap) -> Iterator[str]:
     points = surface.points
 
     def columns(part: slice) -> Columns:
-        off = np.array(["" if value != value else f"{value:.7f}" for value in surface.off[part].tolist()], np.str_)
         side = np.where(points.side[part] == 0, "left", "right")
         return (
             _written("%d", "cl_line station level", points.line[part], points.station[part], points.level[part])
             | _written("%s", "side", side)
             | _written("%.6f", "x y z", *points.point[part].T)
             | _written("%.7f", "nx ny nz", *points.normal[part].T)
-            | _written("%s", "off_mm", off)
+            | _written("%s", "off_mm", or_empty("%.7f", surface.off[part]))
         )
 
     return csv_text(len(surface), columns)
@@ -171,7 +177,7 @@ def corner_table(smoothed: SmoothProgram, rows: Ints | None = None, *, dense: bo
     -------
     dict
         Column name, with its unit, to an array of g values; those of docs/smooth.md, and those
-        that only the method has.
+        that only the method has. NaN: with an axis tolerance the axis point has no path.
 
     Raises
     ------
@@ -202,7 +208,7 @@ def corner_table(smoothed: SmoothProgram, rows: Ints | None = None, *, dense: bo
         "axis_length_in_mm": norm(axis_in) * corners.axis_trim_in[rows],
         "axis_length_out_mm": norm(axis_out) * corners.axis_trim_out[rows],
         "tip_error_mm": tip_error,
-        "axis_error_mm": axis_error,
+        "axis_error_mm": axis_error if settings.axis_tolerance is None else np.full(len(rows), np.nan),
         "orientation_error_deg": np.degrees(corners.orientation_error[rows]),
         "curvature_max_per_mm": _largest_curvature(smoothed, rows),
         "limited_by": _names(LimitedBy, corners.limited_by[rows]),
