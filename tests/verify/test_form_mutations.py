@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import io
 from functools import partial
 
 import pytest
 
 from cornersmooth.model import Program
-from cornersmooth.nc import fit_settings, write
-from cornersmooth.settings import Settings
-from cornersmooth.smoothing import smooth
 from cornersmooth.verify import verify
 from nc.cases import RUNNABLE, Case
 from oracle.share import THOROUGH, share_of_kinds
 
 from .form_mutations import EPS, H, mutants, program_of
 from .judging import judge
+from .word_mutations import text_of
 
 #: every control in every form; Mitsubishi's lines and those of the neutral form are FANUC's
 CASES = [case for case in RUNNABLE if case.machine in ("", "xyzac-trt" if case.control == "linuxcnc" else "table-ac")]
@@ -25,15 +22,6 @@ CASES = [
     for case in CASES
     if case.control not in ("generic", "mitsubishi") or str(case) in ("generic-g6.2", "mitsubishi-g6.2")
 ]
-
-
-def text_of(case: Case, program: Program) -> list[str]:
-    """Lines of a program."""
-    form = case.choose()
-    settings = fit_settings(Settings(tolerance=EPS, axis_length=H, method="proportional"), form, "mm")
-    stream = io.BytesIO()
-    write(smooth(program, settings), stream, form=form)
-    return stream.getvalue().decode("ascii").splitlines()
 
 
 def named_in(case: Case, program: Program, lines: list[str]) -> list[tuple[int, str]]:
@@ -68,7 +56,7 @@ USUAL = (
 @pytest.mark.parametrize("case", [case for case in CASES if THOROUGH or str(case) in USUAL], ids=str)
 def test_every_mutant_that_matters_is_found(case: Case) -> None:
     program = program_of(case)
-    lines = text_of(case, program)
+    lines = text_of(case)
     assert named_in(case, program, lines) == []
     chosen = share_of_kinds(mutants(case, lines), lambda mutant: mutant.kind, 20)
     score = judge(chosen, partial(named_in, case, program))
