@@ -47,7 +47,7 @@ def said(cl: str, *, start: str = "UNITS/MM\n") -> tuple[list[str], dict[str, in
         ("SPINDL/LOCK,0.0", ["M19"]),
         ("SPINDL/ORIENT,0", ["M19"]),
         # coolant
-        ("COOLNT/ON\nCOOLNT/MIST\nCOOLNT/OFF", ["M8", "M7", "M9"]),
+        ("COOLNT/ON\nCOOLNT/MIST\nCOOLNT/OFF", ["M8", "M9", "M7", "M9"]),
         ("COOLNT/FLOOD", ["M8"]),
         ("COOLNT/FLOOD,ON", ["M8"]),
         ("COOLNT", ["M8"]),

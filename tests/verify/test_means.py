@@ -40,8 +40,8 @@ FINI
 
 #: a coolant that no CAM system has: its word in the writer's table, what the reader's list says, blocks of the program
 AIR = {
-    "fanuc": ('XAIR = ["M977"]', 'M977 = "coolant=XAIR;; compared"', ["M977", "M8", "M977", "M9"]),
-    "siemens": ('XAIR = ["M978"]', 'M978 = "coolant=XAIR;; compared"', ["M978", "M8", "M978", "M9"]),
+    "fanuc": ('XAIR = ["M977"]', 'M977 = "coolant=XAIR;; compared"', ["M977", "M9", "M8", "M9", "M977", "M9"]),
+    "siemens": ('XAIR = ["M978"]', 'M978 = "coolant=XAIR;; compared"', ["M978", "M9", "M8", "M9", "M978", "M9"]),
     "haas": (
         'XAIR = ["M983"]',
         'M983 = "coolant=XAIR;; compared"\nM984 = "coolant=-XAIR;; compared"',

@@ -472,3 +472,22 @@ def test_a_tap_of_the_control_is_right_handed(control: str) -> None:
     lines = [re.sub(r"\bM3$", "M4", line) for line in right(text, control, "native")]
     assert "CS552" in codes(text, lines, control)
     assert codes(text.replace("CLW", "CCLW"), lines, control) - {"CS567"} == {"CS566"}
+
+
+def test_a_part_of_a_vector_in_klartext_is_not_understood() -> None:
+    text = "\n".join(right(TWO_TOOLS, "heidenhain"))
+    part, count = re.subn(r"(LN X\+10\.\S* Y\+10\.\S* Z\+0\.\S*) TX\S* TY\S*", r"\1", text, count=1)
+    assert count
+    with pytest.raises(InputError, match="this kind of block"):
+        found(TWO_TOOLS, part.split("\n"), "heidenhain")
+
+
+@pytest.mark.parametrize("control", [one for one in CONTROLS if one not in ("haas", "heidenhain")])
+def test_another_coolant_flows_beside_the_one_before(control: str) -> None:
+    """The interpreter of LinuxCNC: M7 behind M8 lets both flow, until M9."""
+    text = TWO_TOOLS.replace("GOTO/10,0,0\n", "COOLNT/MIST\nGOTO/10,0,0\n", 1)
+    lines = list(right(text, control))
+    mist = lines.index("M7")
+    assert lines.pop(mist - 1) == "M9"
+    assert "CS553" in codes(text, lines, control)
+    assert "CS553" in codes(TWO_TOOLS, lines, control)

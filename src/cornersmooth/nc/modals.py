@@ -249,10 +249,8 @@ class Modals:
         return own[0] if own else words.coolant.get("OFF", ())
 
     def flow(self, blocks: Blocks, *, off: bool = False) -> list[str]:
-        """Let another kind of coolant flow, or switch it `off`; one with its own end would go on beside another."""
-        words, on = self.form.table.words, self.now["coolant"]
-        own = {words.coolant.get(kind) for kind in words.coolant_off}
-        before = self.coolant_end() if on not in ((), blocks) and {on, blocks} & own else ()
+        """Let another kind of coolant flow, or switch it `off`; the one before would go on beside it."""
+        before = self.coolant_end() if self.now["coolant"] not in ((), blocks) else ()
         self.switch("coolant", () if off else blocks)
         return [*(block for block in before if block not in blocks), *blocks]
 

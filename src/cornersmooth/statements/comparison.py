@@ -265,12 +265,13 @@ def _others(
     return found
 
 
-def _counting(found: Iterable[Token], means: Means) -> Callable[[Token], bool]:
+def _counting(found: Sequence[Token], means: Means) -> Callable[[Token], bool]:
     """Whether a token is compared: the control has a word for it."""
     # what shifts the path counts wherever it is written
     shifted = {token.kind for token in found if token.kind == "compensation" and token.value != "OFF"}
+    flowing = {("coolant", token.value) for token in found if token.kind == "coolant"}  # two beside each other, too
     ended = {(kind, "OFF") for kind, value in means.values() if is_off(value)}
-    sayable = {*shifted, *ended, *means.values()}
+    sayable = {*shifted, *flowing, *ended, *means.values()}
 
     def counts(token: Token) -> bool:
         names = token.kind, (token.kind, ""), (token.kind, token.value)
@@ -279,7 +280,7 @@ def _counting(found: Iterable[Token], means: Means) -> Callable[[Token], bool]:
     return counts
 
 
-def without_word(asked_for: Iterable[Token], found: Iterable[Token], means: Means, own: Set[str]) -> str:
+def without_word(asked_for: Iterable[Token], found: Sequence[Token], means: Means, own: Set[str]) -> str:
     """Say what the CL file asks for and the control has no word for; empty for nothing.
 
     A tool has its own length without a word, and what is off needs none.

@@ -80,7 +80,9 @@ def said(events: Sequence[Event], means: Means) -> list[Token]:
         elif letter == "M":
             meaning = of_m(value, means)
             if meaning[0] == "coolant":
-                coolant = after_word(coolant, str(meaning[1]), ends) or ""
+                before, coolant = coolant, after_word(coolant, str(meaning[1]), ends) or ""
+                if before not in ("OFF", coolant) and coolant != "OFF":  # M9 alone ends the one before (LinuxCNC)
+                    coolant = f"{before} beside {coolant}"
                 meaning = "coolant", coolant
         elif word == ("G", 4.0):
             meaning = "dwell", round(float(event.text))

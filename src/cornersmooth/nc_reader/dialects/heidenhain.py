@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import Final
 
+from cornersmooth.control.state import VECTOR
 from cornersmooth.control.words import (
     NOT_NEGATIVE,
     NUMBER,
@@ -226,8 +227,9 @@ class _KlartextLexer(Lexer):
 
     def coded(self, given: Mapping[str, Word]) -> Columns | None:
         """Words of a path with its code; None where they do not go together."""
-        spline = "SPL" in given
-        if ("LN" not in given and given.keys() & {"I", "J", "K"}) or (
+        spline, vector = "SPL" in given, len(given.keys() & VECTOR)
+        # all of it stands in each LN block ("Definition of a normalized vector"): what a part is worth nobody says
+        if (vector and ("LN" not in given or vector < len(VECTOR))) or (
             given.keys() & self.factors and (not spline or "RAPID" in given)
         ):
             return None
