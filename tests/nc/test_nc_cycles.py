@@ -182,6 +182,12 @@ def test_without_a_machine_nothing_brings_the_axes_back_behind_a_tilted_tool() -
     assert not any("G98" in line for line in lines)
 
 
+@pytest.mark.parametrize("case", [Case("siemens", "bspline"), Case("mitsubishi", "g6.2")], ids=str)
+def test_a_form_without_cycles_says_so_and_not_that_the_tool_tilts(case: Case) -> None:
+    with pytest.raises(InputError, match=f"-f {case.form} has no cycles of the control"):
+        text_of(case)
+
+
 def test_plain_moves_are_the_default_and_taps_are_cycles_anyway() -> None:
     lines = text_of(CASES[0], cycles="moves")
     assert [line for line in lines if "G98" in line] == ISO.splitlines()[-2:]

@@ -215,8 +215,11 @@ class Script:
         if cycle.tap and not (clockwise and motion.modals.speed):
             return "", "a tap takes a spindle that turns clockwise at a known speed"
         if motion.at.plane is None:
+            form = motion.at.form
             where = "the tool does not stay along Z between its changes, or nothing says that the rotary axes do"
-            if motion.at.form.orientation == "point":
+            if form.upright is None:
+                where = f"-f {form.name} has no cycles of the control"
+            elif form.orientation == "point":
                 where = "a tool of the program tilts, so all have axis points; lines (-f g1) need none"
             return "", f"a tap, and {where}"
         return kind if self.native or cycle.tap else "", ""
