@@ -297,6 +297,21 @@ def test_a_feed_that_is_not_understood_is_an_error(feed: str) -> None:
 # --- units -------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize(
+    ("head", "kinds"),
+    [
+        ("MODE/MILL\nCOOLNT/ON\nCOOLNT/MIST\n", ["MIST"]),
+        ("MODE/MILL\nCOOLNT/ON\nGOTO/0,0,0\nCOOLNT/MIST\n", ["ON", "MIST"]),
+        ("CSI_TOOL_PATH/1\nCOOLNT/OFF\nCOOLNT/ON\n", ["OFF", "ON"]),
+        ("MCSYS/NUM,1,POINT,0,0,0,VECTOR,1,0,0,VECTOR,0,1,0\nCOOLNT/ THRU\nCOOLNT/ ON\n", ["THRU"]),
+        ("COOLNT/ON\nCOOLNT/MIST\n", ["ON", "MIST"]),
+    ],
+)
+def test_coolant_on_beside_a_kind_is_none_of_its_own_in_posts_of_autodesk(head: str, kinds: list[str]) -> None:
+    result = program(f"{head}GOTO/1,0,0\nFINI\n")
+    assert [one.args[0] for one in result.statements if one.word == "COOLNT"] == kinds
+
+
 @pytest.mark.parametrize("head", ["MODE/MILL\n", "MCSYS/NUM,1,POINT,0,0,0,VECTOR,1,0,0,VECTOR,0,1,0\n"])
 def test_three_numbers_after_a_tilted_axis_are_none_of_autodesk(head: str) -> None:
     """Its posts write six under MULTAX/ON; by MODE/MILL the file of another system was taken for theirs, along +Z."""

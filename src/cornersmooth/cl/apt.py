@@ -30,7 +30,7 @@ from cornersmooth.cl.words import (
 )
 from cornersmooth.errors import Finding
 from cornersmooth.frame import HEAD
-from cornersmooth.model import MM_PER_UNIT, Floats, Ints, Keep, Move, Program, Source, Units
+from cornersmooth.model import MM_PER_UNIT, Floats, Ints, Keep, Move, Program, Source, Statement, Units
 from cornersmooth.nc_reader.recognition import first_block
 
 HANDLERS: Final = motion_statements.HANDLERS | state_statements.FED | state_statements.KEPT
@@ -227,11 +227,17 @@ def _program(state: ReaderState) -> Program:
         keep=keep,
         arcs=replace(arcs, centre=arcs.centre * scale),
         curves=curves_of(state.curves, scale, axis, keep != Keep.NO, kind),
-        statements=tuple(state.statements),
+        statements=tuple(_with_one_coolant(state.statements) if state.dialect.autodesk else state.statements),
         units=units,
         source=Source(state.file, "apt", state.dialect.name),
         findings=(*unit_findings, *state.findings.values(), *axis_findings, *arc_findings, *along, *jumps),
     )
+
+
+def _with_one_coolant(statements: list[Statement]) -> list[Statement]:
+    """Leave out COOLNT/ON beside a kind of coolant."""
+    kinds = {one.pose for one in statements if one.word == "COOLNT" and one.args not in (("ON",), ("OFF",))}
+    return [one for one in statements if one.word != "COOLNT" or one.args != ("ON",) or one.pose not in kinds]
 
 
 def _fed_from_elsewhere(tip: Floats, kind: NDArray[np.uint8]) -> Ints:

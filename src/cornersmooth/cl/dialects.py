@@ -28,8 +28,9 @@ class Dialect:
     #: Whether the axis after MULTAX/OFF is known: locked where it is (CATIA V5, Syntax of Generated APT Instructions;
     #: PostWorks 7.2), or +Z (ISO 4343:2000, 5.32) with `short_axis_up`.
     multax_off_known: bool = False
-    #: whether each position under MULTAX/ON has its axis: three numbers after a tilted one are of another system
-    axis_always: bool = False
+    #: Whether posts of Autodesk write it: each position under MULTAX/ON has its axis, three numbers after a tilted one
+    #: are of another system; COOLNT/ON beside a kind of coolant is no coolant of its own.
+    autodesk: bool = False
     units: Units = "mm"  #: where the file does not say
     decimals: int = 4  #: digits after the point of coordinates
     #: whether zeros at their end are left out, so that a statement alone does not tell the digits
@@ -51,7 +52,7 @@ DIALECTS: Final[tuple[Dialect, ...]] = (
     Dialect("catia", rb"^\$\$ +CATIA APT VERSION|^\$\$\*CATIA0", multax_off_known=True, decimals=5),
     Dialect("nx", rb"^[ \t]*(TOOL PATH/|TLDATA/|MSYS/|END-OF-PATH|PAINT/)"),
     *(
-        Dialect(name, mark, short_axis_up=True, multax_off_known=True, axis_always=True, decimals=6, strips_zeros=True)
+        Dialect(name, mark, short_axis_up=True, multax_off_known=True, autodesk=True, decimals=6, strips_zeros=True)
         for name, mark in (
             ("mfgsuite", rb"^[ \t]*MCSYS[ \t]*/[ \t]*NUM\b"),
             ("hsm", rb"^[ \t]*(MODE[ \t]*/[ \t]*(MILL|TURN)\b|MOVARC[ \t]*/|CSI_TOOL_PATH[ \t]*/)"),

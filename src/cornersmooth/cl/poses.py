@@ -228,7 +228,7 @@ class Poses:
             findings.append(finding("CS137", int(self.rows[off_axes[0][0], 6]), int(dropped.sum())))
             unit, given = unit[~dropped], given[~dropped]
         axis = self._held(unit, given, self.dialect.short_axis_up)
-        if self.dialect.axis_always:
+        if self.dialect.autodesk:
             held = self._held(unit, given, short_axis_up=False)
             doubtful = (state == _FREE) & (np.abs(axis - held).max(axis=1, initial=0) > AXIS_NOISE)
             if doubtful.any():
