@@ -46,10 +46,10 @@ def differences(program: Program, form: str, tolerance: float, axis_length: floa
     write(smoothed, stream, form=chosen)
     text = read_nc(stream.getvalue())
     measured = verify(program, stream.getvalue(), tolerance=tolerance, axis_length=axis_length)
-    worst = worst_corners(smoothed, dense=not chosen.curve)
+    tip, axis_point, _ = worst_corners(smoothed, dense=not chosen.curve)
     return (
-        measured.max_tip_deviation_mm - worst.tip_error,
-        measured.max_axis_point_deviation_mm - worst.axis_error,
+        measured.max_tip_deviation_mm - tip,
+        measured.max_axis_point_deviation_mm - axis_point,
         text.tip_step,
     )
 

@@ -16,7 +16,7 @@ from cornersmooth.cl.messages import error, finding
 from cornersmooth.cl.source import clean, load
 from cornersmooth.errors import SettingsError
 from cornersmooth.kinematics import Machine
-from cornersmooth.model import MM_PER_UNIT, Program, Statement, Units
+from cornersmooth.model import MM_PER_UNIT, Program, Units
 from cornersmooth.statements.asked import Asking, turns
 
 __all__ = ["DIALECTS", "FORMATS", "read"]
@@ -164,11 +164,7 @@ def _refuse(program: Program, name: str, lenient: bool) -> None:
         raise error("CS179", name, turning.line, text=turning.text)
     for statement in unknown:
         if statement.word == "SPINDL" and turning is None:
-            raise error("CS115", name, statement.line, **_spindle_wanted(statement))
-
-
-def _spindle_wanted(statement: Statement) -> dict[str, str]:
-    want = "give revolutions per minute with RPM and CLW or CCLW"
-    if {"SFM", "SMM"} & set(statement.args):
-        want += "; a cutting speed needs CUTTER with the diameter before it, and is not written for a lathe"
-    return {"word": "SPINDL", "text": joined(statement.args), "want": want}
+            want = "give revolutions per minute with RPM and CLW or CCLW"
+            if {"SFM", "SMM"} & set(statement.args):
+                want += "; a cutting speed needs CUTTER with the diameter before it, and is not written for a lathe"
+            raise error("CS115", name, statement.line, word="SPINDL", text=joined(statement.args), want=want)

@@ -36,9 +36,9 @@ def report(
     smoothed, form, found, findings = result.smoothed, result.form, result.verification, result.findings
     program, corners, dense = smoothed.program, smoothed.corners, not form.curve
     done, runs = corners.rounded, smoothed.runs
-    worst = worst_corners(smoothed, dense=dense)
+    tip_error, axis_error, worst = worst_corners(smoothed, dense=dense)
     sharp, listed = sharp_corners(smoothed)
-    axis_error = max(worst.axis_error, _largest(runs.axis_bound) if runs is not None else 0.0)
+    axis_error = max(axis_error, _largest(runs.axis_bound) if runs is not None else 0.0)
     summary: dict[str, Any] = {
         "method": smoothed.settings.method,
         "corners": len(corners),
@@ -47,7 +47,7 @@ def report(
         "smoothed": int(done.sum()),
         **counts_of(corners),
         "sharp": sharp,
-        "max_tip_error_mm": max(worst.tip_error, _largest(runs.tip_bound) if runs is not None else 0.0),
+        "max_tip_error_mm": max(tip_error, _largest(runs.tip_bound) if runs is not None else 0.0),
         "max_axis_error_mm": axis_error if smoothed.settings.axis_tolerance is None else None,
         "max_orientation_error_deg": float(np.degrees(_largest(corners.orientation_error))),
         "length_mm": _feed_length(smoothed),
@@ -71,7 +71,7 @@ def report(
         loosened=loosened,
         times=planned_times(saving, limits or form.machine),
     )
-    contents |= {"summary": summary, "worst": _records(smoothed, worst.rows, dense=dense), "sharp": listed}
+    contents |= {"summary": summary, "worst": _records(smoothed, worst, dense=dense), "sharp": listed}
     if marks := rotary_marks(program, form.machine if form.rotary else None):
         contents["rotary_marks"] = marks
     if found is not None:

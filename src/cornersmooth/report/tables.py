@@ -6,7 +6,7 @@ They are CSV text, a block of rows at a time, and lines to read.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -252,17 +252,11 @@ def _largest_curvature(smoothed: SmoothProgram, rows: Ints) -> Floats:
     return np.where(np.isnan(in_runs[rows]), curvature, in_runs[rows])
 
 
-class WorstCorners(NamedTuple):
-    """The largest errors, and the smoothed corners nearest to the tolerance."""
+def worst_corners(smoothed: SmoothProgram, *, dense: bool = True) -> tuple[float, float, Ints]:
+    """Largest errors of all corners, tip and axis point, mm, and rows (g,) of the `_WORST` worst; ties in path order.
 
-    #: mm: the largest of all corners
-    tip_error: float
-    axis_error: float
-    rows: Ints  #: (g,): rows of the corners, the worst first; ties in path order
-
-
-def worst_corners(smoothed: SmoothProgram, *, dense: bool = True) -> WorstCorners:
-    """Find the `_WORST` worst corners; most corners are settled by what bounds their errors."""
+    Most corners are settled by what bounds their errors.
+    """
     corners = smoothed.corners
     rows = np.flatnonzero(corners.rounded)
     bound = np.maximum(corners.tip_error[rows], corners.axis_error[rows])
@@ -277,7 +271,7 @@ def worst_corners(smoothed: SmoothProgram, *, dense: bool = True) -> WorstCorner
         larger = np.maximum(tip, axis_point)
     seen = rows[order[: len(larger)]]
     best = np.lexsort((seen, -larger))[:_WORST]
-    return WorstCorners(float(tip.max(initial=0.0)), float(axis_point.max(initial=0.0)), seen[best])
+    return float(tip.max(initial=0.0)), float(axis_point.max(initial=0.0)), seen[best]
 
 
 def path_distances(smoothed: SmoothProgram, rows: Ints, *, dense: bool) -> tuple[Floats, Floats]:
