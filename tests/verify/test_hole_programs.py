@@ -78,7 +78,6 @@ REFUSED_ONCE = {
     1503386: "a bore that is left to where a rapid leads, and holes above each other behind it",
     1503417: "taps left out, and a rapid along the tool before a retract",
     1510120: "a feed move to where a hole has been left, with words before it, and nothing behind it",
-    1600308: "taps left out, and bores above each other with coolant between them",
     1600475: "ten holes at one place, by another digit",
     1520289: "holes of two tools in one line",
     1005030: "the CL file's own rapid into a hole that is drilled behind it",
@@ -128,6 +127,7 @@ KNOWN = {
     1790243: "feeds to a hole down from home positions, GOHOME twice",
     8601699: "coolant at the end of a run between poses that are a digit apart: the text passes them in one",
     9800348: "coolant and a stop between poses that are a digit apart, to and fro: the text passes them in one",
+    1600308: "taps left out, and bores above each other with coolant between them",
     3000168: "coolant on behind a tap that is left out, and nothing moves before the end",
 }
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from cornersmooth.model import Bools, Floats, Ints, Move
 from cornersmooth.nc_reader.elements import Ahead, Element, Elements, Problem
-from cornersmooth.nc_reader.tool import beyond_digits, directions, leads_somewhere
+from cornersmooth.nc_reader.tool import directions, leads_somewhere
 from cornersmooth.statements.cycles import Drilling
 from cornersmooth.verify.motions import ARITHMETIC, COLUMNS, digit_errors, on_segments
 from cornersmooth.verify.task import Task, selecting
@@ -72,13 +72,6 @@ class HoleLines:
         rapid = self.exact(moves, elements) & (not self.feeds(element))
         return np.where(self.kind[moves] == Move.HOLE, ~np.isnan(self.heights(moves, elements)), rapid)
 
-    def negligible(self, element: int) -> bool:
-        """Whether an element moves the tool by no more than digits show."""
-        nc, at = self.ahead.nc, element - self.ahead.base
-        both = slice(max(at - 1, 0), at + 1)
-        turn = self.axis_length * np.ptp(directions(nc, nc.tip[both], nc.second[both]), axis=0)
-        return at > 0 and not beyond_digits(nc, np.diff(nc.tip[both], axis=0))[0] and max(turn) <= self.room
-
     def heights(self, moves: Ints, elements: Ints) -> Floats:
         """(k,) mm above the poses of holes at the ends of straight elements; NaN beside a hole or with another axis."""
         return np.where(_straight(self.ahead.nc.kind[elements - self.ahead.base]), self.ends(moves, elements), np.nan)
@@ -100,14 +93,8 @@ class HoleLines:
         return np.where(on, height, np.nan)
 
     def at(self, move: int, element: int) -> bool:
-        """Whether an element ends exactly at the pose of a move, or stands after one that does."""
-        while element > self.ahead.base and not self._of("exact", move, element) and self.stands(element):
-            element -= 1
-        return element >= 0 and self.names(move, element)
-
-    def names(self, move: int, element: int) -> bool:
         """Whether an element ends exactly at the pose of a move."""
-        return bool(self._of("exact", move, element))
+        return element >= 0 and bool(self._of("exact", move, element))
 
     def height(self, move: int, element: int) -> float:
         """Height of one element, as of `heights`."""

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Generator, Iterator, Sequence
-from itertools import count, takewhile
+from itertools import count
 from typing import Final
 
 import numpy as np
@@ -144,7 +144,7 @@ class Parse:
         length, last = self._task.path.length, self._task.original.trail.last
         elements = sorted({event.element for event in self._words.between(element, end)})
         for one, near in zip(elements, lines.poses_near(elements, moves), strict=True):
-            there = [move for move in near if move >= self._cut_at and lines.names(move - 1, one - 1)]
+            there = [move for move in near if move >= self._cut_at and lines.at(move - 1, one - 1)]
             if there:
                 way = gone[max(one - 1 - first, 0)] + length[last[self._move[stop]]]
                 # of those that are there again the nearest, and of those within the tolerance the first
@@ -165,8 +165,7 @@ class Parse:
             due = self._due(following, element)
             if self._reaches(due, element) and (due == following or self._is_there(due, element)):
                 break
-            idle = lines.stands(element) or (rapid and stop >= 0 and lines.negligible(element))
-            if idle and not (rapid and stop >= 0 and self._comes_down_first(stop, element)):
+            if lines.stands(element) and not (rapid and stop >= 0 and self._comes_down_first(stop, element)):
                 element += 1
             elif self._hole[due] and self._over(due, element):
                 break
@@ -191,7 +190,7 @@ class Parse:
         """Take a hole: a cycle of the control, or what leads to its depth and out again, and the rapids behind that."""
         lines, move, end, lowest = self.lines, self._move[stop], begin, math.inf  # of the feed moves
         left = self._is_left_out(stop, begin)
-        while not left and (self._over(stop, end) or (end > begin and self._ahead.has(end) and lines.stands(end))):
+        while not left and self._over(stop, end):
             block = lines.block(end)
             if lines.is_cycle(block):
                 end = block.stop
@@ -200,48 +199,24 @@ class Parse:
             end += 1
             if lowest <= lines.room - self._cycles[move].depth and lines.height(move, end - 1) >= -lines.room:
                 break
-        if not self._hole[stop + 1]:
-            end = self._up_to_rapid(stop, end, left=left)
-        else:
-            end = self._passed_over(stop, begin) if left else self._up_to_hole(stop, end)
-        return self._leave(stop, begin, end)
+        return self._leave(stop, begin, self._up_to_act(stop, end, left=left))
 
-    def _up_to_rapid(self, stop: int, end: int, *, left: bool) -> int:
-        """First element from one on that is no rapid in the line of a hole, or belongs to the act behind it."""
-        following = stop + 1
-        while self._over(stop, end) and not self.lines.feeds(end):
-            if self._is_there(following, end) and self._reaches(following, end):
-                break
-            if self._is_there(following, end - 1) and self._begins(following + 1, end):
-                rapids = takewhile(lambda one: self._ahead.has(one) and not self.lines.feeds(one), count(end + 1))
-                if not (left and any(self._reaches(following, one) for one in rapids)):
-                    break
-            end += 1
-        return end
+    def _up_to_act(self, stop: int, end: int, *, left: bool) -> int:
+        """First element from one on that is no rapid in the line of a hole, or belongs to the act behind it.
 
-    def _up_to_hole(self, stop: int, end: int) -> int:
-        """First element from one on that does not go up along a hole, or belongs to the next one."""
-        lines, move = self.lines, self._move[stop]
-        while self._over(stop, end) and not lines.feeds(end):
-            rises = lines.height(move, end) > lines.begins(move, end)
-            if not (rises or lines.stands(end)) or (self._words.acting(end) and self._over(stop + 1, end)):
-                break
-            end += 1
-        return end
-
-    def _passed_over(self, stop: int, begin: int) -> int:
-        """First element behind the rapids over a hole that is left out, where another one follows, perhaps in its line.
-
-        That one begins with its words where it is drilled, else where the tool is lower or higher than this one has it.
+        Where that is a hole, too, the rapids that go up belong to this one, or all if this one is left out.
         """
-        lines, move = self.lines, self._move[stop]
-        rapids = list(takewhile(lambda one: self._over(stop, one) and not lines.feeds(one), count(begin)))
-        others = [one for one in rapids if self._over(stop + 1, one)]
-        first = next((one for one in others if one > begin and self._words.acting(one)), -1)
-        highest = max(self._cycles[move].level, self._cycles[move].clearance) + lines.room
-        away = (one for one in others if not -lines.room <= lines.height(move, one) <= highest)
-        drilled = first >= 0 and not self._is_left_out(stop + 1, first)
-        return first if drilled else next(away, begin + len(rapids))
+        lines, move, following = self.lines, self._move[stop], stop + 1
+        while self._over(stop, end) and not lines.feeds(end):
+            if self._hole[following]:
+                stays = left or lines.stands(end) or lines.height(move, end) > lines.begins(move, end)
+            else:
+                stays = not (self._is_there(following, end) and self._reaches(following, end))
+                stays &= not (self._is_there(following, end - 1) and self._begins(following + 1, end))
+            if not stays:
+                break
+            end += 1
+        return end
 
     def _is_left_out(self, stop: int, begin: int) -> bool:
         """Whether a hole may be left out, and the first feed move in its line belongs to what is behind it."""
@@ -410,10 +385,7 @@ class Parse:
     def _open(self, stop: int, element: int, *, up: bool = False) -> None:
         """Take down the begin of a run: a rapid, which may be the way `up` from a hole, or the way out of one."""
         last, move = self._move[stop + 1] - 1, self._move[stop]
-        first = move
-        if self._hole[stop]:  # the first move that leads anywhere from where the hole is left
-            leads = (one for one in range(move + 1, last) if not self.lines.at(one, element - 1))
-            first = next(leads, last)
+        first = move + self._hole[stop]
         if not up:
             self.acts.begins.extend((first, element))
         self._end_run(move, element)
