@@ -81,7 +81,8 @@ def fastest(
             break
         most = np.maximum(most, used)
         of_held = np.take_along_axis(used, holding, axis=0).max(axis=0) / _USED
-        stricter = stricter * np.where(of_held > 1.0, _STRICTER * of_held, 1.0)
+        kept = batch.use(c) <= _STRICTER  # what steps have not reached yet says nothing of what lies between places
+        stricter = stricter * np.where(kept & (of_held > 1.0), _STRICTER * of_held, 1.0)
         first, last = _around(beyond, grid)
     return batch, _within(c, share, grid)
 
@@ -182,7 +183,10 @@ def solve_runs(
         if end[0] - at[0] < size:
             solve_window(batch.first[run:following], batch.last[run:following])
         else:
-            brake = _braking_distance(batch, grid, int(at[0]), int(end[0]))
+            # distance in which the fastest motion of the run can stop under the strictest limits there
+            slope, bend = batch.steepest[:, at[0] : end[0] + 1].max(axis=1)
+            speed = np.sqrt(grid.cap[at[0] + 1 : end[0]].max())
+            brake = 1.1 * float(stopping_distance(speed, 0.5 / slope, 1.0 / bend))
             while True:
                 stop = np.minimum(at + size - 1, end)
                 solve_window(at, stop)
@@ -191,10 +195,3 @@ def solve_runs(
                 keep = np.searchsorted(grid.start, grid.start[stop + 1 - CRAWLING] - brake)
                 at = np.minimum(np.maximum(keep, at + size * 7 // 8), stop - CRAWLING - 1)
         run = following
-
-
-def _braking_distance(batch: Batch, grid: Grid, begin: int, end: int) -> float:
-    """Distance in which the fastest motion in some cells can stop under the strictest limits there."""
-    speed = np.sqrt(grid.cap[begin + 1 : end].max())
-    slope, bend = batch.steepest[:, begin : end + 1].max(axis=1)
-    return 1.1 * float(stopping_distance(speed, 0.5 / slope, 1.0 / bend))
