@@ -11,13 +11,13 @@ parameters of its own.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
-from functools import cache
+from dataclasses import dataclass
+from functools import cache, cached_property
 from math import comb
 
 import numpy as np
 
-from cornersmooth.arrays import norm, unit
+from cornersmooth.arrays import joined_rows, norm, unit
 from cornersmooth.geometry import nurbs
 from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.model import Bools, Corners, Floats, Ints, Program, Runs
@@ -206,36 +206,20 @@ class Curves:
     inner: Bools  #: (k,): it goes on where another element ends, with the same tangent and curvature
     corner: Ints  #: (k,): row of the corners for halves of transitions, else -1
     resting: Bools  #: (k,): halves of transitions between a motion of the tip and a turn on the spot
-    #: (k,): of the tip, mm; that the axis turns, rad, where the tip stands still
-    length: Floats
-    angle: Floats
 
     def __len__(self) -> int:
         return len(self.half)
 
-    @classmethod
-    def measured(
-        cls,
-        tip: Floats,
-        axis_point: Floats,
-        origin: Floats,
-        move: Ints,
-        *,
-        half: Ints | None = None,
-        span: Floats | None = None,
-        inner: Bools | None = None,
-        corner: Ints | None = None,
-        resting: Bools | None = None,
-    ) -> Curves:
-        """Measure curves; by default they are whole moves.
+    @cached_property
+    def measured(self) -> tuple[Floats, Floats]:
+        """(k,) lengths of the tip, mm, and angles that the axis turns where the tip stands still, rad.
 
         Where the tip comes all but to a stand beside the turning axis, its way says nothing: the piece is a turn on the
         spot, of length 0.
         """
-        count = len(tip)
-        half = np.full(count, WHOLE) if half is None else half
-        length, angle = np.zeros(count), np.zeros(count)
-        for rows in groups(np.arange(count)):
+        tip, axis_point, half = self.tip, self.axis_point, self.half
+        length, angle = np.zeros((2, len(self)))
+        for rows in groups(np.arange(len(self))):
             length[rows] = interval_lengths(tip[rows], interval_borders(half[rows])).sum(axis=1)
             whole = rows[half[rows] == WHOLE]
             if len(whole):
@@ -245,30 +229,31 @@ class Curves:
                 length[whole[least < _STANDING * norm(lever[:, 1] - lever[:, 0])]] = 0.0
             still = rows[length[rows] <= STANDSTILL]
             angle[still] = turned_angle(tip[still], axis_point[still], half[still])
-        nothing = np.zeros(count, np.bool_)
-        return cls(
-            tip,
-            axis_point,
-            origin,
-            half,
-            move,
-            np.tile([0.0, 1.0], (count, 1)) if span is None else span,
-            nothing if inner is None else inner,
-            np.full(count, -1) if corner is None else corner,
-            nothing if resting is None else resting,
-            length,
-            angle,
-        )
+        return length, angle
+
+    @classmethod
+    def pieces(
+        cls,
+        tip: Floats,
+        axis_point: Floats,
+        origin: Floats,
+        move: Ints,
+        span: Floats | None = None,
+        inner: Bools | None = None,
+    ) -> Curves:
+        """Pieces of runs, or of curves of NC programs, from powers of tip and axis point; whole moves by default."""
+        count, nothing = len(move), np.zeros(len(move), np.bool_)
+        span = np.tile([0.0, 1.0], (count, 1)) if span is None else span
+        inner = nothing if inner is None else inner
+        return cls(tip, axis_point, origin, np.full(count, WHOLE), move, span, inner, np.full(count, -1), nothing)
 
     @classmethod
     def joined(cls, parts: Sequence[Curves]) -> Curves:
         """All rows of parts of one degree."""
-        if not parts:
-            nothing = np.zeros((0, 4, 4))
-            return cls.measured(nothing, nothing, np.zeros((0, 3)), np.zeros(0, np.int64))
-        if len(parts) == 1:
-            return parts[0]
-        return cls(*(np.concatenate([getattr(part, item.name) for part in parts]) for item in fields(cls)))
+        if parts:
+            return joined_rows(parts)
+        nothing = np.zeros((0, 4, 4))
+        return cls.pieces(nothing, nothing, np.zeros((0, 3)), np.zeros(0, np.int64))
 
     @classmethod
     def of_corners(
@@ -286,17 +271,9 @@ class Curves:
             corners.trim_in[rows] * norm(program.tip[pose] - program.tip[corners.before[rows]]),
             corners.trim_out[rows] * norm(program.tip[corners.after[rows]] - program.tip[pose]),
         )
-        return cls.measured(
-            powers[0],
-            powers[1],
-            origin,
-            move,
-            half=half,
-            span=np.where(half[:, None] == 0, np.stack((1.0 - trims[0], one), 1), np.stack((0.0 * one, trims[1]), 1)),
-            inner=np.ones(len(rows), np.bool_),
-            corner=rows,
-            resting=np.minimum(legs[0], legs[1]) <= STANDSTILL,
-        )
+        span = np.where(half[:, None] == 0, np.stack((1.0 - trims[0], one), 1), np.stack((0.0 * one, trims[1]), 1))
+        resting = np.minimum(legs[0], legs[1]) <= STANDSTILL
+        return cls(powers[0], powers[1], origin, half, move, span, np.ones(len(rows), np.bool_), rows, resting)
 
     @classmethod
     def of_runs(cls, program: Program, runs: Runs, height: float) -> Curves:
@@ -308,7 +285,7 @@ class Curves:
         hull = splines.bezier(runs.control, pieces.span, pieces.low, pieces.high) - np.tile(origin, 2)[:, None]
         s0, s1 = lines.s[pieces.segment], lines.s[pieces.segment + 1]
         first = np.isin(pieces.segment, np.cumsum(runs.count) - runs.count) & (pieces.low == s0)
-        return cls.measured(
+        return cls.pieces(
             polynomial(hull[..., :3]),
             polynomial(hull[..., 3:]),
             origin,

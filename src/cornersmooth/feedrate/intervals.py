@@ -15,8 +15,9 @@ import numpy as np
 from cornersmooth.feedrate import taylor
 from cornersmooth.feedrate.curves import INTERVALS, groups, interval_borders, interval_lengths, taylor_series
 from cornersmooth.feedrate.machine_axes import MachineAxes
-from cornersmooth.feedrate.path import Kind, Path, arc_series
+from cornersmooth.feedrate.path import Kind, Path
 from cornersmooth.feedrate.taylor import curvature, taylor_along
+from cornersmooth.geometry.arcs import arc_series
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.settings import Limits
 
@@ -160,7 +161,8 @@ def path_limits(
     whole = np.flatnonzero(~divisible)
     fastest = path.speed**2
     arc = np.flatnonzero((path.kind == Kind.ARC) & ~path.turning)
-    kappa = curvature(arc_series(path.program, path.move[arc], 0.0))
+    rows = np.searchsorted(path.program.arcs.pose, path.move[arc])
+    kappa = curvature(arc_series(path.program, rows, 0.0))
     fastest[arc] = np.minimum(fastest[arc], limits.centripetal_accel / kappa)
     parts = _divided(quantities, divisible, fastest, limits.centripetal_accel, resolution)
     for element, high, width, cap, agile in (

@@ -24,7 +24,7 @@ from cornersmooth.feedrate.path import Kind, Path
 from cornersmooth.feedrate.taylor import taylor_along
 from cornersmooth.kinematics import Machine
 from cornersmooth.kinematics.machine import PARALLEL
-from cornersmooth.kinematics.poses import continued, machine_position
+from cornersmooth.kinematics.poses import Arithmetic, continued, machine_position, tip_position
 from cornersmooth.model import Floats, Ints, rapid_moves
 from cornersmooth.rotary import rotary_angles
 
@@ -77,12 +77,12 @@ class MachineAxes:
         guess = np.degrees(turning[0, led])
         value, _ = continued(self.machine, axis[0, led], guess, self.branch[end[led]], self.cone)
         turning[:, led] = self._angle_series(axis[:, led], np.radians(value))
-        linear = _linear_series(self.machine, tip, turning)
+        linear = machine_position(self.machine, tip, turning, _SERIES)
         if self.places is not None:
             own = np.flatnonzero(even)
             linear[:, own] = _evenly(self.places, start[own], end[own], part[own])
             own = own[~(path.rapid | path.turning)[element[own]]]  # the tip runs unevenly on these
-            speed[:, own] = taylor.speed_of(_tip_series(self.machine, linear[:, own], turning[:, own]))
+            speed[:, own] = taylor.speed_of(tip_position(self.machine, linear[:, own], turning[:, own], _SERIES))
         rotary = np.degrees(turning[..., : len(self.machine.names)])
         return np.concatenate((linear, rotary), axis=-1), speed, tip
 
@@ -218,44 +218,7 @@ def _evenly(values: Floats, start: Ints, end: Ints, part: Floats) -> Floats:
     return found
 
 
-def _linear_series(machine: Machine, tip: Floats, angles: Floats) -> Floats:
-    """Taylor series (4, m, 3) of `cornersmooth.kinematics.machine_position`."""
-    waves = [_waves(axis.sign * angles[..., index]) for index, axis in enumerate(machine.axes)]
-    return _on_tables(machine, waves, tip, -1.0) - _swing(machine, waves, tip.shape)
-
-
-def _tip_series(machine: Machine, position: Floats, angles: Floats) -> Floats:
-    """Taylor series (4, m, 3) of `cornersmooth.kinematics.poses.tip_position`."""
-    waves = [_waves(axis.sign * angles[..., index]) for index, axis in enumerate(machine.axes)]
-    return _on_tables(machine, waves, position + _swing(machine, waves, position.shape), 1.0)
-
-
-def _on_tables(machine: Machine, waves: list[tuple[Floats, Floats]], points: Floats, sense: float) -> Floats:
-    """Points that the tables carry along, from the zero of the part, or back where `sense` is -1."""
-    points, zero = points.copy(), np.array(machine.part_zero)
-    points[0] += zero
-    for index in (1, 0) if sense > 0.0 else (0, 1):
-        axis, (cosine, sine) = machine.axes[index], waves[index]
-        if axis.carrier == "table":
-            points = _about(axis.unit, np.array(axis.point), (cosine, sense * sine), points)
-    points[0] -= zero
-    return points
-
-
-def _swing(machine: Machine, waves: list[tuple[Floats, Floats]], shape: tuple[int, ...]) -> Floats:
-    """Way of the tip when the heads turn and the linear axes stand."""
-    swing = np.zeros(shape)
-    for index in (1, 0):
-        axis = machine.axes[index]
-        if axis.carrier == "head":
-            point = machine.tool_length * machine.tool + np.array(axis.point)
-            swing = _about(axis.unit, point, waves[index], swing)
-    return swing
-
-
-def _about(direction: Floats, point: Floats, waves: tuple[Floats, Floats], points: Floats) -> Floats:
-    arm = points.copy()
-    arm[0] -= point
-    turned = _turned(direction, waves, arm)
-    turned[0] += point
-    return turned
+#: of positions of axes
+_SERIES = Arithmetic(
+    lambda direction, angle, vectors: _turned(direction, _waves(angle), vectors), np.eye(taylor.ORDERS, 1)[:, :, None]
+)

@@ -15,9 +15,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.arrays import angle_between, cross, dot, norm, unit
+from cornersmooth.arrays import angle_between, norm, unit
 from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate.curves import STANDSTILL, WHOLE, Curves, end_tangents
+from cornersmooth.geometry.arcs import arc_series
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import Bools, Corners, FeedMode, Floats, Ints, Move, Program, Runs, Status
 from cornersmooth.settings import Limits, Settings
@@ -126,7 +127,7 @@ def build_path(
     spans = np.stack((trims[:2], trims[2:]))[..., rest]
     spans[:, 1] = 1.0 - spans[:, 1]
     span, axis_span = (np.concatenate((own.T, bent.span)) for own in spans)
-    length, angle = np.concatenate((length[rest], bent.length)), np.concatenate((angle[rest], bent.angle))
+    length, angle = (np.concatenate((own[rest], of)) for own, of in zip((length, angle), bent.measured, strict=True))
     order = np.lexsort((place, owner))
     order = order[owner[order] >= 0]
     owner, row, length, angle = owner[order], row[order], length[order], angle[order]
@@ -182,21 +183,6 @@ def build_path(
     )
 
 
-def arc_series(program: Program, moves: Ints, fraction: Floats | float) -> Floats:
-    """Taylor coefficients (4, k, 3) of the tip by the fraction of the way along the arcs into these poses, mm."""
-    rows = np.searchsorted(program.arcs.pose, moves)
-    start = program.tip[moves - 1]
-    sweep, normal = program.arcs.sweep[rows][:, None], program.arcs.normal[rows]
-    radius = start - program.arcs.centre[rows]
-    radius -= dot(radius, normal)[:, None] * normal
-    rise = dot(program.tip[moves] - start, normal)[:, None] * normal
-    angle = sweep * np.reshape(fraction, (-1, 1))
-    arm = np.cos(angle) * radius + np.sin(angle) * cross(normal, radius)  # Rodrigues
-    across = cross(normal, arm)
-    tip = start - radius + arm + rise * np.reshape(fraction, (-1, 1))
-    return np.stack((tip, sweep * across + rise, -(sweep**2) * arm / 2.0, -(sweep**3) * across / 6.0))
-
-
 def _moves(program: Program, settings: Settings) -> tuple[Ints, Ints]:
     """Poses that are moved to, in order, and the poses they are reached from; repeated poses are one."""
     n = len(program)
@@ -242,7 +228,7 @@ def _rests(
     tangents = np.tile(step / np.maximum(chord, STANDSTILL)[:, None], (2, 1, 1))
     arc = np.flatnonzero(program.kind[moves] == Move.ARC)
     for side in range(2):
-        along = arc_series(program, moves[arc], float(side))[1]
+        along = arc_series(program, np.searchsorted(program.arcs.pose, moves[arc]), side)[1]
         length[arc], tangents[side, arc] = norm(along), unit(along)
     angle = np.zeros(len(moves))
     still = np.flatnonzero((length <= STANDSTILL) & (trims[2] + trims[3] < 1.0))

@@ -11,7 +11,8 @@ import numpy as np
 from cornersmooth import arrays
 from cornersmooth.arrays import norm
 from cornersmooth.feedrate.curves import parameters_at, taylor_series
-from cornersmooth.feedrate.path import Kind, Path, arc_series
+from cornersmooth.feedrate.path import Kind, Path
+from cornersmooth.geometry.arcs import arc_series
 from cornersmooth.model import Floats, Ints
 from cornersmooth.smoothing.construction import construction_of
 
@@ -137,7 +138,7 @@ def _lines(path: Path, element: Ints, share: Floats, orders: int) -> tuple[Float
     lever[1] = axis_part * turn + (axis_part - part) * step
     bow = np.flatnonzero(path.kind[element] == Kind.ARC)
     if len(bow):
-        tip[:, bow] = arc_series(program, end[bow], share[bow])[:orders]
+        tip[:, bow] = arc_series(program, np.searchsorted(program.arcs.pose, end[bow]), share[bow])[:orders]
     return tip, lever
 
 

@@ -243,14 +243,10 @@ def crossing_time(width: Floats, speeds: Floats, rate: Floats) -> Floats:
     return time
 
 
-def ramp_time(speed: Floats, accel: Floats, jerk: Floats) -> Floats:
-    """Time from rest to `speed` with zero acceleration at both ends, s."""
-    return np.where(speed * jerk >= accel * accel, speed / accel + accel / jerk, 2.0 * np.sqrt(speed / jerk))
-
-
 def stopping_distance(speed: Floats, accel: Floats, jerk: Floats) -> Floats:
     """Distance in which `speed` is reached from rest, or comes to rest, with zero acceleration at both ends."""
-    return 0.5 * speed * ramp_time(speed, accel, jerk)
+    time = np.where(speed * jerk >= accel * accel, speed / accel + accel / jerk, 2.0 * np.sqrt(speed / jerk))
+    return 0.5 * speed * time
 
 
 def peak_speed(distance: Floats, speed: Floats, accel: Floats, jerk: Floats) -> Floats:

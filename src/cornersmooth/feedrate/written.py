@@ -17,7 +17,7 @@ from cornersmooth.feedrate.planner import Progress, plan_along
 from cornersmooth.feedrate.timelaw import TimeLaw, peak_speed
 from cornersmooth.kinematics import Machine, endless
 from cornersmooth.model import Arcs, Bools, FeedMode, Floats, Ints, Move, Program, Source, Statement
-from cornersmooth.nc_reader.elements import Element, Event, NcProgram
+from cornersmooth.nc_reader.elements import Element, NcProgram
 from cornersmooth.nc_reader.tool import groups
 from cornersmooth.settings import Limits, Settings
 
@@ -79,7 +79,7 @@ def written_motion(nc: NcProgram, name: str, axis_length: float = 10.0) -> Writt
     if len(of_curve):
         bent = np.flatnonzero(nc.kind[owner] == Element.CURVE)
         powers, axis_powers, origin, tip[bent], lever[bent] = numbers
-        curves = Curves.measured(powers, axis_powers, origin, bent)
+        curves = Curves.pieces(powers, axis_powers, origin, bent)
     move = np.array([_MOVES[Element(kind)] for kind in sorted(Element)], np.uint8)[nc.kind]
     arcs = nc.arcs
     proper = arcs.element > 0
@@ -113,7 +113,7 @@ def written_motion(nc: NcProgram, name: str, axis_length: float = 10.0) -> Writt
         statements=tuple(
             Statement(int(first[event.element]), event.line, "STOP", (event.value,), event.text)
             for event in nc.events
-            if _stops(event)
+            if event.letter in _STOPPING or (event.letter == "G" and event.value == _DWELL)
         ),
         units=nc.units,
         source=Source(name, "nc"),
@@ -191,10 +191,6 @@ def _blocks(nc: NcProgram) -> Floats:
     known = np.where(curve + 1 < len(nc), following - nc.line[curve], nc.curves.points)
     found[curve] = np.maximum(known, 1)
     return found
-
-
-def _stops(event: Event) -> bool:
-    return event.letter in _STOPPING or (event.letter == "G" and event.value == _DWELL)
 
 
 def within_blocks(path: Path, limits: Limits, known: BlockLimits, blocks: Floats) -> Path:

@@ -22,6 +22,11 @@ _LARGEST_STEP = math.pi / 2.0
 #: parameters at which curves are compared with their arcs: the middle and the ends are on them
 _PROBES = np.linspace(0.0, 1.0, 17)[1:-1]
 
+#: axes of the planes G17, G18 and G19 in the order in which a right-handed turn about the third goes round:
+#: X to Y about Z, Z to X about Y, Y to Z about X
+PLANES = np.array([[0, 1, 2], [2, 0, 1], [1, 2, 0]])
+FIRST_PLANE = 17
+
 
 def arc_radii(program: Program) -> Floats:
     """(k,) mean of the distances of start and end from the axis, mm."""
@@ -54,9 +59,8 @@ def arc_points(program: Program, rows: Ints, share: Floats) -> tuple[Floats, Flo
     `rows` (m,) are those of `Program.arcs`, `share` (m,) is from 0 at the start of the arc to 1 at its end; ends are
     exact.
     """
-    pose, sweep, radius, side, closing = _swings(program, rows)
-    swung = (np.cos(sweep * share) - 1.0)[:, None] * radius + np.sin(sweep * share)[:, None] * side
-    tip = program.tip[pose - 1] + swung + share[:, None] * closing
+    pose = program.arcs.pose[rows]
+    tip = arc_series(program, rows, share)[0]
     first, last = program.axis[pose - 1], program.axis[pose]
     axis = first + share[:, None] * (last - first)
     length = norm(axis)
@@ -66,23 +70,22 @@ def arc_points(program: Program, rows: Ints, share: Floats) -> tuple[Floats, Flo
     return tip, axis
 
 
-def arc_tangents(program: Program, rows: Ints, share: float | Floats) -> Floats:
-    """Derivatives (m, 3) of the tips on arcs `rows` (m,) by their share, mm: where the tool goes there."""
-    _, sweep, radius, side, closing = _swings(program, rows)
-    swing = np.cos(sweep * share)[:, None] * side - np.sin(sweep * share)[:, None] * radius
-    return sweep[:, None] * swing + closing
+def arc_series(program: Program, rows: Ints, share: float | Floats) -> Floats:
+    """(4, m, 3) tips on arcs, as of `arc_points`, and their derivatives by the share over 1, 2 and 6: Taylor series.
 
-
-def _swings(program: Program, rows: Ints) -> tuple[Ints, Floats, Floats, Floats, Floats]:
-    """Pose, sweep, radius vector at the start, direction there as long as that, and what rounding leaves at the end."""
-    arcs = program.arcs
-    pose, normal, sweep = arcs.pose[rows], arcs.normal[rows], arcs.sweep[rows]
+    The parts: radius vector at the start, direction there as long as that, and what rounding leaves at the end.
+    """
+    arcs, share = program.arcs, np.reshape(share, (-1, 1))
+    pose, normal, sweep = arcs.pose[rows], arcs.normal[rows], arcs.sweep[rows][:, None]
     radius = program.tip[pose - 1] - arcs.centre[rows]
     radius -= dot(radius, normal)[:, None] * normal
     side = np.cross(normal, radius)
     closing = program.tip[pose] - program.tip[pose - 1]
-    closing -= (np.cos(sweep) - 1.0)[:, None] * radius + np.sin(sweep)[:, None] * side
-    return pose, sweep, radius, side, closing
+    closing -= (np.cos(sweep) - 1.0) * radius + np.sin(sweep) * side
+    cosine, sine = np.cos(sweep * share), np.sin(sweep * share)
+    swung, across = (cosine - 1.0) * radius + sine * side, cosine * side - sine * radius
+    tip = program.tip[pose - 1] + swung + share * closing
+    return np.stack((tip, sweep * across + closing, -(sweep**2) / 2.0 * (swung + radius), -(sweep**3) / 6.0 * across))
 
 
 def arc_weights(turn: Floats, decimals: int | None) -> Floats:
@@ -102,7 +105,7 @@ def arc_curves(program: Program, rows: Ints, begin: Floats, end: Floats, weight:
     turn = program.arcs.sweep[rows] * share
     lever = (share * (1.0 + 3.0 * weight) / (3.0 * weight) * np.tan(turn / 4.0) / turn)[:, None]
     first, last = (arc_points(program, rows, at)[0] for at in (begin, end))
-    slopes = (arc_tangents(program, rows, at) for at in (begin, end))
+    slopes = (arc_series(program, rows, at)[1] for at in (begin, end))
     leaving, arriving = (lever * slope for slope in slopes)
     return np.stack((first, first + leaving, last - arriving, last), axis=1)
 

@@ -79,21 +79,11 @@ class Splines:
         begin = self.span_control[span] + 4 * self.span_run[span]
         return self._extended[begin[:, None] + np.arange(1, 7)]
 
-    @property
-    def first_knots(self) -> Floats:
-        """(controls,) the knot at which each control point begins to count."""
-        return self._extended[np.arange(len(self.control_run)) + 4 * self.control_run]
-
-    @cached_property
-    def inner_knots(self) -> Floats:
-        """(controls, 3) the knots whose blossom each control point is."""
-        begin = np.arange(len(self.control_run)) + 4 * self.control_run
-        return self._extended[begin[:, None] + np.arange(1, 4)]
-
     @cached_property
     def greville(self) -> Floats:
-        """(controls,) mean of the three inner knots of each control point; the control points of a line lie there."""
-        return self.inner_knots.sum(axis=1) / 3.0
+        """(controls,) mean of the three knots whose blossom each control point is; those of a line lie there."""
+        begin = np.arange(len(self.control_run)) + 4 * self.control_run
+        return self._extended[begin[:, None] + np.arange(1, 4)].sum(axis=1) / 3.0
 
     def span_at(self, run: Ints, s: Floats) -> Ints:
         """Span (m,) of the splines `run` (m,) that each parameter s (m,) lies in."""
@@ -110,15 +100,13 @@ class Splines:
 
     def basis(self, span: Ints, s: Floats) -> Floats:
         """(m, 4) basis functions of the spans at the parameters s."""
-        k = self.around(span)
+        k, values = self.around(span), np.ones((len(s), 1))
         left, right = s[:, None] - k[:, 2::-1], k[:, 3:] - s[:, None]  # to the knots behind, nearest first, and ahead
-        values = np.ones((len(s), 1))
         for degree in range(1, 4):
-            sums = right[:, :degree] + left[:, degree - 1 :: -1] if degree > 1 else right[:, :1] + left[:, :1]
-            share = values / sums
-            grown = np.zeros((len(s), degree + 1))
-            grown[:, :-1] += share * right[:, :degree]
-            grown[:, 1:] += share * left[:, degree - 1 :: -1] if degree > 1 else share * left[:, :1]
+            behind, ahead = left[:, degree - 1 :: -1], right[:, :degree]
+            share, grown = values / (ahead + behind), np.zeros((len(s), degree + 1))
+            grown[:, :-1] = share * ahead
+            grown[:, 1:] += share * behind
             values = grown
         return values
 

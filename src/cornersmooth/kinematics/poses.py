@@ -9,7 +9,9 @@ the triangle solves it without the loss of digits near the pole that their squar
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -247,20 +249,31 @@ def _angle(one: Floats, other: Floats) -> float:
 _ROUNDING = 1e-6  #: mm beyond the travel that are rounding
 
 
-def machine_position(machine: Machine, tip: Floats, angles: Floats) -> Floats:
+class Arithmetic(NamedTuple):
+    """What places are made of: numbers here, Taylor series in `cornersmooth.feedrate.machine_axes`."""
+
+    #: vectors turned about a unit direction (3,) by angles
+    turn: Callable[[Floats, Floats, Floats], Floats]
+    one: Floats  #: what stands for the number one
+
+
+_NUMBERS = Arithmetic(lambda direction, angle, vectors: rotate(direction, radians(angle), vectors), np.ones(()))
+
+
+def machine_position(machine: Machine, tip: Floats, angles: Floats, of: Arithmetic = _NUMBERS) -> Floats:
     """Words of the linear axes, (n, 3) mm, that bring the tool tip to points of the part at angles (n, 2), degrees.
 
     They count from the zero of the part, with the length of the tool compensated: with both rotary axes at zero they
     are the tip itself. LinuxCNC's trtfuncs.c computes the same joints (its offsets are the points here).
     """
-    turned = _turned(machine, "table", angles, tip + machine.part_zero, -1.0)
-    return turned - machine.part_zero - _swing(machine, angles)
+    zero = of.one * machine.part_zero
+    return _turned(machine, "table", angles, tip + zero, of, -1.0) - zero - _swing(machine, angles, of)
 
 
-def tip_position(machine: Machine, position: Floats, angles: Floats) -> Floats:
+def tip_position(machine: Machine, position: Floats, angles: Floats, of: Arithmetic = _NUMBERS) -> Floats:
     """Tool tip in part coordinates for words of the linear and rotary axes: the inverse of `machine_position`."""
-    turned = position + machine.part_zero + _swing(machine, angles)
-    return _turned(machine, "table", angles, turned) - machine.part_zero
+    zero = of.one * machine.part_zero
+    return _turned(machine, "table", angles, position + zero + _swing(machine, angles, of), of) - zero
 
 
 def nose_position(machine: Machine, tip: Floats, angles: Floats) -> Floats:
@@ -301,17 +314,19 @@ def check_travel(machine: Machine, tip: Floats, angles: Floats, line: Ints, file
     )
 
 
-def _swing(machine: Machine, angles: Floats) -> Floats:
+def _swing(machine: Machine, angles: Floats, of: Arithmetic) -> Floats:
     """Way of the tip when the heads turn and the linear axes stand: (n, 3) mm."""
-    return _turned(machine, "head", angles, np.zeros((len(angles), 3)))
+    return _turned(machine, "head", angles, np.zeros((*angles.shape[:-1], 3)), of)
 
 
-def _turned(machine: Machine, carrier: str, angles: Floats, points: Floats, sign: float = 1.0) -> Floats:
+def _turned(
+    machine: Machine, carrier: str, angles: Floats, points: Floats, of: Arithmetic, sign: float = 1.0
+) -> Floats:
     """Points that the rotary axes of a carrier turn; with a sign of -1 they turn back, the other one first."""
     arm = machine.tool_length * machine.tool if carrier == "head" else np.zeros(3)
     for index in (1, 0) if sign > 0.0 else (0, 1):
         axis = machine.axes[index]
         if axis.carrier == carrier:
-            centre = arm + np.array(axis.point)
-            points = centre + rotate(axis.unit, sign * axis.sign * radians(angles[:, index]), points - centre)
+            centre = of.one * (arm + np.array(axis.point))
+            points = centre + of.turn(axis.unit, sign * axis.sign * angles[..., index], points - centre)
     return points

@@ -15,7 +15,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from cornersmooth.arrays import dot, norm
-from cornersmooth.geometry.arcs import arc_lines, arc_points, arc_radii, arc_weights, curve_deviation, divided
+from cornersmooth.geometry.arcs import (
+    FIRST_PLANE,
+    PLANES,
+    arc_lines,
+    arc_points,
+    arc_radii,
+    arc_weights,
+    curve_deviation,
+    divided,
+)
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Keep, Program
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.planes import Planes, turned_part
@@ -47,11 +56,6 @@ _MOST_OF_TOLERANCE, _ROUNDS = 0.9, 4
 
 #: shares of a block at which its deviation is measured
 _PROBES = np.linspace(0.0, 1.0, 9)
-
-#: axes of the planes G17, G18 and G19 in the order in which a right-handed turn about the third goes round:
-#: X to Y about Z, Z to X about Y, Y to Z about X
-PLANES = np.array([[0, 1, 2], [2, 0, 1], [1, 2, 0]])
-FIRST_PLANE = 17
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from cornersmooth.geometry.arcs import FIRST_PLANE
 from cornersmooth.kinematics.machine import LINEAR
 from cornersmooth.model import MM_PER_UNIT, FeedMode, Units
-from cornersmooth.nc.circles import FIRST_PLANE
 from cornersmooth.nc.control import STEPS, Blocks, Mode
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.messages import Findings

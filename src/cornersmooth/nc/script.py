@@ -22,9 +22,9 @@ from itertools import accumulate, chain, pairwise, repeat, takewhile
 import numpy as np
 
 from cornersmooth.arrays import dot, some_rows
+from cornersmooth.geometry.arcs import FIRST_PLANE
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Numbers, Program, Statement
 from cornersmooth.nc.blocks import feed_digits, feed_ticks
-from cornersmooth.nc.circles import FIRST_PLANE
 from cornersmooth.nc.control import Blocks
 from cornersmooth.nc.coordinates import BlockRows, Coordinates
 from cornersmooth.nc.hole_cycles import Cycle, Drillings, hole_feeds, kind_of

@@ -11,8 +11,8 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from cornersmooth.geometry.arcs import FIRST_PLANE
 from cornersmooth.model import FeedMode, Move, Program, Statement
-from cornersmooth.nc.circles import FIRST_PLANE
 from cornersmooth.nc.control import Blocks, Words
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.messages import Findings, refused

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from cornersmooth.arrays import angle_between
 from cornersmooth.errors import Finding, Verdict
-from cornersmooth.geometry.arcs import arc_tangents
+from cornersmooth.geometry.arcs import arc_series
 from cornersmooth.model import Floats, Ints, Move, Program, SmoothProgram, Status, Trait
 from cornersmooth.report.tables import corner_table
 from cornersmooth.smoothing.construction import BATCH, STRAIGHT_ON, legs_at
@@ -75,7 +75,7 @@ def other_corners(program: Program, axis_length: float) -> OtherCorners:
     one, other = one[meet], other[meet]
     begins, ends = step.copy(), step
     rows = np.arange(len(program.arcs))
-    begins[program.arcs.pose], ends[program.arcs.pose] = (arc_tangents(program, rows, share) for share in (0.0, 1.0))
+    begins[program.arcs.pose], ends[program.arcs.pose] = (arc_series(program, rows, share)[1] for share in (0.0, 1.0))
     tip = np.degrees(angle_between(ends[one], begins[other]))
     axis = np.degrees(angle_between(ends[one] + turn[one], begins[other] + turn[other]))
     bent = np.maximum(tip, axis) > STRAIGHT_ON

@@ -50,16 +50,15 @@ class Stretches:
         return len(self.first)
 
 
+@dataclass(eq=False)
 class NoChoiceError(Exception):
-    """No choice keeps the path inside the limits: `stretch` is the first that cannot be reached.
+    """No choice keeps the path inside the limits.
 
-    In `states` (s, 3), branch and turns of both axes, it can be entered; all of them leave the limits inside it.
+    In `states` (s, 3), branch and turns of both axes, the stretch can be entered; all of them leave the limits there.
     """
 
-    def __init__(self, stretch: int, states: Ints) -> None:
-        super().__init__(stretch, states)
-        self.stretch = stretch
-        self.states = states
+    stretch: int  #: the first that cannot be reached
+    states: Ints
 
 
 def choose(stretches: Stretches, limits: Floats) -> tuple[Ints, Floats]:
@@ -152,12 +151,11 @@ def _states(limits: Floats, finite: Bools) -> tuple[Ints, Floats]:
     return states[:, 0].astype(np.int64), states[:, 1:]
 
 
+@dataclass(eq=False)
 class CutTooFarError(Exception):
     """Cuts that no choice keeps inside the limits, unless they are left after `poses` (k,), ascending."""
 
-    def __init__(self, poses: Ints) -> None:
-        super().__init__(poses)
-        self.poses = poses
+    poses: Ints
 
 
 def too_far(stretches: Stretches, limits: Floats) -> Ints:

@@ -22,6 +22,7 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.arrays import dot, norm, split, spread, starts, unit
+from cornersmooth.geometry.arcs import FIRST_PLANE, PLANES
 from cornersmooth.model import Bools, Floats, Ints
 
 #: rad; by how much pieces may turn where they meet and the polyline does not
@@ -35,10 +36,6 @@ LANE: Final = 256
 
 #: points that are measured at once: intermediate arrays fit the processor's cache
 _TOGETHER: Final = 1 << 16
-
-#: axes of G17, G18 and G19 in the order in which a right-handed turn about the third goes round, and the first plane
-AXES: Final = np.array([[0, 1, 2], [2, 0, 1], [1, 2, 0]])
-FIRST: Final = 17
 
 #: half of the largest turn of an arc: near half a turn the rounding of the radius moves its middle too far
 _LARGEST: Final = math.radians(75.0)
@@ -258,7 +255,7 @@ class _Search:
         first, last = chords.tangents(beta, slope)
         good = written & whole & self._meets(at, end, enters, first, last)
         radius = np.where(good, np.sign(beta) * ticks, 0.0).astype(np.int64)
-        return _Found(near, good, plane + FIRST, radius, last)
+        return _Found(near, good, plane + FIRST_PLANE, radius, last)
 
     def _planes(self, at: Ints, end: Ints) -> Ints:
         """Of each part the plane, less 17, that it lies in most nearly of those that are allowed."""
@@ -272,7 +269,7 @@ class _Chords:
     """c parts of a polyline beside their chords: x along it, y across it in the plane of an arc, w off the plane."""
 
     def __init__(self, point: Floats, at: Ints, end: Ints, plane: Ints, shortest: float) -> None:
-        self.axes, self.own = AXES[plane], np.arange(len(at))
+        self.axes, self.own = PLANES[plane], np.arange(len(at))
         across, up, self.rise = self._local(point[end] - point[at], self.own)
         length = np.hypot(across, up)
         self.long = length > shortest

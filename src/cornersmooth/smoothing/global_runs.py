@@ -55,7 +55,12 @@ class GlobalRuns(Proportional):
 
         parts: list[_Solved] = []
         for number, solved in enumerate(map_in_processes(solve, range(len(first) - 1), 1 if alone else processes)):
-            _mark(corners, solved)
+            rows = np.searchsorted(corners.pose, solved.pose)
+            corners.status[rows], corners.limited_by[rows] = Status.IN_RUN, LimitedBy.TOLERANCE
+            corners.trim_in[rows] = corners.trim_out[rows] = 0.0  # those of the axis point are the same arrays
+            for name, values in solved.columns.items():
+                column = corners.extra[name] if name in corners.extra else getattr(corners, name)
+                column[rows] = values
             parts.append(solved)
             if progress is not None:
                 progress(int(begin[number + 1]), len(pose))
@@ -103,16 +108,6 @@ def _solve(
     names = ("tip_error", "axis_error", "orientation_error", RUN_CURVATURE)
     columns = {name: values[order][known] for name, values in zip(names, measured(curves), strict=True)}
     return _Solved(some_runs(runs, kept), pose[known], columns, pose[inner & ~kept[run]])
-
-
-def _mark(corners: Corners, solved: _Solved) -> None:
-    """Say in corners that nobody else has yet which are rounded by the curves of runs, in place."""
-    rows = np.searchsorted(corners.pose, solved.pose)
-    corners.status[rows], corners.limited_by[rows] = Status.IN_RUN, LimitedBy.TOLERANCE
-    corners.trim_in[rows] = corners.trim_out[rows] = 0.0  # those of the axis point are the same arrays
-    for name, values in solved.columns.items():
-        column = corners.extra[name] if name in corners.extra else getattr(corners, name)
-        column[rows] = values
 
 
 def corner_by_corner(smoothed: SmoothProgram) -> SmoothProgram:

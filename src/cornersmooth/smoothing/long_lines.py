@@ -11,8 +11,9 @@ bend the motion, so they are also compared halfway.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -46,7 +47,6 @@ class Vertices:
     parameter: Floats  #: (r,) mm: never decreasing
     fixed: Bools  #: (r,): a line ends here in any case
     position: Floats | None = None  #: (r, 3) mm: of the linear axes, where these run straight and not the tip
-    room: Floats | None = None  #: (r,) how many times the limits a line may be off here; once where it is None
 
 
 @dataclass(frozen=True)
@@ -133,13 +133,13 @@ def _fixed(smoothed: SmoothProgram, move: Ints, at_pose: Bools) -> Bools:
     return fixed
 
 
-def fewest_lines(rows: Vertices, limits: LineLimits, lane: int = LANE) -> Ints:
-    """Rows at which lines end, ascending, the first and the last row among them, and each after `lane` others."""
+def fewest_lines(rows: Vertices, limits: LineLimits) -> Ints:
+    """Rows at which lines end, ascending, the first and the last row among them, and each after `LANE` others."""
     count = len(rows.parameter)
     if count < 3:
         return np.arange(count)
     ends = rows.fixed.copy()
-    ends[::lane] = True
+    ends[::LANE] = True
     between = halfway(rows, limits) if limits.rotary else None
     return without_lag(rows, limits, farthest(ends, partial(_reaches, rows, between, limits)))
 
@@ -208,19 +208,11 @@ def halfway(rows: Vertices, limits: LineLimits) -> Vertices:
     def mean(values: Floats) -> Floats:
         return (values[:-1] + values[1:]) / 2.0
 
-    tip = mean(rows.original_tip)
-    lever = mean(rows.original_axis_point) - tip
+    means: dict[str, Any] = {name: mean(column) for name, column in vars(rows).items() if column is not None}
+    found = replace(rows, **means)
+    lever = found.original_axis_point - found.original_tip
     lever *= (limits.axis_length / np.maximum(norm(lever), np.finfo(np.float64).tiny))[:, None]
-    return Vertices(
-        mean(rows.tip),
-        mean(rows.words),
-        tip,
-        tip + lever,
-        mean(rows.parameter),
-        np.zeros(len(tip), np.bool_),
-        None if rows.position is None else mean(rows.position),
-        None if rows.room is None else mean(rows.room),
-    )
+    return replace(found, original_axis_point=found.original_tip + lever)
 
 
 def _reaches(rows: Vertices, between: Vertices | None, limits: LineLimits, start: Ints, end: Ints) -> Bools:
@@ -261,8 +253,6 @@ def _off(rows: Vertices, seen: Vertices, limits: LineLimits, start: Ints, end: I
     row = place + first[line]
     tip, axis_point = _on_lines(rows, limits, start, end, line, seen.parameter[row])
     off = limits.used(tip, axis_point, seen.original_tip[row], seen.original_axis_point[row])
-    if seen.room is not None:
-        off /= seen.room[row]
     return np.maximum.reduceat(off, starts(count)[:-1])
 
 

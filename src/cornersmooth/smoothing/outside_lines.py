@@ -49,7 +49,8 @@ def faster_lines(
     """
     if len(rows.parameter) < 3 or rows.parameter[-1] <= rows.parameter[0]:  # one line, or a tool that stands
         return rows, fewest_lines(rows, limits)
-    stays, near = _staying(rows), _Near.of(rows, limits)
+    stays, near = rows.fixed.copy(), _Near.of(rows, limits)
+    stays[::_LANE] = stays[-1:] = True
     straight = farthest(stays, partial(_reaches, near, np.ones(len(stays)), limits.turn))
     moved, outside = _outside(rows, near, limits, stays)
     before, after = (
@@ -63,13 +64,6 @@ def faster_lines(
     ends[outside[faster[outside]]] = True
     tip, words = (np.where(faster[:, None], *both) for both in ((moved.tip, rows.tip), (moved.words, rows.words)))
     return replace(rows, tip=tip, words=words), np.flatnonzero(ends)
-
-
-def _staying(rows: Vertices) -> Bools:
-    """(r,) rows that stay on the path: the `fixed` ones, the ends, and some between them."""
-    stays = rows.fixed.copy()
-    stays[::_LANE] = stays[-1:] = True
-    return stays
 
 
 def _outside(rows: Vertices, near: _Near, limits: LineLimits, stays: Bools) -> tuple[Vertices, Ints]:

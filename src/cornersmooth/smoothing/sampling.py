@@ -16,7 +16,7 @@ from cornersmooth.arrays import joined_rows, ranges, some_rows, starts, unit
 from cornersmooth.geometry import nurbs
 from cornersmooth.geometry.arcs import arc_curves, arc_lines, arc_points, arc_weights, divided
 from cornersmooth.model import Bools, Floats, Ints, Numbers, SmoothProgram
-from cornersmooth.smoothing.construction import construction_of
+from cornersmooth.smoothing.construction import BATCH, construction_of
 from cornersmooth.smoothing.runs.rows import NO_ROWS, SectionRows, run_lines, section_rows, some_at_once
 from cornersmooth.smoothing.segments import Segments, lines_per_half, segments_of
 
@@ -72,28 +72,26 @@ KNOTS = (0.0, 0.0, 0.0, 0.0, 0.5)
 _POINTS = 4
 
 
-def dense_rows(smoothed: SmoothProgram, arcs: ArcBlocks | None = None, poses: int = 16384) -> Iterator[Rows]:
-    """Rows of the smoothed motion as lines with tool vectors, in batches of about `poses` poses."""
-    return _Layout.of(smoothed, divide=True, arcs=arcs).parts(poses)
+def dense_rows(smoothed: SmoothProgram, arcs: ArcBlocks | None = None) -> Iterator[Rows]:
+    """Rows of the smoothed motion as lines with tool vectors, in batches of `BATCH` poses."""
+    return _Layout.of(smoothed, divide=True, arcs=arcs).parts()
 
 
 def all_dense_rows(smoothed: SmoothProgram, arcs: ArcBlocks | None = None) -> Rows:
     """All rows of `dense_rows` at once, made in the place where they stay."""
     layout = _Layout.of(smoothed, divide=True, arcs=arcs)
     whole = layout.rows(slice(None))
-    for _ in layout.parts(16384, whole):
+    for _ in layout.parts(whole):
         pass
     return whole
 
 
-def curve_rows(
-    smoothed: SmoothProgram, arcs: ArcBlocks | None = None, *, divide: bool = False, poses: int = 16384
-) -> Iterator[Rows]:
-    """Rows of the smoothed motion as lines and curve pairs with axis points, in batches of about `poses` poses.
+def curve_rows(smoothed: SmoothProgram, arcs: ArcBlocks | None, *, divide: bool) -> Iterator[Rows]:
+    """Rows of the smoothed motion as lines and curve pairs with axis points, in batches of `BATCH` poses.
 
     `divide` says whether lines in which the axis turns much are divided: not all controls run the axis point straight.
     """
-    return _Layout.of(smoothed, curves=True, divide=divide, arcs=arcs).parts(poses)
+    return _Layout.of(smoothed, curves=True, divide=divide, arcs=arcs).parts()
 
 
 @dataclass(frozen=True)
@@ -130,10 +128,10 @@ class _Layout:
             counts[program.arcs.pose] = np.where(arcs.blocks > 0, several * arcs.blocks, lines)
         return cls(smoothed, segments, halves, counts, runs, replaced, curves, divide, arcs)
 
-    def parts(self, poses: int, whole: Rows | None = None) -> Iterator[Rows]:
-        """Rows of so many poses after those of so many others, which are those of the whole where it is given."""
+    def parts(self, whole: Rows | None = None) -> Iterator[Rows]:
+        """Rows of `BATCH` poses after those of as many others, which are those of the whole where it is given."""
         stop = 0
-        for own in (slice(begin, begin + poses) for begin in range(0, len(self.counts), poses)):
+        for own in (slice(begin, begin + BATCH) for begin in range(0, len(self.counts), BATCH)):
             begin, stop = stop, stop + int(self.counts[own].sum())
             yield self.filled(own, self.rows(own) if whole is None else some_rows(whole, slice(begin, stop)))
 

@@ -70,11 +70,6 @@ class Original:
         tip, turn = (np.where(before, one[:, :1], one[:, 1:]) for one in (self.tips, self.turns))
         return part[..., None] * tip, self.lever[:, None] + part[..., None] * turn
 
-    def chord_sag(self, height: float) -> Floats:
-        """(g,) mm: what the chord of the larger turn leaves of the height at most."""
-        shortest = np.sqrt(np.maximum(height**2 - square(self.turns).max(axis=1) / 4.0, 0.0))
-        return height - shortest
-
     def out_of_step(self, tip_at: Floats, axis_at: Floats) -> Floats:
         """(g, m) mm: what tip and axis point are off the pose between their own at which they are off by as much."""
         sizes = norm(self.segments)[..., None]
@@ -109,7 +104,9 @@ def bounded(
     and its path is off the straight one by what the chord of the turn leaves of H. `gone` are parts of the segments.
     There is no bound for a tolerance of the axis.
     """
-    own = errors[:, 1] + missing + original.chord_sag(settings.axis_length)
+    height = settings.axis_length
+    chord = np.sqrt(np.maximum(height**2 - square(original.turns).max(axis=1) / 4.0, 0.0))  # of the larger turn
+    own = errors[:, 1] + missing + height - chord
     both = np.maximum(errors[:, 0], own) + original.out_of_step(*gone).max(axis=1)
     share = np.maximum(own, both / TOGETHER) / (settings.common_tolerance + original.spare)
     return own, share if settings.axis_tolerance is None else np.full_like(share, np.inf)

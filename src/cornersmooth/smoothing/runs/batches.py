@@ -16,7 +16,7 @@ from functools import cached_property
 
 import numpy as np
 
-from cornersmooth.arrays import dot, norm, ranges, some_rows, spread, starts
+from cornersmooth.arrays import dot, norm, ranges, some_rows, spread, square, starts
 from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.smoothing.runs.banded import TAPS, Gather, Windows
@@ -97,7 +97,7 @@ class Problem:
 
         Where it has a larger tolerance than the tip it may be off by what it turns in the segment, or as the tip.
         """
-        turned = np.sqrt(_squares(np.diff(self.lever, axis=0, append=self.lever[-1:])))
+        turned = norm(np.diff(self.lever, axis=0, append=self.lever[-1:]))
         return np.minimum(np.maximum(turned, self.tolerances[0]) / self.tolerances[1], 1.0)
 
     @cached_property
@@ -239,7 +239,7 @@ def followed(splines: Splines, windows: Windows, control: Floats) -> Floats:
     """
     tip, lever = control[:, :3], control[:, 3:] - control[:, :3]
     ahead, behind = windows.local + TAPS - 1, windows.local
-    way, turn = (_squares(part[ahead] - part[behind]) for part in (tip, lever))
+    way, turn = (square(part[ahead] - part[behind]) for part in (tip, lever))
     own, others = (np.sqrt(_third_squares(splines, windows, part)) for part in (tip, lever))
     stands = turn > _LARGEST_RATIO * way  # and the tool turns: the tip follows nothing
     own *= (OWN_WAY**2 * (1.0 + np.where(stands, 0.0, turn / np.maximum(way, 1e-300)))) ** 1.5
@@ -266,7 +266,7 @@ def _third_squares(splines: Splines, windows: Windows, curve: Floats) -> Floats:
     for k in range(TAPS):
         third += splines.third[windows.span, k, None] * curve[windows.local + k]
     window, width = windows.span_window, splines.width[windows.span]
-    own = width * _squares(third)
+    own = width * square(third)
     total, length = own.copy(), width.copy()
     for shift in range(1, NEIGHBOURS + 1):
         same = np.where(window[shift:] == window[:-shift], 1.0 - shift / (NEIGHBOURS + 1.0), 0.0)
@@ -274,11 +274,6 @@ def _third_squares(splines: Splines, windows: Windows, curve: Floats) -> Floats:
             sums[shift:] += same * values[:-shift]
             sums[:-shift] += same * values[shift:]
     return total / length
-
-
-def _squares(vectors: Floats) -> Floats:
-    """(m,) squared lengths of vectors (m, d)."""
-    return np.square(vectors).sum(axis=1)
 
 
 def _size(axis: Floats, stretch: Floats, off: Floats) -> Floats:

@@ -77,15 +77,13 @@ def first_knots(lines: Polylines) -> Splines:
 def lines_to_control(lines: Polylines, splines: Splines) -> Floats:
     """Control points on the runs at their Greville points, the outer three of each end on its first or last segment."""
     greville, run = splines.greville, splines.control_run
-    control = lines.at(run, greville)
+    control = lines.on(lines.segment_at(run, greville), greville)
     begin, end = splines.control_first[:-1], splines.control_first[1:]
     for outer, pose in (
         (begin[:, None] + np.arange(3), lines.first[:-1]),
         (end[:, None] - 1 - np.arange(3), lines.first[1:] - 2),
     ):
-        start, step = lines.point[pose], lines.point[pose + 1] - lines.point[pose]
-        share = (greville[outer] - lines.s[pose][:, None]) / (lines.s[pose + 1] - lines.s[pose])[:, None]
-        control[outer] = start[:, None] + share[:, :, None] * step[:, None]
+        control[outer] = lines.on(pose[:, None], greville[outer])
     return control
 
 

@@ -43,9 +43,10 @@ class Polylines:
         length[first] = 0.0
         along = np.cumsum(length)
         along -= np.repeat(along[first], count)
-        # rounded, and at least `_LEAST` steps for every segment
-        place = _LEAST * np.arange(len(point))
-        whole = np.maximum.accumulate(np.round(along) - place + np.repeat(_floors(along, first, count), count)) + place
+        # rounded, and at least `_LEAST` steps for every segment; runs lie above one another: the maximum begins anew
+        place, ends = _LEAST * np.arange(len(point)), np.round(along[first + count - 1]) + _LEAST * count
+        floors = np.concatenate(([0.0], np.cumsum(ends[:-1] + 1.0)))
+        whole = np.maximum.accumulate(np.round(along) - place + np.repeat(floors, count)) + place
         whole -= np.repeat(whole[first], count)
         return cls(point, count, whole.astype(np.float64), step)
 
@@ -64,17 +65,11 @@ class Polylines:
         before, after = self.segment_at(run, low), self.segment_at(run, high)
         return before, after + (high > self.s[after])
 
-    def at(self, run: Ints, s: Floats) -> Floats:
-        """Points (m, 6) at lengths (m,) of the runs (m,)."""
-        before = self.segment_at(run, s)
-        share = (s - self.s[before]) / (self.s[before + 1] - self.s[before])
-        return self.point[before] + share[:, None] * (self.point[before + 1] - self.point[before])
-
-
-def _floors(along: Floats, first: Ints, count: Ints) -> Floats:
-    """What lifts every run above those before it, so that a running maximum begins anew in each."""
-    ends = np.round(along[first + count - 1]) + _LEAST * count
-    return np.concatenate(([0.0], np.cumsum(ends[:-1] + 1.0)))
+    def on(self, segment: Ints, s: Floats) -> Floats:
+        """Points (..., 6) at lengths (...) on segments, which are named by the pose before each."""
+        start, low = self.point[segment], self.s[segment]
+        share = (s - low) / (self.s[segment + 1] - low)
+        return start + share[..., None] * (self.point[segment + 1] - start)
 
 
 @dataclass(frozen=True)
@@ -129,6 +124,5 @@ class Samples:
         piece, place = spread(kind + 1)
         span, segment = pieces.span[piece], pieces.segment[piece]
         s = pieces.low[piece] + width[piece] * _PLACES[kind[piece], place]
-        share = (s - lines.s[segment]) / (lines.s[segment + 1] - lines.s[segment])
-        target = lines.point[segment] + share[:, None] * (lines.point[segment + 1] - lines.point[segment])
+        target = lines.on(segment, s)
         return cls(piece, span, s, splines.basis(span, s), target)

@@ -102,7 +102,9 @@ def solve_runs(
         span = pieces.span[failed]
         windows = Windows.where(splines, near_spans(splines, splines.span_run[span], span, MENDED, MENDED + 1))
         _solve(problem, windows, windows.free, control, tight, MENDING_GAPS, None, 1)
-        changed = _touched(splines, pieces, windows.control[windows.free])
+        moved = np.zeros(len(splines.control_run), np.bool_)
+        moved[windows.control[windows.free]] = True
+        changed = np.flatnonzero(moved[splines.taps(pieces.span)].any(axis=1))
     run = splines.span_run[pieces.span]
     worst = np.zeros((len(lines.count), 2))
     np.maximum.at(worst, run, proven)
@@ -168,13 +170,6 @@ def _solve(
         control[windows.control[own]] = np.concatenate(found)
 
 
-def _touched(splines: Splines, pieces: Pieces, control: Ints) -> Ints:
-    """Pieces that hang on any of the control points."""
-    moved = np.zeros(len(splines.control_run), np.bool_)
-    moved[control] = True
-    return np.flatnonzero(moved[splines.taps(pieces.span)].any(axis=1))
-
-
 def measured(curves: RunCurves) -> tuple[Floats, Floats, Floats, Floats]:
     """Curves at the n poses of their runs, (n,) each.
 
@@ -207,16 +202,14 @@ def _bound(problem: Problem, control: Floats, rows: Ints, parts: int) -> Floats:
     lines, pieces, largest = problem.lines, problem.pieces, np.zeros((len(rows), 2))
     span, segment = pieces.span[rows], pieces.segment[rows]
     hull = problem.splines.bezier(control, span, pieces.low[rows], pieces.high[rows])
-    start, step = lines.point[segment], lines.point[segment + 1] - lines.point[segment]
-    length = lines.s[segment + 1] - lines.s[segment]
-    low, width = (pieces.low[rows] - lines.s[segment]) / length, (pieces.high[rows] - pieces.low[rows]) / length
-    original = start[:, None] + (low[:, None] + width[:, None] * _THIRDS)[:, :, None] * step[:, None]
+    low, high = pieces.low[rows, None], pieces.high[rows, None]
+    original = lines.on(segment[:, None], low + (high - low) * _THIRDS)
     whole_off, whole_levers = hull - original, original[:, :, 3:] - original[:, :, :3]
     ends = np.arange(parts + 1) / parts
     whole = Splines(np.array([0.0, 1.0]), np.array([2]))
     for cut in whole.bernstein(np.zeros(parts, np.int64), ends[:-1], ends[1:]):
         off, levers = cut @ whole_off, cut @ whole_levers
-        np.maximum(largest[:, 0], _longest(off[:, :, :3]), out=largest[:, 0])
+        np.maximum(largest[:, 0], norm(off[:, :, :3]).max(axis=1), out=largest[:, 0])
         np.maximum(largest[:, 1], _axis_bound(off, levers, problem.axis_length), out=largest[:, 1])
     return largest
 
@@ -225,21 +218,16 @@ def _axis_bound(off: Floats, levers: Floats, axis_length: float) -> Floats:
     """(g,) bounds from Bernstein points (g, 4, 6) of the deviation and levers (g, 4, 3) on the stretch."""
     tip, swing = off[:, :, :3], off[:, :, 3:] - off[:, :, :3]
     middle = (levers[:, 0] + levers[:, 3]) / 2.0
-    size = np.sqrt((middle**2).sum(axis=1))
+    size = norm(middle)
     direction = middle / size[:, None]
-    half_way = np.sqrt(((levers[:, 3] - levers[:, 0]) ** 2).sum(axis=1)) / 2.0
+    half_way = norm(levers[:, 3] - levers[:, 0]) / 2.0
     factor = axis_length / size
     across = swing - (swing @ direction[:, :, None]) * direction[:, None]
-    first = _longest(tip + factor[:, None, None] * across)
+    first = norm(tip + factor[:, None, None] * across).max(axis=1)
     # every lever of the stretch is within half_way of the one in the middle
-    largest = _longest(swing)
+    largest = norm(swing).max(axis=1)
     shortest = np.maximum(size - half_way - largest, 1e-9 * axis_length)
     turned = np.minimum(half_way / size, 1.0)  # sine of the angle to the middle, at most
     steepest = axis_length / shortest
     rest = (steepest * turned + (steepest - axis_length / (size + half_way + largest))) * largest
     return first + rest + steepest * largest**2 / (2.0 * shortest)
-
-
-def _longest(vectors: Floats) -> Floats:
-    """(g,) length of the longest of the vectors (g, k, 3)."""
-    return np.sqrt((vectors**2).sum(axis=2).max(axis=1))
