@@ -209,7 +209,6 @@ def test_runs_with_steep_turns_are_named_where_curves_are_written() -> None:
         ("siemens", "bspline", "", {}, "global"),
         ("siemens", "poly", "", {}, "global"),
         ("heidenhain", "spl", "", {}, "global"),
-        ("fanuc", "g6.2", "", {"weights": (1.0, 0.5)}, "proportional"),
         ("fanuc", "g6.2", "", {"method": "proportional"}, "proportional"),
         ("fanuc", "g1", "", {"method": "global"}, "global"),
     ],

@@ -49,7 +49,7 @@ def draw() -> str:
     smoothed = smooth(program, Settings(tolerance=TOLERANCE, axis_length=HEIGHT))
     curves = nurbs.control_points(program, smoothed.corners, slice(None), HEIGHT)
     u = np.linspace(0.0, 1.0, 81)
-    tip_curve, top_curve = (nurbs.evaluate(points, smoothed.corners.weights, u)[0] for points in curves)
+    tip_curve, top_curve = (nurbs.evaluate(points, u)[0] for points in curves)
     tops = program.tip + HEIGHT * program.axis
     grey, blue, red = 'stroke="#9aa3ad" stroke-width="2"', "#1463b8", "#c8402f"
     parts = [

@@ -113,7 +113,6 @@ class Corners:
     #: (k,): The same for the axis-point segments; the same numbers where one parameter drives both curves.
     axis_trim_in: Floats
     axis_trim_out: Floats
-    weights: Floats  #: (k, 2): w1 (second and fourth control point) and w2 (third); the first and the last are 1
     #: (k,), mm: Largest distance between both motions at a common parameter: at the tip, and at b = tip + H·axis. The
     #: paths themselves are at least as near (`report.tables.path_distances`). With an axis tolerance the latter is
     #: what the axis turns, at `Settings.axis_scale` from the tip.

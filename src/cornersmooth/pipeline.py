@@ -347,7 +347,6 @@ def _provenance(program: Program, settings: Settings, form: Form) -> Provenance:
         operation=program.source.operation,
         extras="-".join(extra.name for extra in form.extras),
         sha256=program.source.sha256,
-        weights=(1.0, *settings.weights),
     )
 
 

@@ -29,8 +29,6 @@ class Method:
     #: Whether one parameter drives both curves. Only then do the errors at a common parameter bound the distances of
     #: the paths, and can rotary words follow the curves.
     one_parameter: bool = True
-    #: Settings that the method does not leave open.
-    prescribed: Mapping[str, object] = field(default_factory=lambda: MappingProxyType({}))
 
 
 #: in the order of tables, the oldest first
@@ -48,7 +46,6 @@ METHODS: Mapping[str, Method] = MappingProxyType(
                 "global",
                 "one pair of curves for a whole run of corners, as smooth as the tolerance allows",
                 "cornersmooth.smoothing.global_runs",
-                prescribed=MappingProxyType({"weights": (1.0, 1.0)}),
             ),
         )
     }
@@ -181,8 +178,6 @@ class Settings(OptionFields):
         + " ".join(f"With {item.name}: {item.summary}." for item in METHODS.values())
         + " Global takes less time on the machine and about a block a pose in curves; on LinuxCNC it takes more time.",
     )
-    #: w1 and w2 of the five-point curve, in (0, 3]; rounded to the three decimals that controls accept.
-    weights: tuple[float, float] = option((1.0, 1.0), bounds=(0.001, 3.0))
     #: A corner that turns by more (in the six-dimensional sense) stays sharp.
     reversal_angle: float = option(170.0, unit="deg", bounds=(1.0, 180.0))
     #: A corner next to a segment whose axis turns by more stays sharp: the ruled motion is not a motion any more.
@@ -235,16 +230,10 @@ class Settings(OptionFields):
             raise SettingsError("CS201", f"unknown method {self.method!r}", f"use {' or '.join((AUTO, *METHODS))}")
         if self.lines not in (None, "dense", "long"):
             raise SettingsError("CS201", f"unknown lines {self.lines!r}", "use dense or long")
-        if self.method != AUTO and not self._allows(self.method):
-            names = " and ".join(METHODS[self.method].prescribed)
-            raise SettingsError("CS207", f"the method {self.method} has its own {names}", f"leave out {names}")
         for name, (low, high) in BOUNDS.items():
             value = getattr(self, name)
-            for number in value if isinstance(value, (tuple, list)) else () if value is None else (value,):
-                if not (math.isfinite(number) and low <= float(number) <= high):
-                    raise SettingsError("CS202", f"{name} is {number:g}", f"give a value from {low:g} to {high:g}")
-        # every control keeps three decimals (FANUC IS-B, reference manual B-63324EN/03 4.17)
-        object.__setattr__(self, "weights", tuple(round(float(w), 3) for w in self.weights))
+            if value is not None and not (math.isfinite(value) and low <= float(value) <= high):
+                raise SettingsError("CS202", f"{name} is {value:g}", f"give a value from {low:g} to {high:g}")
         if self.axis_tolerance is not None:
             object.__setattr__(self, "axis_length", self._check_axis_tolerance(self.axis_tolerance))
         if self.tip_tolerance <= 0 or self.axis_point_tolerance <= 0:
@@ -254,15 +243,11 @@ class Settings(OptionFields):
                 self._coarser,
             )
 
-    def _allows(self, method: str) -> bool:
-        """Whether these are the settings that the method does not leave open."""
-        return all(getattr(self, name) == value for name, value in METHODS[method].prescribed.items())
-
     def with_method(self, *, curves: bool = False) -> Settings:
         """Put a method in the place of "auto": what suits lines, or curves; a method that is named already stays."""
         if self.method != AUTO:
             return self
-        return self.but(method=CURVES_METHOD if curves and self._allows(CURVES_METHOD) else DEFAULT_METHOD)
+        return self.but(method=CURVES_METHOD if curves else DEFAULT_METHOD)
 
     def _check_axis_tolerance(self, degrees: float) -> float:
         """H that goes with an axis tolerance, mm."""

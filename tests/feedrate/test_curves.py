@@ -17,44 +17,39 @@ from cornersmooth.smoothing import smooth
 SIDES = np.array([0, 1])
 
 
-def corner(turn: float, leg_in: float, leg_out: float, weights: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
+def corner(turn: float, leg_in: float, leg_out: float) -> np.ndarray:
     angle = np.radians(turn)
     points = nurbs.five_points(
         np.zeros((1, 3)),
         np.array([[leg_in, 0.0, 0.0]]),
         leg_out * np.array([[np.cos(angle), np.sin(angle), 0.0]]),
     )
-    return np.repeat(points, 2, axis=0), np.repeat(np.array([weights]), 2, axis=0)
+    return np.repeat(points, 2, axis=0)
 
 
-def halves(points: np.ndarray, weights: np.ndarray) -> np.ndarray:
+def halves(points: np.ndarray) -> np.ndarray:
     """Powers of both halves of one curve."""
-    return curves.polynomial(points, weights, SIDES)
+    return curves.polynomial(points, half=SIDES)
 
 
-CORNERS = [
-    (turn, *legs, weights)
-    for turn in (1.0, 90.0, 165.0)
-    for legs in ((1.0, 1.0), (0.3, 1.0), (0.002, 0.01))
-    for weights in ((1.0, 1.0), (0.7, 2.5))
-]
+CORNERS = [(turn, *legs) for turn in (1.0, 90.0, 165.0) for legs in ((1.0, 1.0), (0.3, 1.0), (0.002, 0.01))]
 
 
 @pytest.mark.parametrize("given", CORNERS)
-def test_halves_are_the_curve(given: tuple[float, float, float, tuple[float, float]]) -> None:
-    points, weights = corner(*given)
-    powers = halves(points, weights)
+def test_halves_are_the_curve(given: tuple[float, float, float]) -> None:
+    points = corner(*given)
+    powers = halves(points)
     t = np.linspace(0.0, 1.0, 11)
     found = curves.evaluate(powers, np.tile(t, (2, 1)))
     for side in SIDES:
-        expected = nurbs.evaluate(points[:1], weights[:1], 0.5 * (side + t))[0]
+        expected = nurbs.evaluate(points[:1], 0.5 * (side + t))[0]
         assert found[side] == pytest.approx(expected, abs=1e-14)
 
 
 @pytest.mark.parametrize("given", CORNERS)
-def test_arc_length_and_back(given: tuple[float, float, float, tuple[float, float]]) -> None:
-    points, weights = corner(*given)
-    powers = halves(points, weights)
+def test_arc_length_and_back(given: tuple[float, float, float]) -> None:
+    points = corner(*given)
+    powers = halves(points)
     lengths = curves.interval_lengths(powers, curves.interval_borders(SIDES)).sum(axis=1)
     dense = curves.evaluate(powers, np.tile(np.linspace(0.0, 1.0, 100_001), (2, 1)))
     chords = np.linalg.norm(np.diff(dense, axis=1), axis=2)
@@ -69,12 +64,11 @@ def test_arc_length_and_back(given: tuple[float, float, float, tuple[float, floa
 
 
 @pytest.mark.parametrize("turn", [2.0, 45.0, 90.0, 150.0])
-@pytest.mark.parametrize("weights", [(1.0, 1.0), (0.7, 2.5)])
-def test_curvature_bounds_the_speed(turn: float, weights: tuple[float, float]) -> None:
+def test_curvature_bounds_the_speed(turn: float) -> None:
     """Everywhere at most, and in the tightest interval not much less, than the centripetal limit allows."""
     bend, limits = np.radians(turn), Limits(feed=1e6, centripetal=500.0)
     tip = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [4.0 + 3.0 * np.cos(bend), 3.0 * np.sin(bend), 0.0]])
-    smoothed = smooth(Program.from_poses(tip, [[0.0, 0.0, 1.0]] * 3), Settings(tolerance=0.05, weights=weights))
+    smoothed = smooth(Program.from_poses(tip, [[0.0, 0.0, 1.0]] * 3), Settings(tolerance=0.05))
     path = build_path(smoothed.program, smoothed.corners, smoothed.settings, limits)
     found = path_limits(path, limits)
     x = np.linspace(0.0, found.edge[-1], 20_001)[1:-1]
@@ -85,6 +79,5 @@ def test_curvature_bounds_the_speed(turn: float, weights: tuple[float, float]) -
 
 
 def test_length_beside_a_leg_of_length_zero() -> None:
-    points, weights = corner(60.0, 0.4, 0.0, (1.0, 1.0))
-    powers = halves(points, weights)
+    powers = halves(corner(60.0, 0.4, 0.0))
     assert curves.interval_lengths(powers, curves.interval_borders(SIDES)).sum() == pytest.approx(0.4, rel=1e-12)

@@ -57,10 +57,9 @@ def test_jets_against_a_function() -> None:
     assert taylor.derivative(found) == pytest.approx([found[1], 2 * found[2], 3 * found[3]])
 
 
-@pytest.mark.parametrize("weights", [(1.0, 1.0), (0.8, 1.7)])
-def test_derivatives_of_a_path(chain: Callable[[int], Program], weights: tuple[float, float]) -> None:
+def test_derivatives_of_a_path(chain: Callable[[int], Program]) -> None:
     """Against differences of poses along the way, where the curves are smooth."""
-    smoothed = smooth(chain(2), Settings(tolerance=0.05, weights=weights))
+    smoothed = smooth(chain(2), Settings(tolerance=0.05))
     path = build_path(smoothed.program, smoothed.corners, smoothed.settings, Limits())
     for element in np.flatnonzero(path.kind == 0)[:5]:
         length = path.length[element]

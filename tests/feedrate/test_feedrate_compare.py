@@ -58,8 +58,8 @@ def compare(program: Program, settings: Settings, limits: Limits) -> Comparison:
         base: direct(program, limits, kind, settings=settings)
         for base, kind in zip(BASELINES, get_args(Baseline), strict=True)
     }
-    for name, method in METHODS.items():
-        laws[name] = plan(smooth(program, settings.but(method=name, **method.prescribed)), limits)
+    for name in METHODS:
+        laws[name] = plan(smooth(program, settings.but(method=name)), limits)
     return Comparison(program, settings, limits, laws)
 
 

@@ -80,7 +80,7 @@ def tilted(program: Program) -> Program:
 @pytest.mark.parametrize("name", MACHINES)
 def test_derivatives_are_those_of_the_kinematics(chain: Callable[[int], Program], name: str) -> None:
     machine = offset(load_machine(name))
-    path, machine_axes = paths(tilted(chain(2)), machine, Settings(tolerance=0.05, weights=(0.8, 1.7)))
+    path, machine_axes = paths(tilted(chain(2)), machine, Settings(tolerance=0.05))
     for kind, size in ((0, 0.02), (1, 0.01)):
         for element in np.flatnonzero((path.kind == kind) & ~path.turning)[2:8]:
             h = size * path.length[element]

@@ -8,9 +8,8 @@ import pytest
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.kinematics import load_machine
-from cornersmooth.nc import Frame, choose_form, control_names, fit_settings, load_control
+from cornersmooth.nc import Frame, choose_form, control_names, load_control
 from cornersmooth.nc.control_tables import parse_control
-from cornersmooth.settings import Settings
 from nc.writing import lines_of
 from oracle.messages import one_line
 
@@ -84,12 +83,6 @@ def test_a_tilted_tool_is_refused_where_no_word_can_say_it() -> None:
     tilted = CL.replace("GOTO/20,20,0", "GOTO/20,20,0,0,0.6,0.8")
     with pytest.raises(SettingsError, match=r"part.cls:11: error\[\w+\]: the tool is not parallel to Z"):
         lines_of(chosen, tilted)
-
-
-@pytest.mark.parametrize("weights", [(1.0, 2.0), (0.5, 0.5)])
-def test_polynomials_are_for_weights_of_one(weights: tuple[float, float]) -> None:
-    with pytest.raises(SettingsError, match="siemens form poly holds curves with weights 1 only"):
-        fit_settings(Settings(weights=weights), choose_form("siemens", "poly"), "mm")
 
 
 OWN = """

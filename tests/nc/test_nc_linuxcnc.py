@@ -254,12 +254,11 @@ def test_an_error_is_seen(tmp_path: Path) -> None:
         accepted("G21\nG43.5 H1\nM2\n", tmp_path)
 
 
-@pytest.mark.parametrize("weights", share([(1.0, 1.0), (0.7, 1.3), (1.5, 0.5), (3.0, 0.2)], 2, 1))
-def test_its_splines_are_our_curves(weights: tuple[float, float], tmp_path: Path) -> None:
+def test_its_splines_are_our_curves(tmp_path: Path) -> None:
     """G5.2 with L4 has our knots, and runs in the plane: each projection of both curves is a program of its own."""
     rng = np.random.default_rng(5)
     cl, _ = flat(7, 12)
-    smoothed = smooth(read(cl, name="chains.cls"), Settings(tolerance=0.5, weights=weights))
+    smoothed = smooth(read(cl, name="chains.cls"), Settings(tolerance=0.5))
     rows = rng.choice(np.flatnonzero(smoothed.corners.smoothed), how_many(1, 6), replace=False)
     curves = [
         np.round(curve[:, plane], 9)
@@ -267,10 +266,8 @@ def test_its_splines_are_our_curves(weights: tuple[float, float], tmp_path: Path
         for curve in points
         for plane in ((0, 1), (1, 2), (2, 0))
     ]
-    for flat_points, found in zip(curves, _splines(curves, weights, tmp_path), strict=True):
-        dense = nurbs.evaluate(
-            np.pad(flat_points, ((0, 0), (0, 1)))[None], np.array([weights]), np.linspace(0, 1, 8001)
-        )[0, :, :2]
+    for flat_points, found in zip(curves, _splines(curves, tmp_path), strict=True):
+        dense = nurbs.evaluate(flat_points[None], np.linspace(0, 1, 8001))[0]
         start, step = dense[:-1], np.diff(dense, axis=0)
         size = np.einsum("ij,ij->i", step, step)
         for point in found:
@@ -279,14 +276,12 @@ def test_its_splines_are_our_curves(weights: tuple[float, float], tmp_path: Path
             assert np.linalg.norm(foot - point, axis=1).min() < 1e-6
 
 
-def _splines(curves: list[Floats], weights: tuple[float, float], folder: Path) -> list[Floats]:
+def _splines(curves: list[Floats], folder: Path) -> list[Floats]:
     """Points that the interpreter makes of each curve; a rapid leads to its start."""
-    w1, w2 = weights
     lines = ["G21 G90 G17 G94 F100"]
     for points in curves:
         places = [f"X{x:.9f} Y{y:.9f}" for x, y in points.tolist()]
-        lines += [f"G0 {places[0]}", f"G5.2 {places[1]} P{w1} L4", f"{places[2]} P{w2}", f"{places[3]} P{w1}"]
-        lines += [f"{places[4]} P1", "G5.3"]
+        lines += [f"G0 {places[0]}", f"G5.2 {places[1]} P1 L4", *(f"{place} P1" for place in places[2:]), "G5.3"]
     found: list[list[Floats]] = []
     for kind, place in positions("\n".join([*lines, "M2"]) + "\n", folder):
         if kind == "rapid":

@@ -43,7 +43,7 @@ def simultaneous_deviation(smoothed: SmoothProgram, rows: Ints, u: Floats) -> tu
     """Largest tip and axis-point distance at the common parameter, for each of the corners."""
     program, corners, height = smoothed.program, smoothed.corners, smoothed.settings.axis_length
     tip_curve, axis_curve = nurbs.control_points(program, corners, rows, height)
-    shares = nurbs.rational_basis(u, corners.weights[rows])
+    shares = nurbs.basis(u)
     first = shares[..., 0] + 2 / 3 * (shares[..., 1] - shares[..., 3])
     second = shares[..., 4] + 2 / 3 * (shares[..., 3] - shares[..., 1])
     towards = np.where(u <= 0.5, corners.before[rows][:, None], corners.after[rows][:, None])
@@ -53,7 +53,7 @@ def simultaneous_deviation(smoothed: SmoothProgram, rows: Ints, u: Floats) -> tu
     tip = program.tip[pose] + fraction * (program.tip[towards] - program.tip[pose])
     lever = program.axis[pose] + fraction * (program.axis[towards] - program.axis[pose])
     top = tip + height * lever / np.linalg.norm(lever, axis=-1, keepdims=True)
-    points = nurbs.evaluate(tip_curve, corners.weights[rows], u)
-    levers = nurbs.evaluate(axis_curve, corners.weights[rows], u) - points
+    points = nurbs.evaluate(tip_curve, u)
+    levers = nurbs.evaluate(axis_curve, u) - points
     tops = points + height * levers / np.linalg.norm(levers, axis=-1, keepdims=True)
     return np.linalg.norm(points - tip, axis=-1).max(axis=1), np.linalg.norm(tops - top, axis=-1).max(axis=1)

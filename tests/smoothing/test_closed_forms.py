@@ -30,7 +30,7 @@ def test_curvature_and_deviation_of_a_plane_corner(turn):
     assert 3 * 0.05 / np.sin(beta) == pytest.approx(length, rel=1e-9)
     curve, _ = nurbs.control_points(smoothed.program, smoothed.corners, slice(None), 10.0)
     u = np.linspace(0.0, 1.0, 2001)
-    point, first, second = (value[0] for value in nurbs.derivatives(curve, np.ones((1, 2)), u))
+    point, first, second = (value[0] for value in nurbs.derivatives(curve, u))
     curvature = np.linalg.norm(np.cross(first, second), axis=1) / np.linalg.norm(first, axis=1) ** 3
     assert curvature.max() == pytest.approx(2 * np.sin(beta) / (length * np.cos(beta) ** 2), rel=1e-9)
     assert curvature[0] == pytest.approx(0.0, abs=1e-9)
@@ -41,21 +41,12 @@ def test_curvature_and_deviation_of_a_plane_corner(turn):
     assert to_leg.max() == pytest.approx(0.05 * np.cos(beta), rel=1e-9), "curve to polyline"
 
 
-@pytest.mark.parametrize("weights", [(1.0, 1.0), (1.0, 0.4), (0.6, 1.7), (2.5, 0.3)])
-def test_deviation_factor_holds_for_free_weights(weights):
-    settings = Settings(tolerance=0.02, weights=weights)
-    smoothed = smooth(plane_corner(70.0), settings)
-    curve, _ = nurbs.control_points(smoothed.program, smoothed.corners, slice(None), 10.0)
-    points = nurbs.evaluate(curve, smoothed.corners.weights, np.linspace(0, 1, 1001))[0]
-    assert np.linalg.norm(points, axis=1).min() == pytest.approx(0.02, rel=1e-9)
-
-
-def axis_by_tip_length(tip_curve, axis_curve, weights, at):
+def axis_by_tip_length(tip_curve, axis_curve, at):
     """Axis and its first two derivatives with respect to tip arc length, at one end of each transition."""
     u = np.array([float(at)])
-    _, p1, p2 = (value[:, 0] for value in nurbs.derivatives(tip_curve, weights, u))
+    _, p1, p2 = (value[:, 0] for value in nurbs.derivatives(tip_curve, u))
     p0 = tip_curve[:, 0 if at == 0 else 4]
-    q0, q1, q2 = (value[:, 0] for value in nurbs.derivatives(axis_curve, weights, u))
+    q0, q1, q2 = (value[:, 0] for value in nurbs.derivatives(axis_curve, u))
     v0, v1, v2 = q0 - p0, q1 - p1, q2 - p2
     return _unit_derivatives(v0, v1, v2, p1, p2)
 
@@ -88,7 +79,7 @@ def test_orientation_is_twice_differentiable_in_tip_length_at_the_joints():
         tip_step, top_step = program.tip[far] - program.tip[near], tops[far] - tops[near]
         lever = 10.0 * program.axis[near] + trim[:, None] * (top_step - tip_step)
         line = _unit_derivatives(lever, top_step - tip_step, np.zeros_like(lever), tip_step, np.zeros_like(lever))
-        curve = axis_by_tip_length(tip_curve, axis_curve, corners.weights[rows], at)
+        curve = axis_by_tip_length(tip_curve, axis_curve, at)
         for of_line, of_curve in zip(line, curve, strict=True):
             scale = np.maximum(np.linalg.norm(of_line, axis=1), 1e-3)
             assert (np.linalg.norm(of_line - of_curve, axis=1) / scale).max() <= 1e-9

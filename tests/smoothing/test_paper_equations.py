@@ -42,7 +42,6 @@ TABLE_2 = {
     0.078: ((0.07290, 0.07800), (0.07800, 0.07673)),
     0.15: ((0.07290, 0.12654), (0.07895, 0.13074)),
 }
-WEIGHTS = ((1.0, 1.0), (1.0, 0.65), (2.0, 0.5))
 
 
 def table_1() -> Program:
@@ -52,14 +51,14 @@ def table_1() -> Program:
     return Program.from_poses(tip, second - tip if np.abs(second).max() > 2.0 else second)
 
 
-def settings_of(tolerance: float = 0.05, weights: tuple[float, float] = (1.0, 1.0), *, curves: bool = True) -> Settings:
+def settings_of(tolerance: float = 0.05, *, curves: bool = True) -> Settings:
     """Of curves, which are run at common parameters, or of lines, which are run at v(u)."""
-    return Settings(tolerance, HEIGHT, method="zhang2016", weights=weights, round_feed_changes=not curves)
+    return Settings(tolerance, HEIGHT, method="zhang2016", round_feed_changes=not curves)
 
 
 @cache
-def smoothed(seed: int, tolerance: float = 0.05, weights: tuple[float, float] = (1.0, 1.0), *, curves: bool = True):
-    return smooth(random_program(seed, 40), settings_of(tolerance, weights, curves=curves))
+def smoothed(seed: int, tolerance: float = 0.05, *, curves: bool = True):
+    return smooth(random_program(seed, 40), settings_of(tolerance, curves=curves))
 
 
 def legs(of: SmoothProgram) -> tuple[Floats, Floats, Floats, Floats, Floats, Floats]:
@@ -86,22 +85,18 @@ def half_sine(one: Floats, other: Floats) -> Floats:
     return np.sin(np.arccos(np.clip(cosine, -1.0, 1.0)) / 2.0)
 
 
-def curve_point(points: Floats, weights: tuple[float, float], u: Floats) -> Floats:
+def curve_point(points: Floats, u: Floats) -> Floats:
     """Equation (3) by another library's basis: control points (5, 3)."""
-    w = np.array([1.0, weights[0], weights[1], weights[0], 1.0])
-    basis = BSpline(KNOTS, np.eye(5), 3)(u) * w
-    return basis @ points / basis.sum(axis=1)[:, None]
+    return BSpline(KNOTS, points, 3)(u)
 
 
-@pytest.mark.parametrize("weights", WEIGHTS)
-def test_eq_3_and_4_rational_basis_on_the_papers_knots(weights: tuple[float, float]) -> None:
+def test_eq_3_and_4_basis_on_the_papers_knots() -> None:
     u, points = np.linspace(0.0, 1.0, 101), np.random.default_rng(3).normal(size=(5, 3))
-    assert nurbs.evaluate(points[None], np.array(weights), u)[0] == pytest.approx(curve_point(points, weights, u))
+    assert nurbs.evaluate(points[None], u)[0] == pytest.approx(curve_point(points, u))
 
 
-@pytest.mark.parametrize("weights", WEIGHTS)
-def test_eq_5_to_9_control_points(weights: tuple[float, float]) -> None:
-    found = smoothed(1, 0.05, weights)
+def test_eq_5_to_9_control_points() -> None:
+    found = smoothed(1)
     tips, tops = nurbs.control_points(found.program, found.corners, slice(None), HEIGHT)
     corner_tip, tip_in, tip_out, corner_top, top_in, top_out = legs(found)
     trims = found.corners.trim_in, found.corners.axis_trim_in
@@ -115,32 +110,28 @@ def test_eq_5_to_9_control_points(weights: tuple[float, float]) -> None:
         assert points == pytest.approx(np.stack(expected, axis=1))
 
 
-@pytest.mark.parametrize("weights", WEIGHTS)
-def test_eq_10_error_at_the_middle(weights: tuple[float, float]) -> None:
-    found = smoothed(2, 0.05, weights)
+def test_eq_10_error_at_the_middle() -> None:
+    found = smoothed(2)
     curves = nurbs.control_points(found.program, found.corners, slice(None), HEIGHT)
     _, tip_in, tip_out, _, top_in, top_out = legs(found)
-    w1, w2 = weights
     for points, before, behind, trim, error in (
         (curves[0], tip_in, tip_out, found.corners.trim_in, found.corners.tip_error),
         (curves[1], top_in, top_out, found.corners.axis_trim_in, found.corners.axis_error),
     ):
         length = trim * size(before)
-        assert error == pytest.approx(2.0 * w1 * length * half_sine(before, behind) / (3.0 * (w1 + w2)))
-        middle = np.array([curve_point(one, weights, np.array([0.5]))[0] for one in points])
+        assert error == pytest.approx(length * half_sine(before, behind) / 3.0)
+        middle = np.array([curve_point(one, np.array([0.5]))[0] for one in points])
         assert size(middle - points[:, 2]) == pytest.approx(error)
         assert error.max() <= 0.05 * (1.0 + 1e-9)
 
 
-@pytest.mark.parametrize("weights", WEIGHTS)
-def test_eq_11_to_15_length(weights: tuple[float, float]) -> None:
+def test_eq_11_to_15_length() -> None:
     """Of the construction alone: both curves have the length that ε gives, or half of their shorter segment."""
-    program, settings = random_program(3, 60), settings_of(0.05, weights)
+    program, settings = random_program(3, 60), settings_of()
     found = Construction.smooth(CONSTRUCTION, program, settings)
     _, tip_in, tip_out, _, top_in, top_out = legs(found)
-    w1, w2 = weights
     sine = np.maximum(half_sine(tip_in, tip_out), half_sine(top_in, top_out))
-    by_tolerance = 3.0 * (w1 + w2) * 0.05 / (2.0 * w1 * sine)
+    by_tolerance = 3.0 * 0.05 / sine
     kept = found.corners.extra["size"] >= by_tolerance * (1.0 - 1e-9)  # by the motion, too
     assert kept.sum() > 10
     for before, behind, trims in (
@@ -177,10 +168,10 @@ def test_eq_16_and_19_shares_of_the_tolerance() -> None:
     assert np.isclose(larger[both], 0.02, rtol=1e-6).sum() > 10
 
 
-def brute(tip: Floats, curve: Floats, weights: tuple[float, float], low: float, high: float) -> tuple[Floats, Floats]:
+def brute(tip: Floats, curve: Floats, low: float, high: float) -> tuple[Floats, Floats]:
     """Roots of (21) between two parameters, and the excess on a fine grid, by sampling and secants."""
     v = np.linspace(low, high, 4001)
-    excess = size(curve_point(curve, weights, v) - tip) - HEIGHT
+    excess = size(curve_point(curve, v) - tip) - HEIGHT
     at = np.flatnonzero((excess[:-1] <= 0.0) != (excess[1:] <= 0.0))
     return v[at] - excess[at] * (v[at + 1] - v[at]) / (excess[at + 1] - excess[at]), excess
 
@@ -196,23 +187,22 @@ def random_curves(seed: int, count: int) -> tuple[Floats, Floats]:
 
 
 @pytest.mark.parametrize("seed", [7, 18])  # the excess of the second turns where Newton would pass the nearest root
-@pytest.mark.parametrize("weights", WEIGHTS)
-def test_eq_20_and_21_roots_in_the_knot_interval_or_what_is_nearest(weights: tuple[float, float], seed: int) -> None:
+def test_eq_20_and_21_roots_in_the_knot_interval_or_what_is_nearest(seed: int) -> None:
     tips, tops = random_curves(seed, 40)
     u = np.linspace(0.0, 1.0, 9)
-    v, missing = matching_parameters(tips, tops, np.array(weights), u, HEIGHT)
+    v, missing = matching_parameters(tips, tops, u, HEIGHT)
     assert (np.diff(v, axis=1) >= 0.0).all()
     assert (v[:, u < 0.5] <= 0.5).all()
     assert (v[:, u == 0.5] == 0.5).all()
     assert (v[:, u > 0.5] >= 0.5).all()
     with_roots = 0
     for row, (tip_curve, top_curve) in enumerate(zip(tips, tops, strict=True)):
-        points, expected = curve_point(tip_curve, weights, u), curve_point(top_curve, weights, v[row])
+        points, expected = curve_point(tip_curve, u), curve_point(top_curve, v[row])
         assert missing[row] == pytest.approx(np.abs(size(expected - points) - HEIGHT), abs=1e-12)
         for j in np.flatnonzero(u != 0.5):
             before = v[row, j - 1] if j else 0.0
             low, high = max(before, 0.0 if u[j] < 0.5 else 0.5), 0.5 if u[j] < 0.5 else 1.0
-            roots, excess = brute(points[j], top_curve, weights, low, high)
+            roots, excess = brute(points[j], top_curve, low, high)
             assert missing[row, j] <= np.abs(excess).min() + 1e-9
             if len(roots):
                 target = np.clip(before + (u[j] - u[j - 1] if j else 0.0), low, high)
@@ -228,7 +218,7 @@ def test_eq_20_v_is_u_where_both_curves_are_alike() -> None:
     tips, _ = random_curves(8, 30)
     tops = tips + HEIGHT * np.array([0.0, 0.6, 0.8])
     u = np.array([0.0, 0.1, 0.37, 0.5, 0.61, 0.9, 1.0])
-    v, missing = matching_parameters(tips, tops, np.array([1.0, 1.0]), u, HEIGHT)
+    v, missing = matching_parameters(tips, tops, u, HEIGHT)
     assert v == pytest.approx(np.tile(u, (30, 1)), abs=1e-9)
     assert missing.max() <= 1e-12
 
@@ -238,19 +228,19 @@ def test_eq_22_axis_leads_from_the_tip_to_the_axis_point_at_v() -> None:
     rows = np.flatnonzero(found.corners.smoothed)
     tips, tops = nurbs.control_points(found.program, found.corners, rows, HEIGHT)
     u = np.array([0.2, 0.4, 0.5, 0.7, 0.9, 1.0])
-    v, _ = matching_parameters(tips, tops, np.array([1.0, 1.0]), u, HEIGHT)
+    v, _ = matching_parameters(tips, tops, u, HEIGHT)
     points, levers = CONSTRUCTION.points(found, rows, u)
     unlike = 0
     for k in range(len(rows)):
-        expected = curve_point(tops[k], (1.0, 1.0), v[k, :-1]) - points[k, 1:-1]
+        expected = curve_point(tops[k], v[k, :-1]) - points[k, 1:-1]
         assert levers[k, 1:-1] == pytest.approx(expected)
         unlike += np.abs(v[k] - u).max() > 1e-3
     assert unlike > 5
     at = np.full(len(rows), 0.25)
-    v, _ = matching_parameters(tips, tops, np.array([1.0, 1.0]), np.linspace(0.0, 1.0, 9), HEIGHT)
+    v, _ = matching_parameters(tips, tops, np.linspace(0.0, 1.0, 9), HEIGHT)
     axes = CONSTRUCTION.axes(found.program, found.corners, found.settings, rows, at)
     for k in range(len(rows)):
-        own = curve_point(tops[k], (1.0, 1.0), v[k, [2]]) - curve_point(tips[k], (1.0, 1.0), at[:1])
+        own = curve_point(tops[k], v[k, [2]]) - curve_point(tips[k], at[:1])
         assert axes[k] == pytest.approx(direction(own)[0])
 
 
@@ -258,12 +248,12 @@ def test_eq_23_and_18_jumps_and_residuals_are_reported() -> None:
     found = smoothed(12, curves=False)
     rows = np.flatnonzero(found.corners.smoothed)
     tips, tops = nurbs.control_points(found.program, found.corners, rows, HEIGHT)
-    v, missing = matching_parameters(tips, tops, np.array([1.0, 1.0]), np.linspace(0.0, 1.0, 9), HEIGHT)
+    v, missing = matching_parameters(tips, tops, np.linspace(0.0, 1.0, 9), HEIGHT)
     assert found.corners.extra["sync_residual"][rows] == pytest.approx(missing.max(axis=1))
     for name, end, at in (("jump_in", 0, 0), ("jump_out", -1, 4)):
         for k, row in enumerate(rows):
             one = direction(tops[k, at] - tips[k, at])
-            other = direction(curve_point(tops[k], (1.0, 1.0), v[k, [end]])[0] - tips[k, at])
+            other = direction(curve_point(tops[k], v[k, [end]])[0] - tips[k, at])
             angle = np.arctan2(size(np.cross(one, other)), one @ other)
             assert found.corners.extra[name][row] == pytest.approx(angle, abs=1e-12)
 
@@ -323,8 +313,7 @@ def test_the_motion_keeps_the_tolerance_at_fine_parameters(seed: int, curves: bo
     u = np.linspace(0.0, 1.0, 81)
     if curves:
         tips, tops = (
-            nurbs.evaluate(one, np.array([1.0, 1.0]), u)
-            for one in nurbs.control_points(found.program, found.corners, rows, HEIGHT)
+            nurbs.evaluate(one, u) for one in nurbs.control_points(found.program, found.corners, rows, HEIGHT)
         )
         levers = tops - tips
     else:

@@ -56,8 +56,6 @@ class Trial:
         said += ["planned feeds"] if self.planned else []
         said += ["native cycles"] if self.native else []
         said += [f"axis tolerance {s.axis_tolerance:g}"] if s.axis_tolerance is not None else []
-        if s.method == "proportional":
-            said += ["weights {:g},{:g}".format(*s.weights)] if s.weights != (1, 1) else []
         return f"seed {self.seed}: " + " ".join(said) + " [" + " ".join(self.parts) + "]"
 
 
@@ -289,15 +287,12 @@ def _settings(rng: np.random.Generator, seed: int, form: Form) -> Settings:
     }
     if rng.random() < 0.25:
         options["method"] = "zhang2016"
-    else:
-        if rng.random() < 0.2:
-            options["weights"] = tuple(np.round(rng.uniform(0.3, 2.5, 2), 3).tolist())
+    elif rng.random() < 0.2:
+        rng.uniform(0.3, 2.5, 2)  # numbers of an option that is gone: other programs stay as they are
     if rng.random() < 0.2:
         options["reversal_angle"] = float(rng.choice([30.0, 90.0, 175.0, 180.0]))
     if rng.random() < 0.2:
         options["axis_step"] = float(rng.choice([0.1, 1.0, 10.0]))
-    if form.curve in ("poly", "spl"):
-        options.pop("weights", None)
     _other_methods(np.random.default_rng((seed, 1)), form, options)
     try:
         return Settings(**options)  # type: ignore[arg-type]
@@ -309,7 +304,6 @@ def _other_methods(rng: np.random.Generator, form: Form, options: dict[str, obje
     """Methods that some forms do not hold, and long lines; by a generator of its own, so that programs stay."""
     runs = not form.curves or form.curve in ("bspline", "g6.2")
     if rng.random() < 0.25 and runs:
-        options.pop("weights", None)
         options["method"] = "global"
     if form.long_lines and rng.random() < 0.4:
         options["lines"] = str(rng.choice(["long", "dense"]))

@@ -127,7 +127,7 @@ def judged(one: Trial, program: Program, *, oracle: bool = True) -> tuple[str, s
 
 def with_method(one: Trial, method: str) -> Trial:
     """The trial by another method of smoothing; as it is where that has another idea of its options."""
-    return replace(one, settings=one.settings.but(weights=Settings().weights, method=method))
+    return replace(one, settings=one.settings.but(method=method))
 
 
 def drawn(one: Trial) -> list[str]:

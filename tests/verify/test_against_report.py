@@ -125,8 +125,7 @@ def _path(smoothed, row: int, dense: bool):  # type: ignore[no-untyped-def]
     u = np.linspace(0, 1, 20001)
     if dense:
         u = np.concatenate(([0.0], nodes(int(lines_of(smoothed, np.array([row]))[0]))))
-    weights = corners.weights[[row]]
-    tips, tops = (nurbs.evaluate(curve, weights, u)[0] for curve in (tip_curve, axis_curve))
+    tips, tops = (nurbs.evaluate(curve, u)[0] for curve in (tip_curve, axis_curve))
     axes = tops - tips
     axes /= np.linalg.norm(axes, axis=1)[:, None]
     if dense:

@@ -143,17 +143,15 @@ def _machine(machine: Any) -> Machine | None:
 @contextlib.contextmanager
 def _named_as_typed() -> Iterator[None]:
     """Errors about a value name its option; those of the library name its field."""
-
-    def spelled(text: str) -> str:
-        return " ".join(FLAGS.get(word, [word])[-1] for word in text.split(" "))
-
     try:
         yield
     except SettingsError as wrong:
         field_name, verb, rest = wrong.what.partition(" is ")
-        what = spelled(field_name) + verb + rest if wrong.code in ("CS202", "CS260") else wrong.what
-        hint = spelled(wrong.hint) if wrong.code == "CS207" else wrong.hint
-        raise SettingsError(wrong.code, what, hint, file=wrong.file, line=wrong.line) from None
+        if wrong.code in ("CS202", "CS260"):
+            field_name = FLAGS.get(field_name, [field_name])[-1]
+        raise SettingsError(
+            wrong.code, field_name + verb + rest, wrong.hint, file=wrong.file, line=wrong.line
+        ) from None
 
 
 def typed(name: str) -> bool:

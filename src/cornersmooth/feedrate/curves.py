@@ -55,11 +55,8 @@ def polynomial(points: Floats, weights: Floats | None = None, half: Ints | None 
     """Powers of t (g, d + 1, 4) of w·P and w; ``[:, k]`` belongs to t^k, the last coordinate is w.
 
     From Bézier points (g, d + 1, 3) with weights (g, d + 1), all 1 by default; or from the five control points of
-    transitions (g, 5, 3) with w1 and w2 (g, 2), whose first (0) or second (1) `half` (g,) counts: t runs with u on
-    both.
+    transitions (g, 5, 3), whose first (0) or second (1) `half` (g,) counts: t runs with u on both.
     """
-    if half is not None and weights is not None:
-        weights = nurbs.full_weights(weights)
     w = np.ones(points.shape[:2]) if weights is None else weights
     weighted = np.concatenate((points * w[..., None], w[..., None]), axis=-1)
     convert = _to_powers(points.shape[1] - 1) if half is None else (_to_powers(3) @ _HALVES)[half]
@@ -261,11 +258,11 @@ class Curves:
     ) -> Curves:
         """First (0) or second (1) halves of the transitions of some corners, at the ends of the moves into poses."""
         pose = corners.pose[rows]
-        origin, weights = program.tip[pose], corners.weights[rows]
+        origin = program.tip[pose]
         powers = np.zeros((2, len(rows), 4, 4))
         for some in groups(np.arange(len(rows))):
             for into, points in zip(powers, nurbs.control_points(program, corners, rows[some], height), strict=True):
-                into[some] = polynomial(points - origin[some, None], weights[some], half[some])
+                into[some] = polynomial(points - origin[some, None], half=half[some])
         one, trims = np.ones(len(rows)), (corners.axis_trim_in[rows], corners.axis_trim_out[rows])
         legs = (
             corners.trim_in[rows] * norm(program.tip[pose] - program.tip[corners.before[rows]]),

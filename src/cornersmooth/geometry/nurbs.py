@@ -1,13 +1,14 @@
-"""The five-point curve: a cubic NURBS on the knots {0, 0, 0, 0, ½, 1, 1, 1, 1} with weights (1, w1, w2, w1, 1).
+"""The five-point curve: a cubic B-spline on the knots {0, 0, 0, 0, ½, 1, 1, 1, 1}; the paper's NURBS with weights of 1.
 
 Paper equations (3), (4) and (9). Each half is a Bézier cubic, and the second one mirrors the first. Seen from the
-corner X, with the legs a from the first control point to X and b from X to the last, and inner ones at ρ = 2/3 of them:
+corner X, with the legs a from the first control point to X and b from X to the last, and inner ones at ρ = 2/3 of them,
+in s = 2u of the first half:
 
-    first half:   X − σ·a + β·(b − a),    σ = R0 + ρ·R1 − ρ·R3,   β = ρ·R3
+    first half:   X − σ·a + β·(b − a),    σ = 1 − s,   β = ρ·s³/4
     second half:  X + σ·b + β·(b − a),    σ, β at the mirrored parameter
 
-(R: rational basis). X − σ·a and X + σ·b are poses of the original motion, so β·(b − a) is the deviation at a common
-parameter; β is largest at u = ½, where it is c = ρ·w1/(2(w1 + w2)) and σ = 0.
+X − σ·a and X + σ·b are poses of the original motion, so β·(b − a) is the deviation at a common parameter; β is largest
+at u = ½, where it is c = ρ/4 and σ = 0.
 """
 
 from __future__ import annotations
@@ -20,14 +21,11 @@ from cornersmooth.model import Bools, Corners, Floats, Ints, Program
 
 RATIO: Final = 2.0 / 3.0  #: distance of the second control point from the corner over that of the first
 
+#: the factor c: equations (10) to (12) without the sine
+DEVIATION: Final = RATIO / 4.0
 
 #: control points (5,) in the points of the first half by powers of s = 2u: equation (4)
 POWERS: Final = np.array([[4.0, 0, 0, 0, 0], [-12, 12, 0, 0, 0], [12, -18, 6, 0, 0], [-4, 7, -4, 1, 0]]) / 4.0
-
-
-def deviation_factor(weights: Floats) -> Floats:
-    """(...,) the factor c of weights (..., 2): equations (10) to (12) without the sine."""
-    return RATIO * weights[..., 0] / (2.0 * (weights[..., 0] + weights[..., 1]))
 
 
 def basis(u: Floats, order: int = 0) -> Floats:
@@ -39,33 +37,14 @@ def basis(u: Floats, order: int = 0) -> Floats:
     return np.where(second[..., None], (-1.0) ** order * values[..., ::-1], values)
 
 
-def rational_basis(u: Floats, weights: Floats) -> Floats:
-    """Rational basis (..., m, 5) at parameters (..., m), for weights w1, w2 (..., 2)."""
-    weighted = basis(u) * full_weights(weights)[..., None, :]
-    sums: Floats = weighted.sum(axis=-1, keepdims=True)
-    return weighted / sums
-
-
-def leg_coefficients(u: Floats, weights: Floats) -> Floats:
+def leg_coefficients(u: Floats) -> Floats:
     """Coefficients (..., m, 3) of corner, incoming and outgoing leg in the points of curves at parameters (..., m)."""
-    if (weights == 1.0).all():  # the cubics themselves: σ = 1 − s and β = ρ·s³/4
-        u = np.asarray(u, np.float64)
-        second = u > 0.5
-        s = 2.0 * np.where(second, 1.0 - u, u)
-        beta = RATIO / 4.0 * s * s * s
-        reach = 1.0 - s + beta
-        return np.stack((np.ones_like(u), -np.where(second, beta, reach), np.where(second, reach, beta)), axis=-1)
-    shares = rational_basis(u, weights)
-    incoming = -shares[..., 0] - RATIO * shares[..., 1]
-    outgoing = shares[..., 4] + RATIO * shares[..., 3]
-    return np.stack((np.ones_like(incoming), incoming, outgoing), axis=-1)
-
-
-def full_weights(weights: Floats) -> Floats:
-    """(..., 2) weights w1, w2 as the (..., 5) weights 1, w1, w2, w1, 1."""
-    w1, w2 = weights[..., 0], weights[..., 1]
-    one = np.ones_like(w1)
-    return np.stack((one, w1, w2, w1, one), axis=-1)
+    u = np.asarray(u, np.float64)
+    second = u > 0.5
+    s = 2.0 * np.where(second, 1.0 - u, u)
+    beta = RATIO / 4.0 * s * s * s
+    reach = 1.0 - s + beta
+    return np.stack((np.ones_like(u), -np.where(second, beta, reach), np.where(second, reach, beta)), axis=-1)
 
 
 def control_points(
@@ -94,23 +73,11 @@ def five_points(corner: Floats, leg_in: Floats, leg_out: Floats) -> Floats:
     return points
 
 
-def evaluate(points: Floats, weights: Floats, u: Floats) -> Floats:
-    """Points (g, m, 3) of curves by equation (3): control points (g, 5, 3), weights (g, 2), parameters (m,) or (g, m).
-
-    Weights (2,) are those of all curves.
-    """
-    return rational_basis(u, weights) @ points
+def evaluate(points: Floats, u: Floats) -> Floats:
+    """Points (g, m, 3) of curves by equation (3): control points (g, 5, 3), parameters (m,) or (g, m)."""
+    return basis(u) @ points
 
 
-def derivatives(points: Floats, weights: Floats, u: Floats) -> tuple[Floats, Floats, Floats]:
-    """Points and first two derivatives by u, (g, m, 3) each, of curves (g, 5, 3) at common parameters (m,).
-
-    At the knot u = ½ the left derivatives are returned; the curve is C² there.
-    """
-    n0, n1, n2 = (basis(u, order) for order in range(3))
-    w = full_weights(weights)[:, None, :]
-    d0, d1, d2 = ((n * w).sum(axis=-1, keepdims=True) for n in (n0, n1, n2))
-    p0 = ((n0 * w) @ points) / d0
-    p1 = ((n1 * w) @ points - d1 * p0) / d0
-    p2 = ((n2 * w) @ points - 2.0 * d1 * p1 - d2 * p0) / d0
-    return p0, p1, p2
+def derivatives(points: Floats, u: Floats) -> tuple[Floats, Floats, Floats]:
+    """Points and first two derivatives by u, (g, m, 3) each, of curves (g, 5, 3) at common parameters (m,)."""
+    return basis(u) @ points, basis(u, 1) @ points, basis(u, 2) @ points

@@ -55,7 +55,6 @@ __all__ = [
 ]
 
 
-_POLYNOMIAL = ("poly", "spl")  #: curve styles without weights
 #: curve styles of controls that may turn the tool in their own way on a line between two axis points
 _TURNING = ("bspline", "poly")
 
@@ -81,12 +80,6 @@ def fit_settings(settings: Settings, form: Form, units: Units) -> Settings:
     SettingsError
         The form cannot hold what the settings ask for.
     """
-    if form.curve in _POLYNOMIAL and settings.weights != (1.0, 1.0):
-        raise SettingsError(
-            "CS217",
-            f"{form.control} form {form.name} holds curves with weights 1 only",
-            "leave out weights, or choose another form",
-        )
     long = form.table.lines
     lines = settings.lines or (long.lines if form.long_lines else "dense")
     if lines == "long":

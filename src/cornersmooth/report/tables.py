@@ -241,7 +241,7 @@ def _largest_curvature(smoothed: SmoothProgram, rows: Ints) -> Floats:
     for block in np.array_split(np.arange(len(rows)), max(1, len(rows) // 8192)):
         chosen = rows[block]
         curve, _ = nurbs.control_points(smoothed.program, smoothed.corners, chosen, smoothed.settings.axis_length)
-        _, first, second = nurbs.derivatives(curve, smoothed.corners.weights[chosen], _CURVATURE_AT)
+        _, first, second = nurbs.derivatives(curve, _CURVATURE_AT)
         speed = norm(first)
         swing = norm(np.cross(first, second))
         bent = np.divide(swing, speed**3, out=np.zeros_like(speed), where=speed > 1e-12)

@@ -187,9 +187,8 @@ def place_corners(
     measures = {name: np.zeros(k) for name in _MEASURES}
     if METHODS[settings.method].one_parameter:  # the same fractions on both curves: one array
         measures |= {"axis_trim_in": measures["trim_in"], "axis_trim_out": measures["trim_out"]}
-    weights = np.broadcast_to(np.array(settings.weights), (k, 2))
     extra = {name: np.full(k, np.nan) for name in construction.extra}
-    found = Corners(pose, before, after, status, np.zeros(k, np.uint8), weights=weights, extra=extra, **measures)
+    found = Corners(pose, before, after, status, np.zeros(k, np.uint8), extra=extra, **measures)
 
     def settle(start: int) -> int:
         rows = start + np.flatnonzero(status[start : start + BATCH] == Status.SMOOTHED)

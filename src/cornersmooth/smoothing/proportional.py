@@ -35,8 +35,8 @@ BETWEEN_PROBES = 1e-3
 EXACT = 1e-10
 
 #: while the lever turns by less than this many times the deviation, relative to it, the deviation is largest at u = ½:
-#: half of what is proven, for all weights 1 and for all others
-_TILT_PAPER, _TILT_ANY = 1.5, 0.5
+#: half of what is proven
+_TILT = 1.5
 
 
 def keep(length: Floats, rows: Ints, measure: Callable[[Floats, Ints], Floats], tolerance: Floats) -> Floats:
@@ -65,10 +65,9 @@ class CornerLengths:
         per_in, per_out = 1.0 / self.length_in[:, None], 1.0 / self.length_out[:, None]
         self.bend_tip = legs.tip_out * per_out - legs.tip_in * per_in  # (U⁺ − U⁻)_A
         self.bend_turn = legs.turn_out * per_out - legs.turn_in * per_in  # (U⁺ − U⁻)_B − (U⁺ − U⁻)_A
-        self.factor = float(nurbs.deviation_factor(np.array(settings.weights)))
         # deviation over length: tip, axis point, axis point less tip
         bends = self.bend_tip, self.bend_tip + self.bend_turn, self.bend_turn
-        self.per_tip, per_axis, self.per_turn = (self.factor * norm(bend) for bend in bends)
+        self.per_tip, per_axis, self.per_turn = (nurbs.DEVIATION * norm(bend) for bend in bends)
         #: lengths that the tolerances allow, mm
         self.by_tolerance = np.minimum(
             divide(settings.tip_tolerance + legs.spare(settings), self.per_tip),
@@ -87,7 +86,7 @@ class CornerLengths:
 
     def middle(self, length: Floats, rows: Ints | slice = slice(None)) -> Floats:
         """|b′−b| at u = ½, where b is the axis point of the corner itself, mm."""
-        offset = (self.factor * length)[:, None]
+        offset = (nurbs.DEVIATION * length)[:, None]
         lever = self.axis_length * self.legs.axis[rows]
         turned = lever + offset * self.bend_turn[rows]  # Q − P
         turned *= (self.axis_length / norm(turned))[:, None]
@@ -96,7 +95,7 @@ class CornerLengths:
     def middle_turn(self, length: Floats) -> Floats:
         """Angle between the axis at u = ½ and that of the corner, rad."""
         axis = self.legs.axis
-        shift = (self.factor * length / self.axis_length)[:, None] * self.bend_turn
+        shift = (nurbs.DEVIATION * length / self.axis_length)[:, None] * self.bend_turn
         along = dot(shift, axis)
         across = np.sqrt(np.maximum(square(shift) - along * along, 0.0))
         return np.arctan2(across, 1.0 + along)
@@ -104,7 +103,7 @@ class CornerLengths:
     def probe(self, length: Floats, rows: Ints | slice = slice(None)) -> Floats:
         """Largest |b′−b| at common parameters over both halves, mm."""
         reach = length[:, None]
-        shares = nurbs.leg_coefficients(_PROBES, np.array(self.settings.weights))
+        shares = nurbs.leg_coefficients(_PROBES)
         beta = shares[:, 2]
         sigma = -shares[:, 1] - beta
         lever = self.axis_length * self.legs.axis[rows][:, None, :]
@@ -129,15 +128,12 @@ def _largest_in_the_middle(lengths: CornerLengths, length: Floats, turned: Float
 
     The deviation where the original motion is at σ, as in `cornersmooth.geometry.nurbs`, is at most f(σ)·(E + G·σ),
     with E the deviation at u = ½, f = β/c, and G the lever's turn over the half times H|O′−O|. So E is the largest
-    while f·(1 + σ·G/E) ≤ 1. With all weights 1, f is (1−σ)³ and G may be up to 3E; with any other
-    weights f is convex and falls from 1 to 0, so it is at most 1−σ and G may be up to E.
+    while f·(1 + σ·G/E) ≤ 1. As f is (1−σ)³, G may be up to 3E.
     """
     legs = lengths.legs
     turn = np.maximum(norm(legs.turn_in) * (1.0 / lengths.length_in), norm(legs.turn_out) * (1.0 / lengths.length_out))
     turn *= length / lengths.axis_length
-    paper = lengths.settings.weights == (1.0, 1.0)
-    tilt = 2.0 * turn * turned
-    return (tilt <= (_TILT_PAPER if paper else _TILT_ANY) * lengths.middle(length)) & (turn < 0.5)
+    return (2.0 * turn * turned <= _TILT * lengths.middle(length)) & (turn < 0.5)
 
 
 class Proportional(Construction):
@@ -176,8 +172,8 @@ class Proportional(Construction):
 
     def points(self, smoothed: SmoothProgram, rows: Ints, u: Floats) -> tuple[Floats, Floats]:
         """Both curves at the same parameters."""
-        corners, settings = smoothed.corners, smoothed.settings
-        shares = nurbs.leg_coefficients(np.concatenate(([0.0], u)), np.array(settings.weights))
+        corners = smoothed.corners
+        shares = nurbs.leg_coefficients(np.concatenate(([0.0], u)))
         pose, before, after = corners.pose[rows], corners.before[rows], corners.after[rows]
         trim_in, trim_out = corners.trim_in[rows, None], corners.trim_out[rows, None]
         legs = np.empty((2, len(rows), 3, 3))

@@ -223,7 +223,6 @@ def _fill_curves(smoothed: SmoothProgram, segments: Segments, batch: _Batch) -> 
     rows.tip[at], rows.other[at], rows.curve[at] = tip, top, np.arange(1, 6)
     assert rows.spline is not None
     rows.spline[at, 0], rows.spline[at[:, -1], 2] = KNOTS, 1.0
-    rows.spline[at, 1] = nurbs.full_weights(corners.weights[row])
     line = segments.has_line[pose]
     rows.joined[first] = ~line
     rows.tip[first[line] - 1], rows.other[first[line] - 1] = tip[line, 0], top[line, 0]

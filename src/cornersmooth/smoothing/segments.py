@@ -1,6 +1,6 @@
 """What every pose contributes to the written motion: straight remainders, transitions, and how many lines each takes.
 
-With all weights 1 the first half of a transition is, in s = 2u, the straight leg plus s³ times the deviation. So the
+The first half of a transition is, in s = 2u, the straight leg plus s³ times the deviation. So the
 chord error of a step Δs is proportional to s·Δs², and nodes s = (j/n)^(2/3) make it the same in every step.
 """
 
@@ -8,12 +8,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 
 from cornersmooth.arrays import norm, square
-from cornersmooth.geometry import nurbs
 from cornersmooth.model import Bools, Floats, Ints, Move, Numbers, SmoothProgram, Status
 from cornersmooth.settings import FLIP_ANGLE, METHODS, STANDING, Settings
 from cornersmooth.smoothing.construction import legs_at
@@ -21,15 +19,9 @@ from cornersmooth.smoothing.construction import legs_at
 #: exponent of the graded nodes s = (j/n)^(2/3)
 GRADED = 2.0 / 3.0
 
-#: β-error of one line per half with all weights 1, ``max((s − s³)/6)``; for n lines it is at most 1/n²
+#: β-error of one line per half, ``max((s − s³)/6)``; for n lines it is at most 1/n²
 #: of this on graded nodes, and 9/4 of that on even ones
 PAPER_ERROR = 1.0 / (9.0 * np.sqrt(3.0))
-
-#: numbers of lines at which other shapes are measured, and samples in each line; n²·error settles as n grows
-_NUMBERS, _SAMPLES = (1, 2, 3, 4, 8, 32, 400), 24
-
-#: what may lie between two samples
-_MARGIN = 1.01
 
 #: bend (mm) that one line per half may bridge, over the chord tolerance
 _BEND_PER_CHORD = 1.0 / PAPER_ERROR
@@ -230,8 +222,7 @@ def lines_of(smoothed: SmoothProgram, rows: Ints) -> Ints:
         (tip_out + turn_out) * corners.axis_trim_out[rows][:, None]
         - (tip_in + turn_in) * corners.axis_trim_in[rows][:, None],
     )
-    more_bend, more_turn = shape_factors(settings.weights)
-    bend = np.sqrt(np.maximum(square(bends[0]), square(bends[1]))) * more_bend
+    bend = np.sqrt(np.maximum(square(bends[0]), square(bends[1])))
     by_chord = np.sqrt(bend / (_BEND_PER_CHORD * settings.chord))
     way = np.minimum(norm(tip_in) * corners.trim_in[rows], norm(tip_out) * corners.trim_out[rows])
     # in each half the directions change by half of what they do at the corner
@@ -247,39 +238,8 @@ def lines_of(smoothed: SmoothProgram, rows: Ints) -> Ints:
     ):
         half = np.arcsin(np.minimum(np.sqrt(square(turn)) / (2.0 * settings.axis_length), 1.0))
         turned = 2.0 * half * reach + corners.orientation_error[rows]  # on this side of the middle
-        by_turn = np.maximum(by_turn, turned * more_turn / turn_limit(settings, half, settings.interpolation_tolerance))
+        by_turn = np.maximum(by_turn, turned / turn_limit(settings, half, settings.interpolation_tolerance))
     graded = np.maximum(number, np.ceil(by_turn**1.5 - 1e-9))
     even = np.maximum(np.ceil(1.5 * by_chord), np.ceil(by_turn - 1e-9))
     chosen = np.where(even < graded, -np.maximum(even, 1.0), np.maximum(graded, 1.0))
     return np.clip(chosen, -MOST_LINES, MOST_LINES).astype(np.int64)
-
-
-@cache
-def shape_factors(weights: tuple[float, float]) -> tuple[float, float]:
-    """Factors by which bend and turn of transitions count more for their weights.
-
-    The chord error of n lines is at most ``bend·PAPER_ERROR·|b − a|/n²``, 9/4 of it on even nodes; on even nodes σ (see
-    `cornersmooth.geometry.nurbs`) changes by at most ``turn/n`` in a line.
-    """
-    if weights[0] != 1.0 or weights[1] > 1.0:
-        return _measure(np.array(weights))
-    # then both are at most 6c, c the deviation factor (tests/smoothing/test_weights.py)
-    factor = max(6.0 * float(nurbs.deviation_factor(np.array(weights))), 1.0)
-    return factor, factor
-
-
-def _measure(weights: Floats) -> tuple[float, float]:
-    bend, turn = 0.0, 0.0
-    for number in _NUMBERS:
-        for exponent, allowed in ((GRADED, 1.0), (1.0, 2.25)):
-            ends = (np.arange(number + 1) / number) ** exponent
-            s = ends[:-1, None] + np.diff(ends)[:, None] * np.linspace(0.0, 1.0, _SAMPLES + 1)
-            coefficients = nurbs.leg_coefficients(0.5 * s, weights)
-            beta = coefficients[..., 2]
-            sigma = -coefficients[..., 1] - beta
-            slope = (beta[:, -1:] - beta[:, :1]) / (sigma[:, -1:] - sigma[:, :1])
-            error = np.abs(beta[:, :1] + slope * (sigma - sigma[:, :1]) - beta).max()
-            bend = max(bend, float(error) * number**2 / (PAPER_ERROR * allowed))
-            if exponent == 1.0:
-                turn = max(turn, float(np.abs(np.diff(sigma, axis=1)).max() * number * _SAMPLES))
-    return _MARGIN * max(bend, 1e-3), _MARGIN * max(turn, 1.0)

@@ -137,11 +137,6 @@ class Transitions:
     settings: Settings
 
     @cached_property
-    def weights(self) -> Floats:
-        """(2,) those of all curves."""
-        return np.array(self.settings.weights)
-
-    @cached_property
     def legs(self) -> Floats:
         """(g, 2, 2, 3) mm: of both curves, in and out."""
         return self.trims[..., None] * self.original.segments
@@ -152,13 +147,11 @@ class Transitions:
 
     def synchronised(self, u: Floats) -> Parameters:
         """Parameters v(u) (g, m), and what is missing there, mm: equations (20) and (21)."""
-        return synchronised(self.legs, self.original.lever, self.weights, u, self.settings.axis_length)
+        return synchronised(self.legs, self.original.lever, u, self.settings.axis_length)
 
     def motion(self, parameters: Parameters) -> Motion:
         """Poses at parameters."""
-        tip, axis = (
-            nurbs.leg_coefficients(at, self.weights)[..., 1:] @ self.legs[:, k] for k, at in enumerate(parameters)
-        )
+        tip, axis = (nurbs.leg_coefficients(at)[..., 1:] @ self.legs[:, k] for k, at in enumerate(parameters))
         return Motion(tip, self.original.lever[:, None] + axis - tip, *self.gone(parameters))
 
     def missing(self, parameters: Parameters) -> Floats:
@@ -167,17 +160,15 @@ class Transitions:
 
     def gone(self, parameters: Parameters) -> Parameters:
         """(g, m) parts of the segments that tips and axis points are away from corners; below 0 before these."""
-        paper = bool((self.weights == 1.0).all())  # then σ is 1 − 2u, and 2v − 1 behind the corner
         found = []
         for at, trims in zip(parameters, np.moveaxis(self.trims, 0, -1)[..., None], strict=True):
-            away = 2.0 * at - 1.0 if paper else nurbs.leg_coefficients(at, self.weights)[..., 1:].sum(axis=-1)
+            away = 2.0 * at - 1.0
             found.append(away * np.where(away < 0.0, trims[0], trims[1]))
         return found[0], found[1]
 
     def bounded(self, parameters: Parameters, missing: Floats) -> tuple[Floats, Floats]:
         """`bounded` at parameters."""
-        factor = float(nurbs.deviation_factor(self.weights))
-        errors = factor * norm(self.legs[:, :, 1] - self.legs[:, :, 0])
+        errors = nurbs.DEVIATION * norm(self.legs[:, :, 1] - self.legs[:, :, 0])
         return bounded(self.gone(parameters), missing, self.original, errors, self.settings)
 
     def report(self, u: Floats, parameters: Parameters) -> tuple[Floats, Floats, Floats]:

@@ -27,38 +27,34 @@ _NO_EXCESS, _NO_STEP, _STEPS = 1e-13, 1e-12, 60
 #: how far from where it is expected a root is looked for without the grid, and in how many steps of Newton
 _NEAR, _NEAR_STEPS, _SHORT = 1.0 / 16.0, 4, 1e-7
 
-#: shares of the control points in weight, σ and β of the first half
-_OF_SHARES = np.array([[1.0, 1, 1, 1, 1], [1, nurbs.RATIO, 0, -nurbs.RATIO, 0], [0, 0, 0, nurbs.RATIO, 0]])
+#: weight, σ and β of the first half by powers of s, and products of two of them
+_OF_POINTS = np.array([[1.0, 1, 1, 1, 1], [1, nurbs.RATIO, 0, -nurbs.RATIO, 0], [0, 0, 0, nurbs.RATIO, 0]])
+_SHARES = _OF_POINTS @ nurbs.POWERS.T
+_PAIRS = np.triu_indices(3)
+_PRODUCTS = np.array([np.convolve(one, other) for one, other in zip(*(_SHARES[k] for k in _PAIRS), strict=True)]).T
 
 
 @dataclass(frozen=True)
 class _Excess:
     """``(|Q(v) − P|² − H²) / 2H`` of g corners and points P in one half of v: zero where ``|Q(v) − P|`` is H.
 
-    With σ and β as in `cornersmooth.geometry.nurbs`, Q(v) is σ·l + β·d from the corner. Times the squared weight, all
-    are polynomials in s, which runs from the outer end of the half to its middle.
+    With σ and β as in `cornersmooth.geometry.nurbs`, Q(v) is σ·l + β·d from the corner: a polynomial in s, which runs
+    from the outer end of the half to its middle.
     """
 
-    above: Floats  # (7, g): the excess times the squared weight, by powers of s
-    below: Floats  # (1,) or (7,): the squared weight, which is 1 where all weights are
+    powers: Floats  # (7, g): the excess by powers of s
     second: bool  # half
     axis_length: float
 
     def __call__(self, v: Floats, rows: Ints | slice = slice(None)) -> tuple[Floats, Floats, Floats]:
         """Equation (21) as a length, mm, with two derivatives, at parameters (k,) of the curves of rows."""
         s, turned = self._place(v), -2.0 if self.second else 2.0
-        value, slope, bend = _polynomial(self.above[:, rows], s)
-        if len(self.below) > 1:
-            weight, rate, change = _polynomial(self.below, s)
-            value = value / weight
-            slope = (slope - value * rate) / weight
-            bend = (bend - 2.0 * slope * rate - value * change) / weight
+        value, slope, bend = _polynomial(self.powers[:, rows], s)
         return value, turned * slope, 4.0 * bend
 
     def on(self, grid: Floats) -> Floats:
         """(g, m) the excess at common parameters (m,)."""
-        powers = self._place(grid) ** np.arange(7)[:, None]
-        return self.above.T @ powers / (self.below @ powers[: len(self.below)])
+        return self.powers.T @ self._place(grid) ** np.arange(7)[:, None]
 
     def missing(self, v: Floats) -> Floats:
         """``||Q(v) − P| − H|``, mm."""
@@ -79,39 +75,33 @@ def _polynomial(powers: Floats, s: Floats) -> tuple[Floats, Floats, Floats]:
     return value, slope, 2.0 * bend
 
 
-def matching_parameters(
-    tip_curve: Floats, axis_curve: Floats, weights: Floats, u: Floats, axis_length: float
-) -> tuple[Floats, Floats]:
+def matching_parameters(tip_curve: Floats, axis_curve: Floats, u: Floats, axis_length: float) -> tuple[Floats, Floats]:
     """Parameters v(u) (g, m) with |Q(v) − P(u)| = H as nearly as possible, never decreasing, and what is missing, mm.
 
     Equations (20) and (21).
-    Control points (g, 5, 3) are those of P and Q; weights (2,) are those of all, u (m,) ascends.
+    Control points (g, 5, 3) are those of P and Q; u (m,) ascends.
     """
     curves = np.stack((tip_curve, axis_curve), axis=1)
     lever = axis_curve[:, 2] - tip_curve[:, 2]
-    return synchronised(curves[:, :, [2, 4]] - curves[:, :, [0, 2]], lever, weights, u, axis_length)
+    return synchronised(curves[:, :, [2, 4]] - curves[:, :, [0, 2]], lever, u, axis_length)
 
 
-def synchronised(legs: Floats, lever: Floats, weights: Floats, u: Floats, axis_length: float) -> tuple[Floats, Floats]:
+def synchronised(legs: Floats, lever: Floats, u: Floats, axis_length: float) -> tuple[Floats, Floats]:
     """`matching_parameters` of both curves by their legs in and out (g, 2, 2, 3), and by levers at the corners."""
     (tip_in, tip_out), (axis_in, axis_out) = np.ascontiguousarray(np.moveaxis(legs, 0, -1))
     bend, away = axis_out - axis_in, np.stack((np.ascontiguousarray(lever.T), tip_in, tip_out))
-    shares = nurbs.leg_coefficients(u, weights) * (1.0, -1.0, -1.0)  # of `away` in P less the corner of Q
-    first, other = np.triu_indices(3)
+    shares = nurbs.leg_coefficients(u) * (1.0, -1.0, -1.0)  # of `away` in P less the corner of Q
+    first, other = _PAIRS
     pairs = _dot(away[first], away[other]) * np.where(first == other, 1.0, 2.0)[:, None]
     pairs[0] -= axis_length**2
-    powers = (nurbs.full_weights(weights) * _OF_SHARES) @ nurbs.POWERS.T
-    # products of weight, σ and β, each times weight: as they go with the terms below
-    products = np.array([np.convolve(powers[i], powers[j]) for i, j in zip(first, other, strict=True)]).T
     halves = []
     for second, leg in enumerate((-axis_in, axis_out)):
         own = shares[(u > 0.5) == second]
         terms = [own[:, first] * own[:, other] @ pairs, *(2.0 * own @ _dot(one, away) for one in (leg, bend))]
         terms += [_dot(leg, leg), 2.0 * _dot(leg, bend), _dot(bend, bend)]
         every = np.stack([np.broadcast_to(term, terms[0].shape) for term in terms]) / (2.0 * axis_length)
-        above = (products @ every.reshape(6, -1)).reshape(7, *every.shape[1:])
-        below = products[:, 0] if products[1:, 0].any() else products[:1, 0]
-        halves.append(_Excess(above, below, bool(second), axis_length))
+        powers = (_PRODUCTS @ every.reshape(6, -1)).reshape(7, *every.shape[1:])
+        halves.append(_Excess(powers, bool(second), axis_length))
 
     # the paper solves (21) in the knot interval of u, n = 3 or 4: so both are ½ together
     v, missing = np.empty((2, len(u), len(lever)))
@@ -137,11 +127,11 @@ def _in_turn(half: _Excess, u: Floats, last: Floats, before: float) -> Floats:
     for j, step in enumerate(np.diff(u, prepend=before)):
         if u[j] != 0.5:
             low_limit, target = np.maximum(last, low), np.clip(last + step, low, high)
-            excess = replace(half, above=half.above[:, j])
+            excess = replace(half, powers=half.powers[:, j])
             v[j] = _near(low_limit, high, target, excess)
             left = np.flatnonzero(np.isnan(v[j]))
             if len(left):
-                excess = replace(excess, above=excess.above[:, left])
+                excess = replace(excess, powers=excess.powers[:, left])
                 own = _GRID[slice(*np.searchsorted(_GRID, (low, high + _NO_STEP)))]
                 v[j, left] = _follow(own, excess, low_limit[left], target[left])
         last = v[j]

@@ -52,7 +52,7 @@ _PARTS: Final = np.array([0.25, 0.5, 0.75])
 _SMALLER: Final = 0.7
 _TIMES: Final = 12
 
-#: where transitions of other weights than 1 are looked at: they may bend within little of the parameter
+#: where transitions are looked at that keep a tolerance of the axis: there is no bound for it
 _MORE_PARAMETERS: Final = np.linspace(0.0, 1.0, 33)
 
 #: a size whose motion takes the tolerance but for this is the size that just keeps it
@@ -104,7 +104,7 @@ class Zhang2016(Construction):
         sizes, sines = norm(segments), norm(unit(segments[:, :, 1]) - unit(segments[:, :, 0])) / 2.0
         sines[sizes.min(axis=2) == 0.0] = 0.0  # a leg of no length has no direction
         g = len(sines)
-        factor = 2.0 * float(nurbs.deviation_factor(np.array(settings.weights)))  # 2·w1/(3(w1+w2)) in the paper
+        factor = 2.0 * nurbs.DEVIATION  # 2·w1/(3(w1+w2)) in the paper
         allowed = np.array((settings.common_tolerance, settings.axis_point_tolerance)) + original.spare[:, None]
         by_tolerance = divide(allowed, factor * sines).min(axis=1)
         halves = sizes.min(axis=2) / 2.0
@@ -148,11 +148,10 @@ class Zhang2016(Construction):
     def points(self, smoothed: SmoothProgram, rows: Ints, u: Floats) -> tuple[Floats, Floats]:
         """The axis-point curve at the synchronised parameters: equations (20) to (22) and, at the ends, (26)."""
         corners, height = smoothed.corners, smoothed.settings.axis_length
-        weights = np.array(smoothed.settings.weights)
         tip_curve, axis_curve = nurbs.control_points(smoothed.program, corners, rows, height)
-        v, _ = matching_parameters(tip_curve, axis_curve, weights, u, height)
-        points = nurbs.evaluate(tip_curve, weights, np.concatenate(([0.0], u)))
-        tops = nurbs.evaluate(axis_curve, weights, np.concatenate((np.zeros((len(rows), 1)), v), axis=1))
+        v, _ = matching_parameters(tip_curve, axis_curve, u, height)
+        points = nurbs.evaluate(tip_curve, np.concatenate(([0.0], u)))
+        tops = nurbs.evaluate(axis_curve, np.concatenate((np.zeros((len(rows), 1)), v), axis=1))
         tops[:, -1] = axis_curve[:, -1]  # the straight motion behind starts from its own axis: equation (26)
         return points, tops - points
 
@@ -179,13 +178,12 @@ class Zhang2016(Construction):
         """
         distinct, which = np.unique(rows, return_inverse=True)
         tip_curve, axis_curve = nurbs.control_points(program, corners, distinct, settings.axis_length)
-        weights = np.array(settings.weights)
-        v, _ = matching_parameters(tip_curve, axis_curve, weights, REPORT_PARAMETERS, settings.axis_length)
+        v, _ = matching_parameters(tip_curve, axis_curve, REPORT_PARAMETERS, settings.axis_length)
         cell = np.clip(np.searchsorted(REPORT_PARAMETERS, u, side="right") - 1, 0, len(REPORT_PARAMETERS) - 2)
         part = (u - REPORT_PARAMETERS[cell]) / (REPORT_PARAMETERS[cell + 1] - REPORT_PARAMETERS[cell])
         at = v[which, cell] + part * (v[which, cell + 1] - v[which, cell])
-        tips = nurbs.evaluate(tip_curve[which], weights, u[:, None])[:, 0]
-        return unit(nurbs.evaluate(axis_curve[which], weights, at[:, None])[:, 0] - tips)
+        tips = nurbs.evaluate(tip_curve[which], u[:, None])[:, 0]
+        return unit(nurbs.evaluate(axis_curve[which], at[:, None])[:, 0] - tips)
 
     def report_columns(self, corners: Corners, rows: Ints) -> dict[str, Floats]:
         """What the synchronisation leaves at every corner."""
@@ -225,7 +223,7 @@ def _trimmed(original: Original, sizes: Floats, lengths: Floats, settings: Setti
 def _measured(made: Transitions) -> tuple[tuple[Floats, ...], Floats]:
     """Residual, jumps and turn of transitions, and what of the tolerances they take (g,)."""
     settings = made.settings
-    u = REPORT_PARAMETERS if settings.weights == (1.0, 1.0) and settings.axis_tolerance is None else _MORE_PARAMETERS
+    u = REPORT_PARAMETERS if settings.axis_tolerance is None else _MORE_PARAMETERS
     v, residual = made.synchronised(u)
     most, report = residual.max(axis=1), made.report(u, (u, v))
     if settings.round_feed_changes:
