@@ -131,15 +131,16 @@ def test_sections_are_the_curve_of_the_run() -> None:
     runs = smoothed.runs
     assert runs is not None
     rows = section_rows(runs, program)
-    begin = np.flatnonzero(rows.number == 1)
+    assert rows.spline is not None
+    begin, points = np.flatnonzero(rows.curve == 1), np.hstack((rows.tip, rows.other))
     assert len(begin) > len(runs)
-    assert rows.number.max() <= SPANS + 3 + 4 <= np.iinfo(np.int8).max  # as rows of a text count them
+    assert rows.curve.max() <= SPANS + 3 + 4 <= np.iinfo(np.int8).max  # as rows of a text count them
     gone, run_of, at = 0.0, 0, 0
     first = np.concatenate(([0], np.cumsum(runs.knot_count)))
-    for start, end in zip(begin, np.append(begin[1:], len(rows.number)), strict=True):
-        knots = np.concatenate((rows.knot[start:end], [rows.last_knot[end - 1]] * 4)) * 1000.0
+    for start, end in zip(begin, np.append(begin[1:], len(points)), strict=True):
+        knots = np.concatenate((rows.spline[start:end, 0], [rows.spline[end - 1, 2]] * 4)) * 1000.0
         np.testing.assert_allclose(knots, np.round(knots), atol=1e-6)  # three decimals hold them
-        section = BSpline(knots, rows.points[start:end], 3)
+        section = BSpline(knots, points[start:end], 3)
         own = runs.knot[first[run_of] : first[run_of + 1]]
         control = runs.control[at : at + len(own) + 2]
         whole = BSpline(np.concatenate(([own[0]] * 3, own, [own[-1]] * 3)), control, 3)

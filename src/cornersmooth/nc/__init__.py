@@ -34,7 +34,8 @@ from cornersmooth.nc.script import Script
 from cornersmooth.nc.statement_args import spindle_orders, tool_starts
 from cornersmooth.nc.statement_writer import StatementWriter
 from cornersmooth.settings import CURVES_METHOD, DEFAULT_METHOD, FLIP_ANGLE, Settings
-from cornersmooth.smoothing.sampling import Rows, all_dense_rows, curve_rows, dense_rows
+from cornersmooth.smoothing.runs.rows import Rows
+from cornersmooth.smoothing.sampling import all_dense_rows, curve_rows, dense_rows
 
 __all__ = [
     "Control",

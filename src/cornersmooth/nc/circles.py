@@ -186,33 +186,26 @@ def _deviation(
     """(k,) mm from the written circles to the arcs at equal shares; infinite for a block that is too short."""
     rows, share = divided(blocks)
     before = share - 1.0 / blocks[rows]
-    frames = frames[rows]
-    start, end = (step * np.rint(_local(arc_points(program, rows, at)[0], frames) / step) for at in (before, share))
-    first, second, third = planes[rows].T
-    own = np.arange(len(rows))
-    chord = np.stack([end[own, axis] - start[own, axis] for axis in (first, second, third)], axis=1)
+
+    def placed(at: Floats) -> Floats:
+        """(b, 3) places of arcs along the axes of their planes, the one across last."""
+        return np.take_along_axis(_local(arc_points(program, rows, at)[0], frames[rows]), planes[rows], axis=1)
+
+    start, end = (step * np.rint(placed(at) / step) for at in (before, share))
+    chord = end - start
     length = np.hypot(chord[:, 0], chord[:, 1])
     size, left = radius[rows], np.where(counterclockwise[rows], 1.0, -1.0)
-    proper = (
-        (length >= _SHORTEST_CHORD * step)
-        & (length < 2.0 * size)
-        & ~(flat[rows] & (np.rint(chord[:, 2] / step) != 0.0))
-    )
-    safe = np.where(proper, length, 1.0)
-    across = np.stack((-chord[:, 1], chord[:, 0]), axis=1) / safe[:, None]
+    proper = (length >= _SHORTEST_CHORD * step) & (length < 2.0 * size)
+    proper &= ~(flat[rows] & (np.rint(chord[:, 2] / step) != 0.0))
+    across = np.stack((-chord[:, 1], chord[:, 0]), axis=1) / np.where(proper, length, 1.0)[:, None]
     rise = np.sqrt(np.maximum(size**2 - length**2 / 4.0, 0.0))
     to_centre = chord[:, :2] / 2.0 + (left * rise)[:, None] * across
     turn = 2.0 * left * np.arcsin(np.minimum(length / 2.0 / size, 1.0))
-    worst = np.zeros(len(rows))
+    worst, (x, y) = np.zeros(len(rows)), -to_centre.T
     for probe in _PROBES:
         cosine, sine = np.cos(turn * probe), np.sin(turn * probe)
-        x, y = -to_centre.T
-        point = start.copy()
-        point[own, first] += to_centre[:, 0] + cosine * x - sine * y
-        point[own, second] += to_centre[:, 1] + sine * x + cosine * y
-        point[own, third] += probe * chord[:, 2]
-        arc, _ = arc_points(program, rows, before + probe * (share - before))
-        worst = np.maximum(worst, norm(point - _local(arc, frames)))
+        gone = np.stack((cosine * x - sine * y - x, sine * x + cosine * y - y, probe * chord[:, 2]), axis=1)
+        worst = np.maximum(worst, norm(start + gone - placed(before + probe * (share - before))))
     worst[~proper] = np.inf
     deviation = np.zeros(len(blocks))
     np.maximum.at(deviation, rows, worst)

@@ -22,7 +22,7 @@ from cornersmooth.nc.messages import Findings, refused
 from cornersmooth.nc.modals import Modals
 from cornersmooth.nc.planes import turned_part
 from cornersmooth.nc.rotary_words import UPRIGHT, machine_of, rows_that_swing
-from cornersmooth.smoothing.sampling import Rows
+from cornersmooth.smoothing.runs.rows import Rows
 
 NOWHERE = 1 << 62  #: a pose that no program has
 #: Z of a turned part for each mm of Z of the machine, below which a block from the retract may come from below its end

@@ -23,7 +23,8 @@ from cornersmooth.settings import METHODS, TIMED_POSES, Settings
 from cornersmooth.smoothing.blending import largest_blends
 from cornersmooth.smoothing.long_lines import LineLimits, Vertices, fewest_lines, segments_of_rows, vertices
 from cornersmooth.smoothing.outside_lines import faster_lines
-from cornersmooth.smoothing.sampling import ArcBlocks, Rows, all_dense_rows
+from cornersmooth.smoothing.runs.rows import Rows
+from cornersmooth.smoothing.sampling import ArcBlocks, all_dense_rows
 from cornersmooth.text import to_ticks
 
 _CHUNK = 1 << 15  #: dense rows handed on at a time

@@ -20,7 +20,8 @@ from cornersmooth.model import Bools, Floats, Ints, Move, Program, SmoothProgram
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.messages import Findings
 from cornersmooth.nc.statement_args import tool_starts
-from cornersmooth.smoothing.sampling import Rows, all_dense_rows
+from cornersmooth.smoothing.runs.rows import Rows
+from cornersmooth.smoothing.sampling import all_dense_rows
 from cornersmooth.system.processes import return_free_memory
 
 

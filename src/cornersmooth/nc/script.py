@@ -35,7 +35,7 @@ from cornersmooth.nc.program_frame import Stream
 from cornersmooth.nc.rotary_words import machine_of
 from cornersmooth.nc.statement_args import tool_starts
 from cornersmooth.nc.statement_writer import StatementWriter
-from cornersmooth.smoothing.sampling import Rows
+from cornersmooth.smoothing.runs.rows import Rows
 from cornersmooth.text import format_number
 
 PECK_GAP = 0.5  #: mm left above the last depth before feeding goes on, and moved up to break a chip

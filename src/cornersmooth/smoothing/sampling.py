@@ -17,33 +17,8 @@ from cornersmooth.geometry import nurbs
 from cornersmooth.geometry.arcs import arc_curves, arc_lines, arc_points, arc_weights, divided
 from cornersmooth.model import Bools, Floats, Ints, Numbers, SmoothProgram
 from cornersmooth.smoothing.construction import BATCH, construction_of
-from cornersmooth.smoothing.runs.rows import NO_ROWS, SectionRows, run_lines, section_rows, some_at_once
+from cornersmooth.smoothing.runs.rows import Rows, run_lines, section_rows, some_at_once
 from cornersmooth.smoothing.segments import Segments, lines_per_half, segments_of
-
-
-@dataclass(frozen=True)
-class Rows:
-    """A part of the smoothed motion, r rows in path order."""
-
-    tip: Floats  #: (r, 3) mm: end of a line, or a control point of the tip curve
-    #: (r, 3): unit axis vector in dense rows; axis point (mm) or control point of the axis-point curve in curve rows
-    other: Floats
-    #: (r,): Pose whose move the row belongs to; lines after the middle of a transition are of the next. Never
-    #: decreasing. Feed, kind and the place of statements follow from it.
-    move: Ints
-    #: 0 for the end of a line; 1 to 5 for a control point of a transition, from 1 on for one of a section of a run
-    curve: NDArray[np.int8]
-    joined: Bools  #: (r,): first control points that are the end of the row before, with no line between
-    #: (r,): Moves per minute (inverse time) of rows that are timed so, NaN for the others; None where none is.
-    rate: Floats | None = None
-    #: (r, 3): Of control points: knot, weight and, in the last row of a curve, the last knot, zero elsewhere. None in
-    #: rows of lines.
-    spline: Floats | None = None
-    #: (r,) mm: How far the control may round the corner at each row by itself; None where one value holds for all.
-    blend: Floats | None = None
-    #: (r,): Rows at which the tool comes back into a cut that it has left at the row before; None where there is
-    #: none.
-    left: Bools | None = None
 
 
 @dataclass(frozen=True)
@@ -102,7 +77,7 @@ class _Layout:
     segments: Segments
     halves: Numbers  # (k,) lines for each half of the transitions; none in curves
     counts: Numbers  # (n,) rows
-    runs: SectionRows
+    runs: Rows | None  # whole runs: ends of lines or control points of sections
     replaced: Bools  # (n,) poses with rows of runs
     curves: bool
     divide: bool  # whether lines in which the axis turns much are several
@@ -113,13 +88,17 @@ class _Layout:
         program = smoothed.program
         segments = segments_of(smoothed, dense=divide, curves=curves)
         halves = np.zeros(0, np.int32) if curves else lines_per_half(smoothed)
-        runs, replaced = _of_runs(smoothed, curves=curves)
+        replaced, runs, whole = np.zeros(len(program), np.bool_), None, smoothed.runs
+        if whole is not None:
+            replaced[np.delete(whole.pose, starts(whole.count)[:-1])] = True
+            parts, settings = some_at_once(whole), smoothed.settings
+            runs = joined_rows(section_rows(p, program) if curves else run_lines(p, program, settings) for p in parts)
         segments.lines[replaced] = 1
         counts = np.where(segments.has_line, segments.lines, 0)
         rounded = np.flatnonzero(segments.row >= 0)
         counts[rounded] += 5 if curves else 2 * np.abs(halves[segments.row[rounded]])
         counts[segments.skip] = 0
-        if smoothed.runs is not None:
+        if runs is not None:
             counts[replaced] = np.bincount(runs.move, minlength=len(counts))[replaced]
         number = len(program.arcs)
         arcs = ArcBlocks(np.zeros(number, np.int64), np.zeros(number, np.bool_), None) if arcs is None else arcs
@@ -168,26 +147,13 @@ class _Layout:
             _fill_curves(smoothed, segments, batch)
         else:
             _fill_transitions(smoothed, segments, batch, self.halves)
-        here = np.flatnonzero(self.replaced[own])
-        at = ranges(batch.first[here], counts[here])
-        part = slice(*np.searchsorted(runs.move, (batch.poses[0], batch.poses[-1] + 1)))
-        rows.tip[at], rows.other[at] = runs.points[part, :3], runs.points[part, 3:]
-        if rows.spline is not None:
-            rows.curve[at], rows.joined[at] = runs.number[part], runs.number[part] == 1
-            rows.spline[at, 0], rows.spline[at, 2] = runs.knot[part], runs.last_knot[part]
+        if runs is not None:
+            here = np.flatnonzero(self.replaced[own])
+            at = ranges(batch.first[here], counts[here])
+            part = some_rows(runs, slice(*np.searchsorted(runs.move, (batch.poses[0], batch.poses[-1] + 1))))
+            for name in ("tip", "other", "curve", "joined", *(("spline",) if self.curves else ())):
+                getattr(rows, name)[at] = getattr(part, name)
         return rows
-
-
-def _of_runs(smoothed: SmoothProgram, *, curves: bool) -> tuple[SectionRows, Bools]:
-    """Rows of whole runs, ends of lines or control points of sections, and the poses (n,) that they replace."""
-    program, runs = smoothed.program, smoothed.runs
-    replaced = np.zeros(len(program), np.bool_)
-    if runs is None:
-        return NO_ROWS, replaced
-    replaced[np.delete(runs.pose, starts(runs.count)[:-1])] = True
-    parts = some_at_once(runs)
-    made = (section_rows(p, program) if curves else run_lines(p, program, smoothed.settings) for p in parts)
-    return joined_rows(made), replaced
 
 
 def _fill_arcs(smoothed: SmoothProgram, batch: _Batch, counts: Numbers, arcs: ArcBlocks) -> None:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from cornersmooth.arrays import angle_between, batches, norm, search, some_runs, spread, starts, unit
 from cornersmooth.geometry.bsplines import Splines
-from cornersmooth.model import Floats, Ints, Numbers, Program, Runs
+from cornersmooth.model import Bools, Floats, Ints, Program, Runs
 from cornersmooth.settings import STANDING, Settings
 from cornersmooth.smoothing.runs.polylines import Pieces, Polylines
 from cornersmooth.smoothing.segments import MOST_LINES, lines_for_feed, turn_limit
@@ -88,22 +88,32 @@ def largest_curvature(lines: Polylines, splines: Splines, control: Floats) -> Fl
 
 
 @dataclass(frozen=True)
-class SectionRows:
-    """Rows of runs in path order, m of them: control points of sections, or ends of lines."""
+class Rows:
+    """A part of the smoothed motion, r rows in path order."""
 
-    move: Numbers  # pose in whose segment the section or line ends
-    number: NDArray[np.int8]  # 1 for the first control point of a section; 0 for lines
-    points: Floats  # tip and axis point, (m, 6), mm; tip and unit axis for lines
-    knot: Floats  # that goes with each control point, from 0
-    last_knot: Floats  # of the section in its last row, else 0
+    tip: Floats  #: (r, 3) mm: end of a line, or a control point of the tip curve
+    #: (r, 3): unit axis vector in dense rows; axis point (mm) or control point of the axis-point curve in curve rows
+    other: Floats
+    #: (r,): Pose whose move the row belongs to; lines after the middle of a transition are of the next. Never
+    #: decreasing. Feed, kind and the place of statements follow from it.
+    move: Ints
+    #: 0 for the end of a line; 1 to 5 for a control point of a transition, from 1 on for one of a section of a run
+    curve: NDArray[np.int8]
+    joined: Bools  #: (r,): first control points that are the end of the row before, with no line between
+    #: (r,): Moves per minute (inverse time) of rows that are timed so, NaN for the others; None where none is.
+    rate: Floats | None = None
+    #: (r, 3): Of control points: knot, weight and, in the last row of a curve, the last knot, zero elsewhere. None in
+    #: rows of lines.
+    spline: Floats | None = None
+    #: (r,) mm: How far the control may round the corner at each row by itself; None where one value holds for all.
+    blend: Floats | None = None
+    #: (r,): Rows at which the tool comes back into a cut that it has left at the row before; None where there is
+    #: none.
+    left: Bools | None = None
 
 
-#: where there are no runs
-NO_ROWS = SectionRows(np.zeros(0, np.int32), np.zeros(0, np.int8), np.zeros((0, 6)), np.zeros(0), np.zeros(0))
-
-
-def run_lines(runs: Runs, program: Program, settings: Settings) -> SectionRows:
-    """Ends of the lines that runs are written as; with the share of the run's parameter there for a knot."""
+def run_lines(runs: Runs, program: Program, settings: Settings) -> Rows:
+    """Ends of the lines that runs are written as."""
     lines, splines = polylines_of(runs, program, settings.axis_length), Splines(runs.knot, runs.knot_count)
     pieces = Pieces.of(splines, lines)
     segment, first = np.unique(pieces.segment, return_index=True)  # one piece or more for every segment
@@ -124,14 +134,10 @@ def run_lines(runs: Runs, program: Program, settings: Settings) -> SectionRows:
 
     pose, span = segment[row] + 1, pieces.span[piece]
     tip, axis = points_at(runs.control, splines, span, s)
-    along = s / splines.knot[splines.first[1:] - 1][splines.span_run[span]]
     ends = last & np.isin(pose, lines.first[1:] - 1)  # of runs, which are passed exactly
     point = lines.point[pose[ends]]
-    tip[ends], axis[ends], along[ends] = point[:, :3], unit(point[:, 3:] - point[:, :3]), 1.0
-    nothing = np.zeros(len(tip))
-    return SectionRows(
-        runs.pose[pose].astype(np.int32), nothing.astype(np.int8), np.hstack((tip, axis)), along, nothing
-    )
+    tip[ends], axis[ends] = point[:, :3], unit(point[:, 3:] - point[:, :3])
+    return Rows(tip, axis, runs.pose[pose], np.zeros(len(tip), np.int8), np.zeros(len(tip), np.bool_))
 
 
 def _effort(
@@ -154,20 +160,15 @@ def _effort(
     return np.maximum(by_chord, by_turn)
 
 
-def section_rows(runs: Runs, program: Program) -> SectionRows:
+def section_rows(runs: Runs, program: Program) -> Rows:
     """Cut the runs into sections; poses with a statement after them are ends of sections."""
     splines = Splines(runs.knot, runs.knot_count)
     run, begin, end = section_ends(runs, splines, program)
     owner, number, knot, points = clamped(splines, runs.control, run, begin, end)
-    last = np.append(number[1:] == 1, True)
-    return SectionRows(
-        # a pose is in the segment that leads to it
-        move=runs.pose[search(runs.s, runs.count, run, end)].astype(np.int32)[owner],
-        number=number.astype(np.int8),
-        points=points,
-        knot=knot / STEPS_PER_UNIT,
-        last_knot=np.where(last, (end - begin)[owner], 0.0) / STEPS_PER_UNIT,
-    )
+    last_knot = np.where(np.append(number[1:] == 1, True), (end - begin)[owner], 0.0)
+    spline = np.stack((knot / STEPS_PER_UNIT, np.ones(len(knot)), last_knot / STEPS_PER_UNIT), axis=1)
+    move = runs.pose[search(runs.s, runs.count, run, end)][owner]  # a pose is in the segment that leads to it
+    return Rows(points[:, :3], points[:, 3:], move, number.astype(np.int8), number == 1, spline=spline)
 
 
 def clamped(
