@@ -24,6 +24,7 @@ import numpy as np
 from cornersmooth.arrays import dot, norm, split, spread, starts, unit
 from cornersmooth.geometry.arcs import FIRST_PLANE, PLANES
 from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.smoothing.long_lines import TOGETHER
 
 #: rad; by how much pieces may turn where they meet and the polyline does not
 KINK: Final = math.radians(1.9)
@@ -33,9 +34,6 @@ CORNER: Final = math.radians(8.0)
 
 #: rows after which a piece ends in any case; so many parts are worked on side by side
 LANE: Final = 256
-
-#: points that are measured at once: intermediate arrays fit the processor's cache
-_TOGETHER: Final = 1 << 16
 
 #: half of the largest turn of an arc: near half a turn the rounding of the radius moves its middle too far
 _LARGEST: Final = math.radians(75.0)
@@ -192,7 +190,7 @@ class _Search:
         found = _Found.none(len(at))
         for which, attempt in ((_LINE, self._lines), (_ARC, self._arcs)):
             rows = np.flatnonzero(kind == which)
-            for part in split(rows, (end - at)[rows], _TOGETHER):
+            for part in split(rows, (end - at)[rows], TOGETHER):
                 found.put(part, attempt(at[part], end[part], enters[part]))
         return found
 

@@ -24,7 +24,7 @@ from cornersmooth.model import Bools, Floats, Ints, Move, SmoothProgram, Status,
 LANE = 512
 
 #: rows at which lines are tested at once: intermediate arrays fit the processor's cache
-_TOGETHER = 1 << 16
+TOGETHER = 1 << 16
 
 #: mm by which the parameter goes on while a word changes by one
 _PER_WORD = 1e-3
@@ -220,7 +220,7 @@ def _reaches(rows: Vertices, between: Vertices | None, limits: LineLimits, start
     good = np.abs(rows.words[end] - rows.words[start]).max(axis=1) <= limits.turn
     good |= end == start + 1
     long_enough = np.flatnonzero(good & (end > start + 1))
-    for part in split(long_enough, (end - start - 1)[long_enough], _TOGETHER):
+    for part in split(long_enough, (end - start - 1)[long_enough], TOGETHER):
         good[part] = _keeps(rows, between, limits, start[part], end[part])
     return good
 

@@ -14,10 +14,7 @@ import numpy as np
 from cornersmooth.arrays import norm, square
 from cornersmooth.model import Bools, Floats, Ints, Move, Numbers, SmoothProgram, Status
 from cornersmooth.settings import FLIP_ANGLE, METHODS, STANDING, Settings
-from cornersmooth.smoothing.construction import legs_at
-
-#: exponent of the graded nodes s = (j/n)^(2/3)
-GRADED = 2.0 / 3.0
+from cornersmooth.smoothing.construction import BATCH, legs_at
 
 #: β-error of one line per half, ``max((s − s³)/6)``; for n lines it is at most 1/n²
 #: of this on graded nodes, and 9/4 of that on even ones
@@ -31,9 +28,6 @@ _STEEP = 0.25
 
 #: straight remainder between two curves that is none, over the shorter one of their legs beside it
 _SHORT = 0.5
-
-#: poses or corners measured at once: their intermediate arrays fit the processor's cache
-_BATCH = 16384
 
 #: Chord error below which lines are not divided for their feed, mm: half of a step of 0.0001 mm, the last digit of most
 #: controls. Finer lines follow the digits.
@@ -109,8 +103,8 @@ def segments_of(smoothed: SmoothProgram, *, dense: bool, curves: bool = False) -
         axis_entry, axis_leave = _ends(n, corners.pose, corners.axis_trim_in, corners.axis_trim_out, linear, known)
     has_line, lines = np.ones(n, np.bool_), np.ones(n, np.int32)
     segments = Segments(row, skip, start, entry, leave, axis_entry, axis_leave, has_line, lines)
-    for begin in range(0, n, _BATCH):
-        poses = begin + np.flatnonzero(linear[begin : begin + _BATCH] & ~skip[begin : begin + _BATCH])
+    for begin in range(0, n, BATCH):
+        poses = begin + np.flatnonzero(linear[begin : begin + BATCH] & ~skip[begin : begin + BATCH])
         _measure_remainders(smoothed, segments, poses, dense=dense, meet=curves and axis_entry is entry)
     return segments
 
@@ -206,7 +200,7 @@ def lines_per_half(smoothed: SmoothProgram) -> Numbers:
     """(k,) lines per half of every transition: n for nodes (j/n)^(2/3), −n for nodes j/n; 0 where not smoothed."""
     lines = np.zeros(len(smoothed.corners), np.int32)
     rows = np.flatnonzero(smoothed.corners.smoothed)
-    for batch in np.array_split(rows, max(1, len(rows) // _BATCH)):
+    for batch in np.array_split(rows, max(1, len(rows) // BATCH)):
         lines[batch] = lines_of(smoothed, batch)
     return lines
 

@@ -266,7 +266,7 @@ def _third_squares(splines: Splines, windows: Windows, curve: Floats) -> Floats:
     for k in range(TAPS):
         third += splines.third[windows.span, k, None] * curve[windows.local + k]
     window, width = windows.span_window, splines.width[windows.span]
-    own = width * square(third)
+    own = width * np.square(third).sum(axis=1)
     total, length = own.copy(), width.copy()
     for shift in range(1, NEIGHBOURS + 1):
         same = np.where(window[shift:] == window[:-shift], 1.0 - shift / (NEIGHBOURS + 1.0), 0.0)
