@@ -22,7 +22,7 @@ ALLOWED = (
     "cornersmooth.control",
     "cornersmooth.model",
     # rows of tables, not vectors
-    *(f"cornersmooth.arrays.{name}" for name in ("ranges", "some_rows", "spread", "starts")),
+    *(f"cornersmooth.arrays.{name}" for name in ("distinct", "ranges", "some_rows", "spread", "starts")),
     "cornersmooth.errors",
     "cornersmooth.system.processes",  # who does the work, not how
     "cornersmooth.settings",
