@@ -76,32 +76,26 @@ class Circles(ArcBlocks):
         return np.where(self.pose[found] == move, found, -1)
 
 
-@dataclass(frozen=True)
-class ArcAngles:
-    """Rotary words on the arcs of a program, k of them."""
-
-    angles: Floats  #: (k, 2) degrees, in the order of the machine's axes
-    stand: Bools  #: (k,) whether they are the same on all of the arc, and its blocks have feeds per minute
-
-
 def plan_circles(
     program: Program,
     settings: Settings,
     form: Form,
     planes: Planes,
-    rotary: ArcAngles | None = None,
+    rotary: tuple[Floats, Bools] | None = None,
 ) -> Circles:
     """Choose the arcs that a form can write as circles or curves within the tolerance, at the tip and the axis point.
 
     In a plane arcs are those of its own coordinates, and where X Y Z are axes of the machine, of what these make of the
-    part. Without `rotary` words that a form has, arcs that might be circles are taken for such.
+    part. Without `rotary` words that a form has, arcs that might be circles are taken for such. They are angles (k, 2),
+    degrees, in the order of the machine's axes, and (k,) whether these stand on all of an arc, and its blocks have
+    feeds per minute.
     """
     arcs, of = program.arcs, planes.of[program.arcs.pose]
     frames, inside = planes.frames(arcs.pose), of >= 0
     turned = form.rotary & ~inside
     unknown = turned & (rotary is None) & (form.orientation == "machine")
     if rotary is not None and form.machine is not None and form.orientation == "machine":
-        distinct, which = np.unique(rotary.angles[turned], axis=0, return_inverse=True)
+        distinct, which = np.unique(rotary[0][turned], axis=0, return_inverse=True)
         parts = np.array([np.eye(3), *(turned_part(form.machine, angles) for angles in distinct)])
         frames[turned] = parts[1 + which.reshape(-1)]
     normal = _local(arcs.normal, frames)
@@ -118,7 +112,7 @@ def plan_circles(
     flat, circular, in_xy, feed_in_plane = np.array(able)[of + 1].T
     keeps = inside | (vectors[arcs.pose] == vectors[arcs.pose - 1]).all(axis=1)
     if rotary is not None:
-        keeps &= ~turned | (rotary.stand & _may_turn(form, rotary.angles, plane))
+        keeps &= ~turned | (rotary[1] & _may_turn(form, rotary[0], plane))
     keeps &= (radius < _LARGEST_RADIUS) & (ticks > 0)
     offset = program.keep[arcs.pose] == Keep.CUTTER_COMPENSATION
     rise = np.abs(dot(program.tip[arcs.pose] - program.tip[arcs.pose - 1], arcs.normal))

@@ -12,7 +12,6 @@ from cornersmooth.arrays import norm, some_rows, spread, unit
 from cornersmooth.kinematics import machine_position, tip_position, tool_axis
 from cornersmooth.kinematics.machine import LINEAR
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program, SmoothProgram, rapid_moves
-from cornersmooth.nc.circles import ArcAngles
 from cornersmooth.nc.control import INVERSE_TIME_DECIMALS
 from cornersmooth.nc.form import TIP_SHARE, Form
 from cornersmooth.nc.messages import Findings
@@ -110,8 +109,8 @@ def rotary_rows(
         yield Rows(tip, angles, move[pose], *none, rate=rate, blend=blend, left=left)
 
 
-def arc_angles(way: RotaryWay, program: Program, form: Form) -> ArcAngles:
-    """Rotary words on the arcs of a program, from the rows of a way."""
+def arc_angles(way: RotaryWay, program: Program, form: Form) -> tuple[Floats, Bools]:
+    """Rotary words on the arcs of a program, as of `plan_circles`, from the rows of a way."""
     pose, count = program.arcs.pose, len(program.arcs)
     own = np.full(len(program), -1, np.int64)
     own[pose] = np.arange(count)
@@ -123,7 +122,7 @@ def arc_angles(way: RotaryWay, program: Program, form: Form) -> ArcAngles:
     stand, angles = np.ones(count, np.bool_), np.zeros((count, 2))
     stand[arc[turns[rows]]] = False
     angles[arc] = way.angles[rows]
-    return ArcAngles(angles, stand)
+    return angles, stand
 
 
 @dataclass(frozen=True)
