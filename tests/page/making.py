@@ -49,12 +49,14 @@ def smoothed(
     source: str = "part.cls",
     method: str = "proportional",
     form: object = None,
+    **settings: float,
 ) -> Result:
     """Run of a path in memory."""
     import io
 
     text = path.format(name=name, comment=comment).encode()
-    return postprocess(read(text, name=source), io.BytesIO(), Settings(tolerance=0.02, method=method), form=form)
+    kept = Settings(tolerance=0.02, method=method, **settings)
+    return postprocess(read(text, name=source), io.BytesIO(), kept, form=form)
 
 
 def page_of(result: Result, **more: object) -> str:

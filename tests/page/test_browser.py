@@ -293,6 +293,20 @@ def test_a_click_on_a_marker_chooses_the_corner(looked):
     assert "sharp: reversal" in looked.page.inner_text("#panel")
 
 
+def test_deviations_of_an_axis_with_its_own_tolerance_are_no_millimetres_at_a_point(look):
+    """They are drawn as a share of ε, and called so wherever they are named."""
+    page = look(page_of(smoothed(axis_tolerance=0.5))).page
+    page.evaluate("() => { cornersmooth.corners.select(0); cornersmooth.drive.set(0.5 * cornersmooth.meta.seconds); }")
+    named = [
+        *page.locator("option").all_inner_texts(),
+        *(page.inner_text(f"#{name}") for name in ("panel", "place", "charts")),
+    ]
+    assert sum("tool axis as a share of ε" in text for text in named) == 4, named
+    assert not any(
+        words in text for text in named for words in ("off at axis point", "mm, axis point", "of the axis point")
+    )
+
+
 def test_narrow_and_dark_are_usable(phone):
     looked, page = phone, phone.page
     assert page.evaluate("() => document.documentElement.scrollWidth") <= 390

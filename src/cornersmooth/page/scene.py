@@ -161,6 +161,7 @@ def page_values(subject: Subject, story: Mapping[str, Any]) -> tuple[dict[str, A
         "notes": [*story["notes"], *planned.left_out, *_thinning_note(len(view.written), original)],
         "tolerance": subject.settings.tolerance,
         "axis_length": subject.settings.axis_length,
+        "axis_name": "axis point" if subject.settings.axis_tolerance is None else "tool axis as a share of ε",
         "centre": view.centre.tolist(),
         "seconds": float(seconds[-1]),
         "timed": planned.seconds is not None,

@@ -19,6 +19,7 @@ from cornersmooth.verify.batches import Batches
 from cornersmooth.verify.deviation import Gap, together
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.motions import nearest_places
+from cornersmooth.verify.passage import MOST_BREAKS
 from cornersmooth.verify.task import Task
 
 #: segments on either side in which the common pose is looked for
@@ -48,14 +49,14 @@ def deviation_at(task: Task, nc: NcProgram, element: Ints, share: Floats) -> Dev
         match = Match.of(task, batch)
         last = match.motion.last
         start, end = last[:-1], last[1:]
-        feeding = np.flatnonzero((match.section[start] == match.section[end]) & (match.section[end] >= 0))
+        feeding = np.flatnonzero(
+            (match.section[start] == match.section[end]) & (match.section[end] >= 0) & (end <= _looked_at(match))
+        )
         own = feeding + match.first + 1
         rows = np.flatnonzero(np.isin(element, own + batch.offset))
         of, some = np.searchsorted(own, element[rows] - batch.offset), share[rows]
         six = task.six(*written_at(match.nc, own[of], some))
-        # where the motions part places are those between the next that are known
-        known, count = np.flatnonzero(match.on), len(match.place)
-        filled = np.interp(np.arange(count), known, match.place[known]) if len(known) else 1.0 * match.low
+        filled = _filled(match)
         # somewhere between the places of the element's ends
         low, high = filled[start[feeding]][of], filled[end[feeding]][of]
         vertex = end[feeding][of]
@@ -68,6 +69,24 @@ def deviation_at(task: Task, nc: NcProgram, element: Ints, share: Floats) -> Dev
         pose[rows] = match.original.pose[owner]
         numbers[:, rows] = fraction, gap.tip, gap.axis_point, np.degrees(gap.angle)
     return Deviation(pose, *numbers)
+
+
+def _looked_at(match: Match) -> int:
+    """Last vertex that was looked at: the verification ends where the motions have parted many times."""
+    rows = [found.row for metric, found in match.breaks if metric == "both"]
+    return rows[-1] if len(rows) >= MOST_BREAKS else len(match.place)
+
+
+def _filled(match: Match) -> Floats:
+    """Places (v,) of all vertices: where the motions part, between the next that are known or the ends of stretches."""
+    place, rows = match.place.copy(), match.stretches
+    for end, at in (("last", "end"), ("first", "start")):
+        vertex = match.motion.last[rows[end] - match.first]
+        place[vertex] = np.where(match.on[vertex], place[vertex], rows[at][:, 0])
+    known, path = np.flatnonzero(np.isfinite(place)), match.path
+    way = np.cumsum(norm(np.diff(match.six, axis=0, prepend=match.six[:1])))
+    between = np.interp(way, way[known], path.lengths_at(place[known]))
+    return np.where(match.on, place, np.interp(between, path.length, np.arange(len(path.length))))
 
 
 #: points on every line and on every curve or arc: so many in all, between the least and the most of each

@@ -43,7 +43,7 @@ class Charts {
 
   /** What limits the cut comes first, else what changes most; the deviation where something is wrong. @returns {Row[]} */
   rows() {
-    const { tolerance, totals, badge } = this.meta;
+    const { tolerance, axis_name: axisName, totals, badge } = this.meta;
     const { speeds, axes } = this.meta.charts;
     const both = speeds.length > 1;
     /** @type {Chart[]} */
@@ -60,7 +60,7 @@ class Charts {
     const charts = axes.map((axis) => beside(`speed of ${axis}`, axis, "% of its limit", 1, 100));
     if (speeds.length) charts.push(beside("speed of the tip", "speed", "mm/min", 0));
     if (both) charts.push({ title: "time saved so far", plots: saved });
-    const series = [{ name: "axis point", key: "axis_off", colour: "#cc79a7" }, { name: "tip", key: "off", colour: "#0072b2" }];
+    const series = [{ name: axisName, key: "axis_off", colour: "#cc79a7" }, { name: "tip", key: "off", colour: "#0072b2" }];
     charts.push({ title: "deviation", plots: [{ title: "deviation", unit: "mm", digits: 4, series, limit: tolerance, top: 1.15 * tolerance }] });
     return badge === "FAILED" ? [...charts.splice(-1), ...charts] : charts;
   }

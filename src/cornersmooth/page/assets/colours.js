@@ -74,7 +74,7 @@ function channelsOf(meta, arrays) {
   }
   const bounded = { low: 0, high: meta.tolerance, bounded: true };
   add("w_off", "deviation of the tip", "mm", bounded);
-  add("w_axis_off", "deviation of the axis point", "mm", bounded);
+  add("w_axis_off", `deviation of the ${meta.axis_name}`, "mm", bounded);
   add("w_angle", "deviation of the tool axis", "°");
   add("w_speed", "planned speed", "mm/min");
   add("w_feed", "programmed feed", "mm/min");

@@ -140,7 +140,7 @@ class Corners extends List {
       ["turn", `${degrees(a.c_turn[i])} at the tip, ${degrees(a.c_axis_turn[i])} at the axis point`],
       ["length", told(a.c_length[i], "mm")],
       ["off at tip", `${offset(a.c_off[i])} of ${limit} mm`],
-      ["off at axis point", `${offset(a.c_axis_off[i])} of ${limit} mm`],
+      [`off at ${this.meta.axis_name}`, `${offset(a.c_axis_off[i])} of ${limit} mm`],
       ["place, mm", place],
     ];
   }

@@ -18,6 +18,7 @@
  * @property {string[]} notes
  * @property {number} tolerance mm
  * @property {number} axis_length mm
+ * @property {string} axis_name what the deviations of the axis are of, in mm
  * @property {number[]} centre mm: what all coordinates are taken from
  * @property {number} seconds
  * @property {boolean} timed whether the seconds are planned; otherwise they are those of the programmed feed

@@ -51,7 +51,7 @@ class Drive {
       return;
     }
     const speed = Number.isFinite(a.w_speed[i]) ? a.w_speed[i] : a.w_feed[i];
-    const off = a.w_rapid[i] ? "rapid" : `off ${offset(a.w_off[i])} mm, axis point ${offset(a.w_axis_off[i])} mm`;
+    const off = a.w_rapid[i] ? "rapid" : `off ${offset(a.w_off[i])} mm, ${this.meta.axis_name} ${offset(a.w_axis_off[i])} mm`;
     const pieces = [`${this.meta.origin} ${a.w_line[i]} · NC ${a.w_nc[i]}`, off, ...(Number.isFinite(speed) ? [told(speed, "mm/min", 4)] : [])];
     element("place").textContent = pieces.join(" · ");
   }
