@@ -466,6 +466,16 @@ def test_a_rapid_ends_a_run_of_cycles_as_g80_does(control: str) -> None:
     assert "CS563" in codes(LEVELS, low, control)
 
 
+@pytest.mark.parametrize("control", ["fanuc", "mitsubishi"])  # the others retract with G0, which ends cycles
+def test_a_retract_within_hole_cycles_is_not_understood(control: str) -> None:
+    """Whether a modal cycle drills where the retract is, no manual says."""
+    text = LEVELS.replace("GOTO/90,50,0\nCYCLE/OFF\nRAPID\nGOTO/90,50,70\n", "GOTO/90,50,0\nCYCLE/OFF\nGOHOME\n")
+    lines = right(text, control, "native")
+    last = len(lines) - 1 - lines[::-1].index("G80")
+    with pytest.raises(InputError, match="within hole cycles"):
+        found(text, (*lines[:last], *lines[last + 1 :]), control)
+
+
 @pytest.mark.parametrize("control", [one for one in CONTROLS if one != "generic"])
 def test_a_tap_of_the_control_is_right_handed(control: str) -> None:
     text = HOLES.format("TAP,MMPR,1.5")
