@@ -159,7 +159,8 @@ class Iso(Dialect):
 
     def _to_machine(self, line: Line, codes: set[float], state: Running) -> Acts:
         """G91 G28 Z0. and the like: to the reference position without a detour; G53: in machine coordinates."""
-        if state.height is not None and math.isnan(state.modal.code) and 0.0 not in codes:  # no manual says whether it drills
+        # no manual says whether a hole cycle drills there; G0 ends it
+        if state.height is not None and math.isnan(state.modal.code) and 0.0 not in codes:
             raise refused(line, "a position of the machine within hole cycles", "write G80 before it")
         incremental = state.machine.groups["distance"] == "incremental"
         axes = self.machine_axes(line, {("G", code) for code in (*_TO_REFERENCE, _IN_MACHINE, 0.0, 90.0, 91.0)})
