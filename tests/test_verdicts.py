@@ -177,7 +177,7 @@ def test_nothing_is_strange_about_a_usual_file(part, tmp_path, capsys):
 def first_lines(capsys: pytest.CaptureFixture[str], *words: object) -> tuple[int, str]:
     code = run([str(word) for word in words])
     told = capsys.readouterr()
-    return code, " ".join((told.err + told.out).splitlines()[:2])
+    return code, " ".join((told.out + told.err).splitlines()[:2])
 
 
 def test_a_hole_that_is_left_out_makes_the_program_incomplete(tmp_path, capsys):
