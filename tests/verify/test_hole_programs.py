@@ -129,6 +129,11 @@ KNOWN = {
     9800348: "coolant and a stop between poses that are a digit apart, to and fro: the text passes them in one",
     1600308: "taps left out, and bores above each other with coolant between them",
     3000168: "coolant on behind a tap that is left out, and nothing moves before the end",
+    9850180: "a tap left out, and the same hole drilled from where the tool was before it",
+    1960009: "taps left out with two tools, where the tool is before and after them",
+    1960103: "GOHOME twice to one pose, and nothing between",
+    1960132: "GOHOME twice, and a tool with which nothing moves",
+    3350: "GOHOME twice, and feed moves in the line of a hole before and after them",
 }
 
 
