@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 from dataclasses import replace
-from typing import Any, Final
+from typing import Final
 
 from cornersmooth.cl.arcs import RULES, ArcRule
 from cornersmooth.cl.cycles import order_of
@@ -140,9 +140,16 @@ def read(
         text = clean(data, name)
         if dialect is None and is_simulation_cld(text):
             text, dialect = apt_of_simulation_cld(text, name), "plain"
-        options: dict[str, Any] = {"wanted_units": units, "arc_rule": arc_rule, "lenient": lenient}
-        options["cycle_order"] = order_of(cycle_order)
-        program = read_apt(text, name=name, dialect=dialect, processes=processes, **options)
+        program = read_apt(
+            text,
+            name=name,
+            dialect=dialect,
+            units=units,
+            arc_rule=arc_rule,
+            lenient=lenient,
+            cycle_order=order_of(cycle_order),
+            processes=processes,
+        )
     program = replace(program, source=replace(program.source, name=os.path.basename(name), sha256=digest))
     last, behind = int(program.line[-1]), program.statements[-1:]
     if _ENDS_IN_A_NUMBER.search(data, max(0, len(data) - HEAD)) and not any(one.line >= last for one in behind):

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import replace
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cornersmooth.cl import arcs as arc_geometry
 from cornersmooth.cl import motion_statements, state_statements
+from cornersmooth.cl.arcs import ArcRule
 from cornersmooth.cl.bulk import parts
 from cornersmooth.cl.dialects import DIALECTS, recognise
 from cornersmooth.cl.grammar import Decode, Record, joined, number, read_records
@@ -57,8 +58,18 @@ _CHOOSING: Final = frozenset({"LOAD", "SELECT", "MODE", "SET"})
 _STRANGE_PREFIXES: Final = ("TLON,", "TLLFT,", "TLRGT,", "TLOFF,")
 
 
-def read_apt(data: bytes, *, name: str, dialect: str | None = None, processes: int = 1, **options: Any) -> Program:
-    """Read an APT / CL text; parameters are those of `cornersmooth.cl.read`, options such fields of `ReaderState`.
+def read_apt(
+    data: bytes,
+    *,
+    name: str,
+    dialect: str | None = None,
+    units: Units | None = None,
+    arc_rule: ArcRule | None = None,
+    lenient: bool = False,
+    cycle_order: tuple[str, ...] = (),
+    processes: int = 1,
+) -> Program:
+    """Read an APT / CL text; parameters are those of `cornersmooth.cl.read`.
 
     The text has LF line ends (`cornersmooth.cl.source.clean` makes it so). Memory while reading: 5 bytes for a byte of
     a tool path of plain GOTO lines, at most 130 for any statements; the lines of a NURBS record may be
@@ -66,11 +77,13 @@ def read_apt(data: bytes, *, name: str, dialect: str | None = None, processes: i
     """
     refuse_program(data, name)
     known = next(one for one in DIALECTS if one.name == dialect) if dialect else recognise(data)
-    state = ReaderState(file=name, dialect=known, **options)
+    state = ReaderState(
+        file=name, dialect=known, wanted_units=units, arc_rule=arc_rule, lenient=lenient, cycle_order=cycle_order
+    )
     state.expect(data.count(b"GOTO"))
     decode = _decoder(data)
     for part in parts(data, processes):
-        if state.finished and state.lenient:
+        if state.finished and lenient:
             break
         if part.poses is not None:
             _plain(state, part.poses)

@@ -238,10 +238,12 @@ def verify_programs(
     form: Form,
     settings: Settings | None = None,
     *,
+    tip_from_start: bool = False,
+    inch: bool = False,
     axes: Machine | None = None,
     paths: bool = False,
+    processes: int = 1,
     new_name: str = "the second program",
-    **how: Any,
 ) -> Filtered:
     """Compare a program with the one that it was made from, whoever made it.
 
@@ -249,7 +251,7 @@ def verify_programs(
     """
     settings = Settings() if settings is None else settings
     old, new = (_MARKS.sub(b"", data) for data in (old, new))
-    job, before = read_program(old, form, settings, **how)
+    job, before = read_program(old, form, settings, tip_from_start=tip_from_start, inch=inch, processes=processes)
     whole = job.reader.read(new)
     refuse_no_program(whole, new_name)
     where, wrong = places(before, whole, job.reader)
