@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import gc
 import hashlib
 import inspect
 import io
@@ -17,6 +19,7 @@ import cornersmooth
 from careless import look_away
 from cornersmooth import CornersmoothError, Settings, VerdictError, pipeline
 from cornersmooth.cli import run
+from cornersmooth.system.output import open_output
 from oracle.files import beginning
 
 SAMPLE = Path(__file__).resolve().parent.parent / "samples" / "impeller.cls"
@@ -321,4 +324,14 @@ def test_a_raw_stream_gets_all_of_the_program(verify: bool) -> None:
     cornersmooth.postprocess(BREAKING, whole, verify=verify)
     assert len(raw.taken) > 1000
     assert raw.taken == whole.getvalue()
+    assert not raw.closed
+
+
+def test_a_raw_stream_stays_open_where_writing_ends_with_an_error() -> None:
+    raw = TakesAPart()
+    with contextlib.suppress(ZeroDivisionError), open_output(raw) as output:
+        output.stream.write(b"M30\n")
+        raise ZeroDivisionError
+    del output
+    gc.collect()
     assert not raw.closed

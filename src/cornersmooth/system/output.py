@@ -207,8 +207,10 @@ def _whole(stream: BinaryIO) -> Iterator[BinaryIO]:
         yield stream
         return
     whole = io.BufferedWriter(stream)
-    yield whole
-    whole.detach()
+    try:
+        yield whole
+    finally:
+        whole.detach()  # else it closes the stream when it is gone
 
 
 def write_mark(path: str, digest: str, mark: Mapping[str, str]) -> None:
